@@ -1,0 +1,115 @@
+"""The command ``tunnel``: what it is called with, and how it ends.
+
+Exit status: 0 success; 1 a check or an estimate failed; 2 bad input, with one line on standard error;
+130 interrupted. Nothing heavy is imported here: every command imports its own needs when it runs.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated, cast
+
+import typer
+
+from tunnel_lab.commands import demo, identify, plot, simulate, springs
+from tunnel_sim.errors import TunnelError
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+CommandLineError = cast("type[Exception]", typer.BadParameter.__mro__[2])
+"""Click's base of all usage errors. Typer exports only its grandchild, and has moved the others about."""
+
+app = typer.Typer(
+    name="tunnel",
+    no_args_is_help=False,
+    add_completion=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    """Print the installed version and stop."""
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"tunnel {version('virtual-wind-tunnel')}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def tunnel(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    """A virtual wind tunnel: simulate free-decay runs of a yawing model, identify real ones.
+
+    A model on a vertical rod and a spring is released at a yaw angle. The
+    swings that follow, with the wind off and on, give its yaw-moment derivatives
+    Cnβ and Cnr (1/rad), the inertia Izz (kg m²) and the rig's own damping Cr
+    (N m s/rad), each with a standard deviation.
+
+    [bold]Start here[/bold]
+      tunnel demo                        the whole chain, with pictures of it
+      tunnel springs                     the paper's spring table, its inertia
+      tunnel simulate plan.toml --out c  a campaign of your own, into folder c
+      tunnel identify c --json est.json  its coefficients; measured ones alike
+      tunnel plot c                      its figures
+
+    [bold]Units[/bold]
+      SI and radians throughout.
+
+    [bold]Exit status[/bold]
+      0 success, 1 a check or an estimate failed, 2 bad input (one line on
+      standard error says what, where and the remedy), 130 interrupted.
+    """
+    del version
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+for _command in (demo, simulate, identify, plot, springs):
+    app.command(_command.NAME)(_command.run)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run ``tunnel`` and turn whatever ends it into an exit status.
+
+    Args:
+        arguments: the words after ``tunnel``; those of the process when None.
+
+    Returns:
+        0 success, 1 a check or an estimate failed, 2 bad input, 130 interrupted.
+    """
+    command = typer.main.get_command(app)
+    try:
+        status = command.main(args=arguments, prog_name="tunnel", standalone_mode=False)
+        sys.stdout.flush()
+    except TunnelError as error:
+        return _refuse(str(error))
+    except CommandLineError as error:
+        return _refuse(error.format_message())  # type: ignore[attr-defined]  # click's, see CommandLineError
+    except (KeyboardInterrupt, typer.Abort):
+        status = INTERRUPTED
+    except BrokenPipeError:
+        # The reader went away (``tunnel springs | head -1``): not an error, and Python must not flush again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    if status == INTERRUPTED:
+        print("tunnel: interrupted; no file is left half written", file=sys.stderr)
+    return status if isinstance(status, int) else 0
+
+
+def _refuse(reason: str) -> int:
+    """Say what is wrong with the input, in exactly one line."""
+    print(f"tunnel: {' '.join(reason.split())}", file=sys.stderr)
+    return BAD_INPUT
+
+
+if __name__ == "__main__":
+    sys.exit(main())

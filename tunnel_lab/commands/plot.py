@@ -1,0 +1,76 @@
+"""``tunnel plot``: the figures of a campaign on disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from tunnel_sim.campaign import Campaign, Run
+
+NAME = "plot"
+
+
+def run(
+    campaign: Annotated[Path, typer.Argument(help="Folder of the campaign: campaign.toml and its runs.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", "-o", metavar="FOLDER", help="Where the figures go; a folder of the campaign's name."
+        ),
+    ] = Path("tunnel-output"),
+) -> None:
+    """Draw a campaign: angle traces, spectra, and ζ and ωn against the amplitude.
+
+    Writes traces-1.png (twelve runs to a page), spectrum.png and windows.png
+    into FOLDER/<name of the campaign's folder>. Angles in rad, times in s,
+    spectral density in rad²/Hz.
+
+    [bold]Examples[/bold]
+      tunnel plot my-campaign
+      tunnel plot my-campaign --out figures
+
+    [bold]Exit status[/bold]
+      0 drawn, 1 no run could be identified (windows.png is left out), 2 bad
+      input.
+    """
+    from identification import identify
+    from tunnel_lab import plots
+    from tunnel_lab.files import output_folder
+    from tunnel_lab.tables import console
+    from tunnel_sim.campaign_io import read_campaign
+
+    data = read_campaign(campaign)
+    folder = output_folder(out / campaign.resolve().name)
+    written = [
+        plots.save(page, folder / f"traces-{number}.png")
+        for number, page in enumerate(plots.trace_pages(data), 1)
+    ]
+    written.append(plots.save(plots.spectrum_figure(spread(data)), folder / "spectrum.png"))
+    estimate = identify(data, "output_error", throw=False)
+    if any(found.windows for found in estimate.runs):
+        written.append(plots.save(plots.windows_figure(estimate), folder / "windows.png"))
+    for path in written:
+        console().print(f"Written: {path}", markup=False, soft_wrap=True)
+    if estimate.status.failed:
+        console(stderr=True).print(f"Note: {estimate.status.value}", markup=False, soft_wrap=True)
+        raise typer.Exit(1)
+
+
+def spread(campaign: Campaign, count: int = 4) -> tuple[Run, ...]:
+    """A few runs that differ in spring and wind, to keep a plot readable.
+
+    Args:
+        campaign: any.
+        count: at most this many runs (a count).
+
+    Returns:
+        The first runs of distinct spring and wind speed; the first runs where conditions are not stated.
+    """
+    chosen: dict[object, Run] = {}
+    for run in campaign.runs:
+        stated = (run.spring_stiffness, run.wind_speed)
+        chosen.setdefault(run.id if run.spring_stiffness is None else stated, run)
+    return tuple(chosen.values())[:count]

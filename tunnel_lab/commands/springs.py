@@ -1,0 +1,99 @@
+"""``tunnel springs``: the rig's inertia from a table of springs, and the springs that leave the line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from identification.springs import SpringFit
+    from tunnel_lab.spring_table import SpringTable
+
+NAME = "springs"
+
+
+def run(
+    table: Annotated[
+        Path | None,
+        typer.Argument(
+            help="CSV file with columns stiffness_N_m_per_rad and frequency_Hz. Default: the paper's Table II.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Izz from springs of known stiffness and their wind-off frequencies.
+
+    Izz (kg m²) is the gradient of Kr (N m/rad) against ωn² (rad²/s²) by least
+    squares. Each spring's residual says by how much its stated stiffness leaves
+    that line; one that leaves it too far is flagged: measure it again.
+
+    [bold]Examples[/bold]
+      tunnel springs
+      tunnel springs my-springs.csv
+
+    [bold]Exit status[/bold]
+      0 fitted, 1 no inertia could be had, 2 bad input.
+    """
+    from tunnel_lab.spring_table import read_spring_table
+
+    springs = read_spring_table(table) if table is not None else paper_table()
+    show(springs, str(table) if table is not None else "the paper's Table II")
+
+
+def paper_table() -> SpringTable:
+    """The paper's Table II.
+
+    Returns:
+        Ten springs.
+    """
+    from identification.datasets import paper_springs
+    from tunnel_lab.spring_table import SpringTable
+
+    rows = paper_springs()
+    return SpringTable(
+        tuple(str(row.number) for row in rows),
+        tuple(row.stiffness_n_m_per_rad for row in rows),
+        tuple(row.frequency_hz for row in rows),
+    )
+
+
+def show(springs: SpringTable, source: str) -> None:
+    """Fit and print.
+
+    Args:
+        springs: the table.
+        source: where it comes from, for the heading.
+
+    Raises:
+        typer.Exit: with status 1 when the gradient is not above zero.
+    """
+    from math import pi
+
+    from identification.springs import fit_springs
+    from tunnel_lab import tables
+    from tunnel_lab.formatting import with_std
+
+    fit: SpringFit = fit_springs(springs.stiffness, springs.frequency_hz)
+    out = tables.console()
+    rows = tables.table(
+        f"Springs of {source}",
+        *("spring", "Kr [N m/rad]", "f [Hz]", "ωn² [rad²/s²]", "residual [%]", ""),
+        right=("Kr [N m/rad]", "f [Hz]", "ωn² [rad²/s²]", "residual [%]"),
+    )
+    for name, stiffness, frequency, residual, flag in zip(
+        springs.names, springs.stiffness, springs.frequency_hz, fit.residual_percent, fit.flagged, strict=True
+    ):
+        square = (2.0 * pi * frequency) ** 2
+        rows.add_row(
+            name,
+            f"{stiffness:g}",
+            f"{frequency:g}",
+            f"{square:.2f}",
+            f"{residual:+.1f}",
+            "leaves the line" if flag else "",
+        )
+    out.print(rows)
+    out.print(f"Izz (gradient) = {with_std(fit.yaw_inertia.value, fit.yaw_inertia.std)} kg m²")
+    out.print(f"intercept      = {with_std(fit.intercept.value, fit.intercept.std)} N m/rad")

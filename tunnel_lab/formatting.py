@@ -1,0 +1,73 @@
+"""Numbers as a person reads them: two significant digits of the standard deviation decide the rest."""
+
+from __future__ import annotations
+
+import math
+
+FIXED_DECIMALS = 7
+"""Beyond this many decimals, or a million, a number is written with a power of ten."""
+
+
+def significant(value: float, digits: int = 4) -> str:
+    """A number whose uncertainty is not known.
+
+    Args:
+        value: the number, any unit.
+        digits: significant digits (a count).
+
+    Returns:
+        Fixed notation where it is short, otherwise with a power of ten.
+    """
+    if not math.isfinite(value):
+        return "not finite"
+    if value == 0.0:
+        return "0"
+    exponent = _exponent(value, digits)
+    if -4 <= exponent < 6:
+        return f"{value:.{max(digits - 1 - exponent, 0)}f}"
+    return f"{value:.{digits - 1}e}"
+
+
+def with_std(value: float, std: float | None) -> str:
+    """A value and its standard deviation, both rounded to two significant digits of the latter.
+
+    Args:
+        value: the estimate, any unit.
+        std: its standard deviation, in the same unit; None where it is not known.
+
+    Returns:
+        Text such as ``0.4951 ± 0.0012`` or ``(1.234 ± 0.056)e-05``.
+    """
+    if std is None or not math.isfinite(std):
+        return f"{significant(value)} (std unknown)"
+    if std <= 0.0:
+        return f"{significant(value, 7)} ± 0"
+    if not math.isfinite(value):
+        return "not finite"
+    decimals = 1 - _exponent(std, 2)
+    if decimals <= FIXED_DECIMALS and max(abs(value), std) < 1e6:
+        return f"{round(value, decimals):.{max(decimals, 0)}f} ± {round(std, decimals):.{max(decimals, 0)}f}"
+    power = max(_exponent(value, 2), _exponent(std, 2))
+    scale, places = 10.0**power, max(decimals + power, 0)
+    return f"({value / scale:.{places}f} ± {std / scale:.{places}f})e{power:+03d}"
+
+
+def in_stds(error: float, std: float | None) -> str:
+    """An error in standard deviations.
+
+    Args:
+        error: estimate − truth, any unit.
+        std: standard deviation of the estimate, in the same unit; None where it is not known.
+
+    Returns:
+        Text such as ``+0.8 σ``; ``–`` where the standard deviation is not known.
+    """
+    if std is None or not math.isfinite(std) or std <= 0.0:
+        return "–"
+    ratio = error / std
+    return f"{ratio:+.1f} σ" if abs(ratio) < 1000.0 else f"{ratio:+.0e} σ"
+
+
+def _exponent(value: float, digits: int) -> int:
+    """Decimal exponent of ``value`` once rounded to ``digits`` significant digits."""
+    return int(f"{value:.{digits - 1}e}".partition("e")[2]) if value != 0.0 else -300

@@ -1,0 +1,97 @@
+"""A table of springs and wind-off frequencies, as a CSV file."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from tunnel_sim.errors import TunnelError, did_you_mean
+
+STIFFNESS = "stiffness_N_m_per_rad"
+FREQUENCY = "frequency_Hz"
+NAME = "spring"
+REMEDY = f"give a CSV file with the columns {STIFFNESS} and {FREQUENCY}, and optionally {NAME}"
+
+
+@dataclass(frozen=True)
+class SpringTable:
+    """Springs and the wind-off frequencies measured with them.
+
+    Args:
+        names: of the springs, n of them.
+        stiffness: Kr of each, N m/rad, above zero.
+        frequency_hz: wind-off frequency of each, Hz, above zero.
+    """
+
+    names: tuple[str, ...]
+    stiffness: tuple[float, ...]
+    frequency_hz: tuple[float, ...]
+
+
+def read_spring_table(path: Path) -> SpringTable:
+    """Read a spring table; lines starting with ``#`` are comments.
+
+    Args:
+        path: CSV file with the columns ``stiffness_N_m_per_rad`` (N m/rad) and ``frequency_Hz`` (Hz), and
+            optionally ``spring``, its name or number.
+
+    Returns:
+        The table, in the file's order.
+
+    Raises:
+        TunnelError: when the file cannot be read, a column is missing or unknown, a value is not a number
+            above zero, or there are fewer than three springs.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise TunnelError("does not exist", where=str(path), remedy=REMEDY) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise TunnelError("cannot be read as a text file", where=str(path), remedy=REMEDY) from error
+    lines = [
+        (n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")
+    ]
+    rows = [next(csv.reader([line])) for _, line in lines]
+    if not rows:
+        raise TunnelError("is empty", where=str(path), remedy=REMEDY)
+    columns = _columns([name.strip() for name in rows[0]], path)
+    table = [_row(row, columns, f"{path}, line {n}") for row, (n, _) in zip(rows[1:], lines[1:], strict=True)]
+    if len(table) < 3:
+        raise TunnelError(f"has {len(table)} springs", where=str(path), remedy="a line needs three or more")
+    names = tuple(name or str(number) for number, (name, _, _) in enumerate(table, 1))
+    return SpringTable(names, tuple(row[1] for row in table), tuple(row[2] for row in table))
+
+
+def _columns(header: list[str], path: Path) -> dict[str, int]:
+    """Where each known column stands."""
+    known = (NAME, STIFFNESS, FREQUENCY)
+    for name in header:
+        if name not in known:
+            raise TunnelError(f"unknown column {name!r}", where=str(path), remedy=did_you_mean(name, known))
+    for name in (STIFFNESS, FREQUENCY):
+        if header.count(name) != 1:
+            raise TunnelError(f"needs one column {name}", where=str(path), remedy=REMEDY)
+    return {name: header.index(name) for name in known if name in header}
+
+
+def _row(row: list[str], columns: dict[str, int], where: str) -> tuple[str, float, float]:
+    """Name (may be empty), stiffness and frequency of one line."""
+    if len(row) <= max(columns.values()):
+        raise TunnelError(f"has {len(row)} values", where=where, remedy="give one for each column")
+    name = row[columns[NAME]].strip() if NAME in columns else ""
+    return name, _positive(row[columns[STIFFNESS]], where), _positive(row[columns[FREQUENCY]], where)
+
+
+def _positive(text: str, where: str) -> float:
+    """A finite number above zero."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise TunnelError(
+            f"{text.strip()!r} is not a number above zero", where=where, remedy="correct it (SI units)"
+        )
+    return value
