@@ -184,7 +184,9 @@ def load_rig(path: Path | None = None) -> Rig:
     try:
         document = tomllib.loads(source.read_text(encoding="utf-8"))
     except OSError as error:
-        raise TunnelError("cannot be read", where=where, remedy="give the path of a rig description") from error
+        raise TunnelError(
+            "cannot be read", where=where, remedy="give the path of a rig description"
+        ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise TunnelError(f"is not valid TOML ({error})", where=where, remedy="correct the file") from error
     return _parse(document, where)
@@ -193,7 +195,9 @@ def load_rig(path: Path | None = None) -> Rig:
 def _parse(document: dict[str, Any], where: str) -> Rig:
     for key in document:
         if key not in (*_SECTIONS, "springs"):
-            raise TunnelError(f"unknown section [{key}]", where=where, remedy=did_you_mean(key, [*_SECTIONS, "springs"]))
+            raise TunnelError(
+                f"unknown section [{key}]", where=where, remedy=did_you_mean(key, [*_SECTIONS, "springs"])
+            )
     parts = {name: _section(document, name, kind, where) for name, kind in _SECTIONS.items()}
     return Rig(**parts, springs=_springs(document, where))
 
@@ -202,7 +206,9 @@ def _section(document: dict[str, Any], name: str, kind: type, where: str) -> Any
     table = document.get(name)
     fields: dict[str, str] = kind.__annotations__
     if not isinstance(table, dict):
-        raise TunnelError(f"section [{name}] is missing", where=where, remedy=f"add it with {', '.join(fields)}")
+        raise TunnelError(
+            f"section [{name}] is missing", where=where, remedy=f"add it with {', '.join(fields)}"
+        )
     for key in table:
         if key not in fields:
             raise TunnelError(f"unknown key {name}.{key}", where=where, remedy=did_you_mean(key, fields))
@@ -222,17 +228,23 @@ def _check_number(value: object, key: str, where: str, *, whole: bool = False) -
         good = lowest_reached and number < float("inf")
     if not good:
         kind = "whole number" if whole else "number"
-        raise TunnelError(f"{key} = {value!r} is not a positive {kind}", where=where, remedy="correct it (SI units)")
+        raise TunnelError(
+            f"{key} = {value!r} is not a positive {kind}", where=where, remedy="correct it (SI units)"
+        )
 
 
 def _springs(document: dict[str, Any], where: str) -> Mapping[int, float]:
     table = document.get("springs")
     if not isinstance(table, dict) or not table:
-        raise TunnelError("section [springs] is missing", where=where, remedy="add one line per spring: 1 = 0.98")
+        raise TunnelError(
+            "section [springs] is missing", where=where, remedy="add one line per spring: 1 = 0.98"
+        )
     springs: dict[int, float] = {}
     for key, value in table.items():
         if not key.isdecimal():
-            raise TunnelError(f"spring {key!r} is not a number", where=where, remedy="number the springs 1, 2, …")
+            raise TunnelError(
+                f"spring {key!r} is not a number", where=where, remedy="number the springs 1, 2, …"
+            )
         _check_number(value, f"springs.{key}", where)
         springs[int(key)] = float(value)
     return MappingProxyType(springs)

@@ -1,0 +1,214 @@
+#include "forward.h"
+
+#include <math.h>
+
+typedef struct {
+  double angle, rate, twist, twist_rate;
+} Motion;
+
+// What stays fixed during one step: the law, the run, and the start of the step for the lag.
+typedef struct {
+  const vwt_parameters* p;
+  const vwt_run* run;
+  double start;        // time of the step's start, s
+  Motion from;         // motion there
+  double lagged;       // lag state there
+  int slip;            // sign of the slip under friction; 0: at rest
+} Step;
+
+static double wind_at(const vwt_run* run, double time) {
+  return fmax(0, vwt_series(run->wind, (int)run->wind_count, run->wind_interval, time));
+}
+
+static double body_angle(const Motion* y) { return y->angle + y->twist; }
+static double body_rate(const Motion* y) { return y->rate + y->twist_rate; }
+
+static double lagged_at(const Step* s, double time, const Motion* y) {
+  const double lag = vwt_lag_time(s->p, wind_at(s->run, time));
+  if (lag == 0) {
+    return body_angle(y);
+  }
+  return vwt_lag_advance(lag, s->lagged, time - s->start, body_angle(&s->from), body_rate(&s->from),
+                         body_angle(y), body_rate(y));
+}
+
+static double air_at(const Step* s, double time, const Motion* y) {
+  const vwt_air_state air = {
+      .time = time,
+      .wind_speed = wind_at(s->run, time),
+      .angle = body_angle(y),
+      .rate = body_rate(y),
+      .lagged = s->p->aero_lag != 0 ? lagged_at(s, time, y) : 0,
+      .forcing = s->run->forcing_count > 0 ? vwt_series(s->run->forcing, (int)s->run->forcing_count,
+                                                        s->run->forcing_interval, time)
+                                           : 0,
+  };
+  return vwt_air_moment(s->p, &air);
+}
+
+// Moments on the spring's end apart from friction; with a rigid rod the air is among them.
+static double other_moment(const Step* s, double air, const Motion* y) {
+  const vwt_parameters* p = s->p;
+  const double mechanism =
+      vwt_mechanism_moment(p, y->angle, y->rate) - p->spring_stiffness * y->angle - p->mechanical_damping * y->rate;
+  if (s->run->twist_stiffness > 0) {
+    return mechanism + s->run->twist_stiffness * y->twist + s->run->twist_damping * y->twist_rate;
+  }
+  return mechanism + air;
+}
+
+// Time derivative of the motion while the friction's sign is that of the step.
+static Motion derivative(const Step* s, double time, const Motion* y) {
+  const vwt_parameters* p = s->p;
+  const double air = air_at(s, time, y);
+  const double friction = -s->slip * p->friction_moment;
+  const int stuck = p->friction_moment > 0 && s->slip == 0;
+  Motion d = {y->rate, 0, y->twist_rate, 0};
+  if (s->run->twist_stiffness > 0) {
+    const double share = s->run->inertia_share;
+    const double rod = s->run->twist_stiffness * y->twist + s->run->twist_damping * y->twist_rate;
+    d.rate = stuck ? 0 : (other_moment(s, air, y) + friction) / (share * p->yaw_inertia);
+    d.twist_rate = (air - rod) / ((1 - share) * p->yaw_inertia) - d.rate;
+  } else {
+    d.rate = stuck ? 0 : (other_moment(s, air, y) + friction) / p->yaw_inertia;
+  }
+  if (stuck) {
+    d.angle = 0;
+  }
+  return d;
+}
+
+static Motion along(const Motion* y, double h, const Motion* d) {
+  const Motion out = {y->angle + h * d->angle, y->rate + h * d->rate, y->twist + h * d->twist,
+                      y->twist_rate + h * d->twist_rate};
+  return out;
+}
+
+static Motion runge_kutta(const Step* s, double h) {
+  const double t = s->start;
+  const Motion k1 = derivative(s, t, &s->from);
+  const Motion y2 = along(&s->from, h / 2, &k1), k2 = derivative(s, t + h / 2, &y2);
+  const Motion y3 = along(&s->from, h / 2, &k2), k3 = derivative(s, t + h / 2, &y3);
+  const Motion y4 = along(&s->from, h, &k3), k4 = derivative(s, t + h, &y4);
+  const Motion mean = {
+      (k1.angle + 2 * (k2.angle + k3.angle) + k4.angle) / 6,
+      (k1.rate + 2 * (k2.rate + k3.rate) + k4.rate) / 6,
+      (k1.twist + 2 * (k2.twist + k3.twist) + k4.twist) / 6,
+      (k1.twist_rate + 2 * (k2.twist_rate + k3.twist_rate) + k4.twist_rate) / 6,
+  };
+  return along(&s->from, h, &mean);
+}
+
+static void move(Step* s, double h, const Motion* to) {
+  if (s->p->aero_lag != 0) {
+    s->lagged = lagged_at(s, s->start + h, to);
+  }
+  s->from = *to;
+  s->start += h;
+}
+
+// Sign of the slip that starts from rest at the present state: 0 while friction holds.
+static int slip_from_rest(const Step* s) {
+  const double other = other_moment(s, air_at(s, s->start, &s->from), &s->from);
+  return fabs(other) <= s->p->friction_moment ? 0 : other > 0 ? 1 : -1;
+}
+
+// Length of the step at which the rate passes zero, by regula falsi (Illinois) on repeated steps.
+static double reversal(const Step* s, double h, double end_rate) {
+  double low = 0, high = h, low_rate = s->from.rate, high_rate = end_rate;
+  for (int i = 0; i < 30 && high - low > 1e-13; i++) {
+    const double middle = low + (high - low) * low_rate / (low_rate - high_rate);
+    const Motion y = runge_kutta(s, middle);
+    if (fabs(y.rate) < 1e-13) {
+      return middle;
+    }
+    if ((y.rate > 0) == (high_rate > 0)) {
+      high = middle, high_rate = y.rate, low_rate *= 0.5;
+    } else {
+      low = middle, low_rate = y.rate, high_rate *= 0.5;
+    }
+  }
+  return high;
+}
+
+// One step with friction: it ends early at each reversal, where the body sticks or slips back.
+static void step_with_friction(Step* s, double h) {
+  double left = h;
+  for (int i = 0; i < 8 && left > 0; i++) {
+    if (s->from.rate == 0) {
+      s->slip = slip_from_rest(s);
+    }
+    const Motion y = runge_kutta(s, left);
+    if (s->slip == 0 || y.rate * s->slip > 0) {
+      move(s, left, &y);
+      return;
+    }
+    if (s->from.rate * s->slip <= 0) {  // the slip that had begun from rest stops at once: hold
+      s->slip = 0;
+      const Motion held = runge_kutta(s, left);
+      move(s, left, &held);
+      return;
+    }
+    const double part = reversal(s, left, y.rate);
+    Motion at = runge_kutta(s, part);
+    at.rate = 0;
+    move(s, part, &at);
+    left -= part;
+  }
+  if (left > 0) {  // chattering: friction holds for what is left
+    s->slip = 0;
+    s->from.rate = 0;
+    const Motion held = runge_kutta(s, left);
+    move(s, left, &held);
+  }
+}
+
+static int integrate(const vwt_parameters* p, const vwt_run* run, double* angle, double* rate) {
+  Step s = {p, run, 0, {run->angle, run->rate, run->twist, run->twist_rate}, run->lagged, 0};
+  const int samples = (int)run->samples, steps = (int)run->steps;
+  const int friction = p->friction_moment > 0;
+  s.slip = run->rate > 0 ? 1 : run->rate < 0 ? -1 : 0;
+  for (int i = 0; i < samples; i++) {
+    angle[i] = s.from.angle;
+    rate[i] = s.from.rate;
+    for (int k = 0; k < steps; k++) {
+      if (friction) {
+        step_with_friction(&s, run->step);
+      } else {
+        const Motion y = runge_kutta(&s, run->step);
+        move(&s, run->step, &y);
+      }
+      s.start = (i * (double)steps + k + 1) * run->step;  // no drift of the clock
+    }
+    if (!(fabs(s.from.angle) < 1e6)) {
+      return 1;
+    }
+  }
+  return 0;
+}
+
+int vwt_forward(int count, const vwt_parameters* parameters, const vwt_run* runs, double* const* angle,
+                double* const* rate) {
+  for (int i = 0; i < count; i++) {
+    if (integrate(&parameters[i], &runs[i], angle[i], rate[i])) {
+      return 1 + i;
+    }
+  }
+  return 0;
+}
+
+void vwt_backlash(int count, const double* in, double half, double start, double* out) {
+  double at = start;
+  for (int i = 0; i < count; i++) {
+    if (in[i] - half > at) {
+      at = in[i] - half;
+    } else if (in[i] + half < at) {
+      at = in[i] + half;
+    }
+    out[i] = at;
+  }
+}
+
+int vwt_parameter_count(void) { return VWT_PARAMETER_COUNT; }
+const char* vwt_parameter_name(int index) { return vwt_parameter_names[index]; }
+const char* vwt_parameter_unit(int index) { return vwt_parameter_units[index]; }

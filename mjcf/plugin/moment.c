@@ -1,0 +1,103 @@
+#include "moment.h"
+
+#include <math.h>
+
+#define X(name, unit, least) #name,
+const char* const vwt_parameter_names[VWT_PARAMETER_COUNT] = {VWT_PARAMETERS(X)};
+#undef X
+#define X(name, unit, least) unit,
+const char* const vwt_parameter_units[VWT_PARAMETER_COUNT] = {VWT_PARAMETERS(X)};
+#undef X
+#define X(name, unit, least) least,
+const double vwt_parameter_least[VWT_PARAMETER_COUNT] = {VWT_PARAMETERS(X)};
+#undef X
+
+static const double kTwoPi = 6.283185307179586476925286766559;
+
+double vwt_lag_time(const vwt_parameters* p, double wind_speed) {
+  return wind_speed > 0 ? p->aero_lag * p->reference_length / wind_speed : 0;
+}
+
+double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
+  const double speed = s->wind_speed;
+  if (!(speed > 0)) {
+    return 0;
+  }
+  const double scale = 0.5 * p->air_density * speed * speed * p->frontal_area * p->reference_length;
+  // paper, eqs 4 and 5: Ka = scale*Cnb and Ca = scale*Cnr*l/V
+  const double stiffness = scale * p->cn_beta;
+  const double damping = scale * p->cn_r * p->reference_length / speed;
+  const double lag = vwt_lag_time(p, speed);
+  // A lag reads the state x; a lead (lag < 0) mirrors it about the angle, b + (b - x), because the lag's
+  // own equation is unstable with a negative time constant.
+  const double angle = lag > 0 ? s->lagged : lag < 0 ? 2 * s->angle - s->lagged : s->angle;
+  const double square = s->angle * s->angle;
+  double moment = stiffness * (angle * (1 + p->moment_cubic * square) + p->flow_angle);
+  moment += damping * (1 + p->damping_quadratic * square) * s->rate;
+  if (p->shedding_amplitude != 0 && p->width > 0) {
+    const double phase = kTwoPi * p->strouhal_number * speed / p->width * s->time + p->shedding_phase;
+    moment += scale * p->shedding_amplitude * sin(phase);
+  }
+  return moment + scale * s->forcing;
+}
+
+double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate) {
+  const double spring = p->spring_stiffness;
+  double moment = 0;
+  if (p->quadratic_damping != 0) {
+    moment -= p->quadratic_damping * fabs(rate) * rate;
+  }
+  if (p->loss_factor != 0) {
+    moment -= p->loss_factor * sqrt(spring * p->yaw_inertia) * rate;  // eta Kr/wn, wn of the rig at rest
+  }
+  if (p->stiffness_cubic != 0 || p->stiffness_quadratic != 0) {
+    moment -= spring * angle * angle * (p->stiffness_cubic * angle + p->stiffness_quadratic);
+  }
+  if (p->free_play > 0) {  // gives back what the linear spring takes inside the dead zone
+    const double held = angle > p->free_play ? p->free_play : angle < -p->free_play ? -p->free_play : angle;
+    moment += spring * held;
+  }
+  if (p->gravity_stiffness != 0) {
+    moment -= p->gravity_stiffness * sin(angle - p->gravity_angle);
+  }
+  return moment;
+}
+
+double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double hold) {
+  const double limit = p->friction_moment;
+  if (!(limit > 0)) {
+    return 0;
+  }
+  const double stop = -(inertia * rate / hold + other);
+  return stop > limit ? limit : stop < -limit ? -limit : stop;
+}
+
+double vwt_lag_advance(double lag_time, double lagged, double duration, double angle0, double rate0,
+                       double angle1, double rate1) {
+  if (lag_time == 0) {
+    return angle1;
+  }
+  if (duration == 0) {
+    return lagged;
+  }
+  const double tau = fabs(lag_time), h = duration;
+  // the path b(t) = c0 + c1 t + c2 t^2 + c3 t^3 (Hermite), and x = particular polynomial + decay
+  const double slope = (angle1 - angle0) / h;
+  const double c0 = angle0, c1 = rate0;
+  const double c2 = (3 * slope - 2 * rate0 - rate1) / h;
+  const double c3 = (rate0 + rate1 - 2 * slope) / (h * h);
+  const double d3 = c3, d2 = c2 - 3 * tau * d3, d1 = c1 - 2 * tau * d2, d0 = c0 - tau * d1;
+  return d0 + h * (d1 + h * (d2 + h * d3)) + (lagged - d0) * exp(-h / tau);
+}
+
+double vwt_series(const double* values, int count, double interval, double time) {
+  if (count == 1 || !(time > 0)) {
+    return values[0];
+  }
+  const double place = time / interval;
+  if (place >= count - 1) {
+    return values[count - 1];
+  }
+  const int low = (int)place;
+  return values[low] + (place - low) * (values[low + 1] - values[low]);
+}

@@ -1,0 +1,99 @@
+// The one moment law of the rig: what air and mechanism add to the linear spring and damper.
+//
+// Nothing here knows MuJoCo. The engine plugin (plugin.c) and the forward integrator (forward.c) both call
+// these functions, so a term exists once. Angles in rad, moments in N m, positive the way yaw is positive.
+
+#ifndef VWT_MOMENT_H_
+#define VWT_MOMENT_H_
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Every parameter of the law: name, unit, least value allowed. A missing parameter is zero, and at zero its
+// term vanishes exactly. The names are those of the MJCF's <custom><numeric> elements.
+#define VWT_PARAMETERS(X)                        \
+  /* the flow and the model's reference sizes */ \
+  X(air_density, "kg/m3", 0)                     \
+  X(frontal_area, "m2", 0)                       \
+  X(reference_length, "m", 0)                    \
+  X(width, "m", 0)                               \
+  /* the aerodynamic moment */                   \
+  X(cn_beta, "1/rad", -VWT_ANY)                  \
+  X(cn_r, "1/rad", -VWT_ANY)                     \
+  X(moment_cubic, "1/rad2", -VWT_ANY)            \
+  X(damping_quadratic, "1/rad2", -VWT_ANY)       \
+  X(aero_lag, "l/V", -VWT_ANY)                   \
+  X(flow_angle, "rad", -VWT_ANY)                 \
+  X(shedding_amplitude, "1", -VWT_ANY)           \
+  X(strouhal_number, "1", 0)                     \
+  X(shedding_phase, "rad", -VWT_ANY)             \
+  /* the mechanism */                            \
+  X(spring_stiffness, "N m/rad", 0)              \
+  X(mechanical_damping, "N m s/rad", 0)          \
+  X(yaw_inertia, "kg m2", 0)                     \
+  X(friction_moment, "N m", 0)                   \
+  X(quadratic_damping, "N m s2/rad2", -VWT_ANY)  \
+  X(loss_factor, "1", -VWT_ANY)                  \
+  X(stiffness_cubic, "1/rad2", -VWT_ANY)         \
+  X(stiffness_quadratic, "1/rad", -VWT_ANY)      \
+  X(free_play, "rad", 0)                         \
+  X(gravity_stiffness, "N m/rad", -VWT_ANY)      \
+  X(gravity_angle, "rad", -VWT_ANY)
+
+#define VWT_ANY 1e300
+
+typedef struct {
+#define X(name, unit, least) double name;
+  VWT_PARAMETERS(X)
+#undef X
+} vwt_parameters;
+
+enum {
+#define X(name, unit, least) VWT_INDEX_##name,
+  VWT_PARAMETERS(X)
+#undef X
+  VWT_PARAMETER_COUNT
+};
+
+extern const char* const vwt_parameter_names[VWT_PARAMETER_COUNT];
+extern const char* const vwt_parameter_units[VWT_PARAMETER_COUNT];
+extern const double vwt_parameter_least[VWT_PARAMETER_COUNT];
+
+// What the air sees.
+typedef struct {
+  double time;        // s since the start of the run
+  double wind_speed;  // m/s, now
+  double angle;       // rad, of the body
+  double rate;        // rad/s, of the body
+  double lagged;      // rad, the lag's state x; ignored where aero_lag or the wind is zero
+  double forcing;     // 1, coefficient of an imposed aerodynamic moment (turbulence)
+} vwt_air_state;
+
+// Time constant of the aerodynamic lag, s (a l/V); 0 where there is none. Negative for a lead.
+double vwt_lag_time(const vwt_parameters* p, double wind_speed);
+
+// Aerodynamic yaw moment on the body, N m.
+double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s);
+
+// Moment of the mechanism at the spring's end of the rod without friction, N m: what departs from
+// -spring_stiffness*angle - mechanical_damping*rate.
+double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate);
+
+// Coulomb friction, N m: opposes the rate, and holds at rest while |other| stays within friction_moment.
+// `other` is the sum of all other moments, `hold` the time in which a slip that friction can stop is
+// stopped, s (the integrator's step).
+double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double hold);
+
+// Lag state after `duration` s, from `lagged`, while the angle follows the cubic through the two given
+// ends (angle0, rate0) and (angle1, rate1). Exact for such a path.
+double vwt_lag_advance(double lag_time, double lagged, double duration, double angle0, double rate0,
+                       double angle1, double rate1);
+
+// Linear interpolation in `count` samples at `interval` s from time 0; the ends are held.
+double vwt_series(const double* values, int count, double interval, double time);
+
+#ifdef __cplusplus
+}
+#endif
+#endif  // VWT_MOMENT_H_

@@ -1,0 +1,297 @@
+// MuJoCo engine plugin "vwt.yaw_moment": the rig's moment law as passive forces, and the aerodynamic
+// moment as a sensor. Its attributes and numerics are the table in README.md.
+//
+// Coefficients live in <custom><numeric> and are read in compute: mujoco.rollout and mujoco.batch reuse one
+// mjData for many models, and what is parsed from <config> in init stays that of the first of them.
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <mujoco/mujoco.h>
+
+#include "moment.h"
+
+// plugin state: the lag and the point of the path it belongs to
+enum { kLagged, kAngle, kRate, kStarted, kStateCount };
+
+typedef struct {
+  int dof;                                // yaw of the spring's end of the rod
+  int twist_dof;                          // of the body against that end; -1: the rod is rigid
+  int joint, twist_joint;
+  int wind_speed, wind_interval;          // ids of numerics; intervals -1 where constant
+  int forcing, forcing_interval;          // ids of numerics, -1 where absent
+  int count;                              // how many parameters the model gives
+  int parameter[VWT_PARAMETER_COUNT];     // which they are
+  int numeric[VWT_PARAMETER_COUNT];       // and the ids of their numerics
+} Instance;
+
+// what a MuJoCo element owns is read there, never given again as a numeric
+static int is_native(int parameter) {
+  return parameter == VWT_INDEX_spring_stiffness || parameter == VWT_INDEX_mechanical_damping ||
+         parameter == VWT_INDEX_yaw_inertia;
+}
+
+static mjtNum mass_diagonal(const mjModel* m, const mjData* d, int dof) {
+  return d->M[m->M_rowadr[dof] + m->M_rownnz[dof] - 1];
+}
+
+static mjtNum series_at(const mjModel* m, int values, int interval, mjtNum time) {
+  return vwt_series(m->numeric_data + m->numeric_adr[values], m->numeric_size[values],
+                    interval < 0 ? 0 : m->numeric_data[m->numeric_adr[interval]], time);
+}
+
+static void read_parameters(const mjModel* m, const mjData* d, const Instance* self, vwt_parameters* p) {
+  double table[VWT_PARAMETER_COUNT] = {0};
+  for (int i = 0; i < self->count; i++) {
+    table[self->parameter[i]] = m->numeric_data[m->numeric_adr[self->numeric[i]]];
+  }
+  table[VWT_INDEX_spring_stiffness] = m->jnt_stiffness[self->joint];
+  table[VWT_INDEX_mechanical_damping] = m->dof_damping[self->dof];
+  table[VWT_INDEX_yaw_inertia] = mass_diagonal(m, d, self->dof);
+  memcpy(p, table, sizeof(table));
+}
+
+static mjtNum wind_speed_now(const mjModel* m, const mjData* d, const Instance* self) {
+  const mjtNum live = m->nuserdata > 0 ? d->userdata[0] : 0;  // live input: departure from the series
+  return fmax(0, series_at(m, self->wind_speed, self->wind_interval, d->time) + live);
+}
+
+static void body_motion(const mjModel* m, const mjData* d, const Instance* self, mjtNum* angle, mjtNum* rate) {
+  *angle = d->qpos[m->jnt_qposadr[self->joint]];
+  *rate = d->qvel[self->dof];
+  if (self->twist_dof >= 0) {
+    *angle += d->qpos[m->jnt_qposadr[self->twist_joint]];
+    *rate += d->qvel[self->twist_dof];
+  }
+}
+
+// The step's start time is not known in compute, so the time since then comes from the path: stages of
+// RK4 are at 0, 1/2 and 1 of the step, and d->time is the stage's own time.
+static mjtNum lagged_now(const mjModel* m, const mjData* d, const Instance* self, const vwt_parameters* p,
+                         mjtNum wind, mjtNum angle, mjtNum rate, int instance) {
+  const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
+  const mjtNum lag = vwt_lag_time(p, wind);
+  if (lag == 0 || state[kStarted] == 0) {
+    return angle;
+  }
+  const mjtNum elapsed = d->time - (state[kStarted] - 1);
+  return vwt_lag_advance(lag, state[kLagged], fmax(0, elapsed), state[kAngle], state[kRate], angle, rate);
+}
+
+static mjtNum air_moment(const mjModel* m, const mjData* d, const Instance* self, const vwt_parameters* p,
+                         int instance) {
+  mjtNum angle, rate;
+  body_motion(m, d, self, &angle, &rate);
+  const mjtNum wind = wind_speed_now(m, d, self);
+  const vwt_air_state air = {
+      .time = d->time,
+      .wind_speed = wind,
+      .angle = angle,
+      .rate = rate,
+      .lagged = lagged_now(m, d, self, p, wind, angle, rate, instance),
+      .forcing = self->forcing < 0 ? 0 : series_at(m, self->forcing, self->forcing_interval, d->time),
+  };
+  return vwt_air_moment(p, &air);
+}
+
+static void apply_moments(const mjModel* m, mjData* d, const Instance* self, int instance) {
+  vwt_parameters p;
+  read_parameters(m, d, self, &p);
+  const mjtNum air = air_moment(m, d, self, &p, instance);
+  const mjtNum angle = d->qpos[m->jnt_qposadr[self->joint]], rate = d->qvel[self->dof];
+  mjtNum mechanism = vwt_mechanism_moment(&p, angle, rate);
+  if (p.friction_moment > 0) {
+    mjtNum inertia = p.yaw_inertia, other = mechanism - p.spring_stiffness * angle - p.mechanical_damping * rate;
+    if (self->twist_dof < 0) {
+      other += air;
+    } else {
+      inertia -= mass_diagonal(m, d, self->twist_dof);
+      other += m->jnt_stiffness[self->twist_joint] * d->qpos[m->jnt_qposadr[self->twist_joint]] +
+               m->dof_damping[self->twist_dof] * d->qvel[self->twist_dof];
+    }
+    mechanism += vwt_friction_moment(&p, inertia, rate, other, m->opt.timestep);
+  }
+  d->qfrc_passive[self->dof] += air + mechanism;
+  if (self->twist_dof >= 0) {
+    d->qfrc_passive[self->twist_dof] += air;
+  }
+}
+
+static void compute(const mjModel* m, mjData* d, int instance, int capability_bit) {
+  const Instance* self = (const Instance*)d->plugin_data[instance];
+  if (capability_bit & mjPLUGIN_PASSIVE) {
+    apply_moments(m, d, self, instance);
+  } else if (capability_bit & mjPLUGIN_SENSOR) {
+    vwt_parameters p;
+    read_parameters(m, d, self, &p);
+    const mjtNum moment = air_moment(m, d, self, &p, instance);
+    for (int i = 0; i < m->nsensor; i++) {
+      if (m->sensor_type[i] == mjSENS_PLUGIN && m->sensor_plugin[i] == instance) {
+        d->sensordata[m->sensor_adr[i]] = moment;
+      }
+    }
+  }
+}
+
+static void advance(const mjModel* m, mjData* d, int instance) {
+  const Instance* self = (const Instance*)d->plugin_data[instance];
+  mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
+  mjtNum angle, rate;
+  body_motion(m, d, self, &angle, &rate);
+  vwt_parameters p;
+  read_parameters(m, d, self, &p);
+  state[kLagged] = lagged_now(m, d, self, &p, wind_speed_now(m, d, self), angle, rate, instance);
+  state[kAngle] = angle;
+  state[kRate] = rate;
+  state[kStarted] = 1 + d->time;  // offset by one, so that zero means: not started
+}
+
+//------------------------------ configuration ---------------------------------------------------------
+
+static int find_numeric(const mjModel* m, const char* name) { return mj_name2id(m, mjOBJ_NUMERIC, name); }
+
+// id of the hinge named by an attribute, -1 where the attribute is empty
+static int find_hinge(const mjModel* m, int instance, const char* attribute) {
+  const char* name = mj_getPluginConfig(m, instance, attribute);
+  if (!name || !*name) {
+    return -1;
+  }
+  const int joint = mj_name2id(m, mjOBJ_JOINT, name);
+  if (joint < 0 || m->jnt_type[joint] != mjJNT_HINGE) {
+    mju_error("vwt.yaw_moment: %s=\"%s\" names no hinge of the model", attribute, name);
+  }
+  return joint;
+}
+
+static void check_series(const mjModel* m, int values, int interval, const char* name) {
+  for (int i = 0; i < m->numeric_size[values]; i++) {
+    const mjtNum value = m->numeric_data[m->numeric_adr[values] + i];
+    if (!isfinite(value)) {
+      mju_error("vwt.yaw_moment: numeric %s is not finite at sample %d", name, i);
+    }
+  }
+  if (m->numeric_size[values] > 1 &&
+      (interval < 0 || !(m->numeric_data[m->numeric_adr[interval]] > 0) ||
+       !isfinite(m->numeric_data[m->numeric_adr[interval]]))) {
+    mju_error("vwt.yaw_moment: numeric %s is a series: give a positive %s_interval in s", name, name);
+  }
+}
+
+static void find_series(const mjModel* m, Instance* self) {
+  self->wind_speed = find_numeric(m, "wind_speed");
+  self->wind_interval = find_numeric(m, "wind_speed_interval");
+  self->forcing = find_numeric(m, "forcing");
+  self->forcing_interval = find_numeric(m, "forcing_interval");
+  if (self->wind_speed < 0) {
+    mju_error("vwt.yaw_moment: numeric wind_speed is missing; give it in m/s, 0 for wind-off");
+  }
+  check_series(m, self->wind_speed, self->wind_interval, "wind_speed");
+  for (int i = 0; i < m->numeric_size[self->wind_speed]; i++) {
+    if (m->numeric_data[m->numeric_adr[self->wind_speed] + i] < 0) {
+      mju_error("vwt.yaw_moment: numeric wind_speed is negative at sample %d", i);
+    }
+  }
+  if (self->forcing >= 0) {
+    check_series(m, self->forcing, self->forcing_interval, "forcing");
+  }
+}
+
+static void find_parameters(const mjModel* m, Instance* self) {
+  self->count = 0;
+  for (int i = 0; i < VWT_PARAMETER_COUNT; i++) {
+    const char* name = vwt_parameter_names[i];
+    const int id = find_numeric(m, name);
+    const int required = i == VWT_INDEX_air_density || i == VWT_INDEX_frontal_area ||
+                         i == VWT_INDEX_reference_length || i == VWT_INDEX_cn_beta || i == VWT_INDEX_cn_r;
+    if (id < 0) {
+      if (required) {
+        mju_error("vwt.yaw_moment: numeric %s is missing; give it in %s", name, vwt_parameter_units[i]);
+      }
+      continue;
+    }
+    if (is_native(i)) {
+      mju_error("vwt.yaw_moment: numeric %s repeats what the joint or body owns; remove it", name);
+    }
+    const mjtNum value = m->numeric_data[m->numeric_adr[id]];
+    if (m->numeric_size[id] != 1 || !isfinite(value) || value < vwt_parameter_least[i]) {
+      mju_error("vwt.yaw_moment: numeric %s must be one finite number in %s, at least %g", name,
+                vwt_parameter_units[i], vwt_parameter_least[i]);
+    }
+    self->parameter[self->count] = i;
+    self->numeric[self->count++] = id;
+  }
+}
+
+static int init(const mjModel* m, mjData* d, int instance) {
+  if (mj_version() != mjVERSION_HEADER) {
+    mju_error("vwt.yaw_moment: built against MuJoCo %d but loaded by %d; rebuild the package", mjVERSION_HEADER,
+              mj_version());
+  }
+  Instance found;
+  memset(&found, 0, sizeof(found));
+  found.joint = find_hinge(m, instance, "joint");
+  if (found.joint < 0) {
+    mju_error("vwt.yaw_moment: attribute joint is missing; name the hinge in yaw");
+  }
+  found.twist_joint = find_hinge(m, instance, "twist_joint");
+  if (found.twist_joint == found.joint) {
+    mju_error("vwt.yaw_moment: twist_joint is the same hinge as joint; name the hinge of the rod's twist");
+  }
+  found.dof = m->jnt_dofadr[found.joint];
+  found.twist_dof = found.twist_joint < 0 ? -1 : m->jnt_dofadr[found.twist_joint];
+  find_series(m, &found);
+  find_parameters(m, &found);
+  Instance* self = (Instance*)malloc(sizeof(Instance));  // last: a refusal above must not leak
+  if (!self) {
+    return -1;
+  }
+  *self = found;
+  d->plugin_data[instance] = (uintptr_t)self;
+  return 0;
+}
+
+static void destroy(mjData* d, int instance) {
+  free((void*)d->plugin_data[instance]);
+  d->plugin_data[instance] = 0;
+}
+
+static void copy(mjData* dest, const mjModel* m, const mjData* src, int instance) {
+  (void)m;
+  memcpy((void*)dest->plugin_data[instance], (const void*)src->plugin_data[instance], sizeof(Instance));
+}
+
+static void reset(const mjModel* m, mjtNum* plugin_state, void* plugin_data, int instance) {
+  (void)m, (void)plugin_data, (void)instance;
+  memset(plugin_state, 0, kStateCount * sizeof(mjtNum));
+}
+
+static int nstate(const mjModel* m, int instance) {
+  (void)m, (void)instance;
+  return kStateCount;
+}
+
+static int nsensordata(const mjModel* m, int instance, int sensor_id) {
+  (void)m, (void)instance, (void)sensor_id;
+  return 1;
+}
+
+mjPLUGIN_LIB_INIT(vwt_yaw_moment) {
+  static const char* const attributes[] = {"joint", "twist_joint"};
+  mjpPlugin plugin;
+  mjp_defaultPlugin(&plugin);
+  plugin.name = "vwt.yaw_moment";
+  plugin.nattribute = sizeof(attributes) / sizeof(attributes[0]);
+  plugin.attributes = attributes;
+  plugin.capabilityflags = mjPLUGIN_PASSIVE | mjPLUGIN_SENSOR;
+  plugin.needstage = mjSTAGE_VEL;
+  plugin.nstate = nstate;
+  plugin.nsensordata = nsensordata;
+  plugin.init = init;
+  plugin.destroy = destroy;
+  plugin.copy = copy;
+  plugin.reset = reset;
+  plugin.compute = compute;
+  plugin.advance = advance;
+  mjp_registerPlugin(&plugin);
+}

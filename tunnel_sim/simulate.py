@@ -1,0 +1,224 @@
+"""Runs of the virtual rig: one, many at once, or a whole campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from mujoco import batch as mujoco_batch
+
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.model import Model, build_model
+from tunnel_sim.plan import SensorModel
+from tunnel_sim.record import Array, Record, read_only
+from tunnel_sim.rig import Rig
+from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.sensor import read_angle
+
+Progress = Callable[[int, int], None]
+_CHUNK_SAMPLES = 4_000_000  # recorded angles held at once: bounds the memory of a large batch
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The true motion of one run at the sensor's sample times.
+
+    Args:
+        time_s: shape (n,), s from the release.
+        angle: of the spring's and sensor's end of the rod, shape (n,), rad.
+        rate: likewise, rad/s.
+    """
+
+    time_s: Array
+    angle: Array
+    rate: Array = field(repr=False)
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        for name in ("time_s", "angle", "rate"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+def sampling(settings: RunSettings, sample_rate: float) -> tuple[int, int]:
+    """How many samples a run has and how many integration steps lie between two of them.
+
+    Args:
+        settings: duration and timestep, s.
+        sample_rate: Hz.
+
+    Returns:
+        (samples, steps between samples).
+
+    Raises:
+        TunnelError: when the sample interval is not a whole number of timesteps.
+    """
+    steps = 1.0 / (sample_rate * settings.timestep)
+    if abs(steps - round(steps)) > 1e-9 * steps or round(steps) < 1:
+        raise TunnelError(
+            f"a sample rate of {sample_rate:g} Hz is no whole number of {settings.timestep:g} s steps",
+            remedy="choose a timestep that divides the sample interval",
+        )
+    return max(2, round(settings.duration * sample_rate)), round(steps)
+
+
+def simulate_motion(model: Model, sample_rate: float) -> Motion:
+    """Integrate one run with plain ``mj_step``.
+
+    Args:
+        model: the rig in this run.
+        sample_rate: Hz.
+
+    Returns:
+        The motion from the release on.
+
+    Raises:
+        TunnelError: when the integration leaves the finite range.
+    """
+    samples, steps = sampling(model.settings, sample_rate)
+    data = model.release_state()
+    angle, rate = np.empty(samples), np.empty(samples)
+    at = model.yaw_address
+    for i in range(samples):
+        angle[i], rate[i] = data.qpos[at], data.qvel[at]
+        if i + 1 < samples:
+            mujoco.mj_step(model.mj, data, steps)
+    _check_finite(angle, "the run")
+    return Motion(np.arange(samples) / sample_rate, angle, rate)
+
+
+def simulate(model: Model, sensor: SensorModel, rng: np.random.Generator) -> Record:
+    """Simulate one run as the sensor sees it.
+
+    Args:
+        model: the rig in this run.
+        sensor: the potentiometer.
+        rng: source of its noise.
+
+    Returns:
+        The record.
+
+    Raises:
+        TunnelError: when the integration leaves the finite range.
+    """
+    motion = simulate_motion(model, sensor.sample_rate)
+    return Record(motion.time_s, read_angle(motion.angle, sensor, rng))
+
+
+def simulate_batch(
+    rig: Rig,
+    settings: Sequence[RunSettings],
+    sensor: SensorModel,
+    rngs: Sequence[np.random.Generator],
+    *,
+    nthread: int = 0,
+    progress: Progress | None = None,
+) -> list[Record]:
+    """Simulate many runs on a thread pool.
+
+    Args:
+        rig: geometry, mass and sensor, common to the runs.
+        settings: the physics of every run.
+        sensor: the potentiometer, common to the runs.
+        rngs: one generator per run.
+        nthread: threads; 0 takes all processors. The result is the same to the bit whatever the number,
+            and the same as a loop over `simulate`.
+        progress: called with (runs done, runs in all).
+
+    Returns:
+        One record per run, in order.
+
+    Raises:
+        TunnelError: when a run leaves the finite range or its settings are refused.
+    """
+    if len(rngs) != len(settings):
+        raise TunnelError(
+            f"{len(settings)} runs but {len(rngs)} random generators", remedy="give one generator per run"
+        )
+    motions = simulate_motions(rig, settings, sensor.sample_rate, nthread=nthread, progress=progress)
+    return [
+        Record(motion.time_s, read_angle(motion.angle, sensor, rng))
+        for motion, rng in zip(motions, rngs, strict=True)
+    ]
+
+
+def simulate_motions(
+    rig: Rig,
+    settings: Sequence[RunSettings],
+    sample_rate: float,
+    *,
+    nthread: int = 0,
+    progress: Progress | None = None,
+) -> list[Motion]:
+    """Integrate many runs on a thread pool; arguments and guarantees as in `simulate_batch`.
+
+    Args:
+        rig: geometry and mass, common to the runs.
+        settings: the physics of every run.
+        sample_rate: Hz.
+        nthread: threads; 0 takes all processors.
+        progress: called with (runs done, runs in all).
+
+    Returns:
+        One motion per run, in order.
+    """
+    motions: dict[int, Motion] = {}
+    for group in _groups(settings):
+        samples, _ = sampling(settings[group[0]], sample_rate)
+        size = max(1, _CHUNK_SAMPLES // samples)
+        for start in range(0, len(group), size):
+            chunk = group[start : start + size]
+            done = _integrate_chunk(rig, [settings[i] for i in chunk], sample_rate, nthread)
+            motions.update(zip(chunk, done, strict=True))
+            if progress is not None:
+                progress(len(motions), len(settings))
+    return [motions[i] for i in range(len(settings))]
+
+
+def _groups(settings: Sequence[RunSettings]) -> list[list[int]]:
+    """Indices of runs that one compiled model can serve with expanded fields."""
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for i, run in enumerate(settings):
+        layout = tuple((name, len(series.values)) for name, series in run.series.items())
+        key = (run.timestep, run.duration, layout, run.rod_twist is None)
+        groups.setdefault(key, []).append(i)
+    return list(groups.values())
+
+
+def _integrate_chunk(rig: Rig, runs: list[RunSettings], sample_rate: float, nthread: int) -> list[Motion]:
+    model = build_model(rig, runs[0])
+    batch = mujoco_batch.Batch(model.mj, nsim=len(runs), nthread=nthread)
+    fields = {
+        name: batch.expand(name) for name in ("jnt_stiffness", "dof_damping", "numeric_data", "body_inertia")
+    }
+    states = {name: batch.bind(name) for name in ("qpos", "qvel", "plugin_state")}
+    for i, run in enumerate(runs):
+        case = model.with_settings(run)
+        for name, values in fields.items():
+            values[i] = getattr(case.mj, name)
+        data = case.release_state()
+        for name, values in states.items():
+            values[i] = getattr(data, name)
+    batch.set_const()
+    samples, steps = sampling(runs[0], sample_rate)
+    qpos, qvel = states["qpos"].copy(), states["qvel"].copy()
+    recorded = batch.rollout(nstep=(samples - 1) * steps, record=("qpos", "qvel"))
+    at = model.yaw_address
+    time = np.arange(samples) / sample_rate
+    motions = []
+    for i in range(len(runs)):
+        angle = np.concatenate([qpos[i, at : at + 1], recorded["qpos"][i, steps - 1 :: steps, at]])
+        rate = np.concatenate([qvel[i, at : at + 1], recorded["qvel"][i, steps - 1 :: steps, at]])
+        _check_finite(angle, f"run {i + 1}")
+        motions.append(Motion(time, angle, rate))
+    return motions
+
+
+def _check_finite(angle: Array, where: str) -> None:
+    if not np.all(np.isfinite(angle)) or np.max(np.abs(angle)) > 1e3:
+        raise TunnelError(
+            "the motion grows without bound",
+            where=where,
+            remedy="check that spring and wind leave a positive stiffness (Kr > Ka) and the damping's sign",
+        )
