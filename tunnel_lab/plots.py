@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tunnel_lab.files import write_whole
+from tunnel_lab.tables import SYMBOLS
 from tunnel_sim.campaign import Campaign, Run
 
 if TYPE_CHECKING:
@@ -163,17 +164,12 @@ def windows_figure(estimate: Estimate) -> Figure:
     figure = _figure(10.0, 4.4)
     damping, frequency = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
     for index, run in enumerate(estimate.runs[:RUNS_PER_PLOT]):
-        rows = [
-            (window.amplitude, window.zeta, window.omega_n)
-            for window in run.windows
-            if window.zeta is not None and window.omega_n is not None
-        ]
-        if not rows:
+        if not run.windows:
             continue
         style = {"color": COLOURS[index], "marker": MARKERS[index], "label": run.id}
-        amplitude = [row[0] for row in rows]
-        _intervals(damping, amplitude, [row[1] for row in rows], style)
-        _intervals(frequency, amplitude, _relative([row[2] for row in rows]), style)
+        amplitude = [window.amplitude.value for window in run.windows]
+        _intervals(damping, amplitude, [window.zeta for window in run.windows], style)
+        _intervals(frequency, amplitude, _relative([window.omega_n for window in run.windows]), style)
     damping.set_ylabel("damping ratio ζ [1]")
     frequency.set_ylabel("ωn against the last window [%]")
     for axes in (damping, frequency):
@@ -222,10 +218,6 @@ def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> F
             axes.set_ylabel("estimate − truth [% of truth]")
         _grid(axes)
     return figure
-
-
-SYMBOLS = {"cn_beta": "Cnβ", "cn_r": "Cnr", "yaw_inertia": "Izz", "mechanical_damping": "Cr"}
-"""How the paper writes the quantities of an estimate."""
 
 
 def _relative(quantities: Sequence[Quantity]) -> list[Quantity]:

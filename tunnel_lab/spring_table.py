@@ -53,11 +53,12 @@ def read_spring_table(path: Path) -> SpringTable:
     lines = [
         (n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")
     ]
-    rows = [next(csv.reader([line])) for _, line in lines]
+    # Line by line: a quoted line feed has no business in such a table.
+    rows = [(number, next(csv.reader([line]))) for number, line in lines]
     if not rows:
         raise TunnelError("is empty", where=str(path), remedy=REMEDY)
-    columns = _columns([name.strip() for name in rows[0]], path)
-    table = [_row(row, columns, f"{path}, line {n}") for row, (n, _) in zip(rows[1:], lines[1:], strict=True)]
+    columns = _columns([name.strip() for name in rows[0][1]], path)
+    table = [_row(row, columns, f"{path}, line {number}") for number, row in rows[1:]]
     if len(table) < 3:
         raise TunnelError(f"has {len(table)} springs", where=str(path), remedy="a line needs three or more")
     names = tuple(name or str(number) for number, (name, _, _) in enumerate(table, 1))

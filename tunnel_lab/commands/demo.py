@@ -188,9 +188,8 @@ def draw(
     console().print("Figures: traces.png, spectrum.png, windows.png, estimates.png", markup=False)
     with console(stderr=True).status("rendering the rig"):
         problem = render_rig(folder / "rig.png")
-    console().print(
-        f"No picture of the rig: {problem}" if problem else "Picture: rig.png", markup=False, soft_wrap=True
-    )
+    outcome = f"No picture of the rig: {problem}" if problem else "Picture: rig.png"
+    console().print(outcome, markup=False, soft_wrap=True)
 
 
 def wind_off_on_pair(campaign: Campaign) -> tuple[Run, Run]:

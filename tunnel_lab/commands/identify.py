@@ -23,9 +23,7 @@ def run(
     ] = "output_error",
     json: Annotated[
         Path | None,
-        typer.Option(
-            "--json", metavar="FILE", help="Write the estimate as JSON, too; - for standard output alone."
-        ),
+        typer.Option("--json", metavar="FILE", help="Write the estimate as JSON; - for standard output."),
     ] = None,
     windows: Annotated[
         bool | None,

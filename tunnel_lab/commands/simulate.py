@@ -75,21 +75,21 @@ def run(
 
 
 def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
-    """Refuse, before the work is done, a folder that cannot take the campaign.
+    """Refuse, before the work is done, a folder the writer would refuse after it.
 
     Args:
         folder: where the campaign shall go.
         overwrite: whether what is there may be replaced.
 
     Raises:
-        TunnelError: when it is a file, or holds something and may not be replaced.
+        TunnelError: when it is a file, or exists and may not be replaced.
     """
     from tunnel_sim.errors import TunnelError
 
     if folder.exists() and not folder.is_dir():
         raise TunnelError("is a file, not a folder", where=str(folder), remedy="name another --out")
-    if folder.is_dir() and any(folder.iterdir()) and not overwrite:
-        raise TunnelError("is not empty", where=str(folder), remedy="name another --out or add --overwrite")
+    if folder.exists() and not overwrite:
+        raise TunnelError("exists already", where=str(folder), remedy="name another --out or add --overwrite")
 
 
 def simulate_with_progress(plan: CampaignPlan) -> Campaign:

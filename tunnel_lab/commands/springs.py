@@ -18,7 +18,7 @@ def run(
     table: Annotated[
         Path | None,
         typer.Argument(
-            help="CSV file with columns stiffness_N_m_per_rad and frequency_Hz. Default: the paper's Table II.",
+            help="CSV file: stiffness_N_m_per_rad and frequency_Hz. Default: the paper's Table II.",
             show_default=False,
         ),
     ] = None,
