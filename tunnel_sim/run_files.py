@@ -1,0 +1,190 @@
+"""Run files: one table of times and angles, as CSV or Parquet."""
+
+from __future__ import annotations
+
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.record import Array, Record
+from tunnel_sim.toml_input import one_line
+
+RUN_FORMATS = ("parquet", "csv")
+_COLUMNS = "a column yaw_rad or yaw_deg, and time_s unless [sensor] sample_rate is given"
+
+
+def read_table(path: Path, where: str) -> tuple[Array | None, Array, str]:
+    """Read the columns of a run file.
+
+    Args:
+        path: a ``.csv`` or ``.parquet`` file.
+        where: file and run, for messages.
+
+    Returns:
+        Times in s (None without a column time_s), the reading as written, and the name of its column:
+        ``yaw_rad`` or ``yaw_deg``. All values are finite.
+
+    Raises:
+        TunnelError: no such file, not a table, a column missing or twice, a value missing or not a number.
+    """
+    readers = {".csv": _read_csv, ".parquet": _read_parquet}
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        raise TunnelError(
+            f"unsupported file type '{one_line(path.suffix)}'", where=where, remedy="use .csv or .parquet"
+        )
+    try:
+        content = path.read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        raise TunnelError(
+            "no such file", where=where, remedy="put the file there or correct 'file' in campaign.toml"
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise TunnelError(
+            f"cannot be read ({one_line(reason)})",
+            where=where,
+            remedy="name a readable .csv or .parquet file",
+        ) from None
+    if not content.strip():
+        raise TunnelError("the file is empty", where=where, remedy=f"give it {_COLUMNS}")
+    table, first_line = reader(content, where)
+    return _columns(table, first_line, where)
+
+
+def write_table(record: Record, path: Path) -> None:
+    """Write a record so that reading it gives the same numbers.
+
+    Args:
+        record: what to write; columns time_s and yaw_rad.
+        path: a ``.csv`` or ``.parquet`` file in an existing folder.
+    """
+    table = pl.DataFrame({"time_s": record.time_s, "yaw_rad": record.yaw_rad})
+    if path.suffix == ".csv":
+        table.write_csv(path)  # shortest digits that read back as the same float
+    else:
+        table.write_parquet(path)
+
+
+def _read_csv(content: bytes, where: str) -> tuple[pl.DataFrame, int]:
+    """The table as text, and the line number of its first row."""
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise TunnelError(
+            f"not UTF-8 text (line {line})", where=where, remedy="save the file as UTF-8"
+        ) from None
+    try:
+        rows = pl.read_csv(content, has_header=False, infer_schema=False, quote_char=None)
+    except pl.exceptions.PolarsError as error:
+        raise TunnelError(
+            f"not a comma-separated table ({one_line(error, 60)})",
+            where=where,
+            remedy="give every line one value for each column, with commas between and decimal points",
+        ) from None
+    names = [str(name or "").strip().strip('"').strip() for name in rows.row(0)]
+    if any(_is_number(name) for name in names):
+        raise TunnelError(
+            "no header line", where=where, remedy="name the columns in the first line, such as time_s,yaw_rad"
+        )
+    if len(names) == 1 and re.search(r"[;\t]", names[0]):
+        raise TunnelError("not comma-separated", where=where, remedy="put commas between the columns")
+    twice = next((name for name in names if name and names.count(name) > 1), None)
+    if twice is not None:
+        raise TunnelError(f"the column {twice} is there twice", where=where, remedy="leave one of them out")
+    # Nameless columns are kept apart by their position; nobody asks for them.
+    rows.columns = [name or f"(column {i + 1})" for i, name in enumerate(names)]
+    return rows.slice(1), 2
+
+
+def _read_parquet(content: bytes, where: str) -> tuple[pl.DataFrame, int]:
+    """The table, and the number of its first row."""
+    try:
+        return pl.read_parquet(io.BytesIO(content)), 1
+    # Some broken files make the decoder panic, which is no subclass of Exception.
+    except (Exception, pl.exceptions.PanicException) as error:
+        raise TunnelError(
+            f"not a readable Parquet file ({one_line(error, 60)})",
+            where=where,
+            remedy="write the file again, as Parquet or as CSV",
+        ) from None
+
+
+def _columns(table: pl.DataFrame, first_line: int, where: str) -> tuple[Array | None, Array, str]:
+    names = table.columns
+    if "yaw_rad" in names and "yaw_deg" in names:
+        raise TunnelError("both yaw_rad and yaw_deg", where=where, remedy="leave one of them out")
+    column = next((name for name in ("yaw_rad", "yaw_deg") if name in names), None)
+    if column is None:
+        found = one_line(", ".join(names) or "none", 60)
+        raise TunnelError(
+            f"no column yaw_rad or yaw_deg (columns found: {found})",
+            where=where,
+            remedy="name the angle's column yaw_rad (radians) or yaw_deg (degrees)",
+        )
+    # A time column by another name would silently be replaced by the sample rate, whatever its unit.
+    stray = next((name for name in names if name != "time_s" and re.match(r"(?i)t$|time", name)), None)
+    if "time_s" not in names and stray is not None:
+        raise TunnelError(
+            f"unknown column '{one_line(stray, 40)}'",
+            where=where,
+            remedy="did you mean 'time_s' (in seconds)? Otherwise leave it out",
+        )
+    used = [name for name in ("time_s", column) if name in names]
+    table = table.select(used)
+    if first_line == 2:
+        table = _without_blank_end(table)
+    if table.height == 0:
+        raise TunnelError(
+            "the file has no samples", where=where, remedy="record the run again or leave it out"
+        )
+    values = {name: _numbers(table.get_column(name), first_line, where) for name in used}
+    return values.get("time_s"), values[column], column
+
+
+def _without_blank_end(table: pl.DataFrame) -> pl.DataFrame:
+    """A text table without the blank lines at its end."""
+    blank = table.select(pl.all_horizontal(pl.all().is_null())).to_series().to_numpy()
+    filled = np.flatnonzero(~blank)
+    return table.head(int(filled[-1]) + 1 if filled.size else 0)
+
+
+def _numbers(series: pl.Series, first_line: int, where: str) -> Array:
+    """The values of a column as finite floats, or a message naming the first that is not."""
+    if series.dtype == pl.String and first_line == 2:
+        numbers = series.str.strip_chars(' \t\r"').cast(pl.Float64, strict=False)
+    elif series.dtype.is_numeric():
+        numbers = series.cast(pl.Float64)
+    else:
+        raise TunnelError(
+            f"the column {series.name} holds {one_line(series.dtype, 30)}, not numbers",
+            where=where,
+            remedy=f"write {series.name} as floating-point numbers",
+        )
+    values: NDArray[np.float64] = numbers.fill_null(np.nan).to_numpy()
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        at = int(bad[0])
+        cell = series[at]
+        said = "no value" if cell is None or not str(cell).strip() else one_line(cell, 30)
+        raise TunnelError(
+            f"{series.name} is {said}{'' if said == 'no value' else ', not a finite number,'} in "
+            f"{'line' if first_line == 2 else 'row'} {at + first_line} ({bad.size} such)",
+            where=where,
+            remedy="cut the record before it, or leave the run out",
+        )
+    return values
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
