@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -11,56 +10,15 @@ from mujoco import batch as mujoco_batch
 
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.model import Model, build_model
+from tunnel_sim.motion import Motion, sampling
 from tunnel_sim.plan import SensorModel
-from tunnel_sim.record import Array, Record, read_only
+from tunnel_sim.record import Array, Record
 from tunnel_sim.rig import Rig
 from tunnel_sim.run_settings import RunSettings
 from tunnel_sim.sensor import read_angle
 
 Progress = Callable[[int, int], None]
 _CHUNK_SAMPLES = 4_000_000  # recorded angles held at once: bounds the memory of a large batch
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """The true motion of one run at the sensor's sample times.
-
-    Args:
-        time_s: shape (n,), s from the release.
-        angle: of the spring's and sensor's end of the rod, shape (n,), rad.
-        rate: likewise, rad/s.
-    """
-
-    time_s: Array
-    angle: Array
-    rate: Array = field(repr=False)
-
-    def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        for name in ("time_s", "angle", "rate"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
-
-def sampling(settings: RunSettings, sample_rate: float) -> tuple[int, int]:
-    """How many samples a run has and how many integration steps lie between two of them.
-
-    Args:
-        settings: duration and timestep, s.
-        sample_rate: Hz.
-
-    Returns:
-        (samples, steps between samples).
-
-    Raises:
-        TunnelError: when the sample interval is not a whole number of timesteps.
-    """
-    steps = 1.0 / (sample_rate * settings.timestep)
-    if abs(steps - round(steps)) > 1e-9 * steps or round(steps) < 1:
-        raise TunnelError(
-            f"a sample rate of {sample_rate:g} Hz is no whole number of {settings.timestep:g} s steps",
-            remedy="choose a timestep that divides the sample interval",
-        )
-    return max(2, round(settings.duration * sample_rate)), round(steps)
 
 
 def simulate_motion(model: Model, sample_rate: float) -> Motion:

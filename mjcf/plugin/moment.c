@@ -63,13 +63,25 @@ double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate) 
   return moment;
 }
 
-double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double hold) {
+double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double duration) {
   const double limit = p->friction_moment;
   if (!(limit > 0)) {
     return 0;
   }
-  const double stop = -(inertia * rate / hold + other);
-  return stop > limit ? limit : stop < -limit ? -limit : stop;
+  const double onward = other > 0 ? -limit : limit;  // friction once the other moments have turned the slip
+  if (rate == 0) {
+    return fabs(other) <= limit ? -other : onward;
+  }
+  const double slip = rate > 0 ? -limit : limit;
+  const double acceleration = (other + slip) / inertia;
+  const double stop = -rate / acceleration;  // time at which the rate passes zero
+  if (!(stop >= 0 && stop < duration)) {
+    return slip;
+  }
+  if (fabs(other) <= limit) {
+    return -other - inertia * rate / duration;  // holds: the rate is zero at the step's end
+  }
+  return (slip * stop + onward * (duration - stop)) / duration;
 }
 
 double vwt_lag_advance(double lag_time, double lagged, double duration, double angle0, double rate0,

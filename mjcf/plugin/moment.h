@@ -80,10 +80,10 @@ double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s);
 // -spring_stiffness*angle - mechanical_damping*rate.
 double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate);
 
-// Coulomb friction, N m: opposes the rate, and holds at rest while |other| stays within friction_moment.
-// `other` is the sum of all other moments, `hold` the time in which a slip that friction can stop is
-// stopped, s (the integrator's step).
-double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double hold);
+// Coulomb friction for a step of `duration` s, N m, as the constant moment of the same impulse. It opposes
+// the rate; where the rate would pass zero within the step, friction turns over there or holds, whichever
+// the other moments ask for. `rate` and `other`, the sum of all other moments, are those at the step's start.
+double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double duration);
 
 // Lag state after `duration` s, from `lagged`, while the angle follows the cubic through the two given
 // ends (angle0, rate0) and (angle1, rate1). Exact for such a path.

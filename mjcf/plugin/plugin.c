@@ -12,8 +12,12 @@
 
 #include "moment.h"
 
-// plugin state: the lag and the point of the path it belongs to
-enum { kLagged, kAngle, kRate, kStarted, kStateCount };
+// Plugin state: where the present step started. Its stages read it for the lag and for friction.
+enum { kLagged, kAngle, kRate, kTwist, kTwistRate, kTime, kStarted, kStateCount };
+
+typedef struct {
+  mjtNum time, angle, rate, twist, twist_rate;
+} Motion;
 
 typedef struct {
   int dof;                                // yaw of the spring's end of the rod
@@ -52,65 +56,80 @@ static void read_parameters(const mjModel* m, const mjData* d, const Instance* s
   memcpy(p, table, sizeof(table));
 }
 
-static mjtNum wind_speed_now(const mjModel* m, const mjData* d, const Instance* self) {
+static mjtNum wind_speed_at(const mjModel* m, const mjData* d, const Instance* self, mjtNum time) {
   const mjtNum live = m->nuserdata > 0 ? d->userdata[0] : 0;  // live input: departure from the series
-  return fmax(0, series_at(m, self->wind_speed, self->wind_interval, d->time) + live);
+  return fmax(0, series_at(m, self->wind_speed, self->wind_interval, time) + live);
 }
 
-static void body_motion(const mjModel* m, const mjData* d, const Instance* self, mjtNum* angle, mjtNum* rate) {
-  *angle = d->qpos[m->jnt_qposadr[self->joint]];
-  *rate = d->qvel[self->dof];
+static Motion present_motion(const mjModel* m, const mjData* d, const Instance* self) {
+  Motion now = {d->time, d->qpos[m->jnt_qposadr[self->joint]], d->qvel[self->dof], 0, 0};
   if (self->twist_dof >= 0) {
-    *angle += d->qpos[m->jnt_qposadr[self->twist_joint]];
-    *rate += d->qvel[self->twist_dof];
+    now.twist = d->qpos[m->jnt_qposadr[self->twist_joint]];
+    now.twist_rate = d->qvel[self->twist_dof];
   }
+  return now;
 }
 
-// The step's start time is not known in compute, so the time since then comes from the path: stages of
-// RK4 are at 0, 1/2 and 1 of the step, and d->time is the stage's own time.
-static mjtNum lagged_now(const mjModel* m, const mjData* d, const Instance* self, const vwt_parameters* p,
-                         mjtNum wind, mjtNum angle, mjtNum rate, int instance) {
-  const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
+// Motion at the start of the step; the present one before the first step.
+static Motion start_motion(const mjtNum* state, const Motion* now) {
+  if (state[kStarted] == 0) {
+    return *now;
+  }
+  const Motion start = {state[kTime], state[kAngle], state[kRate], state[kTwist], state[kTwistRate]};
+  return start;
+}
+
+static mjtNum lagged_at(const mjtNum* state, const vwt_parameters* p, mjtNum wind, const Motion* now) {
   const mjtNum lag = vwt_lag_time(p, wind);
+  const mjtNum angle = now->angle + now->twist, rate = now->rate + now->twist_rate;
   if (lag == 0 || state[kStarted] == 0) {
     return angle;
   }
-  const mjtNum elapsed = d->time - (state[kStarted] - 1);
-  return vwt_lag_advance(lag, state[kLagged], fmax(0, elapsed), state[kAngle], state[kRate], angle, rate);
+  return vwt_lag_advance(lag, state[kLagged], fmax(0, now->time - state[kTime]), state[kAngle] + state[kTwist],
+                         state[kRate] + state[kTwistRate], angle, rate);
 }
 
 static mjtNum air_moment(const mjModel* m, const mjData* d, const Instance* self, const vwt_parameters* p,
-                         int instance) {
-  mjtNum angle, rate;
-  body_motion(m, d, self, &angle, &rate);
-  const mjtNum wind = wind_speed_now(m, d, self);
+                         const mjtNum* state, const Motion* at) {
+  const mjtNum wind = wind_speed_at(m, d, self, at->time);
   const vwt_air_state air = {
-      .time = d->time,
+      .time = at->time,
       .wind_speed = wind,
-      .angle = angle,
-      .rate = rate,
-      .lagged = lagged_now(m, d, self, p, wind, angle, rate, instance),
-      .forcing = self->forcing < 0 ? 0 : series_at(m, self->forcing, self->forcing_interval, d->time),
+      .angle = at->angle + at->twist,
+      .rate = at->rate + at->twist_rate,
+      .lagged = p->aero_lag != 0 ? lagged_at(state, p, wind, at) : 0,
+      .forcing = self->forcing < 0 ? 0 : series_at(m, self->forcing, self->forcing_interval, at->time),
   };
   return vwt_air_moment(p, &air);
 }
 
-static void apply_moments(const mjModel* m, mjData* d, const Instance* self, int instance) {
+// All moments on the spring's end but friction, those of MuJoCo's own spring, damper and rod included.
+static mjtNum other_moment(const mjModel* m, const Instance* self, const vwt_parameters* p, mjtNum air,
+                           const Motion* at) {
+  const mjtNum mechanism = vwt_mechanism_moment(p, at->angle, at->rate) - p->spring_stiffness * at->angle -
+                           p->mechanical_damping * at->rate;
+  if (self->twist_dof < 0) {
+    return mechanism + air;
+  }
+  return mechanism + m->jnt_stiffness[self->twist_joint] * at->twist + m->dof_damping[self->twist_dof] * at->twist_rate;
+}
+
+static mjtNum friction(const mjModel* m, const mjData* d, const Instance* self, const vwt_parameters* p,
+                       const mjtNum* state, const Motion* now) {
+  const mjtNum inertia = self->twist_dof < 0 ? p->yaw_inertia : p->yaw_inertia - mass_diagonal(m, d, self->twist_dof);
+  const Motion start = start_motion(state, now);
+  const mjtNum other = other_moment(m, self, p, air_moment(m, d, self, p, state, &start), &start);
+  return vwt_friction_moment(p, inertia, start.rate, other, m->opt.timestep);
+}
+
+static void apply_moments(const mjModel* m, mjData* d, const Instance* self, const mjtNum* state) {
   vwt_parameters p;
   read_parameters(m, d, self, &p);
-  const mjtNum air = air_moment(m, d, self, &p, instance);
-  const mjtNum angle = d->qpos[m->jnt_qposadr[self->joint]], rate = d->qvel[self->dof];
-  mjtNum mechanism = vwt_mechanism_moment(&p, angle, rate);
+  const Motion now = present_motion(m, d, self);
+  const mjtNum air = air_moment(m, d, self, &p, state, &now);
+  mjtNum mechanism = vwt_mechanism_moment(&p, now.angle, now.rate);
   if (p.friction_moment > 0) {
-    mjtNum inertia = p.yaw_inertia, other = mechanism - p.spring_stiffness * angle - p.mechanical_damping * rate;
-    if (self->twist_dof < 0) {
-      other += air;
-    } else {
-      inertia -= mass_diagonal(m, d, self->twist_dof);
-      other += m->jnt_stiffness[self->twist_joint] * d->qpos[m->jnt_qposadr[self->twist_joint]] +
-               m->dof_damping[self->twist_dof] * d->qvel[self->twist_dof];
-    }
-    mechanism += vwt_friction_moment(&p, inertia, rate, other, m->opt.timestep);
+    mechanism += friction(m, d, self, &p, state, &now);
   }
   d->qfrc_passive[self->dof] += air + mechanism;
   if (self->twist_dof >= 0) {
@@ -118,33 +137,41 @@ static void apply_moments(const mjModel* m, mjData* d, const Instance* self, int
   }
 }
 
+static void sense_moment(const mjModel* m, mjData* d, const Instance* self, const mjtNum* state, int instance) {
+  vwt_parameters p;
+  read_parameters(m, d, self, &p);
+  const Motion now = present_motion(m, d, self);
+  const mjtNum moment = air_moment(m, d, self, &p, state, &now);
+  for (int i = 0; i < m->nsensor; i++) {
+    if (m->sensor_type[i] == mjSENS_PLUGIN && m->sensor_plugin[i] == instance) {
+      d->sensordata[m->sensor_adr[i]] = moment;
+    }
+  }
+}
+
 static void compute(const mjModel* m, mjData* d, int instance, int capability_bit) {
   const Instance* self = (const Instance*)d->plugin_data[instance];
+  const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   if (capability_bit & mjPLUGIN_PASSIVE) {
-    apply_moments(m, d, self, instance);
+    apply_moments(m, d, self, state);
   } else if (capability_bit & mjPLUGIN_SENSOR) {
-    vwt_parameters p;
-    read_parameters(m, d, self, &p);
-    const mjtNum moment = air_moment(m, d, self, &p, instance);
-    for (int i = 0; i < m->nsensor; i++) {
-      if (m->sensor_type[i] == mjSENS_PLUGIN && m->sensor_plugin[i] == instance) {
-        d->sensordata[m->sensor_adr[i]] = moment;
-      }
-    }
+    sense_moment(m, d, self, state, instance);
   }
 }
 
 static void advance(const mjModel* m, mjData* d, int instance) {
   const Instance* self = (const Instance*)d->plugin_data[instance];
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
-  mjtNum angle, rate;
-  body_motion(m, d, self, &angle, &rate);
   vwt_parameters p;
   read_parameters(m, d, self, &p);
-  state[kLagged] = lagged_now(m, d, self, &p, wind_speed_now(m, d, self), angle, rate, instance);
-  state[kAngle] = angle;
-  state[kRate] = rate;
-  state[kStarted] = 1 + d->time;  // offset by one, so that zero means: not started
+  const Motion now = present_motion(m, d, self);
+  state[kLagged] = lagged_at(state, &p, wind_speed_at(m, d, self, now.time), &now);
+  state[kAngle] = now.angle;
+  state[kRate] = now.rate;
+  state[kTwist] = now.twist;
+  state[kTwistRate] = now.twist_rate;
+  state[kTime] = now.time;
+  state[kStarted] = 1;
 }
 
 //------------------------------ configuration ---------------------------------------------------------
