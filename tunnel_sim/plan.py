@@ -1,0 +1,183 @@
+"""What to simulate: a campaign described in one small TOML, and the conditions it stands for.
+
+The packaged ``data/paper-campaign.toml`` is the example, with a comment on every key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import resources
+from math import pi, radians
+from pathlib import Path
+
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.plan_schema import ConditionsTable, PlanDocument, read_plan
+from tunnel_sim.rig import load_rig
+from tunnel_sim.toml_input import shown
+
+POTENTIOMETER_RESOLUTION = 2.0 * pi / 3.0 / 4096.0
+"""12 bit over ±60°, rad."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The coefficients that are injected.
+
+    Args:
+        cn_beta: Cnβ, 1/rad.
+        cn_r: Cnr, 1/rad.
+        yaw_inertia: Izz of model and support, kg m².
+        mechanical_damping: Cr, N m s/rad.
+    """
+
+    cn_beta: float
+    cn_r: float
+    yaw_inertia: float
+    mechanical_damping: float
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One run to make.
+
+    Args:
+        id: unique in the campaign; tells spring, speed, angle and repeat.
+        spring_stiffness: Kr, N m/rad.
+        wind_speed: V, m/s; 0 is wind-off.
+        air_density: ρ, kg/m³.
+        release_angle: rad, nose-right positive.
+        duration: of the record, s.
+    """
+
+    id: str
+    spring_stiffness: float
+    wind_speed: float
+    air_density: float
+    release_angle: float
+    duration: float
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """The potentiometer: zero, then noise, then quantisation.
+
+    Args:
+        sample_rate: Hz.
+        noise_std: standard deviation of the noise, rad.
+        resolution: step of the reading, rad; 0 does not quantise.
+        zero: added to the angle, rad; common to the campaign and unknown to the estimators.
+    """
+
+    sample_rate: float = 1000.0
+    noise_std: float = 0.0005
+    resolution: float = POTENTIOMETER_RESOLUTION
+    zero: float = 0.0
+
+
+@dataclass(frozen=True)
+class EffectSetting:
+    """One effect beyond the nominal model, by name; the registry of effects validates it.
+
+    Args:
+        name: name of the effect.
+        parameters: its parameters by name, SI units.
+    """
+
+    name: str
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CampaignPlan:
+    """All that a simulated campaign depends on, besides the rig.
+
+    Args:
+        name: short name of the campaign.
+        seed: of the random numbers.
+        truth: coefficients to inject.
+        conditions: the runs, at least one, with unique ids.
+        sensor: the potentiometer.
+        effects: what is added to the nominal model.
+        description: free text.
+    """
+
+    name: str
+    seed: int
+    truth: Truth
+    conditions: tuple[Condition, ...]
+    sensor: SensorModel = SensorModel()
+    effects: tuple[EffectSetting, ...] = ()
+    description: str = ""
+
+
+def load_plan(path: Path | str, *, springs: Mapping[int, float] | None = None) -> CampaignPlan:
+    """Read a campaign description.
+
+    Args:
+        path: a TOML file like the packaged ``paper-campaign.toml``.
+        springs: torsional stiffness by spring number, N m/rad; None takes the packaged rig's (paper, Table II).
+
+    Returns:
+        The plan: runs in the order springs, stiffnesses, then wind speeds, release angles and repeats.
+
+    Raises:
+        TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
+    """
+    path = Path(path)
+    document = read_plan(path)
+    return CampaignPlan(
+        name=document.name,
+        description=document.description,
+        seed=document.seed,
+        truth=Truth(**document.truth.model_dump()),
+        conditions=_conditions(document, load_rig().springs if springs is None else springs, path),
+        sensor=SensorModel(**document.sensor.model_dump(exclude_none=True)),
+        effects=tuple(EffectSetting(effect.name, dict(effect.parameters)) for effect in document.effects),
+    )
+
+
+def paper_plan() -> CampaignPlan:
+    """The paper's campaign: springs of Table II with the wind off and at three speeds.
+
+    Returns:
+        The plan of the packaged ``data/paper-campaign.toml``.
+    """
+    with resources.as_file(resources.files("tunnel_sim") / "data" / "paper-campaign.toml") as path:
+        return load_plan(path)
+
+
+def _conditions(document: PlanDocument, springs: Mapping[int, float], path: Path) -> tuple[Condition, ...]:
+    table = document.conditions
+    return tuple(
+        Condition(
+            id=f"{label}-v{_short(speed)}-a{_short(angle)}" + (f"-{repeat}" if table.repeats > 1 else ""),
+            spring_stiffness=stiffness,
+            wind_speed=speed,
+            air_density=table.air_density,
+            release_angle=radians(angle),
+            duration=table.duration,
+        )
+        for label, stiffness in _stiffnesses(table, springs, path)
+        for speed in table.wind_speeds
+        for angle in table.release_angles_deg
+        for repeat in range(1, table.repeats + 1)
+    )
+
+
+def _stiffnesses(table: ConditionsTable, springs: Mapping[int, float], path: Path) -> list[tuple[str, float]]:
+    """A label and a stiffness for every numbered spring and every stiffness stated outright."""
+    for number in table.springs:
+        if number not in springs:
+            raise TunnelError(
+                f"there is no spring {number}",
+                where=f"{shown(path)}, [conditions]",
+                remedy=f"use one of {', '.join(str(n) for n in springs)}, or give spring_stiffness in N m/rad",
+            )
+    numbered = [(f"s{number}", springs[number]) for number in table.springs]
+    return numbered + [(f"k{_short(stiffness)}", stiffness) for stiffness in table.spring_stiffness]
+
+
+def _short(value: float) -> str:
+    """The shortest text that tells a number from every other: ``15``, ``16.12``."""
+    return repr(value).removesuffix(".0")

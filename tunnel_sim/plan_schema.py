@@ -1,0 +1,110 @@
+"""The tables of a campaign description."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.toml_input import OneLine, StrictModel, check_version, load_toml, shown, validate
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+def _release_angle(angle: float) -> float:
+    if not 0.0 < abs(angle) <= 180.0:
+        raise ValueError("is no release angle in degrees: it is zero or beyond half a turn")
+    return angle
+
+
+ReleaseAngle = Annotated[float, AfterValidator(_release_angle)]
+
+
+class TruthTable(StrictModel):
+    """``[truth]``."""
+
+    cn_beta: float = Field(description="a number, 1/rad")
+    cn_r: float = Field(description="a number, 1/rad")
+    yaw_inertia: Positive = Field(description="a positive number in kg m2")
+    mechanical_damping: NotNegative = Field(description="a number in N m s/rad, zero or more")
+
+
+class ConditionsTable(StrictModel):
+    """``[conditions]``: every spring at every wind speed and release angle, ``repeats`` times."""
+
+    springs: list[int] = Field(default=[], description="a list of spring numbers of Table II, such as [5, 6]")
+    spring_stiffness: list[Positive] = Field(default=[], description="a list of positive numbers in N m/rad")
+    wind_speeds: list[NotNegative] = Field(
+        min_length=1, description="a list of speeds in m/s, 0 for wind-off, such as [0, 10]"
+    )
+    release_angles_deg: list[ReleaseAngle] = Field(
+        min_length=1, description="a list of angles in degrees, such as [20]"
+    )
+    repeats: int = Field(default=1, ge=1, le=1000, description="a whole number from 1 to 1000")
+    duration: Positive = Field(description="a positive number in s")
+    air_density: Positive = Field(default=1.204, description="a positive number in kg/m3")
+
+
+class SensorModelTable(StrictModel):
+    """``[sensor]``; a key that is left out takes the default of ``SensorModel``."""
+
+    sample_rate: Positive | None = Field(default=None, description="a positive number in Hz")
+    noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
+    resolution: NotNegative | None = Field(default=None, description="a number in rad, zero for none")
+    zero: float | None = Field(default=None, description="a number in rad")
+
+
+class EffectTable(StrictModel):
+    """``[[effects]]``."""
+
+    name: OneLine = Field(description="the name of an effect in quotes")
+    parameters: dict[str, float] = Field(default={}, description="a table of numbers, such as { x = 0.1 }")
+
+
+class PlanDocument(StrictModel):
+    """The whole of a campaign description."""
+
+    schema_version: Literal[1] = Field(description="1")
+    name: OneLine = Field(description="a short name in quotes")
+    description: str = Field(default="", description="text in quotes, or leave it out")
+    seed: int = Field(ge=0, description="a whole number, zero or more")
+    truth: TruthTable = Field(description="a [truth] table")
+    conditions: ConditionsTable = Field(description="a [conditions] table")
+    sensor: SensorModelTable = Field(default=SensorModelTable(), description="a [sensor] table")
+    effects: list[EffectTable] = Field(default=[], description="[[effects]] tables")
+
+
+def read_plan(path: Path) -> PlanDocument:
+    """Read and validate a campaign description.
+
+    Args:
+        path: the file.
+
+    Returns:
+        The validated document.
+
+    Raises:
+        TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
+    """
+    document = load_toml(path, missing="name a campaign description such as the packaged paper-campaign.toml")
+    check_version(document, path)
+    plan = validate(PlanDocument, document, path)
+    where = f"{shown(path)}, [conditions]"
+    table = plan.conditions
+    if not table.springs and not table.spring_stiffness:
+        raise TunnelError(
+            "no spring", where=where, remedy="give springs (numbers) or spring_stiffness (N m/rad)"
+        )
+    for key in ("springs", "spring_stiffness", "wind_speeds", "release_angles_deg"):
+        values = getattr(table, key)
+        twice = next((value for value in values if values.count(value) > 1), None)
+        if twice is not None:
+            raise TunnelError(
+                f"{key} holds {twice:g} twice",
+                where=where,
+                remedy="leave one out, and use repeats for more runs",
+            )
+    return plan
