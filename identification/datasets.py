@@ -1,0 +1,130 @@
+"""Packaged measurements: the paper's tables and two measured campaigns, each with its source and licence.
+
+The files lie in ``identification/data``; a ``SOURCE.md`` beside each says where they come from.
+The paper: "Identification of Aerodynamic Coefficients of Ground Vehicles Using Neural Network".
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from importlib import resources
+
+from tunnel_sim.campaign import Campaign
+from tunnel_sim.campaign_io import read_campaign
+from tunnel_sim.errors import TunnelError, did_you_mean
+
+MEASURED_CAMPAIGNS: tuple[str, ...] = ("kvlcc2-roll-decay-0kn", "rotary-pendulum")
+"""Names of the packaged measured campaigns."""
+
+# Windows of Table III whose omega_n can be read in two ways in the scan, and the reading that is not in the file.
+_SECOND_READING = {3: 12.5054, 4: 12.5638}
+
+
+@dataclass(frozen=True)
+class SpringRow:
+    """One spring of Table II, measured with the wind off.
+
+    Args:
+        number: of the spring.
+        stiffness_n_m_per_rad: Kr, N m/rad.
+        frequency_hz: of the free oscillation, Hz.
+    """
+
+    number: int
+    stiffness_n_m_per_rad: float
+    frequency_hz: float
+
+
+@dataclass(frozen=True)
+class WindowRow:
+    """Three consecutive cycles of Table III's wind-on run.
+
+    Args:
+        number: of the window, from the release on.
+        zeta: damping ratio.
+        omega_n_rad_per_s: natural frequency, rad/s.
+        omega_n_second_reading_rad_per_s: where the scan is garbled, its other possible reading; else None.
+    """
+
+    number: int
+    zeta: float
+    omega_n_rad_per_s: float
+    omega_n_second_reading_rad_per_s: float | None = None
+
+
+@dataclass(frozen=True)
+class DerivativeRow:
+    """One row of Table IV.
+
+    Args:
+        method: ``neural network`` or ``conventional``.
+        cn_beta_per_rad: Cnβ, 1/rad; positive lowers the frequency.
+        cn_r_per_rad: Cnr, 1/rad; negative adds damping.
+    """
+
+    method: str
+    cn_beta_per_rad: float
+    cn_r_per_rad: float
+
+
+def paper_springs() -> tuple[SpringRow, ...]:
+    """Table II: the ten torsion springs and the frequencies measured with the wind off.
+
+    Returns:
+        Ten rows, from the softest spring to the stiffest.
+    """
+    return tuple(
+        SpringRow(int(row["spring"]), float(row["stiffness_N_m_per_rad"]), float(row["frequency_Hz"]))
+        for row in _table("table2-springs.csv")
+    )
+
+
+def paper_windows() -> tuple[WindowRow, ...]:
+    """Table III: damping and frequency of one wind-on run, three cycles at a time.
+
+    Returns:
+        Eight rows, in the order of time.
+    """
+    return tuple(
+        WindowRow(number, float(row["zeta"]), float(row["omega_n_rad_per_s"]), _SECOND_READING.get(number))
+        for row in _table("table3-windows.csv")
+        for number in (int(row["window"]),)
+    )
+
+
+def paper_derivatives() -> tuple[DerivativeRow, ...]:
+    """Table IV: the yaw-moment derivatives by both of the paper's methods.
+
+    Returns:
+        Two rows: neural network, conventional.
+    """
+    return tuple(
+        DerivativeRow(row["method"], float(row["cn_beta"]), float(row["cn_r"]))
+        for row in _table("table4-derivatives.csv")
+    )
+
+
+def measured_campaign(name: str) -> Campaign:
+    """A packaged measured campaign.
+
+    Args:
+        name: one of :data:`MEASURED_CAMPAIGNS`.
+
+    Returns:
+        The campaign, angles in radians; without spring stiffness, so that it is identified in normalised form.
+
+    Raises:
+        TunnelError: there is no such campaign.
+    """
+    if name not in MEASURED_CAMPAIGNS:
+        raise TunnelError(
+            f"no measured campaign '{name}' is packaged", remedy=did_you_mean(name, MEASURED_CAMPAIGNS)
+        )
+    with resources.as_file(resources.files("identification") / "data" / "measured" / name) as folder:
+        return read_campaign(folder)
+
+
+def _table(file: str) -> list[dict[str, str]]:
+    text = (resources.files("identification") / "data" / "paper" / file).read_text(encoding="utf-8")
+    return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
