@@ -17,7 +17,7 @@ from tunnel_sim.errors import TunnelError, did_you_mean
 MEASURED_CAMPAIGNS: tuple[str, ...] = ("kvlcc2-roll-decay-0kn", "rotary-pendulum")
 """Names of the packaged measured campaigns."""
 
-# Windows of Table III whose omega_n can be read in two ways in the scan, and the reading that is not in the file.
+# Windows of Table III whose omega_n reads in two ways in the scan, and the reading that is not in the file.
 _SECOND_READING = {3: 12.5054, 4: 12.5638}
 
 
@@ -112,7 +112,7 @@ def measured_campaign(name: str) -> Campaign:
         name: one of :data:`MEASURED_CAMPAIGNS`.
 
     Returns:
-        The campaign, angles in radians; without spring stiffness, so that it is identified in normalised form.
+        The campaign, angles in radians; without spring stiffness, so identified in normalised form.
 
     Raises:
         TunnelError: there is no such campaign.

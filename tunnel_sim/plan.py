@@ -12,8 +12,8 @@ from math import pi, radians
 from pathlib import Path
 
 from tunnel_sim.errors import TunnelError
-from tunnel_sim.plan_schema import ConditionsTable, PlanDocument, read_plan
-from tunnel_sim.rig import load_rig
+from tunnel_sim.plan_schema import PlanDocument, read_plan
+from tunnel_sim.rig import Rig, load_rig
 from tunnel_sim.toml_input import shown
 
 POTENTIOMETER_RESOLUTION = 2.0 * pi / 3.0 / 4096.0
@@ -111,12 +111,13 @@ class CampaignPlan:
     description: str = ""
 
 
-def load_plan(path: Path | str, *, springs: Mapping[int, float] | None = None) -> CampaignPlan:
+def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
     """Read a campaign description.
 
     Args:
         path: a TOML file like the packaged ``paper-campaign.toml``.
-        springs: torsional stiffness by spring number, N m/rad; None takes the packaged rig's (paper, Table II).
+        rig: whose springs the numbers stand for, and whose inertia, damping and air density are taken where
+            the description states none; None takes the packaged rig.
 
     Returns:
         The plan: runs in the order springs, stiffnesses, then wind speeds, release angles and repeats.
@@ -126,12 +127,15 @@ def load_plan(path: Path | str, *, springs: Mapping[int, float] | None = None) -
     """
     path = Path(path)
     document = read_plan(path)
+    rig = load_rig() if rig is None else rig
+    stated = document.truth.model_dump(exclude_none=True)
+    inertia, damping = rig.dynamics.yaw_inertia, rig.dynamics.mechanical_damping
     return CampaignPlan(
         name=document.name,
         description=document.description,
         seed=document.seed,
-        truth=Truth(**document.truth.model_dump()),
-        conditions=_conditions(document, load_rig().springs if springs is None else springs, path),
+        truth=Truth(**({"yaw_inertia": inertia, "mechanical_damping": damping} | stated)),
+        conditions=_conditions(document, rig, path),
         sensor=SensorModel(**document.sensor.model_dump(exclude_none=True)),
         effects=tuple(EffectSetting(effect.name, dict(effect.parameters)) for effect in document.effects),
     )
@@ -147,37 +151,37 @@ def paper_plan() -> CampaignPlan:
         return load_plan(path)
 
 
-def _conditions(document: PlanDocument, springs: Mapping[int, float], path: Path) -> tuple[Condition, ...]:
-    table = document.conditions
+def _conditions(document: PlanDocument, rig: Rig, path: Path) -> tuple[Condition, ...]:
+    density = rig.air.density if document.air_density is None else document.air_density
     return tuple(
         Condition(
-            id=f"{label}-v{_short(speed)}-a{_short(angle)}" + (f"-{repeat}" if table.repeats > 1 else ""),
+            id=f"{label}-v{_short(speed)}-a{_short(angle)}" + (f"-{repeat}" if document.repeats > 1 else ""),
             spring_stiffness=stiffness,
             wind_speed=speed,
-            air_density=table.air_density,
+            air_density=density,
             release_angle=radians(angle),
-            duration=table.duration,
+            duration=document.duration,
         )
-        for label, stiffness in _stiffnesses(table, springs, path)
-        for speed in table.wind_speeds
-        for angle in table.release_angles_deg
-        for repeat in range(1, table.repeats + 1)
+        for label, stiffness in _stiffnesses(document, rig.springs, path)
+        for speed in document.wind_speeds
+        for angle in document.release_angles_deg
+        for repeat in range(1, document.repeats + 1)
     )
 
 
-def _stiffnesses(table: ConditionsTable, springs: Mapping[int, float], path: Path) -> list[tuple[str, float]]:
+def _stiffnesses(document: PlanDocument, springs: Mapping[int, float], path: Path) -> list[tuple[str, float]]:
     """A label and a stiffness for every numbered spring and every stiffness stated outright."""
-    for number in table.springs:
+    for number in document.springs:
         if number not in springs:
             raise TunnelError(
                 f"there is no spring {number}",
-                where=f"{shown(path)}, [conditions]",
-                remedy=f"use one of {', '.join(str(n) for n in springs)}, or give spring_stiffness in N m/rad",
+                where=shown(path),
+                remedy=f"use one of {', '.join(map(str, springs))}, or give spring_stiffness in N m/rad",
             )
-    numbered = [(f"s{number}", springs[number]) for number in table.springs]
-    return numbered + [(f"k{_short(stiffness)}", stiffness) for stiffness in table.spring_stiffness]
+    numbered = [(f"s{number}", springs[number]) for number in document.springs]
+    return numbered + [(f"k{_short(stiffness)}", stiffness) for stiffness in document.spring_stiffness]
 
 
 def _short(value: float) -> str:
     """The shortest text that tells a number from every other: ``15``, ``16.12``."""
-    return repr(value).removesuffix(".0")
+    return repr(value + 0.0).removesuffix(".0")  # + 0.0: minus zero is zero

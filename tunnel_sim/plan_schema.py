@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
 from tunnel_sim.errors import TunnelError
-from tunnel_sim.toml_input import OneLine, StrictModel, check_version, load_toml, shown, validate
+from tunnel_sim.toml_input import OneLine, StrictModel, load_toml, shown, validate
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -28,24 +28,10 @@ class TruthTable(StrictModel):
 
     cn_beta: float = Field(description="a number, 1/rad")
     cn_r: float = Field(description="a number, 1/rad")
-    yaw_inertia: Positive = Field(description="a positive number in kg m2")
-    mechanical_damping: NotNegative = Field(description="a number in N m s/rad, zero or more")
-
-
-class ConditionsTable(StrictModel):
-    """``[conditions]``: every spring at every wind speed and release angle, ``repeats`` times."""
-
-    springs: list[int] = Field(default=[], description="a list of spring numbers of Table II, such as [5, 6]")
-    spring_stiffness: list[Positive] = Field(default=[], description="a list of positive numbers in N m/rad")
-    wind_speeds: list[NotNegative] = Field(
-        min_length=1, description="a list of speeds in m/s, 0 for wind-off, such as [0, 10]"
+    yaw_inertia: Positive | None = Field(default=None, description="a positive number in kg m2")
+    mechanical_damping: NotNegative | None = Field(
+        default=None, description="a number in N m s/rad, zero or more"
     )
-    release_angles_deg: list[ReleaseAngle] = Field(
-        min_length=1, description="a list of angles in degrees, such as [20]"
-    )
-    repeats: int = Field(default=1, ge=1, le=1000, description="a whole number from 1 to 1000")
-    duration: Positive = Field(description="a positive number in s")
-    air_density: Positive = Field(default=1.204, description="a positive number in kg/m3")
 
 
 class SensorModelTable(StrictModel):
@@ -65,14 +51,23 @@ class EffectTable(StrictModel):
 
 
 class PlanDocument(StrictModel):
-    """The whole of a campaign description."""
+    """The whole of a campaign description: springs × speeds × release angles × repeats."""
 
-    schema_version: Literal[1] = Field(description="1")
     name: OneLine = Field(description="a short name in quotes")
     description: str = Field(default="", description="text in quotes, or leave it out")
     seed: int = Field(ge=0, description="a whole number, zero or more")
-    truth: TruthTable = Field(description="a [truth] table")
-    conditions: ConditionsTable = Field(description="a [conditions] table")
+    springs: list[int] = Field(default=[], description="a list of spring numbers of Table II, such as [5, 6]")
+    spring_stiffness: list[Positive] = Field(default=[], description="a list of positive numbers in N m/rad")
+    wind_speeds: list[NotNegative] = Field(
+        min_length=1, description="a list of speeds in m/s, 0 for wind-off, such as [0, 10]"
+    )
+    release_angles_deg: list[ReleaseAngle] = Field(
+        min_length=1, description="a list of angles in degrees, such as [20]"
+    )
+    repeats: int = Field(default=1, ge=1, le=1000, description="a whole number from 1 to 1000")
+    duration: Positive = Field(description="a positive number in s")
+    air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
+    truth: TruthTable = Field(description="a [truth] table with cn_beta and cn_r")
     sensor: SensorModelTable = Field(default=SensorModelTable(), description="a [sensor] table")
     effects: list[EffectTable] = Field(default=[], description="[[effects]] tables")
 
@@ -90,16 +85,14 @@ def read_plan(path: Path) -> PlanDocument:
         TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
     """
     document = load_toml(path, missing="name a campaign description such as the packaged paper-campaign.toml")
-    check_version(document, path)
     plan = validate(PlanDocument, document, path)
-    where = f"{shown(path)}, [conditions]"
-    table = plan.conditions
-    if not table.springs and not table.spring_stiffness:
+    where = shown(path)
+    if not plan.springs and not plan.spring_stiffness:
         raise TunnelError(
             "no spring", where=where, remedy="give springs (numbers) or spring_stiffness (N m/rad)"
         )
     for key in ("springs", "spring_stiffness", "wind_speeds", "release_angles_deg"):
-        values = getattr(table, key)
+        values = getattr(plan, key)
         twice = next((value for value in values if values.count(value) > 1), None)
         if twice is not None:
             raise TunnelError(
