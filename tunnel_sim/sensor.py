@@ -2,25 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from tunnel_sim.effects import Effect
+from tunnel_sim.motion import Motion
 from tunnel_sim.plan import SensorModel
-from tunnel_sim.record import Array
+from tunnel_sim.record import Array, Record
+from tunnel_sim.run_settings import RunSettings
 
 
-def read_angle(angle: Array, sensor: SensorModel, rng: np.random.Generator) -> Array:
-    """The reading y = quantised(β + zero + noise).
+def read_motion(
+    motion: Motion,
+    stated: RunSettings,
+    sensor: SensorModel,
+    rng: np.random.Generator,
+    effects: Sequence[Effect] = (),
+) -> Record:
+    """The reading y = quantised(β + zero + noise), with the sensor's effects at their places.
 
     Args:
-        angle: true angle of the sensor's end of the rod, rad, shape (n,).
+        motion: of the rod's upper end.
+        stated: the run as the campaign states it.
         sensor: noise, zero and resolution; a resolution of 0 leaves the reading continuous.
-        rng: source of the noise.
+        rng: source of the noise. What effects draw comes from generators spawned of it, so that an effect at
+            its null leaves the noise as it is.
+        effects: what the nominal model leaves out; those that do not concern the sensor do nothing here.
 
     Returns:
-        The reading, rad, shape (n,). It is the ideal converter's without an end stop: clipping is an effect.
+        The record. The ideal converter has no end stop: clipping is an effect.
     """
-    noisy = angle + sensor.zero + sensor.noise_std * rng.standard_normal(angle.shape)
-    return quantise(noisy, sensor.resolution)
+    angle = motion.angle
+    for effect in effects:
+        angle = effect.on_angle(angle, motion.time_s, stated, rng.spawn(1)[0])
+        sensor = effect.on_sensor(sensor)
+    reading = angle + sensor.zero + sensor.noise_std * rng.standard_normal(angle.shape)
+    for effect in effects:
+        reading = effect.on_reading(reading)
+    return Record(motion.time_s, quantise(reading, sensor.resolution))
 
 
 def quantise(reading: Array, step: float) -> Array:

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from mujoco import batch as mujoco_batch
 
+from tunnel_sim.effects import Effect
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.model import Model, build_model
 from tunnel_sim.motion import Motion, sampling
@@ -15,7 +16,7 @@ from tunnel_sim.plan import SensorModel
 from tunnel_sim.record import Array, Record
 from tunnel_sim.rig import Rig
 from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.sensor import read_angle
+from tunnel_sim.sensor import read_motion
 
 Progress = Callable[[int, int], None]
 _CHUNK_SAMPLES = 4_000_000  # recorded angles held at once: bounds the memory of a large batch
@@ -46,22 +47,48 @@ def simulate_motion(model: Model, sample_rate: float) -> Motion:
     return Motion(np.arange(samples) / sample_rate, angle, rate)
 
 
-def simulate(model: Model, sensor: SensorModel, rng: np.random.Generator) -> Record:
+def simulate(
+    rig: Rig,
+    settings: RunSettings,
+    sensor: SensorModel,
+    rng: np.random.Generator,
+    *,
+    effects: Sequence[Effect] = (),
+) -> Record:
     """Simulate one run as the sensor sees it.
 
     Args:
-        model: the rig in this run.
+        rig: geometry, mass and sensor.
+        settings: the physics of the run as stated.
         sensor: the potentiometer.
-        rng: source of its noise.
+        rng: source of its noise and of what effects draw.
+        effects: what acts beyond the stated physics.
 
     Returns:
         The record.
 
     Raises:
-        TunnelError: when the integration leaves the finite range.
+        TunnelError: when the integration leaves the finite range or the settings are refused.
     """
-    motion = simulate_motion(model, sensor.sample_rate)
-    return Record(motion.time_s, read_angle(motion.angle, sensor, rng))
+    model = build_model(rig, apply_effects(settings, effects, rng))
+    return read_motion(simulate_motion(model, sensor.sample_rate), settings, sensor, rng, effects)
+
+
+def apply_effects(stated: RunSettings, effects: Sequence[Effect], rng: np.random.Generator) -> RunSettings:
+    """The physics of a run with effects added.
+
+    Args:
+        stated: the run as the campaign states it.
+        effects: in the order in which they act.
+        rng: what effects draw comes from generators spawned of it.
+
+    Returns:
+        The changed physics.
+    """
+    run = stated
+    for effect in effects:
+        run = effect.on_run(run, stated, rng.spawn(1)[0])
+    return run
 
 
 def simulate_batch(
@@ -70,6 +97,7 @@ def simulate_batch(
     sensor: SensorModel,
     rngs: Sequence[np.random.Generator],
     *,
+    effects: Sequence[Effect] = (),
     nthread: int = 0,
     progress: Progress | None = None,
 ) -> list[Record]:
@@ -77,9 +105,10 @@ def simulate_batch(
 
     Args:
         rig: geometry, mass and sensor, common to the runs.
-        settings: the physics of every run.
+        settings: the stated physics of every run.
         sensor: the potentiometer, common to the runs.
         rngs: one generator per run.
+        effects: what acts beyond the stated physics, in all runs.
         nthread: threads; 0 takes all processors. The result is the same to the bit whatever the number,
             and the same as a loop over `simulate`.
         progress: called with (runs done, runs in all).
@@ -94,10 +123,11 @@ def simulate_batch(
         raise TunnelError(
             f"{len(settings)} runs but {len(rngs)} random generators", remedy="give one generator per run"
         )
-    motions = simulate_motions(rig, settings, sensor.sample_rate, nthread=nthread, progress=progress)
+    true = [apply_effects(run, effects, rng) for run, rng in zip(settings, rngs, strict=True)]
+    motions = simulate_motions(rig, true, sensor.sample_rate, nthread=nthread, progress=progress)
     return [
-        Record(motion.time_s, read_angle(motion.angle, sensor, rng))
-        for motion, rng in zip(motions, rngs, strict=True)
+        read_motion(motion, run, sensor, rng, effects)
+        for motion, run, rng in zip(motions, settings, rngs, strict=True)
     ]
 
 

@@ -1,0 +1,63 @@
+"""A random moment from the turbulence of the stream."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from math import exp, pi, sqrt
+
+import numpy as np
+from scipy.signal import lfilter
+
+from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.run_settings import RunSettings, Series
+
+_INTERVAL = 1e-3  # s between samples of the random moment
+
+
+@dataclass(frozen=True)
+class Buffeting(Effect):
+    """A random moment from the turbulence of the stream.
+
+    Args:
+        intensity: standard deviation of the moment coefficient, dimensionless.
+        bandwidth: corner frequency of the moment's spectrum, Hz.
+    """
+
+    name = "buffeting"
+    channel = "forcing"
+    condition = "wind_on"
+    equation = "random moment of standard deviation s ½ρV²Al, exponentially correlated"
+    signature = (
+        "The response wanders about the decay in wind-on runs, and after the decay goes on as "
+        "narrow-band noise at the rig's own frequency."
+    )
+    references = (
+        "Dryden, NACA Report 342 (1930)",
+        "Gauss–Markov process: Gillespie, Phys. Rev. E 54 (1996) 2084, doi 10.1103/PhysRevE.54.2084",
+    )
+    stochastic = True
+
+    intensity: float = parameter(
+        "s", "1", "standard deviation of the moment coefficient", scale=0.003, lower=0.0, upper=1.0
+    )
+    bandwidth: float = parameter(
+        "fb",
+        "Hz",
+        "corner frequency of the moment's spectrum",
+        scale=20.0,
+        lower=0.01,
+        upper=400.0,
+        default=20.0,
+    )
+
+    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+        """Add the random moment as a sampled forcing."""
+        if stated.wind_speed <= 0.0 or self.is_null:
+            return run
+        count = int(run.duration / _INTERVAL) + 2
+        decay = exp(-2.0 * pi * self.bandwidth * _INTERVAL)
+        kicks = sqrt(1.0 - decay**2) * rng.standard_normal(count)
+        kicks[0] = rng.standard_normal()  # starts in its steady state
+        series = Series(tuple((self.intensity * lfilter([1.0], [1.0, -decay], kicks)).tolist()), _INTERVAL)
+        return dataclasses.replace(run, series={**run.series, "forcing": series})

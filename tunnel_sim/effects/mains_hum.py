@@ -1,0 +1,37 @@
+"""Hum of the mains in the reading."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.record import Array
+from tunnel_sim.run_settings import RunSettings
+
+
+@dataclass(frozen=True)
+class MainsHum(Effect):
+    """Hum of the mains in the reading.
+
+    Args:
+        amplitude: amplitude of the hum, rad.
+    """
+
+    name = "mains_hum"
+    channel = "sensor"
+    condition = "always"
+    equation = "y = β + a sin(2π·50 t + φ), φ drawn for every run"
+    signature = "A spectral line at 50 Hz in every run, whatever the motion."
+    references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+
+    amplitude: float = parameter("a", "rad", "amplitude of the hum", scale=0.0005, lower=0.0, upper=1.0)
+
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, rng: np.random.Generator) -> Array:
+        """Add the hum at a phase of the run's own."""
+        del stated
+        phase = float(rng.uniform(0.0, 2.0 * np.pi))
+        return (
+            angle + self.amplitude * np.sin(2.0 * np.pi * 50.0 * time_s + phase) if self.amplitude else angle
+        )

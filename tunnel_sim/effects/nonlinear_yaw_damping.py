@@ -1,0 +1,35 @@
+"""Aerodynamic damping that depends on the yaw angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.effects.base import Effect, parameter, with_law
+from tunnel_sim.run_settings import RunSettings
+
+
+@dataclass(frozen=True)
+class NonlinearYawDamping(Effect):
+    """Aerodynamic damping that depends on the yaw angle.
+
+    Args:
+        coefficient: share of Ca per squared angle, 1/rad2.
+    """
+
+    name = "nonlinear_yaw_damping"
+    channel = "damping"
+    condition = "wind_on"
+    equation = "Ca (1 + μa β²) β̇ in place of Ca β̇"
+    signature = "The damping ratio of wind-on runs departs by the share μa A²/4 of the aerodynamic part."
+    references = ("van der Pol, Phil. Mag. 2 (1926) 978, doi 10.1080/14786442608564127",)
+
+    coefficient: float = parameter(
+        "μa", "1/rad2", "share of Ca per squared angle", scale=5.0, lower=-500.0, upper=500.0
+    )
+
+    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+        """Set the moment law's term."""
+        del stated, rng
+        return with_law(run, damping_quadratic=self.coefficient)

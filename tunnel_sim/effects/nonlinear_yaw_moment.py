@@ -1,0 +1,37 @@
+"""An aerodynamic yaw moment that is not linear in the yaw angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.effects.base import Effect, parameter, with_law
+from tunnel_sim.run_settings import RunSettings
+
+
+@dataclass(frozen=True)
+class NonlinearYawMoment(Effect):
+    """An aerodynamic yaw moment that is not linear in the yaw angle.
+
+    Args:
+        coefficient: share of Ka per squared angle, 1/rad2.
+    """
+
+    name = "nonlinear_yaw_moment"
+    channel = "stiffness"
+    condition = "wind_on"
+    equation = "Ka (1 + κa β²) β in place of Ka β"
+    signature = "As cubic stiffness, but in proportion to V² and absent with the wind off."
+    references = (
+        "Mansor & Passmore, J. Wind Eng. Ind. Aerodyn. 96 (2008) 1218, doi 10.1016/j.jweia.2007.05.008",
+    )
+
+    coefficient: float = parameter(
+        "κa", "1/rad2", "share of Ka per squared angle", scale=1.0, lower=-100.0, upper=100.0
+    )
+
+    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+        """Set the moment law's term."""
+        del stated, rng
+        return with_law(run, moment_cubic=self.coefficient)

@@ -1,0 +1,51 @@
+"""A rod that twists between the spring's and sensor's end and the body."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.run_settings import RodTwist, RunSettings
+
+
+@dataclass(frozen=True)
+class RodFlexibility(Effect):
+    """A rod that twists between the spring's and sensor's end and the body.
+
+    Args:
+        compliance: twist per moment, rad/(N m).
+        inertia_share: share of Izz that moves with the spring's end, dimensionless.
+    """
+
+    name = "rod_flexibility"
+    channel = "stiffness"
+    condition = "always"
+    equation = "two inertias coupled by Krod; the sensor reads the spring's end, the air acts on the body"
+    signature = (
+        "The stiffness of spring and rod in series falls below the spring's, the more the stiffer "
+        "the spring; the air's stiffness acts on the far end; the rod may ring at the release."
+    )
+    references = ("Meirovitch, Fundamentals of Vibrations, McGraw-Hill 2001",)
+
+    compliance: float = parameter(
+        "1/Krod", "rad/(N m)", "twist per moment", scale=0.0005, lower=0.0, upper=1.0
+    )
+    inertia_share: float = parameter(
+        "s",
+        "1",
+        "share of Izz that moves with the spring's end",
+        scale=0.1,
+        lower=0.001,
+        upper=0.999,
+        default=0.1,
+    )
+
+    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+        """Let the rod twist."""
+        del stated, rng
+        if self.is_null:
+            return run
+        return dataclasses.replace(run, rod_twist=RodTwist(self.compliance, self.inertia_share))

@@ -1,0 +1,39 @@
+"""Backlash between rod and sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.forward import backlash
+from tunnel_sim.record import Array
+from tunnel_sim.run_settings import RunSettings
+
+
+@dataclass(frozen=True)
+class SensorHysteresis(Effect):
+    """Backlash between rod and sensor.
+
+    Args:
+        half_width: half width of the play, rad.
+    """
+
+    name = "sensor_hysteresis"
+    channel = "sensor"
+    condition = "always"
+    equation = "y follows β when pushed: play of half width w"
+    signature = "The reading rests for a moment at every turn of the motion, and lags by w between turns."
+    references = (
+        "Visintin, Differential Models of Hysteresis, Springer 1994, doi 10.1007/978-3-662-11557-2",
+    )
+
+    half_width: float = parameter("w", "rad", "half width of the play", scale=0.001, lower=0.0, upper=0.2)
+
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, rng: np.random.Generator) -> Array:
+        """Follow when pushed; the release has just pushed it outward."""
+        del time_s, stated, rng
+        if self.is_null:
+            return angle
+        return backlash(angle, self.half_width, float(angle[0] - np.sign(angle[0]) * self.half_width))

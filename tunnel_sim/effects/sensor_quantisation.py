@@ -1,0 +1,31 @@
+"""A resolution coarser than stated."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.plan import SensorModel
+
+
+@dataclass(frozen=True)
+class SensorQuantisation(Effect):
+    """A resolution coarser than stated.
+
+    Args:
+        step: true step of the reading, rad.
+    """
+
+    name = "sensor_quantisation"
+    channel = "sensor"
+    condition = "always"
+    equation = "y = step·round(y/step)"
+    signature = "The reading lies on a lattice coarser than stated, and its error is a sawtooth of the angle."
+    references = ("Widrow & Kollár, Quantization Noise, CUP 2008, doi 10.1017/CBO9780511754661",)
+
+    step: float = parameter("q", "rad", "true step of the reading", scale=0.002, lower=0.0, upper=1.0)
+
+    def on_sensor(self, sensor: SensorModel) -> SensorModel:
+        """Convert at the true step."""
+        return dataclasses.replace(sensor, resolution=self.step) if self.step else sensor

@@ -1,0 +1,39 @@
+"""A wind speed that drifts during the run."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.run_settings import RunSettings, Series
+
+
+@dataclass(frozen=True)
+class WindSpeedDrift(Effect):
+    """A wind speed that drifts during the run.
+
+    Args:
+        drift: share of the speed gained over the run, dimensionless.
+    """
+
+    name = "wind_speed_drift"
+    channel = "stiffness"
+    condition = "wind_on"
+    equation = "V(t) = V (1 + d t/T) over a run of length T"
+    signature = "The frequency of wind-on runs moves with time, whatever the amplitude."
+    references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
+
+    drift: float = parameter(
+        "d", "1", "share of the speed gained over the run", scale=0.02, lower=-0.9, upper=5.0
+    )
+
+    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+        """Replace the constant wind by a ramp."""
+        del rng
+        if stated.wind_speed <= 0.0 or self.is_null:
+            return run
+        ramp = Series((run.wind_speed, run.wind_speed * (1.0 + self.drift)), run.duration)
+        return dataclasses.replace(run, series={**run.series, "wind_speed": ramp})

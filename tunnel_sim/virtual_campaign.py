@@ -1,0 +1,134 @@
+"""A whole campaign on the virtual rig, from its plan."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from tunnel_sim.aero import AeroDerivatives
+from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.effects import Effect, effect_from
+from tunnel_sim.plan import CampaignPlan, Condition, Truth
+from tunnel_sim.rig import Rig, load_rig
+from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.simulate import Progress, simulate_batch
+
+
+def simulate_campaign(
+    plan: CampaignPlan, rig: Rig | None = None, *, nthread: int = 0, progress: Progress | None = None
+) -> Campaign:
+    """Make every run of a plan.
+
+    Args:
+        plan: conditions, truth, sensor, effects and seed.
+        rig: geometry and mass; None takes the packaged rig.
+        nthread: threads; 0 takes all processors. The result is the same to the bit whatever the number.
+        progress: called with (runs done, runs in all).
+
+    Returns:
+        The campaign, as a rig engineer would have measured it: it states the rig's nominal inertia, not
+        the injected one, and knows nothing of the truth.
+
+    Raises:
+        TunnelError: when an effect is unknown or a run leaves the finite range.
+    """
+    rig = load_rig() if rig is None else rig
+    effects = plan_effects(plan)
+    settings = [run_settings(plan.truth, condition) for condition in plan.conditions]
+    rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(plan.seed).spawn(len(settings))]
+    records = simulate_batch(
+        rig, settings, plan.sensor, rngs, effects=effects, nthread=nthread, progress=progress
+    )
+    runs = tuple(
+        Run(
+            id=condition.id,
+            record=record,
+            wind_speed=condition.wind_speed,
+            spring_stiffness=condition.spring_stiffness,
+            air_density=condition.air_density if condition.wind_speed > 0.0 else None,
+            release_angle=condition.release_angle,
+        )
+        for condition, record in zip(plan.conditions, records, strict=True)
+    )
+    return Campaign(
+        name=plan.name,
+        description=plan.description,
+        rig=RigProperties(
+            yaw_inertia=rig.dynamics.yaw_inertia,
+            frontal_area=rig.body.frontal_area,
+            reference_length=rig.body.length,
+            width=rig.body.width,
+        ),
+        sensor=SensorProperties(
+            sample_rate=plan.sensor.sample_rate,
+            resolution=plan.sensor.resolution or None,
+            noise_std=plan.sensor.noise_std or None,
+        ),
+        runs=runs,
+    )
+
+
+def run_settings(truth: Truth, condition: Condition, *, timestep: float = 1e-3) -> RunSettings:
+    """The stated physics of one run.
+
+    Args:
+        truth: coefficients.
+        condition: spring, wind and release.
+        timestep: integration step, s.
+
+    Returns:
+        The run without any effect.
+    """
+    return RunSettings(
+        spring_stiffness=condition.spring_stiffness,
+        derivatives=AeroDerivatives(truth.cn_beta, truth.cn_r),
+        yaw_inertia=truth.yaw_inertia,
+        mechanical_damping=truth.mechanical_damping,
+        wind_speed=condition.wind_speed,
+        air_density=condition.air_density,
+        release_angle=condition.release_angle,
+        duration=condition.duration,
+        timestep=timestep,
+    )
+
+
+def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
+    """The effects a plan names.
+
+    Args:
+        plan: its effects, by name and parameters.
+
+    Returns:
+        The effects.
+
+    Raises:
+        TunnelError: when a name is unknown or a value out of range.
+    """
+    return tuple(effect_from(setting.name, setting.parameters) for setting in plan.effects)
+
+
+def truth_document(plan: CampaignPlan) -> dict[str, Any]:
+    """What was injected, for ``truth.json``; no estimator or diagnosis reads it.
+
+    Args:
+        plan: the plan that was simulated.
+
+    Returns:
+        Coefficients, sensor, effects with their parameters, seed and versions, in JSON's types.
+    """
+    effects = plan_effects(plan)
+    return {
+        "schema_version": 1,
+        "cn_beta": plan.truth.cn_beta,
+        "cn_r": plan.truth.cn_r,
+        "yaw_inertia": plan.truth.yaw_inertia,
+        "mechanical_damping": plan.truth.mechanical_damping,
+        "noise_std": plan.sensor.noise_std,
+        "sensor_zero": plan.sensor.zero,
+        "effects": sorted(effect.name for effect in effects),
+        "parameters": {effect.name: effect.to_json_dict()["parameters"] for effect in effects},
+        "seed": plan.seed,
+        "versions": {"mujoco": mujoco.__version__, "numpy": np.__version__},
+    }
