@@ -100,6 +100,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader went away (``tunnel springs | head -1``): not an error, and Python must not flush again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        return _refuse(
+            f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}; check disk and path"
+        )
     if status == INTERRUPTED:
         print("tunnel: interrupted; no file is left half written", file=sys.stderr)
     return status if isinstance(status, int) else 0

@@ -8,6 +8,10 @@ FIXED_DECIMALS = 7
 """Beyond this many decimals, or a million, a number is written with a power of ten."""
 
 
+NEGLIGIBLE = 1e-9
+"""A standard deviation below this share of the value no longer decides how many digits are worth printing."""
+
+
 def significant(value: float, digits: int = 4) -> str:
     """A number whose uncertainty is not known.
 
@@ -44,6 +48,8 @@ def with_std(value: float, std: float | None) -> str:
         return f"{significant(value, 7)} ± 0"
     if not math.isfinite(value):
         return "not finite"
+    if std < NEGLIGIBLE * abs(value):
+        return f"{value:.10g} ± {std:.1e}"
     decimals = 1 - _exponent(std, 2)
     if decimals <= FIXED_DECIMALS and max(abs(value), std) < 1e6:
         return f"{round(value, decimals):.{max(decimals, 0)}f} ± {round(std, decimals):.{max(decimals, 0)}f}"

@@ -15,6 +15,9 @@ from pathlib import Path
 TIMEOUT_S = 60.0
 """A back end that has not drawn one picture by now is taken to hang, s."""
 
+SHOWN_ANGLE_DEG = 20.0
+"""The yaw angle of the model in the picture, degrees: the largest release of the paper's campaign."""
+
 REMEDY = "install EGL or OSMesa (Debian and Ubuntu: libegl1 or libosmesa6) to have the picture"
 
 
@@ -72,16 +75,25 @@ def _draw(path: Path, width: int, height: int, camera: str) -> None:
     from matplotlib import image
 
     from tunnel_lab.files import write_whole
+    from tunnel_sim.aero import AeroDerivatives
     from tunnel_sim.model import build_model
     from tunnel_sim.rig import load_rig
+    from tunnel_sim.run_settings import RunSettings
 
-    model = build_model(load_rig())
-    model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
-    model.vis.global_.offheight = max(height, model.vis.global_.offheight)
-    data = mujoco.MjData(model)
-    data.qpos[0] = radians(20.0)
-    mujoco.mj_forward(model, data)
-    with mujoco.Renderer(model, height, width) as renderer:
+    rig = load_rig()
+    settings = RunSettings(
+        rig.spring(rig.dynamics.default_spring),
+        AeroDerivatives(0.0, 0.0),
+        rig.dynamics.yaw_inertia,
+        rig.dynamics.mechanical_damping,
+        release_angle=radians(SHOWN_ANGLE_DEG),
+    )
+    model = build_model(rig, settings)
+    model.mj.vis.global_.offwidth = max(width, model.mj.vis.global_.offwidth)
+    model.mj.vis.global_.offheight = max(height, model.mj.vis.global_.offheight)
+    data = model.release_state()
+    mujoco.mj_forward(model.mj, data)
+    with mujoco.Renderer(model.mj, height, width) as renderer:
         renderer.update_scene(data, camera=camera)
         buffer = io.BytesIO()
         image.imsave(buffer, renderer.render(), format="png")

@@ -9,6 +9,7 @@ from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from tunnel_lab.formatting import in_stds, significant, with_std
 
@@ -25,6 +26,14 @@ SYMBOLS: Mapping[str, str] = {
 """How the paper writes the quantities of an estimate, by their name in its JSON."""
 
 
+class _Console(Console):
+    """A console that leaves it to ``main`` to end when the reader of a pipe goes away."""
+
+    def on_broken_pipe(self) -> None:
+        """Pass the error on; Rich itself would exit with status 1."""
+        raise BrokenPipeError
+
+
 def console(*, stderr: bool = False) -> Console:
     """A console that colours nothing by guesswork.
 
@@ -34,7 +43,7 @@ def console(*, stderr: bool = False) -> Console:
     Returns:
         The console.
     """
-    return Console(stderr=stderr, highlight=False)
+    return _Console(stderr=stderr, highlight=False)
 
 
 def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
@@ -50,7 +59,8 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
     """
     result = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     for column in columns:
-        result.add_column(column, justify="right" if column in right else "left", no_wrap=True)
+        # As text, not markup: units stand in brackets.
+        result.add_column(Text(column), justify="right" if column in right else "left", no_wrap=True)
     return result
 
 

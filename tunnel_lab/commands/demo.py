@@ -119,7 +119,7 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
     from tunnel_lab.files import write_json
     from tunnel_lab.tables import console, status_lines, truth_table
     from tunnel_sim.campaign_io import write_campaign
-    from tunnel_sim.simulate import truth_document
+    from tunnel_sim.virtual_campaign import truth_document
 
     out = console()
     campaign = simulate_with_progress(plan)

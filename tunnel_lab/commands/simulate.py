@@ -61,7 +61,7 @@ def run(
     from tunnel_lab.tables import console
     from tunnel_sim.campaign_io import write_campaign
     from tunnel_sim.plan import load_plan
-    from tunnel_sim.simulate import truth_document
+    from tunnel_sim.virtual_campaign import truth_document
 
     loaded = load_plan(plan)
     if seed is not None:
@@ -104,7 +104,7 @@ def simulate_with_progress(plan: CampaignPlan) -> Campaign:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     from tunnel_lab.tables import console
-    from tunnel_sim.simulate import simulate_campaign
+    from tunnel_sim.virtual_campaign import simulate_campaign
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console(stderr=True)) as progress:

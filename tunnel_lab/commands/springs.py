@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from identification.springs import SpringFit
     from tunnel_lab.spring_table import SpringTable
 
 NAME = "springs"
@@ -75,7 +74,7 @@ def show(springs: SpringTable, source: str) -> None:
     from tunnel_lab import tables
     from tunnel_lab.formatting import with_std
 
-    fit: SpringFit = fit_springs(springs.stiffness, springs.frequency_hz)
+    fit = fit_springs(springs.stiffness, springs.frequency_hz)
     out = tables.console()
     rows = tables.table(
         f"Springs of {source}",
@@ -92,8 +91,12 @@ def show(springs: SpringTable, source: str) -> None:
             f"{frequency:g}",
             f"{square:.2f}",
             f"{residual:+.1f}",
-            "leaves the line" if flag else "",
+            "off the line" if flag else "",
         )
     out.print(rows)
-    out.print(f"Izz (gradient) = {with_std(fit.yaw_inertia.value, fit.yaw_inertia.std)} kg m²")
+    if fit.inertia.value <= 0.0:
+        problem = "stiffness does not rise with frequency: check the table; no inertia can be had from it"
+        tables.console(stderr=True).print(problem, markup=False, soft_wrap=True)
+        raise typer.Exit(1)
+    out.print(f"Izz (gradient) = {with_std(fit.inertia.value, fit.inertia.std)} kg m²")
     out.print(f"intercept      = {with_std(fit.intercept.value, fit.intercept.std)} N m/rad")
