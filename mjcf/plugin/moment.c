@@ -84,22 +84,44 @@ double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate,
   return (slip * stop + onward * (duration - stop)) / duration;
 }
 
+// Moments of the lag's kernel, w[n] = integral of z exp(-z (1 - u)) u^n over u from 0 to 1, n = 0..3.
+// Integration by parts links neighbours, w[n] = 1 - n w[n-1]/z: used upwards where z is large, downwards from
+// a series where it is small. Either way no digits are lost, however short the step.
+static void kernel_moments(double z, double w[4]) {
+  if (z > 1) {
+    w[0] = -expm1(-z);
+    for (int n = 1; n < 4; n++) {
+      w[n] = 1 - n * w[n - 1] / z;
+    }
+    return;
+  }
+  double term = z / 4, sum = term;  // w[3] = sum of -(-z)^k 3!/(3+k)! over k from 1
+  for (int k = 2; k < 16; k++) {
+    term *= -z / (3 + k);
+    sum += term;
+  }
+  w[3] = sum;
+  for (int n = 3; n > 0; n--) {
+    w[n - 1] = z * (1 - w[n]) / n;
+  }
+}
+
 double vwt_lag_advance(double lag_time, double lagged, double duration, double angle0, double rate0,
                        double angle1, double rate1) {
   if (lag_time == 0) {
     return angle1;
   }
-  if (duration == 0) {
+  if (!(duration > 0)) {
     return lagged;
   }
-  const double tau = fabs(lag_time), h = duration;
-  // the path b(t) = c0 + c1 t + c2 t^2 + c3 t^3 (Hermite), and x = particular polynomial + decay
-  const double slope = (angle1 - angle0) / h;
-  const double c0 = angle0, c1 = rate0;
-  const double c2 = (3 * slope - 2 * rate0 - rate1) / h;
-  const double c3 = (rate0 + rate1 - 2 * slope) / (h * h);
-  const double d3 = c3, d2 = c2 - 3 * tau * d3, d1 = c1 - 2 * tau * d2, d0 = c0 - tau * d1;
-  return d0 + h * (d1 + h * (d2 + h * d3)) + (lagged - d0) * exp(-h / tau);
+  // the path in u = time/duration: angle0 + c1 u + c2 u^2 + c3 u^3 (Hermite)
+  const double h = duration, change = angle1 - angle0;
+  const double c1 = h * rate0;
+  const double c2 = 3 * change - h * (2 * rate0 + rate1);
+  const double c3 = h * (rate0 + rate1) - 2 * change;
+  double w[4];
+  kernel_moments(h / fabs(lag_time), w);
+  return lagged + w[0] * (angle0 - lagged) + w[1] * c1 + w[2] * c2 + w[3] * c3;
 }
 
 double vwt_series(const double* values, int count, double interval, double time) {
@@ -107,7 +129,7 @@ double vwt_series(const double* values, int count, double interval, double time)
     return values[0];
   }
   const double place = time / interval;
-  if (place >= count - 1) {
+  if (!(place < count - 1)) {  // also where interval is zero or not a number
     return values[count - 1];
   }
   const int low = (int)place;

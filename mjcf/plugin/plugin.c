@@ -28,12 +28,33 @@ typedef struct {
   int count;                              // how many parameters the model gives
   int parameter[VWT_PARAMETER_COUNT];     // which they are
   int numeric[VWT_PARAMETER_COUNT];       // and the ids of their numerics
+  int names_size;                         // of the names of all numerics, which the ids stand for
+  char names[];
 } Instance;
 
 // what a MuJoCo element owns is read there, never given again as a numeric
 static int is_native(int parameter) {
   return parameter == VWT_INDEX_spring_stiffness || parameter == VWT_INDEX_mechanical_damping ||
          parameter == VWT_INDEX_yaw_inertia;
+}
+
+// The names of the model's numerics, one after the other, and their size in bytes.
+static const char* numeric_names(const mjModel* m, int* size) {
+  const char* last = m->names + m->name_numericadr[m->nnumeric - 1];
+  const char* first = m->names + m->name_numericadr[0];
+  *size = (int)(last - first + strlen(last) + 1);
+  return first;
+}
+
+// One mjData may serve many models, but the ids found for the first hold only where the others list the same
+// numerics in the same order: anything else would give one coefficient the value of another.
+static void check_same_numerics(const mjModel* m, const Instance* self) {
+  int size = 0;
+  if (m->nnumeric < 1 || (numeric_names(m, &size), size != self->names_size) ||
+      memcmp(numeric_names(m, &size), self->names, size)) {
+    mju_error("vwt.yaw_moment: this model's numerics are not those of the model its mjData was made for; give "
+              "all models of a rollout or batch the same numerics in the same order");
+  }
 }
 
 static mjtNum mass_diagonal(const mjModel* m, const mjData* d, int dof) {
@@ -138,6 +159,7 @@ static void apply_moments(const mjModel* m, mjData* d, const Instance* self, con
 }
 
 static void sense_moment(const mjModel* m, mjData* d, const Instance* self, const mjtNum* state, int instance) {
+  check_same_numerics(m, self);
   vwt_parameters p;
   read_parameters(m, d, self, &p);
   const Motion now = present_motion(m, d, self);
@@ -162,6 +184,7 @@ static void compute(const mjModel* m, mjData* d, int instance, int capability_bi
 static void advance(const mjModel* m, mjData* d, int instance) {
   const Instance* self = (const Instance*)d->plugin_data[instance];
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
+  check_same_numerics(m, self);
   vwt_parameters p;
   read_parameters(m, d, self, &p);
   const Motion now = present_motion(m, d, self);
@@ -192,16 +215,42 @@ static int find_hinge(const mjModel* m, int instance, const char* attribute) {
 }
 
 static void check_series(const mjModel* m, int values, int interval, const char* name) {
-  for (int i = 0; i < m->numeric_size[values]; i++) {
-    const mjtNum value = m->numeric_data[m->numeric_adr[values] + i];
-    if (!isfinite(value)) {
+  for (int i = 0; values >= 0 && i < m->numeric_size[values]; i++) {
+    if (!isfinite(m->numeric_data[m->numeric_adr[values] + i])) {
       mju_error("vwt.yaw_moment: numeric %s is not finite at sample %d", name, i);
     }
   }
-  if (m->numeric_size[values] > 1 &&
-      (interval < 0 || !(m->numeric_data[m->numeric_adr[interval]] > 0) ||
-       !isfinite(m->numeric_data[m->numeric_adr[interval]]))) {
-    mju_error("vwt.yaw_moment: numeric %s is a series: give a positive %s_interval in s", name, name);
+  if (interval < 0) {
+    if (values >= 0 && m->numeric_size[values] > 1) {
+      mju_error("vwt.yaw_moment: numeric %s is a series: give its %s_interval in s", name, name);
+    }
+    return;
+  }
+  const mjtNum step = m->numeric_data[m->numeric_adr[interval]];
+  if (m->numeric_size[interval] != 1 || !(step > 0) || !isfinite(step)) {
+    mju_error("vwt.yaw_moment: numeric %s_interval must be one positive number in s", name);
+  }
+  if (values < 0) {
+    mju_error("vwt.yaw_moment: numeric %s_interval is given without %s", name, name);
+  }
+}
+
+// A coefficient whose name is misspelt would silently stay zero.
+static void check_names(const mjModel* m) {
+  static const char* const series[] = {"wind_speed", "wind_speed_interval", "forcing", "forcing_interval"};
+  for (int i = 0; i < m->nnumeric; i++) {
+    const char* name = m->names + m->name_numericadr[i];
+    int known = !strncmp(name, "user_", 5);
+    for (int k = 0; k < VWT_PARAMETER_COUNT && !known; k++) {
+      known = !strcmp(name, vwt_parameter_names[k]);
+    }
+    for (int k = 0; k < 4 && !known; k++) {
+      known = !strcmp(name, series[k]);
+    }
+    if (!known) {
+      mju_error("vwt.yaw_moment: numeric %s is unknown; correct it by the table in the plugin's README, or begin "
+                "its name with user_ if it is not the plugin's", name);
+    }
   }
 }
 
@@ -214,13 +263,11 @@ static void find_series(const mjModel* m, Instance* self) {
     mju_error("vwt.yaw_moment: numeric wind_speed is missing; give it in m/s, 0 for wind-off");
   }
   check_series(m, self->wind_speed, self->wind_interval, "wind_speed");
+  check_series(m, self->forcing, self->forcing_interval, "forcing");
   for (int i = 0; i < m->numeric_size[self->wind_speed]; i++) {
     if (m->numeric_data[m->numeric_adr[self->wind_speed] + i] < 0) {
       mju_error("vwt.yaw_moment: numeric wind_speed is negative at sample %d", i);
     }
-  }
-  if (self->forcing >= 0) {
-    check_series(m, self->forcing, self->forcing_interval, "forcing");
   }
 }
 
@@ -242,38 +289,55 @@ static void find_parameters(const mjModel* m, Instance* self) {
     }
     const mjtNum value = m->numeric_data[m->numeric_adr[id]];
     if (m->numeric_size[id] != 1 || !isfinite(value) || value < vwt_parameter_least[i]) {
-      mju_error("vwt.yaw_moment: numeric %s must be one finite number in %s, at least %g", name,
-                vwt_parameter_units[i], vwt_parameter_least[i]);
+      const int bounded = vwt_parameter_least[i] > -VWT_ANY;
+      mju_error("vwt.yaw_moment: numeric %s must be one finite number%s in %s", name,
+                bounded ? " of zero or more" : "", vwt_parameter_units[i]);
     }
     self->parameter[self->count] = i;
     self->numeric[self->count++] = id;
   }
 }
 
-static int init(const mjModel* m, mjData* d, int instance) {
+static void find_joints(const mjModel* m, int instance, Instance* self) {
+  self->joint = find_hinge(m, instance, "joint");
+  if (self->joint < 0) {
+    mju_error("vwt.yaw_moment: attribute joint is missing; name the hinge in yaw");
+  }
+  self->twist_joint = find_hinge(m, instance, "twist_joint");
+  if (self->twist_joint == self->joint) {
+    mju_error("vwt.yaw_moment: twist_joint is the same hinge as joint; name the hinge of the rod's twist");
+  }
+  self->dof = m->jnt_dofadr[self->joint];
+  self->twist_dof = self->twist_joint < 0 ? -1 : m->jnt_dofadr[self->twist_joint];
+}
+
+// Finds what the instance refers to, or refuses with a message.
+static void configure(const mjModel* m, int instance, Instance* found) {
   if (mj_version() != mjVERSION_HEADER) {
     mju_error("vwt.yaw_moment: built against MuJoCo %d but loaded by %d; rebuild the package", mjVERSION_HEADER,
               mj_version());
   }
+  if (m->opt.disableflags & mjDSBL_SPRING && m->opt.disableflags & mjDSBL_DAMPER) {
+    mju_error("vwt.yaw_moment: springs and dampers are both disabled, which disables the plugin too; set the "
+              "joint's stiffness or damping to zero instead");
+  }
+  memset(found, 0, sizeof(*found));
+  find_joints(m, instance, found);
+  check_names(m);
+  find_series(m, found);
+  find_parameters(m, found);
+}
+
+static int init(const mjModel* m, mjData* d, int instance) {
   Instance found;
-  memset(&found, 0, sizeof(found));
-  found.joint = find_hinge(m, instance, "joint");
-  if (found.joint < 0) {
-    mju_error("vwt.yaw_moment: attribute joint is missing; name the hinge in yaw");
-  }
-  found.twist_joint = find_hinge(m, instance, "twist_joint");
-  if (found.twist_joint == found.joint) {
-    mju_error("vwt.yaw_moment: twist_joint is the same hinge as joint; name the hinge of the rod's twist");
-  }
-  found.dof = m->jnt_dofadr[found.joint];
-  found.twist_dof = found.twist_joint < 0 ? -1 : m->jnt_dofadr[found.twist_joint];
-  find_series(m, &found);
-  find_parameters(m, &found);
-  Instance* self = (Instance*)malloc(sizeof(Instance));  // last: a refusal above must not leak
+  configure(m, instance, &found);
+  const char* names = numeric_names(m, &found.names_size);
+  Instance* self = (Instance*)malloc(sizeof(Instance) + found.names_size);  // last: a refusal must not leak it
   if (!self) {
     return -1;
   }
   *self = found;
+  memcpy(self->names, names, found.names_size);
   d->plugin_data[instance] = (uintptr_t)self;
   return 0;
 }
@@ -285,7 +349,14 @@ static void destroy(mjData* d, int instance) {
 
 static void copy(mjData* dest, const mjModel* m, const mjData* src, int instance) {
   (void)m;
-  memcpy((void*)dest->plugin_data[instance], (const void*)src->plugin_data[instance], sizeof(Instance));
+  const Instance* from = (const Instance*)src->plugin_data[instance];
+  const size_t size = sizeof(Instance) + from->names_size;
+  Instance* to = (Instance*)realloc((void*)dest->plugin_data[instance], size);
+  if (!to) {
+    mju_error("vwt.yaw_moment: out of memory");
+  }
+  memcpy(to, from, size);
+  dest->plugin_data[instance] = (uintptr_t)to;
 }
 
 static void reset(const mjModel* m, mjtNum* plugin_state, void* plugin_data, int instance) {
