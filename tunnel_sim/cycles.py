@@ -8,8 +8,10 @@ from tunnel_sim.record import Array, Record
 
 MAINS_HZ = (50.0, 60.0)
 # A spectral line counts when it is this many times the median of the spectrum. Of white noise, whose bins are
-# exponentially distributed, one record of 10 000 samples in about ten thousand has such a line.
+# exponentially distributed, one record of 10 000 samples in about thirty thousand has such a line. A record
+# shorter than SHORT_RECORD samples has too few bins for a background: its strongest line counts.
 LINE_OVER_MEDIAN = 27.0
+SHORT_RECORD = 100
 # A crossing counts when the reading then goes this far, as a share of the largest swing, beyond the centre.
 HYSTERESIS = 0.03
 NOISE_MARGIN = 4.0  # standard deviations of the smoothed noise, where that is the larger one
@@ -30,9 +32,10 @@ def count_cycles(record: Record) -> float:
         The number of cycles; 0 when nothing oscillates.
     """
     reading = _without_hum(record)
-    if reading.size < 6 or float(np.ptp(reading)) == 0.0:
-        return 0.0
     level = _without_trend(reading)
+    # What is left of a constant, a straight line or pure hum is rounding.
+    if reading.size < 6 or float(np.ptp(level)) <= 1e-9 * float(np.abs(record.yaw_rad).max()):
+        return 0.0
     frequency = _dominant_frequency(level, record.sample_rate)
     if frequency is None:
         return 0.0
@@ -65,11 +68,13 @@ def _without_hum(record: Record) -> Array:
         if reading.size < block or mains > 0.45 * record.sample_rate:
             continue
         phase = 2.0 * np.pi * mains * np.arange(block) / record.sample_rate
-        basis = np.column_stack([np.cos(phase), np.sin(phase)])
+        # A level and a slope are fitted beside the hum, so that a second's motion is not taken for hum.
+        hum_basis = np.column_stack([np.cos(phase), np.sin(phase)])
+        basis = np.column_stack([hum_basis, np.ones(block), np.linspace(-1.0, 1.0, block)])
         # The last block is a whole one too: it begins inside the one before and mends only its own part.
         starts = [*range(0, reading.size - block, block), reading.size - block]
         pieces = np.stack([reading[start : start + block] for start in starts])
-        hum = (pieces @ basis) @ np.linalg.solve(basis.T @ basis, basis.T)
+        hum = pieces @ np.linalg.pinv(basis).T[:, :2] @ hum_basis.T
         overlap = len(starts) * block - reading.size
         reading = reading - np.concatenate([hum[:-1].ravel(), hum[-1, overlap:]])
     return reading
@@ -88,7 +93,8 @@ def _dominant_frequency(reading: Array, sample_rate: float) -> float | None:
     power = np.abs(np.fft.rfft(reading))[1:] ** 2
     frequency = np.fft.rfftfreq(reading.size, 1.0 / sample_rate)[1:]
     # Between power and power per octave: neither slow wander nor a short ringing may hide the oscillation.
-    share = np.where(power > LINE_OVER_MEDIAN * np.median(power), power * np.sqrt(frequency), 0.0)
+    background = float(np.median(power)) if reading.size >= SHORT_RECORD else 0.0
+    share = np.where(power > LINE_OVER_MEDIAN * background, power * np.sqrt(frequency), 0.0)
     best = int(np.argmax(share))
     return float(frequency[best]) if share[best] > 0.0 else None
 

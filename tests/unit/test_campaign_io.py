@@ -1,0 +1,379 @@
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tunnel_sim import campaign_io
+from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.campaign_io import read_campaign, write_campaign
+from tunnel_sim.cycles import count_cycles
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.record import Record
+from tunnel_sim.run_files import read_table, write_table
+
+
+def decay(
+    frequency: float = 2.0,
+    *,
+    zeta: float = 0.01,
+    amplitude: float = 0.35,
+    duration: float = 5.0,
+    rate: float = 200.0,
+    noise: float = 0.0005,
+    seed: int = 0,
+) -> Record:
+    time = np.arange(round(duration * rate)) / rate
+    omega = 2.0 * np.pi * frequency
+    clean = amplitude * np.exp(-zeta * omega * time) * np.cos(omega * np.sqrt(1.0 - zeta**2) * time)
+    return Record(time, clean + noise * np.random.default_rng(seed).standard_normal(time.size))
+
+
+def campaign() -> Campaign:
+    return Campaign(
+        name="two runs",
+        description='of "one" rig – with a\nsecond line',
+        rig=RigProperties(yaw_inertia=0.11, frontal_area=0.036, reference_length=0.625),
+        sensor=SensorProperties(sample_rate=200.0, resolution=0.0005113269292952137),
+        runs=(
+            Run("off", decay(), 0.0, spring_stiffness=16.12, release_angle=0.3490658503988659),
+            Run("on", decay(1.9, seed=1), 10.0, spring_stiffness=16.12, air_density=1.204),
+        ),
+    )
+
+
+def assert_same(one: Campaign, other: Campaign) -> None:
+    assert replace(one, runs=()) == replace(other, runs=())
+    assert len(one.runs) == len(other.runs)
+    for a, b in zip(one.runs, other.runs, strict=True):
+        assert {k: v for k, v in vars(a).items() if k != "record"} == {
+            k: v for k, v in vars(b).items() if k != "record"
+        }
+        np.testing.assert_array_equal(a.record.time_s, b.record.time_s)
+        np.testing.assert_array_equal(a.record.yaw_rad, b.record.yaw_rad)
+
+
+@pytest.mark.parametrize("run_format", ["parquet", "csv"])
+def test_what_is_written_reads_back_as_the_same_numbers(tmp_path: Path, run_format: str) -> None:
+    folder = write_campaign(campaign(), tmp_path / "new" / "c", run_format=run_format)
+    assert_same(read_campaign(folder), campaign())
+    assert {p.suffix for p in (folder / "runs").iterdir()} == {f".{run_format}"}
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=40)
+@given(
+    values=st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=2, max_size=20),
+    suffix=st.sampled_from([".csv", ".parquet"]),
+)
+def test_any_float_survives_a_run_file(tmp_path: Path, values: list[float], suffix: str) -> None:
+    path = tmp_path / f"run{suffix}"
+    record = Record(np.arange(len(values)) / 3.0, np.array(values))
+    write_table(record, path)
+    time_s, yaw, column = read_table(path, "here")
+    assert column == "yaw_rad"
+    assert time_s is not None
+    assert time_s.tobytes() == record.time_s.tobytes()
+    assert yaw.tobytes() == record.yaw_rad.tobytes()
+
+
+text = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1, max_size=12)
+positive = st.floats(min_value=1e-300, max_value=1e300)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=40)
+@given(
+    name=text,
+    description=st.text(st.characters(codec="utf-8"), max_size=20).filter(lambda s: "\r" not in s),
+    ids=st.lists(text, min_size=1, max_size=3, unique=True),
+    rig=st.builds(RigProperties, *[st.none() | positive] * 4),
+    stiffness=st.none() | positive,
+    speed=st.floats(min_value=0.0, max_value=1e300),
+    density=positive,
+    angle=st.none() | st.floats(min_value=0.1, max_value=3.0),
+    noise=st.none() | st.floats(min_value=0.0, max_value=1e300),
+)
+def test_any_statement_survives_the_campaign_file(
+    tmp_path: Path, name, description, ids, rig, stiffness, speed, density, angle, noise
+) -> None:
+    runs = tuple(Run(i, decay(), speed, stiffness, density, angle) for i in ids)
+    one = Campaign(name, rig, SensorProperties(noise_std=noise), runs, description)
+    assert_same(read_campaign(write_campaign(one, tmp_path / "c", run_format="csv", overwrite=True)), one)
+
+
+def written(folder: Path, header: str, rows: list[str], sensor: str = "") -> Path:
+    (folder / "runs").mkdir(parents=True)
+    (folder / "runs" / "r.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    (folder / "campaign.toml").write_text(
+        f'schema_version = 1\n[campaign]\nname = "c"\n{sensor}\n'
+        '[[runs]]\nid = "r"\nfile = "runs/r.csv"\nwind_speed = 0\n',
+        encoding="utf-8",
+    )
+    return folder
+
+
+def test_degrees_become_radians(tmp_path: Path) -> None:
+    record = decay()
+    degrees = np.rad2deg(record.yaw_rad)
+    rows = [f"{t!r},{y!r}" for t, y in zip(record.time_s.tolist(), degrees.tolist(), strict=True)]
+    read = read_campaign(written(tmp_path, "time_s,yaw_deg", rows))
+    np.testing.assert_array_equal(read.runs[0].record.yaw_rad, np.deg2rad(degrees))
+
+
+def test_without_times_the_sample_rate_gives_them(tmp_path: Path) -> None:
+    record = decay(rate=100.0)
+    rows = [repr(y) for y in record.yaw_rad.tolist()]
+    read = read_campaign(written(tmp_path, "yaw_rad", rows, "[sensor]\nsample_rate = 100"))
+    np.testing.assert_array_equal(read.runs[0].record.time_s, record.time_s)
+
+
+def test_csv_from_other_hands_is_read(tmp_path: Path) -> None:
+    # Byte-order mark, Windows line ends, quoted and padded cells, another column, blank lines at the end.
+    record = decay()
+    folder = written(tmp_path, "", [])
+    rows = [
+        f'{t!r}, "{y!r}",20.1' for t, y in zip(record.time_s.tolist(), record.yaw_rad.tolist(), strict=True)
+    ]
+    content = "\r\n".join(['time_s, "yaw_rad",temperature', *rows, "", ""])
+    (folder / "runs" / "r.csv").write_bytes(b"\xef\xbb\xbf" + content.encode())
+    np.testing.assert_array_equal(read_campaign(folder).runs[0].record.yaw_rad, record.yaw_rad)
+
+
+@pytest.mark.parametrize("dtype", [pl.Float32, pl.Int32])
+def test_other_number_types_of_parquet_are_read(tmp_path: Path, dtype: type[pl.DataType]) -> None:
+    folder = written(tmp_path, "", [], "[sensor]\nsample_rate = 200")
+    toml = folder / "campaign.toml"
+    toml.write_text(toml.read_text().replace("r.csv", "r.parquet"))
+    degrees = np.round(np.rad2deg(decay().yaw_rad))
+    pl.DataFrame({"yaw_deg": pl.Series(degrees, dtype=dtype)}).write_parquet(folder / "runs" / "r.parquet")
+    np.testing.assert_array_equal(read_campaign(folder).runs[0].record.yaw_rad, np.deg2rad(degrees))
+
+
+def test_sampling_may_jitter_by_one_per_cent_and_no_more(tmp_path: Path) -> None:
+    record = decay(rate=200.0)
+    for share, good in ((0.009, True), (0.02, False)):
+        time = record.time_s.copy()
+        time[300:] += share / 200.0
+        rows = [f"{t!r},{y!r}" for t, y in zip(time.tolist(), record.yaw_rad.tolist(), strict=True)]
+        folder = written(tmp_path / str(share), "time_s,yaw_rad", rows)
+        if good:
+            np.testing.assert_array_equal(read_campaign(folder).runs[0].record.time_s, time)
+        else:
+            with pytest.raises(TunnelError, match="not uniform"):
+                read_campaign(folder)
+
+
+def test_times_may_start_anywhere(tmp_path: Path) -> None:
+    record = decay(rate=1000.0)
+    shifted = Record(record.time_s + 1.7e9, record.yaw_rad)  # seconds since 1970
+    one = replace(campaign(), sensor=SensorProperties(), runs=(Run("r", shifted, 0.0),))
+    assert_same(read_campaign(write_campaign(one, tmp_path / "c")), one)
+
+
+def test_a_wide_swing_of_a_pendulum_is_no_unit_slip(tmp_path: Path) -> None:
+    one = replace(campaign(), runs=(Run("r", decay(amplitude=2.6), 0.0, release_angle=2.4),))
+    assert_same(read_campaign(write_campaign(one, tmp_path / "c")), one)
+
+
+def test_the_truth_is_written_and_never_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = write_campaign(campaign(), tmp_path / "c", truth={"cn_beta": 0.4719})
+    assert json.loads((folder / "truth.json").read_text()) == {"cn_beta": 0.4719}
+    opened: list[str] = []
+    original = Path.read_bytes
+
+    def spy(path: Path) -> bytes:
+        opened.append(path.name)
+        return original(path)
+
+    monkeypatch.setattr(Path, "read_bytes", spy)
+    (folder / "truth.json").write_text("not JSON")
+    assert_same(read_campaign(folder), campaign())
+    assert sorted(opened) == ["campaign.toml", "off.parquet", "on.parquet"]
+
+
+def test_ids_that_are_no_file_names_are_kept(tmp_path: Path) -> None:
+    runs = tuple(replace(campaign().runs[0], id=i) for i in ("../up", "a/b", "A", "a", "β = 20°"))
+    one = replace(campaign(), runs=runs)
+    folder = write_campaign(one, tmp_path / "c")
+    assert_same(read_campaign(folder), one)
+    assert sorted(p.name for p in tmp_path.rglob("*.parquet")) == [
+        f"run-{n:04d}.parquet" for n in range(1, 6)
+    ]
+
+
+def test_an_existing_folder_is_only_replaced_when_asked_for(tmp_path: Path) -> None:
+    folder = write_campaign(campaign(), tmp_path / "c", truth={})
+    shorter = replace(campaign(), runs=campaign().runs[:1])
+    with pytest.raises(TunnelError, match="exists"):
+        write_campaign(shorter, folder)
+    assert_same(read_campaign(folder), campaign())
+    write_campaign(shorter, folder, overwrite=True)
+    assert_same(read_campaign(folder), shorter)
+    assert sorted(p.name for p in folder.rglob("*")) == ["campaign.toml", "off.parquet", "runs"]
+    assert list(tmp_path.iterdir()) == [folder]
+
+
+@pytest.mark.parametrize("stranger", ["notes.txt", "c/notes.txt", "c/runs/notes.txt", "c/runs/old/r.csv"])
+def test_what_is_not_a_campaign_is_never_deleted(tmp_path: Path, stranger: str) -> None:
+    folder = tmp_path / "c"
+    if stranger == "notes.txt":
+        folder.mkdir()
+        (folder / stranger).write_text("mine")
+    else:
+        write_campaign(campaign(), folder)
+        (tmp_path / stranger).parent.mkdir(exist_ok=True)
+        (tmp_path / stranger).write_text("mine")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(TunnelError, match=r"folder holds"):
+        write_campaign(campaign(), folder, overwrite=True)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_an_empty_folder_may_be_filled_and_a_file_not(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    assert_same(read_campaign(write_campaign(campaign(), tmp_path / "empty", overwrite=True)), campaign())
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(TunnelError, match="not a folder"):
+        write_campaign(campaign(), tmp_path / "file", overwrite=True)
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_disk_that_fails_leaves_the_old_campaign_and_no_litter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = write_campaign(campaign(), tmp_path / "c")
+
+    def full(record: Record, path: Path) -> None:
+        if path.stem == "on":
+            raise OSError(28, "No space left on device")
+        write_table(record, path)
+
+    monkeypatch.setattr(campaign_io, "write_table", full)
+    for target in (folder, tmp_path / "other"):
+        with pytest.raises(TunnelError, match="No space left on device"):
+            write_campaign(campaign(), target, overwrite=True)
+    assert list(tmp_path.iterdir()) == [folder]
+    assert_same(read_campaign(folder), campaign())
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"runs": ()}, "'runs' is empty"),
+        ({"runs": (campaign().runs[0],) * 2}, "used twice"),
+        ({"runs": (replace(campaign().runs[1], air_density=None),)}, "without air_density"),
+        ({"runs": (replace(campaign().runs[0], record=decay(duration=1.0)),)}, "fewer than three"),
+        ({"runs": (replace(campaign().runs[0], record=decay(noise=np.nan)),)}, "NaN"),
+        ({"name": ""}, "blank"),
+        ({"sensor": SensorProperties(sample_rate=2000.0)}, "sample_rate"),
+    ],
+)
+def test_what_could_not_be_read_is_not_written(
+    tmp_path: Path, change: dict[str, object], message: str
+) -> None:
+    with pytest.raises(TunnelError, match=message):
+        write_campaign(replace(campaign(), **change), tmp_path / "c")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_unknown_format_is_named(tmp_path: Path) -> None:
+    with pytest.raises(TunnelError, match="did you mean 'parquet'"):
+        write_campaign(campaign(), tmp_path / "c", run_format="parket")
+
+
+def test_truth_that_json_cannot_hold_is_refused_before_writing(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="JSON"):
+        write_campaign(campaign(), tmp_path / "c", truth={"cn_beta": float("nan")})
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_toml_itself_may_be_named(tmp_path: Path) -> None:
+    folder = write_campaign(campaign(), tmp_path / "c")
+    assert_same(read_campaign(folder / "campaign.toml"), campaign())
+
+
+def test_reading_imports_no_engine() -> None:
+    code = (
+        "import sys, tunnel_sim.campaign_io, identification.datasets\n"
+        "sys.exit(bool({'mujoco', 'torch', 'matplotlib'} & sys.modules.keys()))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+NOISE = np.random.default_rng(3).standard_normal(10000)
+SECONDS = np.arange(10000) / 1000.0
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.01, 0.1, 0.3])
+@pytest.mark.parametrize("cycles", [3.0, 5.0, 40.0])
+@pytest.mark.parametrize(
+    "disturb",
+    [
+        lambda y: y,
+        lambda y: y + 0.002 * NOISE,
+        lambda y: np.round(y / 0.01) * 0.01,
+        lambda y: np.clip(y, -0.15, 0.15) + 3.0,
+        lambda y: y + 0.02 * np.sin(2.0 * np.pi * 50.0 * SECONDS),
+        lambda y: y + 0.02 * np.sin(2.0 * np.pi * 49.97 * SECONDS),
+        lambda y: y + 0.03 * np.exp(-2.0 * SECONDS) * np.cos(2.0 * np.pi * 22.0 * SECONDS),
+    ],
+    ids=["clean", "noisy", "coarse", "clipped", "hum", "wandering-hum", "ringing"],
+)
+def test_three_cycles_are_seen_through_any_disturbance(zeta: float, cycles: float, disturb) -> None:
+    phase = 2.0 * np.pi * cycles / 10.0 * SECONDS
+    motion = 0.35 * np.exp(-zeta / np.sqrt(1.0 - zeta**2) * phase) * np.cos(phase)
+    found = count_cycles(Record(SECONDS, disturb(motion)))
+    assert found == pytest.approx(cycles, rel=0.15)
+
+
+@pytest.mark.parametrize("samples_per_cycle", [8, 12, 30, 200])
+@pytest.mark.parametrize("cycles", [3.0, 3.4, 6.5])
+@pytest.mark.parametrize("zeta", [0.0, 0.02, 0.1])
+def test_few_samples_are_enough(samples_per_cycle: int, cycles: float, zeta: float) -> None:
+    phase = 2.0 * np.pi * np.arange(round(samples_per_cycle * cycles) + 1) / samples_per_cycle
+    for start in np.linspace(0.0, 2.0 * np.pi, 9):
+        motion = 0.35 * np.exp(-zeta * phase) * np.cos(phase + start)
+        found = count_cycles(Record(np.arange(phase.size) / 50.0, motion))
+        assert found == pytest.approx(cycles, rel=0.3)
+        assert found >= 2.75
+
+
+@pytest.mark.parametrize("drift", [-0.03, 0.03])
+def test_drift_neither_makes_nor_hides_cycles(drift: float) -> None:
+    for cycles in (2.0, 4.0, 20.0):
+        motion = 0.14 * np.exp(-0.1 * SECONDS) * np.cos(2.0 * np.pi * cycles / 10.0 * SECONDS)
+        found = count_cycles(Record(SECONDS, motion + drift * SECONDS / 10.0))
+        assert found == pytest.approx(cycles, rel=0.15)
+
+
+@pytest.mark.parametrize("cycles", [0.8, 1.5, 2.0, 2.4])
+@pytest.mark.parametrize("hum", [0.0, 0.03])
+def test_hum_and_noise_make_no_cycles(cycles: float, hum: float) -> None:
+    motion = 0.2 * np.cos(2.0 * np.pi * cycles / 10.0 * SECONDS)
+    disturbed = motion + hum * np.sin(2.0 * np.pi * 50.0 * SECONDS) + 0.002 * NOISE
+    assert count_cycles(Record(SECONDS, disturbed)) < 2.75
+
+
+@pytest.mark.parametrize(
+    "reading",
+    [
+        0.1 + 0.0 * SECONDS,
+        0.0005 * NOISE,
+        np.round(NOISE) * 0.0005,
+        0.05 * SECONDS,
+        0.01 * np.sin(2.0 * np.pi * 50.0 * SECONDS),
+    ],
+    ids=["constant", "noise", "coarse-noise", "drift", "hum"],
+)
+def test_what_does_not_oscillate_has_no_cycles(reading: np.ndarray) -> None:
+    assert count_cycles(Record(SECONDS, reading)) == 0.0
+
+
+@pytest.mark.parametrize("rate", [0.2, 1.0, 5.0])
+def test_a_creep_back_to_rest_is_no_oscillation(rate: float) -> None:
+    assert count_cycles(Record(SECONDS, 0.35 * np.exp(-rate * SECONDS))) < 2.75
