@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-FIXED_DECIMALS = 7
-"""Beyond this many decimals, or a million, a number is written with a power of ten."""
-
+FIXED_DECIMALS = 9
+"""Beyond this many decimals, a million or below a ten-thousandth a number takes a power of ten."""
 
 NEGLIGIBLE = 1e-9
 """A standard deviation below this share of the value no longer decides how many digits are worth printing."""
@@ -42,20 +41,38 @@ def with_std(value: float, std: float | None) -> str:
     Returns:
         Text such as ``0.4951 ± 0.0012`` or ``(1.234 ± 0.056)e-05``.
     """
-    if std is None or not math.isfinite(std):
-        return f"{significant(value)} (std unknown)"
-    if std <= 0.0:
-        return f"{significant(value, 7)} ± 0"
-    if not math.isfinite(value):
-        return "not finite"
-    if std < NEGLIGIBLE * abs(value):
-        return f"{value:.10g} ± {std:.1e}"
+    special = _special(value, std)
+    if special or std is None:
+        return special
     decimals = 1 - _exponent(std, 2)
-    if decimals <= FIXED_DECIMALS and max(abs(value), std) < 1e6:
-        return f"{round(value, decimals):.{max(decimals, 0)}f} ± {round(std, decimals):.{max(decimals, 0)}f}"
+    if _fixed(value, std, decimals):
+        places = max(decimals, 0)
+        return f"{round(value, decimals):.{places}f} ± {round(std, decimals):.{places}f}"
     power = max(_exponent(value, 2), _exponent(std, 2))
     scale, places = 10.0**power, max(decimals + power, 0)
     return f"({value / scale:.{places}f} ± {std / scale:.{places}f})e{power:+03d}"
+
+
+def concise(value: float, std: float | None) -> str:
+    """The same as `with_std` in the short notation of metrology, for narrow columns.
+
+    Args:
+        value: the estimate, any unit.
+        std: its standard deviation, in the same unit; None where it is not known.
+
+    Returns:
+        Text such as ``0.4951(12)``: the deviation counts in the last digits, unless it has a point itself.
+    """
+    special = _special(value, std)
+    if special or std is None:
+        return special
+    decimals = 1 - _exponent(std, 2)
+    if not _fixed(value, std, decimals):
+        return with_std(value, std)
+    if decimals <= 0:
+        return f"{round(value, decimals):.0f}({round(std, decimals):.0f})"
+    rounded = f"{round(std, decimals):.{decimals}f}"
+    return f"{value:.{decimals}f}({rounded if std >= 1.0 else rounded.replace('.', '').lstrip('0')})"
 
 
 def in_stds(error: float, std: float | None) -> str:
@@ -72,6 +89,34 @@ def in_stds(error: float, std: float | None) -> str:
         return "–"
     ratio = error / std
     return f"{ratio:+.1f} σ" if abs(ratio) < 1000.0 else f"{ratio:+.0e} σ"
+
+
+def unit(text: str) -> str:
+    """A unit as printed: squares and cubes as such, in brackets.
+
+    Args:
+        text: as in an estimate's JSON, such as ``kg m2``.
+
+    Returns:
+        Text such as ``[kg m²]``.
+    """
+    return f"[{text.replace('m2', 'm²').replace('m3', 'm³')}]"
+
+
+def _special(value: float, std: float | None) -> str:
+    """The text of what has no digits to round to; empty for the rest."""
+    if not math.isfinite(value):
+        return "not finite"
+    if std is None or not math.isfinite(std):
+        return f"{significant(value)} (std unknown)"
+    if std <= 0.0:
+        return f"{significant(value, 7)} ± 0"
+    return f"{value:.10g} ± {std:.1e}" if std < NEGLIGIBLE * abs(value) else ""
+
+
+def _fixed(value: float, std: float, decimals: int) -> bool:
+    """Whether fixed notation is short enough."""
+    return decimals <= FIXED_DECIMALS and 1e-4 <= max(abs(value), std) < 1e6
 
 
 def _exponent(value: float, digits: int) -> int:

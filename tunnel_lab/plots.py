@@ -12,9 +12,12 @@ from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from tunnel_lab.files import write_whole
 from tunnel_lab.tables import SYMBOLS
 from tunnel_sim.campaign import Campaign, Run
+from tunnel_sim.record import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +30,7 @@ COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 MARKERS = ("o", "s", "^", "D", "v", "P")
 WIND_OFF, WIND_ON = BLUE, VERMILION
 PANELS_PER_PAGE = 12
+BINS_PER_DECADE = 60
 RUNS_PER_PLOT = 6
 """More lines than colours in one plot cannot be told apart."""
 
@@ -90,6 +94,7 @@ def _trace_page(runs: Sequence[Run]) -> Figure:
         colour = WIND_ON if run.wind_on else WIND_OFF
         axes.plot(run.record.time_s, run.record.yaw_rad, color=colour, linewidth=0.7)
         axes.set_title(run_label(run), fontsize=9)
+        axes.margins(x=0.01)
         _grid(axes)
         if (place - 1) % columns == 0:
             axes.set_ylabel("angle β [rad]")
@@ -115,6 +120,7 @@ def wind_off_on_figure(off: Run, on: Run) -> Figure:
         axes.plot(run.record.time_s, run.record.yaw_rad, color=colour, linewidth=0.8)
         axes.set_title(run_label(run), fontsize=10)
         axes.set_ylabel("angle β [rad]")
+        axes.margins(x=0.01)
         _grid(axes)
         first = first or axes
     axes.set_xlabel("time since the start of the record [s]")
@@ -122,7 +128,7 @@ def wind_off_on_figure(off: Run, on: Run) -> Figure:
 
 
 def spectrum_figure(runs: Sequence[Run]) -> Figure:
-    """Power spectral density of the angle.
+    """Power spectral density of the angle, averaged over sixtieths of a decade to quieten the noise.
 
     Args:
         runs: up to six runs, one line each.
@@ -136,13 +142,13 @@ def spectrum_figure(runs: Sequence[Run]) -> Figure:
     axes = figure.add_subplot()
     top = 0.0
     for run, colour in zip(runs[:RUNS_PER_PLOT], COLOURS, strict=False):
-        frequency, density = periodogram(
-            run.record.yaw_rad, run.record.sample_rate, window="hann", detrend="constant"
+        frequency, density = _log_averaged(
+            *periodogram(run.record.yaw_rad, run.record.sample_rate, window="hann", detrend="constant")
         )
-        axes.loglog(frequency[1:], density[1:], color=colour, linewidth=0.9, label=run_label(run))
+        axes.loglog(frequency, density, color=colour, linewidth=1.1, label=run_label(run))
         top = max(top, float(density.max()))
-    axes.set_xlim(0.1, None)
-    axes.set_ylim(top * 1e-13, top * 10.0)
+    axes.set_ylim(None, 100.0 * top)  # room for the legend
+    axes.margins(x=0.01)
     axes.set_xlabel("frequency [Hz]")
     axes.set_ylabel("power spectral density of β [rad²/Hz]")
     axes.legend(loc="upper right", fontsize=9)
@@ -226,6 +232,15 @@ def _relative(quantities: Sequence[Quantity]) -> list[Quantity]:
 
     last = quantities[-1].value
     return [Quantity(100.0 * (q.value / last - 1.0), 100.0 * q.std / last, "%") for q in quantities]
+
+
+def _log_averaged(frequency: Array, density: Array) -> tuple[Array, Array]:
+    """Means of a spectrum over bins of equal ratio, without the zero frequency."""
+    decades = np.log10(frequency[-1] / frequency[1])
+    edges = np.geomspace(1.0, frequency.size, max(2, int(BINS_PER_DECADE * decades)))
+    starts = np.unique(edges.astype(int))[:-1]
+    counts = np.diff(np.append(starts, frequency.size))
+    return np.add.reduceat(frequency, starts) / counts, np.add.reduceat(density, starts) / counts
 
 
 def _intervals(

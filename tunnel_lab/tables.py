@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 from rich import box
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from tunnel_lab.formatting import in_stds, significant, with_std
+from tunnel_lab.formatting import concise, in_stds, significant, unit, with_std
 
 if TYPE_CHECKING:
-    from identification.estimate import Estimate, Quantity, RunEstimate
+    from identification.estimate import Estimate, Quantity, RunEstimate, Status
     from tunnel_sim.campaign import Campaign
 
 SYMBOLS: Mapping[str, str] = {
@@ -24,6 +23,10 @@ SYMBOLS: Mapping[str, str] = {
     "mechanical_damping": "Cr",
 }
 """How the paper writes the quantities of an estimate, by their name in its JSON."""
+
+
+BRACKETS = "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10."
+"""Said once below tables in the short notation."""
 
 
 class _Console(Console):
@@ -46,6 +49,29 @@ def console(*, stderr: bool = False) -> Console:
     return _Console(stderr=stderr, highlight=False)
 
 
+def say(line: str, *, stderr: bool = False) -> None:
+    """Print one line as it is: no markup, no wrapping, so that paths can be copied.
+
+    Args:
+        line: the text.
+        stderr: print to standard error.
+    """
+    console(stderr=stderr).print(line, markup=False, soft_wrap=True)
+
+
+def show_tables(*tables: Table) -> None:
+    """Print tables, each followed by an empty line.
+
+    Args:
+        tables: those without rows are left out.
+    """
+    out = console()
+    for one in tables:
+        if one.row_count:
+            out.print(one)
+            out.print()
+
+
 def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
     """An empty table in the house's style.
 
@@ -57,10 +83,12 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
     Returns:
         The table.
     """
-    result = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    result = Table(
+        title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_edge=False
+    )
     for column in columns:
-        # As text, not markup: units stand in brackets.
-        result.add_column(Text(column), justify="right" if column in right else "left", no_wrap=True)
+        # As text, not markup: units stand in brackets. Folded, not cut: a digit must not be lost.
+        result.add_column(Text(column), justify="right" if column in right else "left", overflow="fold")
     return result
 
 
@@ -73,14 +101,15 @@ def coefficients_table(estimate: Estimate) -> Table:
     Returns:
         A table; without rows when the campaign gives normalised form only.
     """
-    result = table(f"{estimate.campaign} by {estimate.estimator}", "quantity", "estimate ± std", "unit")
+    result = table(f"{estimate.campaign} by {estimate.estimator}", "quantity", "estimate ± std")
     for name, symbol in SYMBOLS.items():
         quantity: Quantity | None = getattr(estimate, name)
         if quantity is not None:
-            result.add_row(symbol, with_std(quantity.value, quantity.std), quantity.unit)
+            result.add_row(_named(symbol, quantity.unit), with_std(quantity.value, quantity.std))
     if estimate.wind_off_inertia is not None:
         quantity = estimate.wind_off_inertia
-        result.add_row("Izz, gradient of Kr over ωn²", with_std(quantity.value, quantity.std), quantity.unit)
+        label = _named("Izz, gradient of Kr over ωn²", quantity.unit)
+        result.add_row(label, with_std(quantity.value, quantity.std))
     return result
 
 
@@ -92,32 +121,27 @@ def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Ta
         truth: injected values by name, each in the unit of the estimate's quantity of that name.
 
     Returns:
-        A table with a row for each estimator and quantity.
+        A table with a section for each estimator and a row for each quantity.
     """
+    from identification.estimate import UNITS
+
     result = table(
-        "Estimate against the injected truth",
-        *("estimator", "quantity", "truth", "estimate ± std", "unit", "error", "error/std"),
+        "Estimates against the injected truth",
+        *("quantity", "truth", "estimate ± std", "error", "error/std"),
         right=("truth", "error", "error/std"),
     )
     for estimate in estimates:
+        result.add_row(Text(estimate.estimator, style="bold"))
         for name, value in truth.items():
+            row = (_named(f"  {SYMBOLS[name]}", UNITS[name]), significant(value))
             quantity: Quantity | None = getattr(estimate, name)
-            first = estimate.estimator if name == next(iter(truth)) else ""
             if quantity is None:
-                result.add_row(
-                    first, SYMBOLS[name], significant(value), estimate.status.name.lower(), "", "", ""
-                )
+                result.add_row(*row, _status(estimate.status))
                 continue
             error = quantity.value - value
-            result.add_row(
-                first,
-                SYMBOLS[name],
-                significant(value),
-                with_std(quantity.value, quantity.std),
-                quantity.unit,
-                f"{100.0 * error / abs(value):+.2f} %" if value else "",
-                in_stds(error, quantity.std),
-            )
+            relative = f"{100.0 * error / abs(value):+.2g} %" if value else ""
+            stds = in_stds(error, quantity.std)
+            result.add_row(*row, with_std(quantity.value, quantity.std), relative, stds)
         result.add_section()
     return result
 
@@ -133,18 +157,18 @@ def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
         A table with a row for each run.
     """
     result = table(
-        "Runs",
-        *("run", "Kr [N m/rad]", "V [m/s]", "ωn ± std [rad/s]", "ζ ± std [1]", "status"),
-        right=("Kr [N m/rad]", "V [m/s]"),
+        f"Runs of {campaign.name}",
+        *("run", "Kr\n[N m/rad]", "V\n[m/s]", "ωn\n[rad/s]", "ζ\n[1]", "status"),
+        right=("Kr\n[N m/rad]", "V\n[m/s]"),
     )
     for run, found in zip(campaign.runs, estimate.runs, strict=True):
         result.add_row(
-            escape(run.id),
+            Text(run.id),
             "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
             f"{run.wind_speed:g}",
-            _text(found.omega_n),
-            _text(found.zeta),
-            found.status.name.lower().replace("_", " "),
+            _concise(found.omega_n),
+            _concise(found.zeta),
+            _status(found.status),
         )
     return result
 
@@ -159,17 +183,17 @@ def windows_table(run: RunEstimate) -> Table:
         A table with a row for each window, the largest amplitude first.
     """
     result = table(
-        f"{escape(run.id)}: windows of three cycles",
-        *("from [s]", "to [s]", "amplitude ± std [rad]", "ζ ± std [1]", "ωn ± std [rad/s]"),
+        f"{run.id}: windows of three cycles",
+        *("from [s]", "to [s]", "amplitude [rad]", "ζ [1]", "ωn [rad/s]"),
         right=("from [s]", "to [s]"),
     )
     for window in run.windows:
         result.add_row(
             f"{window.start_s:.2f}",
             f"{window.start_s + window.duration_s:.2f}",
-            _text(window.amplitude),
-            _text(window.zeta),
-            _text(window.omega_n),
+            _concise(window.amplitude),
+            _concise(window.zeta),
+            _concise(window.omega_n),
         )
     return result
 
@@ -194,6 +218,16 @@ def status_lines(estimate: Estimate) -> list[str]:
     ]
 
 
-def _text(quantity: Quantity | None) -> str:
+def _named(symbol: str, unit_name: str) -> Text:
+    """A symbol with its unit."""
+    return Text(f"{symbol} {unit(unit_name)}")
+
+
+def _concise(quantity: Quantity | None) -> str:
     """A quantity whose unit stands in the heading."""
-    return "–" if quantity is None else with_std(quantity.value, quantity.std)
+    return "–" if quantity is None else concise(quantity.value, quantity.std)
+
+
+def _status(status: Status) -> str:
+    """A status in a few words; its remedy is printed below the table."""
+    return status.name.lower().replace("_", " ")

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tunnel_lab.formatting import in_stds, significant, with_std
+from tunnel_lab.formatting import concise, in_stds, significant, unit, with_std
 
 
 @pytest.mark.parametrize(
@@ -21,6 +21,7 @@ from tunnel_lab.formatting import in_stds, significant, with_std
         (1234.5, 210.0, "1230 ± 210"),
         (1234.5, 21.0, "1234 ± 21"),
         (1.23456e-5, 5.6e-7, "(1.235 ± 0.056)e-05"),
+        (0.105864597, 6.3e-7, "0.10586460 ± 0.00000063"),
         (1.23456e-9, 5.6e-11, "(1.235 ± 0.056)e-09"),
         (3.2e7, 1.0e5, "(3.200 ± 0.010)e+07"),
         (0.0, 0.05, "0.000 ± 0.050"),
@@ -73,3 +74,25 @@ def test_a_number_without_deviation_has_four_digits(value: float, text: str) -> 
 )
 def test_an_error_in_deviations(error: float, std: float | None, text: str) -> None:
     assert in_stds(error, std) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "text"),
+    [
+        (12.3397608, 0.0000091, "12.3397608(91)"),
+        (-0.114, 0.0448, "-0.114(45)"),
+        (0.8, 0.0996, "0.80(10)"),
+        (12.34, 1.49, "12.3(1.5)"),
+        (1234.5, 21.0, "1234(21)"),
+        (1234.5, 210.0, "1230(210)"),
+        (1.23456e-9, 5.6e-11, "(1.235 ± 0.056)e-09"),
+        (5.0, None, "5.000 (std unknown)"),
+    ],
+)
+def test_the_short_notation(value: float, std: float | None, text: str) -> None:
+    assert concise(value, std) == text
+
+
+def test_units_are_printed_with_their_powers() -> None:
+    assert unit("kg m2") == "[kg m²]"
+    assert unit("1/rad") == "[1/rad]"

@@ -45,7 +45,7 @@ def run(
       than four standard deviations, 2 bad input.
     """
     from tunnel_lab.files import output_folder
-    from tunnel_lab.tables import console
+    from tunnel_lab.tables import say
     from tunnel_sim.plan import paper_plan
 
     folder = output_folder(out)
@@ -55,9 +55,9 @@ def run(
     campaign, estimates = simulated_part(plan, folder)
     measured = measured_part(folder)
     draw(folder, campaign, estimates, plan, measured)
-    console().print(f"Campaign, estimates and figures: {folder}", markup=False, soft_wrap=True)
+    say(f"Campaign, estimates (JSON) and figures are in {folder}")
     if missed := misses(estimates, plan):
-        console(stderr=True).print(f"Check failed: {'; '.join(missed)}", markup=False, soft_wrap=True)
+        say(f"Check failed: {'; '.join(missed)}", stderr=True)
         raise typer.Exit(1)
 
 
@@ -117,13 +117,12 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
     from identification.estimators import ALL_ESTIMATORS
     from tunnel_lab.commands.simulate import simulate_with_progress
     from tunnel_lab.files import write_json
-    from tunnel_lab.tables import console, status_lines, truth_table
+    from tunnel_lab.tables import console, say, show_tables, status_lines, truth_table
     from tunnel_sim.campaign_io import write_campaign
     from tunnel_sim.virtual_campaign import truth_document
 
-    out = console()
     campaign = simulate_with_progress(plan)
-    out.print(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}", markup=False)
+    say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")
     write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
     estimates = []
     for name in ALL_ESTIMATORS:
@@ -131,10 +130,10 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
             estimate = identify(campaign, name, throw=False)
         write_json(folder / f"estimate-{name}.json", estimate.to_json_dict())
         estimates.append(estimate)
-    out.print(truth_table(estimates, truth_of(plan)))
+    show_tables(truth_table(estimates, truth_of(plan)))
     for estimate in estimates:
         for line in status_lines(estimate):
-            out.print(f"Note, {estimate.estimator}: {line}", markup=False, soft_wrap=True)
+            say(f"Note, {estimate.estimator}: {line}")
     return campaign, tuple(estimates)
 
 
@@ -149,18 +148,15 @@ def measured_part(folder: Path) -> Estimate:
     """
     from identification import identify
     from identification.datasets import measured_campaign
+    from tunnel_lab.commands.identify import show
     from tunnel_lab.files import write_json
-    from tunnel_lab.tables import console, status_lines, windows_table
+    from tunnel_lab.tables import say
 
-    out = console()
     campaign = measured_campaign(MEASURED)
     estimate = identify(campaign, CHECKED_ESTIMATOR, throw=False)
     write_json(folder / f"estimate-{MEASURED}.json", estimate.to_json_dict())
-    out.print(f"Measured: {campaign.name}, {len(campaign.runs)} runs", markup=False)
-    for found in estimate.runs:
-        out.print(windows_table(found))
-    for line in status_lines(estimate):
-        out.print(f"Note, {campaign.name}: {line}", markup=False, soft_wrap=True)
+    say(f"\nMeasured: {campaign.name}, {len(campaign.runs)} runs. {campaign.description}\n")
+    show(campaign, estimate, windows=True)
     return estimate
 
 
@@ -178,18 +174,17 @@ def draw(
     """
     from tunnel_lab import plots
     from tunnel_lab.rendering import render_rig
-    from tunnel_lab.tables import console
+    from tunnel_lab.tables import console, say
 
     off, on = wind_off_on_pair(campaign)
     plots.save(plots.wind_off_on_figure(off, on), folder / "traces.png")
     plots.save(plots.spectrum_figure((off, on)), folder / "spectrum.png")
     plots.save(plots.windows_figure(measured), folder / "windows.png")
     plots.save(plots.truth_figure(estimates, truth_of(plan)), folder / "estimates.png")
-    console().print("Figures: traces.png, spectrum.png, windows.png, estimates.png", markup=False)
+    say("\nFigures: traces.png, spectrum.png, windows.png, estimates.png")
     with console(stderr=True).status("rendering the rig"):
         problem = render_rig(folder / "rig.png")
-    outcome = f"No picture of the rig: {problem}" if problem else "Picture: rig.png"
-    console().print(outcome, markup=False, soft_wrap=True)
+    say(f"No picture of the rig: {problem}" if problem else "Picture of the rig: rig.png")
 
 
 def wind_off_on_pair(campaign: Campaign) -> tuple[Run, Run]:

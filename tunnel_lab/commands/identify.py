@@ -57,7 +57,7 @@ def run(
     """
     from identification import identify
     from tunnel_lab.files import json_text, write_json
-    from tunnel_lab.tables import console
+    from tunnel_lab.tables import say
     from tunnel_sim.campaign_io import read_campaign
 
     known_estimator(estimator)
@@ -70,7 +70,7 @@ def run(
             write_json(json, estimate.to_json_dict())
         show(data, estimate, windows=len(data.runs) <= FEW_RUNS if windows is None else windows)
         if json is not None:
-            console().print(f"Written: {json}", markup=False, soft_wrap=True)
+            say(f"Written: {json}")
     if estimate.status.failed:
         raise typer.Exit(1)
 
@@ -101,15 +101,11 @@ def show(campaign: Campaign, estimate: Estimate, *, windows: bool) -> None:
         estimate: its estimate.
         windows: whether to show every run's windows, too.
     """
-    from tunnel_lab.tables import coefficients_table, console, runs_table, status_lines, windows_table
+    from tunnel_lab import tables
 
-    out = console()
-    coefficients = coefficients_table(estimate)
-    if coefficients.row_count:
-        out.print(coefficients)
-    out.print(runs_table(campaign, estimate))
-    for found in estimate.runs if windows else ():
-        if found.windows:
-            out.print(windows_table(found))
-    for line in status_lines(estimate):
-        out.print(f"Note: {line}", markup=False, soft_wrap=True)
+    tables.show_tables(tables.coefficients_table(estimate), tables.runs_table(campaign, estimate))
+    if windows:
+        tables.show_tables(*map(tables.windows_table, estimate.runs))
+    tables.say(tables.BRACKETS)
+    for line in tables.status_lines(estimate):
+        tables.say(f"Note: {line}")

@@ -37,7 +37,7 @@ def run(
     from identification import identify
     from tunnel_lab import plots
     from tunnel_lab.files import output_folder
-    from tunnel_lab.tables import console
+    from tunnel_lab.tables import say
     from tunnel_sim.campaign_io import read_campaign
 
     data = read_campaign(campaign)
@@ -51,9 +51,9 @@ def run(
     if any(found.windows for found in estimate.runs):
         written.append(plots.save(plots.windows_figure(estimate), folder / "windows.png"))
     for path in written:
-        console().print(f"Written: {path}", markup=False, soft_wrap=True)
+        say(f"Written: {path}")
     if estimate.status.failed:
-        console(stderr=True).print(f"Note: {estimate.status.value}", markup=False, soft_wrap=True)
+        say(f"Note: {estimate.status.value}", stderr=True)
         raise typer.Exit(1)
 
 

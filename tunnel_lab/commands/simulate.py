@@ -58,7 +58,7 @@ def run(
     [bold]Exit status[/bold]
       0 written, 2 bad input; nothing is written then.
     """
-    from tunnel_lab.tables import console
+    from tunnel_lab.tables import say
     from tunnel_sim.campaign_io import write_campaign
     from tunnel_sim.plan import load_plan
     from tunnel_sim.virtual_campaign import truth_document
@@ -71,7 +71,7 @@ def run(
     folder = write_campaign(
         campaign, out, run_format=format.value, truth=truth_document(loaded), overwrite=overwrite
     )
-    console().print(f"Written: {folder} ({len(campaign.runs)} runs)", markup=False, soft_wrap=True)
+    say(f"Written: {folder} ({len(campaign.runs)} runs)")
 
 
 def refuse_occupied(folder: Path, *, overwrite: bool) -> None:

@@ -75,7 +75,6 @@ def show(springs: SpringTable, source: str) -> None:
     from tunnel_lab.formatting import with_std
 
     fit = fit_springs(springs.stiffness, springs.frequency_hz)
-    out = tables.console()
     rows = tables.table(
         f"Springs of {source}",
         *("spring", "Kr [N m/rad]", "f [Hz]", "ωn² [rad²/s²]", "residual [%]", ""),
@@ -93,10 +92,10 @@ def show(springs: SpringTable, source: str) -> None:
             f"{residual:+.1f}",
             "off the line" if flag else "",
         )
-    out.print(rows)
+    tables.show_tables(rows)
     if fit.inertia.value <= 0.0:
         problem = "stiffness does not rise with frequency: check the table; no inertia can be had from it"
-        tables.console(stderr=True).print(problem, markup=False, soft_wrap=True)
+        tables.say(problem, stderr=True)
         raise typer.Exit(1)
-    out.print(f"Izz (gradient) = {with_std(fit.inertia.value, fit.inertia.std)} kg m²")
-    out.print(f"intercept      = {with_std(fit.intercept.value, fit.intercept.std)} N m/rad")
+    tables.say(f"Izz (gradient) = {with_std(fit.inertia.value, fit.inertia.std)} kg m²")
+    tables.say(f"intercept      = {with_std(fit.intercept.value, fit.intercept.std)} N m/rad")
