@@ -1,1 +1,75 @@
-"""One estimator per file."""
+"""One estimator per file, one registry of them.
+
+To add one: a frozen dataclass in a file of its own whose fields are its settings, with the members of
+`Estimator`, and an entry below. The entry is data, so that a heavy import (torch, say) waits until the
+estimator is used, and the conformance suite runs over every entry by itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, ClassVar, Protocol, cast
+
+from tunnel_sim.errors import TunnelError, did_you_mean
+
+if TYPE_CHECKING:
+    from identification.estimate import Estimate
+    from tunnel_sim.campaign import Campaign
+
+
+class Estimator(Protocol):
+    """A method with its settings."""
+
+    name: ClassVar[str]
+
+    def estimate(self, campaign: Campaign) -> Estimate:
+        """Identify a campaign; a failure is a status of the estimate, never NaN.
+
+        Args:
+            campaign: at least one run.
+
+        Returns:
+            The estimate, its runs in the campaign's order.
+        """
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Where an estimator is found.
+
+    Args:
+        name: in the registry, in JSON and on the command line.
+        module: it lives in.
+        factory: the class in it; called without arguments it has its default settings.
+    """
+
+    name: str
+    module: str
+    factory: str
+
+
+ENTRIES: tuple[Entry, ...] = (
+    Entry("output_error", "identification.estimators.output_error", "OutputError"),
+    Entry("conventional", "identification.estimators.conventional", "Conventional"),
+)
+
+ALL_ESTIMATORS: tuple[str, ...] = tuple(entry.name for entry in ENTRIES)
+
+
+def make_estimator(name: str) -> Estimator:
+    """An estimator by name, with its default settings.
+
+    Args:
+        name: one of `ALL_ESTIMATORS`.
+
+    Returns:
+        The estimator.
+
+    Raises:
+        TunnelError: when there is none of that name, with the closest one.
+    """
+    for entry in ENTRIES:
+        if entry.name == name:
+            return cast("Estimator", getattr(import_module(entry.module), entry.factory)())
+    raise TunnelError(f"no estimator {name!r}", where="identify", remedy=did_you_mean(name, ALL_ESTIMATORS))

@@ -1,0 +1,287 @@
+"""What an estimator answers: values with standard deviations, and a status that says what to do next.
+
+One `Estimate` serves every estimator. A value that could not be had is None, never NaN, and a `Status` says
+why and what would give it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from identification.status import Status as Status
+from identification.status import by_gravity as by_gravity
+from tunnel_sim.record import Array
+
+PARAMETERS = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
+UNITS: Mapping[str, str] = {
+    "cn_beta": "1/rad",
+    "cn_r": "1/rad",
+    "yaw_inertia": "kg m2",
+    "mechanical_damping": "N m s/rad",
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """An estimated value.
+
+    Args:
+        value: in the unit.
+        std: its standard deviation, in the unit.
+        unit: SI, e.g. ``rad/s``; ``1`` where there is none.
+    """
+
+    value: float
+    std: float
+    unit: str
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """``{"value", "std", "unit"}``."""
+        return {"value": self.value, "std": self.std, "unit": self.unit}
+
+    @classmethod
+    def from_json_dict(cls, data: Mapping[str, Any]) -> Quantity:
+        """The inverse of `to_json_dict`."""
+        return cls(float(data["value"]), float(data["std"]), str(data["unit"]))
+
+
+@dataclass(frozen=True)
+class NoiseLevel:
+    """The sensor noise a standard deviation rests on, and how the residual compares with it.
+
+    Args:
+        std: standard deviation used, rad, quantisation included.
+        source: ``stated`` (noise_std and resolution of the campaign) or ``residual`` (what the fit left).
+        residual_std: standard deviation of the residual, rad.
+        slow_ratio: power of the residual's slow part over that of white noise; 1 where the model explains the
+            data, and the factor the variances are widened by where it does not.
+        departs: whether the slow ratio is beyond chance (false-alarm rate 1e-3).
+        disagrees: whether the residual's white part contradicts the stated noise.
+    """
+
+    std: float
+    source: str
+    residual_std: float
+    slow_ratio: float
+    departs: bool
+    disagrees: bool
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+    @classmethod
+    def from_json_dict(cls, data: Mapping[str, Any]) -> NoiseLevel:
+        """The inverse of `to_json_dict`."""
+        return cls(**data)
+
+
+@dataclass(frozen=True)
+class WindowEstimate:
+    """The oscillation seen through one window of a few cycles, as in the paper's Table III.
+
+    Args:
+        start_s: start of the window since the record's first sample, s.
+        duration_s: length of the window, s.
+        amplitude: of the oscillation at mid-window, rad.
+        omega_n: natural angular frequency, rad/s.
+        zeta: damping ratio.
+        cycles: how many periods it holds; three, or one in a short record.
+    """
+
+    start_s: float
+    duration_s: float
+    amplitude: Quantity
+    omega_n: Quantity
+    zeta: Quantity
+    cycles: int = 3
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name."""
+        return {
+            "start_s": self.start_s,
+            "duration_s": self.duration_s,
+            "amplitude": self.amplitude.to_json_dict(),
+            "omega_n": self.omega_n.to_json_dict(),
+            "zeta": self.zeta.to_json_dict(),
+            "cycles": self.cycles,
+        }
+
+    @classmethod
+    def from_json_dict(cls, data: Mapping[str, Any]) -> WindowEstimate:
+        """The inverse of `to_json_dict`."""
+        quantities = {name: Quantity.from_json_dict(data[name]) for name in ("amplitude", "omega_n", "zeta")}
+        return cls(
+            float(data["start_s"]), float(data["duration_s"]), cycles=int(data["cycles"]), **quantities
+        )
+
+
+_RUN_QUANTITIES = (
+    "omega_n",
+    "zeta",
+    "initial_angle",
+    "initial_rate",
+    "sensor_zero",
+    "aerodynamic_stiffness",
+    "aerodynamic_damping",
+)
+
+
+@dataclass(frozen=True)
+class RunEstimate:
+    """One run by itself.
+
+    Args:
+        id: the run's.
+        statuses: from the gravest; OK alone where nothing is to be said.
+        omega_n: natural angular frequency, rad/s.
+        zeta: damping ratio.
+        initial_angle: at the first sample, from the sensor's zero, rad.
+        initial_rate: at the first sample, rad/s.
+        sensor_zero: as this run alone shows it, rad.
+        aerodynamic_stiffness: Ka, N m/rad, from the whole campaign; wind-on runs only.
+        aerodynamic_damping: Ca, N m s/rad, likewise.
+        noise: what the standard deviations rest on; None where the method does not use it.
+        windows: consecutive windows of three cycles.
+    """
+
+    id: str
+    statuses: tuple[Status, ...] = (Status.OK,)
+    omega_n: Quantity | None = None
+    zeta: Quantity | None = None
+    initial_angle: Quantity | None = None
+    initial_rate: Quantity | None = None
+    sensor_zero: Quantity | None = None
+    aerodynamic_stiffness: Quantity | None = None
+    aerodynamic_damping: Quantity | None = None
+    noise: NoiseLevel | None = None
+    windows: tuple[WindowEstimate, ...] = ()
+
+    @property
+    def status(self) -> Status:
+        """The gravest status."""
+        return self.statuses[0]
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name; None where there is no value."""
+        return {
+            "id": self.id,
+            **_statuses_json(self.statuses),
+            **_quantities_json(self, _RUN_QUANTITIES),
+            "noise": self.noise.to_json_dict() if self.noise else None,
+            "windows": [window.to_json_dict() for window in self.windows],
+        }
+
+    @classmethod
+    def from_json_dict(cls, data: Mapping[str, Any]) -> RunEstimate:
+        """The inverse of `to_json_dict`."""
+        return cls(
+            id=str(data["id"]),
+            statuses=_statuses_from_json(data),
+            noise=NoiseLevel.from_json_dict(data["noise"]) if data["noise"] else None,
+            windows=tuple(WindowEstimate.from_json_dict(window) for window in data["windows"]),
+            **_quantities_from_json(data, _RUN_QUANTITIES),
+        )
+
+
+_CAMPAIGN_QUANTITIES = (*PARAMETERS, "sensor_zero", "wind_off_inertia", "wind_off_intercept")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A campaign identified.
+
+    Args:
+        campaign: the campaign's name.
+        estimator: the method's name in the registry.
+        runs: one per run of the campaign, in its order.
+        statuses: from the gravest; OK alone where nothing is to be said.
+        cn_beta: Cnβ, 1/rad.
+        cn_r: Cnr, 1/rad.
+        yaw_inertia: Izz, kg m², as the method's own model gives it.
+        mechanical_damping: Cr, N m s/rad.
+        sensor_zero: common to the campaign, rad.
+        wind_off_inertia: Izz as the gradient of Kr against ωn² of the wind-off runs, kg m².
+        wind_off_intercept: the intercept of that line, N m/rad; None with one spring.
+        parameters: names of the covariance's rows and columns.
+        covariance: of the parameters, in the products of their units; shape (p, p).
+        noise: what the covariance rests on; None where the method does not use it.
+    """
+
+    campaign: str
+    estimator: str
+    runs: tuple[RunEstimate, ...]
+    statuses: tuple[Status, ...] = (Status.OK,)
+    cn_beta: Quantity | None = None
+    cn_r: Quantity | None = None
+    yaw_inertia: Quantity | None = None
+    mechanical_damping: Quantity | None = None
+    sensor_zero: Quantity | None = None
+    wind_off_inertia: Quantity | None = None
+    wind_off_intercept: Quantity | None = None
+    parameters: tuple[str, ...] = ()
+    covariance: tuple[tuple[float, ...], ...] = ()
+    noise: NoiseLevel | None = None
+
+    @property
+    def status(self) -> Status:
+        """The gravest status."""
+        return self.statuses[0]
+
+    @property
+    def covariance_matrix(self) -> Array:
+        """The covariance as an array, shape (p, p), rows and columns as in ``parameters``."""
+        size = len(self.parameters)
+        return np.array(self.covariance, dtype=np.float64).reshape(size, size)
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name; None where there is no value."""
+        return {
+            "campaign": self.campaign,
+            "estimator": self.estimator,
+            **_statuses_json(self.statuses),
+            **_quantities_json(self, _CAMPAIGN_QUANTITIES),
+            "parameters": list(self.parameters),
+            "covariance": [list(row) for row in self.covariance],
+            "noise": self.noise.to_json_dict() if self.noise else None,
+            "runs": [run.to_json_dict() for run in self.runs],
+        }
+
+    @classmethod
+    def from_json_dict(cls, data: Mapping[str, Any]) -> Estimate:
+        """The inverse of `to_json_dict`."""
+        return cls(
+            campaign=str(data["campaign"]),
+            estimator=str(data["estimator"]),
+            runs=tuple(RunEstimate.from_json_dict(run) for run in data["runs"]),
+            statuses=_statuses_from_json(data),
+            parameters=tuple(data["parameters"]),
+            covariance=tuple(tuple(float(value) for value in row) for row in data["covariance"]),
+            noise=NoiseLevel.from_json_dict(data["noise"]) if data["noise"] else None,
+            **_quantities_from_json(data, _CAMPAIGN_QUANTITIES),
+        )
+
+
+def _statuses_json(statuses: tuple[Status, ...]) -> dict[str, Any]:
+    return {
+        "status": statuses[0].name.lower(),
+        "message": statuses[0].value,
+        "statuses": [status.name.lower() for status in statuses],
+    }
+
+
+def _statuses_from_json(data: Mapping[str, Any]) -> tuple[Status, ...]:
+    return tuple(Status[name.upper()] for name in data["statuses"])
+
+
+def _quantities_json(owner: object, names: tuple[str, ...]) -> dict[str, Any]:
+    quantities: dict[str, Quantity | None] = {name: getattr(owner, name) for name in names}
+    return {name: None if value is None else value.to_json_dict() for name, value in quantities.items()}
+
+
+def _quantities_from_json(data: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Quantity | None]:
+    return {name: None if data[name] is None else Quantity.from_json_dict(data[name]) for name in names}

@@ -1,0 +1,53 @@
+"""Linear algebra of information matrices: solve, invert, eliminate, extend."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tunnel_sim.record import Array
+
+
+def eliminate(information: Array, score: Array, keep: int) -> tuple[Array, Array]:
+    """The information and score of the first unknowns with the others eliminated (Schur complement).
+
+    Args:
+        information: shape (m, m).
+        score: shape (m,).
+        keep: how many unknowns to keep.
+
+    Returns:
+        Shapes (keep, keep) and (keep,).
+    """
+    cross = information[keep:, :keep]
+    solved = scaled_solve(information[keep:, keep:], np.column_stack((cross, score[keep:])))
+    return information[:keep, :keep] - cross.T @ solved[:, :keep], score[:keep] - cross.T @ solved[:, keep]
+
+
+def scaled_solve(matrix: Array, right: Array) -> Array:
+    """Solve a symmetric positive system after scaling its diagonal to one (units differ by decades).
+
+    Raises:
+        numpy.linalg.LinAlgError: when the matrix is singular.
+    """
+    scale = np.sqrt(np.diag(matrix))
+    if not np.all(scale > 0.0):
+        raise np.linalg.LinAlgError("an unknown has no influence on the reading")
+    scaled = right / (scale[:, None] if right.ndim == 2 else scale)
+    solution = np.linalg.solve(matrix / np.outer(scale, scale), scaled)
+    return np.asarray(solution / (scale[:, None] if right.ndim == 2 else scale))
+
+
+def inverse(information: Array) -> Array:
+    """The inverse of an information matrix, symmetric to the last bit."""
+    result = scaled_solve(information, np.eye(information.shape[0]))
+    return np.asarray(0.5 * (result + result.T))
+
+
+def embed(link: Array, *, with_zero: bool) -> Array:
+    """A run's link, (2, p), extended by the common zero as last parameter: (3, p + 1)."""
+    if not with_zero:
+        return link
+    extended = np.zeros((3, link.shape[1] + 1))
+    extended[:2, :-1] = link
+    extended[2, -1] = 1.0
+    return extended

@@ -1,0 +1,134 @@
+"""One run by itself: start, least squares, noise, standard deviations, windows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.decay_fit import (
+    ANGLE,
+    ANGULAR_RATE,
+    RATE,
+    STIFFNESS,
+    ZERO,
+    DecayFit,
+    Reading,
+    RunFit,
+    fit_run,
+)
+from identification.estimate import NoiseLevel, Quantity, RunEstimate, Status, by_gravity
+from identification.information import inverse
+from identification.noise import Residual, eighth_of_a_cycle, noise_level
+from identification.start import starting_decay
+from identification.windows import fit_windows, modal_quantities
+from tunnel_sim.campaign import Run, SensorProperties
+
+# The energy of the decay over the noise variance that noise alone reaches, at the best of all frequencies of
+# a record of 1e6 samples, less than once in 1e6 runs: 2 ln(1e12).
+_LEAST_ENERGY = 56.0
+_FEW_CYCLES = 3.0
+_UNKNOWNS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRun:
+    """A run and its fit.
+
+    Args:
+        reading: what was fitted.
+        fit: None where the run could not be identified; the estimate's status says why.
+        noise: what the fit's residual says of the noise; None likewise.
+        estimate: the run's own result.
+    """
+
+    reading: Reading
+    fit: RunFit | None
+    noise: NoiseLevel | None
+    estimate: RunEstimate
+
+
+def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int | None = None) -> FittedRun:
+    """Identify ωn, ζ, the initial state and the sensor's zero of one run by maximum likelihood.
+
+    Args:
+        run: the run; wind and spring are of no concern here.
+        sensor: what is stated of the noise.
+        cycles_per_window: periods in each of its windows; where None three, or one in a short record.
+
+    Returns:
+        The fit and the run's estimate.
+    """
+    reading = Reading.from_record(run.record)
+    start = starting_decay(run.record)
+    if start is None:
+        return _failed(run, reading, Status.NO_OSCILLATION)
+    fit = fit_run(reading, start)
+    if not fit.converged or fit.runs[0].decay.stiffness <= 0.0:
+        return _failed(run, reading, Status.NOT_CONVERGED)
+    noise = noise_level(residuals_of([reading], fit.runs, fit.zero, _UNKNOWNS), sensor)
+    energy = float(np.sum((reading.yaw - fit.zero - fit.runs[0].residual) ** 2))
+    if energy < _LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
+        return _failed(run, reading, Status.NO_OSCILLATION)
+    return FittedRun(reading, fit.runs[0], noise, _run_estimate(run, reading, fit, noise, cycles_per_window))
+
+
+def residuals_of(
+    readings: Sequence[Reading], runs: Sequence[RunFit], zero: float, unknowns: int
+) -> list[Residual]:
+    """The residuals of fitted runs with what their judgement needs.
+
+    Args:
+        readings: of the runs.
+        runs: their fits.
+        zero: the sensor's, rad.
+        unknowns: how many parameters each run's own data decided.
+
+    Returns:
+        One per run.
+    """
+    return [
+        Residual(
+            values=run.residual,
+            block=eighth_of_a_cycle(
+                float(np.sqrt(abs(run.decay.stiffness))), float(reading.time[-1]) / (reading.time.size - 1)
+            ),
+            unknowns=unknowns,
+            peak=float(np.abs(reading.yaw - zero).max()),
+        )
+        for reading, run in zip(readings, runs, strict=True)
+    ]
+
+
+def _run_estimate(
+    run: Run, reading: Reading, fit: DecayFit, noise: NoiseLevel, cycles: int | None
+) -> RunEstimate:
+    fitted = fit.runs[0]
+    covariance = inverse(fitted.information) * (noise.std**2 * noise.slow_ratio)
+    deviations = np.sqrt(np.diag(covariance))
+    omega_n, zeta = modal_quantities(fitted.decay, covariance[np.ix_([RATE, STIFFNESS], [RATE, STIFFNESS])])
+    statuses = set()
+    if noise.departs:
+        statuses.add(Status.MODEL_DEPARTS)
+    if noise.disagrees:
+        statuses.add(Status.NOISE_DISAGREES)
+    if fitted.decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * _FEW_CYCLES:
+        statuses.add(Status.FEW_CYCLES)
+    if run.spring_stiffness is None:
+        statuses.add(Status.NO_STIFFNESS)
+    return RunEstimate(
+        id=run.id,
+        statuses=by_gravity(statuses),
+        omega_n=omega_n,
+        zeta=zeta,
+        initial_angle=Quantity(fitted.angle, float(deviations[ANGLE]), "rad"),
+        initial_rate=Quantity(fitted.rate, float(deviations[ANGULAR_RATE]), "rad/s"),
+        sensor_zero=Quantity(fit.zero, float(deviations[ZERO]), "rad"),
+        noise=noise,
+        windows=fit_windows(reading, fitted.decay, fit.zero, noise, cycles=cycles),
+    )
+
+
+def _failed(run: Run, reading: Reading, status: Status) -> FittedRun:
+    return FittedRun(reading, None, None, RunEstimate(run.id, (status,)))

@@ -1,0 +1,42 @@
+"""The frequency of a damped oscillation from its power spectral density."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tunnel_sim.record import Array, Record
+
+_PADDING = 8  # zero padding: eight times the record, so the interpolated peak sits within 1/16 of a bin
+
+
+def psd_peak_frequency(record: Record) -> float:
+    """The damped frequency, as the peak of the power spectral density.
+
+    The mean is taken off, a Hann window keeps the offset and the negative frequencies from leaking into the
+    peak, zeros pad the record to at least eight times its length, and a parabola through the logarithm of the
+    three highest bins gives the peak between them.
+
+    Args:
+        record: the reading, n samples, rad against s.
+
+    Returns:
+        Frequency of the peak, Hz; 0 where the record is constant.
+    """
+    centred = record.yaw_rad - record.yaw_rad.mean()
+    size = 1 << int(np.ceil(np.log2(_PADDING * centred.size)))
+    power = np.abs(np.fft.rfft(centred * np.hanning(centred.size), size)) ** 2
+    # Below one cycle per record the spectrum holds the offset's remainder, not the oscillation.
+    lowest = max(1, int(size / centred.size))
+    peak = lowest + int(np.argmax(power[lowest:-1]))
+    if power[peak] <= 0.0:
+        return 0.0
+    return (peak + _parabola_offset(power[peak - 1 : peak + 2])) * record.sample_rate / size
+
+
+def _parabola_offset(power: Array) -> float:
+    # Where the parabola through three log powers peaks, in bins from the middle one, at most one half.
+    low, middle, high = np.log(np.maximum(power, 1e-300))
+    curvature = low - 2.0 * middle + high
+    if curvature >= 0.0:
+        return 0.0
+    return float(np.clip(0.5 * (low - high) / curvature, -0.5, 0.5))

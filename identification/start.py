@@ -1,0 +1,63 @@
+"""Where the fit of a record starts: from the record alone, at any damping."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.damped_oscillation import Decay
+from identification.decay_fit import Reading, projected_cost
+from identification.spectrum import psd_peak_frequency
+from tunnel_sim.record import Array, Record
+
+_SAMPLES = 1024  # the start is judged on a thinned record; the fit itself sees every sample
+_DAMPING_RATIOS = (0.0, 0.002, 0.006, 0.02, 0.06, 0.2, 0.5)
+
+
+def starting_decay(record: Record) -> Decay | None:
+    """A decay near enough for the least-squares fit to converge.
+
+    Candidates are the peak of the power spectral density with a ladder of damping ratios, for records of many
+    cycles, and the fit of the twice integrated equation of motion, for heavily damped ones; the one that
+    leaves the smallest sum of squares is taken.
+
+    Args:
+        record: the reading of one run.
+
+    Returns:
+        The start; None where the record is constant.
+    """
+    frequency = psd_peak_frequency(record)
+    if frequency == 0.0 or np.ptp(record.yaw_rad) == 0.0:
+        return None
+    thin = _thinned(record, frequency)
+    omega = 2.0 * np.pi * frequency
+    candidates = [Decay.from_modal(omega / np.sqrt(1.0 - zeta**2), zeta) for zeta in _DAMPING_RATIOS]
+    integrated = _integrated_equation(thin)
+    if integrated.stiffness > 0.0:
+        candidates.append(integrated)
+    costs = [projected_cost(thin, candidate) for candidate in candidates]
+    return candidates[int(np.argmin(costs))]
+
+
+def _thinned(record: Record, frequency: float) -> Reading:
+    # Block means, at least twenty to the cycle.
+    factor = max(1, min(record.time_s.size // _SAMPLES, int(record.sample_rate / (20.0 * frequency))))
+    usable = record.time_s.size // factor * factor
+    time = (record.time_s[:usable] - record.time_s[0]).reshape(-1, factor).mean(axis=1)
+    return Reading(time, record.yaw_rad[:usable].reshape(-1, factor).mean(axis=1))
+
+
+def _integrated_equation(reading: Reading) -> Decay:
+    # y + 2a∫y + k∬y = c₀ + c₁t + c₂t²: linear in a and k, and integration quiets the noise.
+    time, yaw = reading.time, reading.yaw
+    once = _integral(time, yaw)
+    twice = _integral(time, once)
+    columns = np.column_stack((once, twice, np.ones_like(time), time, time**2))
+    scale = np.linalg.norm(columns, axis=0)
+    solution = np.linalg.lstsq(columns / scale, -yaw, rcond=None)[0] / scale
+    return Decay(float(solution[0]) / 2.0, float(solution[1]))
+
+
+def _integral(time: Array, values: Array) -> Array:
+    steps = np.diff(time) * 0.5 * (values[1:] + values[:-1])
+    return np.concatenate(([0.0], np.cumsum(steps)))
