@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tunnel_lab.files import write_whole
+from tunnel_lab.formatting import unit
 from tunnel_lab.tables import SYMBOLS
 from tunnel_sim.campaign import Campaign, Run
 from tunnel_sim.record import Array
@@ -31,6 +32,8 @@ MARKERS = ("o", "s", "^", "D", "v", "P")
 WIND_OFF, WIND_ON = BLUE, VERMILION
 PANELS_PER_PAGE = 12
 BINS_PER_DECADE = 60
+ONE_RIG = 1.5
+"""Frequencies within this factor go into one plot as they are."""
 RUNS_PER_PLOT = 6
 """More lines than colours in one plot cannot be told apart."""
 
@@ -165,8 +168,11 @@ def windows_figure(estimate: Estimate) -> Figure:
         estimate: of any campaign; runs past the sixth and windows without an estimate are left out.
 
     Returns:
-        A figure of two panels; ωn as its difference from the smallest window's, %.
+        A figure of two panels; ωn in rad/s, or, where springs differ, as its difference from that of the
+        run's last window, %.
     """
+    shown = [window.omega_n.value for run in estimate.runs[:RUNS_PER_PLOT] for window in run.windows]
+    one_rig = bool(shown) and max(shown) < ONE_RIG * min(shown)
     figure = _figure(10.0, 4.4)
     damping, frequency = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
     for index, run in enumerate(estimate.runs[:RUNS_PER_PLOT]):
@@ -174,10 +180,13 @@ def windows_figure(estimate: Estimate) -> Figure:
             continue
         style = {"color": COLOURS[index], "marker": MARKERS[index], "label": run.id}
         amplitude = [window.amplitude.value for window in run.windows]
+        omega_n = [window.omega_n for window in run.windows]
         _intervals(damping, amplitude, [window.zeta for window in run.windows], style)
-        _intervals(frequency, amplitude, _relative([window.omega_n for window in run.windows]), style)
+        _intervals(frequency, amplitude, omega_n if one_rig else _relative(omega_n), style)
     damping.set_ylabel("damping ratio ζ [1]")
-    frequency.set_ylabel("ωn against the last window [%]")
+    frequency.set_ylabel(
+        "natural frequency ωn [rad/s]" if one_rig else "ωn against the run's last window [%]"
+    )
     for axes in (damping, frequency):
         axes.set_xlabel("mean amplitude of the window [rad]")
         _grid(axes)
@@ -197,6 +206,8 @@ def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> F
     Returns:
         A figure with a panel for each quantity: relative error with 95 % intervals, %.
     """
+    from identification.estimate import UNITS
+
     figure = _figure(10.0, 3.6)
     names = tuple(truth)
     for place, name in enumerate(names, 1):
@@ -219,7 +230,7 @@ def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> F
             range(len(estimates)), [e.estimator.replace("_", "\n") for e in estimates], fontsize=8
         )
         axes.set_xlim(-0.6, len(estimates) - 0.4)
-        axes.set_title(f"{SYMBOLS.get(name, name)} = {truth[name]:g}", fontsize=10)
+        axes.set_title(f"{SYMBOLS[name]} = {truth[name]:g} {unit(UNITS[name])}", fontsize=10)
         if place == 1:
             axes.set_ylabel("estimate − truth [% of truth]")
         _grid(axes)

@@ -131,18 +131,19 @@ def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Ta
         right=("truth", "error", "error/std"),
     )
     for estimate in estimates:
+        if result.row_count:
+            result.add_section()
         result.add_row(Text(estimate.estimator, style="bold"))
         for name, value in truth.items():
-            row = (_named(f"  {SYMBOLS[name]}", UNITS[name]), significant(value))
+            row = (_named(SYMBOLS[name], UNITS[name]), significant(value))
             quantity: Quantity | None = getattr(estimate, name)
             if quantity is None:
                 result.add_row(*row, _status(estimate.status))
                 continue
             error = quantity.value - value
-            relative = f"{100.0 * error / abs(value):+.2g} %" if value else ""
+            relative = f"{100.0 * error / abs(value):+.1g} %" if value else ""
             stds = in_stds(error, quantity.std)
             result.add_row(*row, with_std(quantity.value, quantity.std), relative, stds)
-        result.add_section()
     return result
 
 
@@ -182,8 +183,9 @@ def windows_table(run: RunEstimate) -> Table:
     Returns:
         A table with a row for each window, the largest amplitude first.
     """
+    cycles = run.windows[0].cycles if run.windows else 0
     result = table(
-        f"{run.id}: windows of three cycles",
+        f"{run.id}: windows of {cycles} cycle{'s' if cycles > 1 else ''}",
         *("from [s]", "to [s]", "amplitude [rad]", "ζ [1]", "ωn [rad/s]"),
         right=("from [s]", "to [s]"),
     )

@@ -33,7 +33,7 @@ def run(
 
     The rig of the paper swings with the wind off and on; every estimator gives
     Cnβ and Cnr (1/rad), Izz (kg m²) and Cr (N m s/rad) beside what was
-    injected. Then come real swings of a pendulum, by windows of three cycles.
+    injected. Then come real swings of a pendulum, by windows of a few cycles.
     Campaign, estimates (JSON) and figures (PNG) stay in FOLDER.
 
     [bold]Examples[/bold]
@@ -155,7 +155,7 @@ def measured_part(folder: Path) -> Estimate:
     campaign = measured_campaign(MEASURED)
     estimate = identify(campaign, CHECKED_ESTIMATOR, throw=False)
     write_json(folder / f"estimate-{MEASURED}.json", estimate.to_json_dict())
-    say(f"\nMeasured: {campaign.name}, {len(campaign.runs)} runs. {campaign.description}\n")
+    say(f"Measured: {campaign.name}, {len(campaign.runs)} runs. {campaign.description}\n")
     show(campaign, estimate, windows=True)
     return estimate
 

@@ -29,7 +29,7 @@ def run(
         bool | None,
         typer.Option(
             "--windows/--no-windows",
-            help="Show ζ and ωn by windows of three cycles. Default: for up to three runs.",
+            help="Show ζ and ωn by windows of a few cycles. Default: for up to three runs.",
             show_default=False,
         ),
     ] = None,

@@ -1,0 +1,213 @@
+"""Every public function and class says what its arguments are; numeric ones in which unit.
+
+The packages are walked, so nothing is forgotten; the rules themselves are tried on planted examples below.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import re
+from collections.abc import Callable, Iterator
+from types import ModuleType
+from typing import Any
+
+import pydantic
+import pytest
+
+PACKAGES = ("tunnel_sim", "identification", "tunnel_lab")
+# Typer turns the arguments of a command into its help; test_cli.py reads that.
+COMMANDS = {f"tunnel_lab.commands.{name}.run" for name in ("demo", "simulate", "identify", "plot", "springs")}
+EXEMPT = {"tunnel_lab.cli.tunnel", *COMMANDS}
+# Catalogues of small laws: all of a module have one signature, described at its head.
+CATALOGUES = (
+    "tunnel_sim.reference.moments.",
+    "tunnel_sim.reference.readings.",
+    "tunnel_sim.reference.binding.",
+)
+
+UNIT = re.compile(
+    r"""(?<![\w/])(
+        rad(/s|²|2|/\(N\ m\))?(/s)?(²|2)? | degrees? | °
+        | s | Hz | m(/s|²|³)? | kg(/m³|\ m²|\ m2)?
+        | N\ m([ ]s)?([ ]s²)?(/rad(/s)?(²)?)? | 1/rad(²|2)? | 1/s
+        | 1/s²? | % | pixels | inches | bits? | cycles | SI(\ units)?
+        | dimensionless | ratio | fraction | share | count | number\ of | units?
+        | radians | in\ the\ unit | probability | threads | seed | index | steps? | samples? | \(1\) | factor
+    )(?![\w])""",
+    re.VERBOSE,
+)
+ARRAY = re.compile(r"\bshapes?\b|\bn of them\b|\bper (run|spring|window|sample)\b|\bof each\b")
+NUMERIC = {"float", "float | None"}
+
+
+def modules() -> Iterator[ModuleType]:
+    for package in PACKAGES:
+        root = importlib.import_module(package)
+        yield root
+        for found in pkgutil.walk_packages(root.__path__, package + "."):
+            if not any(part.startswith("_") for part in found.name.split(".")):
+                yield importlib.import_module(found.name)
+
+
+def public_objects() -> Iterator[tuple[str, Any]]:
+    """Public functions, classes and methods with the module that defines them."""
+    for module in modules():
+        for name, member in vars(module).items():
+            if name.startswith("_") or getattr(member, "__module__", None) != module.__name__:
+                continue
+            if inspect.isclass(member):
+                yield f"{module.__name__}.{name}", member
+                for method_name, method in vars(member).items():
+                    if not method_name.startswith("_") and inspect.isfunction(method):
+                        yield f"{module.__name__}.{name}.{method_name}", method
+            elif inspect.isfunction(inspect.unwrap(member)) if callable(member) else False:
+                yield f"{module.__name__}.{name}", inspect.unwrap(member)
+
+
+def documented_arguments(text: str) -> dict[str, str]:
+    """Names and texts under ``Args:`` of a Google-style docstring."""
+    section = re.search(r"^Args:\n((?:(?:[ ]{4,}.*)?\n?)*)", inspect.cleandoc(text), re.MULTILINE)
+    if section is None:
+        return {}
+    found: dict[str, str] = {}
+    name = ""
+    for line in section[1].splitlines():
+        start = re.match(r"[ ]{4}(\w+)(?:, \w+)*:\s*(.*)", line)
+        if start:
+            name = start[1]
+            found[name] = start[2]
+        elif name:
+            found[name] += " " + line.strip()
+    return found
+
+
+def arguments(member: Any) -> dict[str, str]:
+    """Arguments and their annotations, those of the constructor for a class."""
+    try:
+        signature = inspect.signature(member)
+    except ValueError:
+        return {}
+    return {
+        name: str(parameter.annotation)
+        for name, parameter in signature.parameters.items()
+        if name not in ("self", "cls") and parameter.kind is not inspect.Parameter.VAR_KEYWORD
+    }
+
+
+def says_it_in_one_line(member: Any) -> bool:
+    """A single line may do where there is one argument at most."""
+    return len(arguments(member)) <= 1 and "\n" not in inspect.cleandoc(member.__doc__ or "")
+
+
+def overrides(name: str, member: Any) -> bool:
+    """Whether a base class documents the method already."""
+    module, _, rest = name.rpartition(".")
+    if not inspect.isfunction(member) or "." not in member.__qualname__:
+        return False
+    owner = getattr(importlib.import_module(member.__module__), member.__qualname__.split(".")[0])
+    return any(getattr(vars(base).get(rest), "__doc__", None) for base in owner.__mro__[1:])
+
+
+def undescribed_fields(name: str, model: type[pydantic.BaseModel]) -> list[str]:
+    """Fields of a table of a file format that carry no description; nested tables have their own."""
+    return [
+        f"{name}: field {field} has no description"
+        for field, info in model.model_fields.items()
+        if not info.description and "Table" not in str(info.annotation)
+    ]
+
+
+def faults(name: str, member: Any) -> list[str]:
+    """What is wrong with one docstring."""
+    text = member.__doc__ or ""
+    if not text.strip():
+        return [f"{name}: no docstring"]
+    enumerated = inspect.isclass(member) and hasattr(member, "__members__")
+    if name in EXEMPT or name.startswith(CATALOGUES) or enumerated:
+        return []
+    if says_it_in_one_line(member) or overrides(name, member):
+        return []
+    if inspect.isclass(member) and issubclass(member, pydantic.BaseModel):
+        return undescribed_fields(name, member)
+    known = documented_arguments(text)
+    result = []
+    for argument, annotation in arguments(member).items():
+        if argument.startswith("_"):
+            continue
+        if argument not in known:
+            result.append(f"{name}: argument {argument} is not documented")
+        elif annotation in NUMERIC and not UNIT.search(known[argument]):
+            result.append(f"{name}: argument {argument} has no unit: {known[argument]!r}")
+        elif annotation in ("Array", "ArrayLike") and not ARRAY.search(known[argument]):
+            result.append(f"{name}: argument {argument} has no shape: {known[argument]!r}")
+    signature = arguments(member)
+    result += [
+        f"{name}: documents {extra}, which it does not take" for extra in known if extra not in signature
+    ]
+    return result
+
+
+def test_every_public_object_is_documented() -> None:
+    found = list(public_objects())
+    assert len(found) > 100  # the walk walks
+    wrong = [fault for name, member in found for fault in faults(name, member)]
+    assert not wrong, "\n".join(wrong)
+
+
+def good(speed: float, count: int) -> float:
+    """Something.
+
+    Args:
+        speed: V, m/s.
+        count: of runs.
+    """
+    return speed * count
+
+
+def undocumented_argument(speed: float, count: int) -> float:
+    """Something.
+
+    Args:
+        speed: V, m/s.
+    """
+    return speed * count
+
+
+def without_unit(speed: float, count: int) -> float:
+    """Something.
+
+    Args:
+        speed: of the wind.
+        count: of runs.
+    """
+    return speed * count
+
+
+def promises_more(speed: float, count: int) -> float:
+    """Something.
+
+    Args:
+        speed: V, m/s.
+        count: of runs.
+        colour: of the line.
+    """
+    return speed * count
+
+
+@pytest.mark.parametrize(
+    ("function", "fault"),
+    [
+        (undocumented_argument, "argument count is not documented"),
+        (without_unit, "argument speed has no unit"),
+        (promises_more, "documents colour, which it does not take"),
+        (lambda: None, "no docstring"),
+    ],
+)
+def test_planted_faults_are_found(function: Callable[..., object], fault: str) -> None:
+    assert [text for text in faults("planted", function) if fault in text]
+
+
+def test_a_good_docstring_has_no_fault() -> None:
+    assert faults("good", good) == []

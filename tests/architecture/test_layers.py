@@ -1,0 +1,98 @@
+"""The layers of decision 0001: contracts on the sources, and what a fresh interpreter really imports."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import grimp
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = tuple(
+    tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["root_packages"],
+)
+# An editable installation would lead import-linter back to the original sources, wherever it is started.
+LINT_IMPORTS = """
+import sys
+sys.meta_path = [finder for finder in sys.meta_path if "editable" not in type(finder).__module__]
+sys.path.insert(0, "")
+from importlinter.cli import lint_imports
+sys.exit(lint_imports(no_cache=True))
+"""
+
+
+def lint_imports(folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", LINT_IMPORTS], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+def imported_by(script: str) -> set[str]:
+    """Top-level names of all modules loaded once a script has run in a fresh interpreter."""
+    report = "\nimport sys\nprint(*sorted({name.partition('.')[0] for name in sys.modules}))"
+    done = subprocess.run(
+        [sys.executable, "-c", script + report], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.splitlines()[-1].split())
+
+
+def test_the_import_contracts_hold() -> None:
+    done = lint_imports(ROOT)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("identification/estimate.py", "import mujoco"),
+        ("identification/estimate.py", "import tunnel_sim.model"),
+        ("tunnel_sim/record.py", "import identification.estimate"),
+        ("identification/estimate.py", "import tunnel_lab.formatting"),
+    ],
+)
+def test_a_planted_breach_is_caught(tmp_path: Path, module: str, line: str) -> None:
+    for package in PACKAGES:
+        ignored = shutil.ignore_patterns("__pycache__", "data")
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=ignored)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    target = tmp_path / module
+    target.write_text(target.read_text() + f"\n{line}\n")
+    done = lint_imports(tmp_path)
+    assert done.returncode == 1, done.stdout
+    assert "BROKEN" in done.stdout
+
+
+def test_mujoco_is_imported_only_where_the_engine_runs() -> None:
+    graph = grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
+    importers = graph.find_modules_that_directly_import("mujoco")
+    assert "tunnel_sim.simulate" in importers
+    outside = {name for name in importers if not name.startswith("tunnel_sim.")}
+    assert outside == {"tunnel_lab.rendering"}  # inside a function, in a process of its own
+
+
+def test_reading_and_identifying_a_campaign_never_imports_the_engine() -> None:
+    modules = imported_by(
+        "from identification import identify\n"
+        "from identification.datasets import measured_campaign\n"
+        "campaign = measured_campaign('rotary-pendulum')\n"
+        "assert identify(campaign, 'output_error').runs\n"
+    )
+    assert "identification" in modules
+    assert not modules & {"mujoco", "gymnasium", "torch", "matplotlib"}
+
+
+def test_no_module_of_the_upper_layers_loads_heavy_packages_at_import() -> None:
+    modules = imported_by(
+        "import importlib, pkgutil\n"
+        "for package in ('identification', 'tunnel_lab'):\n"
+        "    found = pkgutil.walk_packages(importlib.import_module(package).__path__, package + '.')\n"
+        "    for module in found:\n"
+        "        importlib.import_module(module.name)\n"
+    )
+    assert {"identification", "tunnel_lab"} <= modules
+    assert not modules & {"mujoco", "gymnasium", "torch", "matplotlib"}

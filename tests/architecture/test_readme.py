@@ -1,0 +1,129 @@
+"""What the README shows is what the tool does: commands are run, outputs compared, files read."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+SESSIONS = {
+    text.splitlines()[0].removeprefix("$ "): text.splitlines()[1:]
+    for kind, text in BLOCKS
+    if kind == "console"
+}
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
+LAST_DIGITS = 3
+"""Another processor may round the last digits otherwise; what is shown is given to two digits of the std."""
+
+
+def blocks(kind: str) -> list[str]:
+    return [text for language, text in BLOCKS if language == kind]
+
+
+def toml_block(key: str) -> str:
+    (found,) = [text for text in blocks("toml") if key in text]
+    return found
+
+
+def output_of(command: str, folder: Path) -> list[str]:
+    program, *arguments = command.split()
+    assert program == "tunnel"
+    done = subprocess.run(
+        [sys.executable, "-m", "tunnel_lab.cli", *arguments],
+        cwd=folder,
+        env={**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+def comparable(lines: list[str]) -> list[str]:
+    """Lines without what hangs on the machine: trailing blanks, and whether it can draw."""
+    kept = [line.rstrip() for line in lines if "icture of the rig" not in line]
+    return "\n".join(kept).strip("\n").splitlines()
+
+
+def last_digit(number: str) -> float:
+    mantissa, _, power = number.partition("e")
+    return 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
+
+
+def assert_same(shown: list[str], real: list[str]) -> None:
+    """The same words, and numbers that differ by no more than a few of their last digits."""
+    shown, real = comparable(shown), comparable(real)
+    words = [[NUMBER.sub("#", line).split() for line in lines] for lines in (shown, real)]
+    assert words[0] == words[1]
+    for shown_line, real_line in zip(shown, real, strict=True):
+        for a, b in zip(NUMBER.findall(shown_line), NUMBER.findall(real_line), strict=True):
+            allowed = LAST_DIGITS * max(last_digit(a), last_digit(b)) * 1.001
+            assert abs(float(a) - float(b)) <= allowed, (shown_line, real_line)
+
+
+@pytest.mark.parametrize("command", sorted(SESSIONS))
+def test_shown_output_is_real_output(command: str, tmp_path: Path) -> None:
+    assert_same(SESSIONS[command], output_of(command, tmp_path))
+
+
+def test_demo_and_springs_are_shown() -> None:
+    assert set(SESSIONS) == {"tunnel demo", "tunnel springs"}
+
+
+def test_the_comparison_can_fail() -> None:
+    assert_same(["Cnr -0.1033 ± 0.0012"], ["Cnr   -0.1034 ± 0.0011  "])
+    for other in ("Cnr -0.1043 ± 0.0012", "Cnb -0.1033 ± 0.0012", "Cnr -0.1033 ± 0.0012 1"):
+        with pytest.raises(AssertionError):
+            assert_same(["Cnr -0.1033 ± 0.0012"], [other])
+
+
+def test_there_are_two_set_up_commands_of_one_line() -> None:
+    commands = [text.strip() for text in blocks("bash") if ".venv" in text]
+    assert len(commands) == 2
+    assert all(
+        "\n" not in command and command.startswith("python3 -m venv .venv && ") for command in commands
+    )
+    assert commands[0].endswith(" && .venv/bin/tunnel demo")
+    assert commands[1].endswith(" && .venv/bin/python -m pytest")
+
+
+def test_ci_takes_the_test_command_from_here() -> None:
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    pattern = re.search(r"grep -E '(.*)' README\.md", script)
+    assert pattern is not None
+    assert len(re.findall(pattern[1], README, re.MULTILINE)) == 1
+    assert "-m pytest" not in script.replace(pattern[1], "").replace('"-m pytest" is the command', "")
+
+
+def test_the_links_lead_somewhere() -> None:
+    links = [link for link in re.findall(r"\]\(([^)]+)\)", README) if "://" not in link and link[0] != "#"]
+    assert len(links) > 10
+    missing = [link for link in links if not (ROOT / link.partition("#")[0]).exists()]
+    assert missing == []
+
+
+def test_the_plan_shown_can_be_simulated(tmp_path: Path) -> None:
+    from tunnel_sim.plan import load_plan
+
+    (tmp_path / "plan.toml").write_text(toml_block("wind_speeds"), encoding="utf-8")
+    assert len(load_plan(tmp_path / "plan.toml").conditions) == 4
+
+
+def test_the_measured_campaign_shown_can_be_read(tmp_path: Path) -> None:
+    from tunnel_sim.campaign_io import read_campaign
+
+    (tmp_path / "campaign.toml").write_text(toml_block("first-swing"), encoding="utf-8")
+    (tmp_path / "runs").mkdir()
+    time = np.arange(0.0, 6.0, 0.01)
+    rows = (f"{t:.2f},{0.2 * np.exp(-0.1 * t) * np.cos(6.0 * t):.5f}" for t in time)
+    (tmp_path / "runs" / "first-swing.csv").write_text("time_s,yaw_rad\n" + "\n".join(rows) + "\n")
+    assert [run.id for run in read_campaign(tmp_path).runs] == ["first-swing"]
