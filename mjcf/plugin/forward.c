@@ -24,10 +24,7 @@ static double body_angle(const Motion* y) { return y->angle + y->twist; }
 static double body_rate(const Motion* y) { return y->rate + y->twist_rate; }
 
 static double lagged_at(const Step* s, double time, const Motion* y) {
-  const double lag = vwt_lag_time(s->p, wind_at(s->run, time));
-  if (lag == 0) {
-    return body_angle(y);
-  }
+  const double lag = vwt_lag_time(s->p, wind_at(s->run, 0.5 * (s->start + time)));
   return vwt_lag_advance(lag, s->lagged, time - s->start, body_angle(&s->from), body_rate(&s->from),
                          body_angle(y), body_rate(y));
 }

@@ -100,25 +100,26 @@ static Motion start_motion(const mjtNum* state, const Motion* now) {
   return start;
 }
 
-static mjtNum lagged_at(const mjtNum* state, const vwt_parameters* p, mjtNum wind, const Motion* now) {
-  const mjtNum lag = vwt_lag_time(p, wind);
+// The lag's time constant changes with the wind: that of the time halfway from the step's start is taken.
+static mjtNum lagged_at(const mjModel* m, const mjData* d, const Instance* self, const vwt_parameters* p,
+                        const mjtNum* state, const Motion* now) {
   const mjtNum angle = now->angle + now->twist, rate = now->rate + now->twist_rate;
-  if (lag == 0 || state[kStarted] == 0) {
+  if (p->aero_lag == 0 || state[kStarted] == 0) {
     return angle;
   }
-  return vwt_lag_advance(lag, state[kLagged], fmax(0, now->time - state[kTime]), state[kAngle] + state[kTwist],
-                         state[kRate] + state[kTwistRate], angle, rate);
+  const mjtNum halfway = wind_speed_at(m, d, self, 0.5 * (state[kTime] + now->time));
+  return vwt_lag_advance(vwt_lag_time(p, halfway), state[kLagged], now->time - state[kTime],
+                         state[kAngle] + state[kTwist], state[kRate] + state[kTwistRate], angle, rate);
 }
 
 static mjtNum air_moment(const mjModel* m, const mjData* d, const Instance* self, const vwt_parameters* p,
                          const mjtNum* state, const Motion* at) {
-  const mjtNum wind = wind_speed_at(m, d, self, at->time);
   const vwt_air_state air = {
       .time = at->time,
-      .wind_speed = wind,
+      .wind_speed = wind_speed_at(m, d, self, at->time),
       .angle = at->angle + at->twist,
       .rate = at->rate + at->twist_rate,
-      .lagged = p->aero_lag != 0 ? lagged_at(state, p, wind, at) : 0,
+      .lagged = lagged_at(m, d, self, p, state, at),
       .forcing = self->forcing < 0 ? 0 : series_at(m, self->forcing, self->forcing_interval, at->time),
   };
   return vwt_air_moment(p, &air);
@@ -188,7 +189,7 @@ static void advance(const mjModel* m, mjData* d, int instance) {
   vwt_parameters p;
   read_parameters(m, d, self, &p);
   const Motion now = present_motion(m, d, self);
-  state[kLagged] = lagged_at(state, &p, wind_speed_at(m, d, self, now.time), &now);
+  state[kLagged] = lagged_at(m, d, self, &p, state, &now);
   state[kAngle] = now.angle;
   state[kRate] = now.rate;
   state[kTwist] = now.twist;
