@@ -109,7 +109,12 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
 
 
 def run_place(path: Path, run_id: str) -> str:
-    """File and run for an error message."""
+    """File and run for an error message.
+
+    Args:
+        path: of the run's file, or of the campaign's folder.
+        run_id: the run's.
+    """
     return f"{shown(path)}, run '{run_id}'"
 
 

@@ -27,7 +27,12 @@ ModelT = TypeVar("ModelT", bound=StrictModel)
 
 
 def one_line(value: object, limit: int = 120) -> str:
-    """The text of a value without line breaks or control characters, shortened to ``limit`` characters."""
+    """The text of a value without line breaks or control characters.
+
+    Args:
+        value: anything.
+        limit: longest text, characters; what is longer is shortened.
+    """
     text = " ".join("".join(c if c.isprintable() else " " for c in str(value)).split())
     return text if len(text) <= limit else f"{text[: limit - 1]}…"
 

@@ -29,9 +29,9 @@ class ParameterInfo:
         unit: SI, rad.
         meaning: one clause.
         scale: a size typical of this rig, for steps and starting values.
-        lower: least value allowed.
-        upper: greatest value allowed.
-        default: value where none is given; for the severity this is the null.
+        lower: least value allowed, in the unit.
+        upper: greatest value allowed, in the unit.
+        default: value where none is given, in the unit; for the severity this is the null.
     """
 
     name: str
