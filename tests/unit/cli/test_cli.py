@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -145,13 +145,13 @@ def test_help_imports_nothing_heavy_and_answers_in_half_a_second() -> None:
         "main(['--help'])\n"
         f"print(sorted({heavy} & set(sys.modules)), file=sys.stderr)\n"
     )
-    shortest = 10.0
-    for _ in range(10):  # the best of ten: the machine's other work is not the help's
-        start = time.perf_counter()
+    seconds = []
+    for _ in range(3):
+        before = os.times()
         done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-        shortest = min(shortest, time.perf_counter() - start)
+        after = os.times()
         assert done.stderr == "[]\n"
         assert "tunnel demo" in done.stdout
-        if shortest < 0.5:
-            return
-    pytest.fail(f"tunnel --help took {shortest:.2f} s")
+        # Processor time: what the machine does besides is not the help's.
+        seconds.append(sum(after[2:4]) - sum(before[2:4]))
+    assert min(seconds) < 0.5

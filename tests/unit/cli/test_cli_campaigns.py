@@ -51,7 +51,7 @@ def test_without_stiffness_the_form_is_normalised(tunnel: Tunnel, normalised_cam
     status, out, _ = tunnel("identify", normalised_campaign)
     assert status == 0
     assert "not stated" in out
-    assert "windows of three cycles" in out
+    assert "windows of 3 cycles" in out
     assert "state it in campaign.toml" in out
     assert "Cnβ" not in out
 

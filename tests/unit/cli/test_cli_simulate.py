@@ -1,0 +1,142 @@
+"""``tunnel simulate`` and ``tunnel demo``: what they write, and that a failed check is seen."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from identification.estimate import Estimate, Quantity, Status
+from tunnel_lab.commands.demo import misses, truth_of
+from tunnel_lab.rendering import backends, render_rig
+from tunnel_sim.plan import CampaignPlan, load_plan
+
+Tunnel = Callable[..., tuple[int, str, str]]
+PLAN = Path(__file__).parents[2] / "data" / "tiny-plan.toml"
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture
+def plan() -> CampaignPlan:
+    return load_plan(PLAN)
+
+
+def test_a_plan_becomes_a_campaign_that_can_be_identified(tunnel: Tunnel, tmp_path: Path) -> None:
+    status, out, _ = tunnel("simulate", PLAN, "--out", tmp_path / "c")
+    assert status == 0
+    assert f"Written: {tmp_path / 'c'} (2 runs)" in out
+    assert {"campaign.toml", "truth.json"} <= contents(tmp_path / "c").keys()
+    assert tunnel("identify", tmp_path / "c", "--json", tmp_path / "e.json")[0] == 0
+    found = json.loads((tmp_path / "e.json").read_text(encoding="utf-8"))["cn_beta"]
+    assert abs(found["value"] - 0.495) < 4.0 * found["std"]
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_does_not(tunnel: Tunnel, tmp_path: Path) -> None:
+    for name, seed in (("a", "5"), ("b", "5"), ("c", "6")):
+        assert tunnel("simulate", PLAN, "--out", tmp_path / name, "--seed", seed, "--format", "csv")[0] == 0
+    a, b, c = (contents(tmp_path / name) for name in "abc")
+    assert a == b
+    assert a.keys() == c.keys()
+    assert a != c
+    assert any(name.endswith(".csv") for name in a)
+
+
+def test_a_campaign_is_not_overwritten_unasked(tunnel: Tunnel, tmp_path: Path) -> None:
+    assert tunnel("simulate", PLAN, "--out", tmp_path / "c")[0] == 0
+    before = contents(tmp_path / "c")
+    status, out, err = tunnel("simulate", PLAN, "--out", tmp_path / "c", "--seed", "9")
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert "--overwrite" in err
+    assert contents(tmp_path / "c") == before
+    assert tunnel("simulate", PLAN, "--out", tmp_path / "c", "--seed", "9", "--overwrite")[0] == 0
+    assert contents(tmp_path / "c") != before
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("name = [", "TOML"),
+        (PLAN.read_text().replace("springs = [5]", "springs = [11]"), "there is no spring 11"),
+        (PLAN.read_text().replace("seed = 1", "sed = 1"), "sed"),
+        (PLAN.read_text().replace("cn_beta = 0.495", "cn_beta = nan"), "cn_beta"),
+    ],
+)
+def test_a_bad_plan_is_one_line_and_leaves_nothing(
+    tunnel: Tunnel, tmp_path: Path, text: str, part: str
+) -> None:
+    (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
+    status, out, err = tunnel("simulate", tmp_path / "plan.toml", "--out", tmp_path / "c")
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert "plan.toml" in err
+    assert part in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.toml"]
+
+
+def test_a_folder_below_a_file_is_refused(tunnel: Tunnel, tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    status, _, err = tunnel("simulate", PLAN, "--out", tmp_path / "taken" / "c")
+    assert status == 2
+    assert err.splitlines()[-1].startswith("tunnel: ")
+
+
+def exact(plan: CampaignPlan, name: str = "output_error") -> Estimate:
+    values = {key: Quantity(value, 0.01 * abs(value), "") for key, value in truth_of(plan).items()}
+    return Estimate("tiny", name, (), **values)
+
+
+def test_the_demo_misses_nothing_that_is_near(plan: CampaignPlan) -> None:
+    assert misses([exact(plan), exact(plan, "conventional")], plan) == []
+
+
+def test_the_demo_sees_an_estimate_far_from_the_truth(plan: CampaignPlan) -> None:
+    far = replace(exact(plan), cn_r=Quantity(plan.truth.cn_r * 1.05, 0.01 * abs(plan.truth.cn_r), "1/rad"))
+    assert misses([far], plan) == ["output_error: cn_r misses the truth by more than 4 std"]
+
+
+def test_the_demo_sees_an_estimate_that_is_missing_or_failed(plan: CampaignPlan) -> None:
+    failed = Estimate("tiny", "conventional", (), (Status.NO_RUN_IDENTIFIED,))
+    (missing, reason) = misses([replace(exact(plan), yaw_inertia=None), failed], plan)[::-1]
+    assert missing == "output_error: no yaw_inertia"
+    assert reason.startswith("conventional: no run could be identified")
+
+
+def test_a_failed_check_ends_the_demo_with_status_one(
+    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, plan: CampaignPlan
+) -> None:
+    monkeypatch.setattr("tunnel_sim.plan.paper_plan", lambda: plan)
+    monkeypatch.setattr("tunnel_lab.commands.demo.misses", lambda *_: ["planted"])
+    monkeypatch.setenv("MUJOCO_GL", "nonsense")
+    status, out, err = tunnel("demo", "--out", tmp_path / "out")
+    assert status == 1
+    assert "Check failed: planted" in err
+    assert "No picture of the rig: off-screen rendering does not work here" in out
+    written = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"campaign", "traces.png", "spectrum.png", "windows.png", "estimates.png"} <= written
+    assert "rig.png" not in written
+
+
+def test_a_machine_that_cannot_draw_is_told_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "nonsense")
+    assert backends() == ("nonsense",)
+    problem = render_rig(tmp_path / "rig.png")
+    assert "nonsense" in problem
+    assert "libosmesa6" in problem
+    assert "\n" not in problem
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_is_whole_where_the_machine_can_draw(tmp_path: Path) -> None:
+    problem = render_rig(tmp_path / "rig.png", width=64, height=48)
+    if problem:
+        pytest.skip(problem)
+    assert (tmp_path / "rig.png").read_bytes().startswith(b"\x89PNG")
