@@ -78,7 +78,7 @@ class DecayFit:
         parameters: φ, shape (p,).
         zero: the sensor's zero, rad.
         runs: one per reading.
-        normal: information of φ, and of the zero last where it was estimated.
+        normal: information of φ, and of the zero last where it was estimated, shape (p, p) or (p + 1, p + 1).
         converged: whether the step fell below 1e-12.
         iterations: how many linearisations it took.
     """
@@ -147,7 +147,15 @@ def fit_run(reading: Reading, start: Decay, *, zero: float | None = None) -> Dec
 
 
 def projected_cost(reading: Reading, decay: Decay) -> float:
-    """Sum of squares left by the best initial state and zero for a given decay, rad²."""
+    """What is left of a reading by the best initial state and zero for a given decay.
+
+    Args:
+        reading: angles in rad against s.
+        decay: decay rate and normalised stiffness.
+
+    Returns:
+        Sum of squares, rad²; infinite where the decay overflows.
+    """
     return _project([reading], [np.eye(2)], np.array([decay.rate, decay.stiffness]), None).cost
 
 

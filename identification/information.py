@@ -26,6 +26,13 @@ def eliminate(information: Array, score: Array, keep: int) -> tuple[Array, Array
 def scaled_solve(matrix: Array, right: Array) -> Array:
     """Solve a symmetric positive system after scaling its diagonal to one (units differ by decades).
 
+    Args:
+        matrix: shape (m, m).
+        right: shape (m,) or (m, n).
+
+    Returns:
+        The solution, of the shape of ``right``.
+
     Raises:
         numpy.linalg.LinAlgError: when the matrix is singular.
     """
@@ -44,7 +51,15 @@ def inverse(information: Array) -> Array:
 
 
 def embed(link: Array, *, with_zero: bool) -> Array:
-    """A run's link, (2, p), extended by the common zero as last parameter: (3, p + 1)."""
+    """A run's link extended by the common zero as last parameter.
+
+    Args:
+        link: from the shared parameters to (a, k), shape (2, p).
+        with_zero: whether the zero is among the shared parameters.
+
+    Returns:
+        Shape (3, p + 1); the link itself without the zero.
+    """
     if not with_zero:
         return link
     extended = np.zeros((3, link.shape[1] + 1))

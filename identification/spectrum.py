@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from tunnel_sim.record import Array, Record
@@ -9,7 +11,20 @@ from tunnel_sim.record import Array, Record
 _PADDING = 8  # zero padding: eight times the record, so the interpolated peak sits within 1/16 of a bin
 
 
-def psd_peak_frequency(record: Record) -> float:
+@dataclass(frozen=True)
+class SpectralPeak:
+    """The highest peak of a power spectral density.
+
+    Args:
+        frequency: of the peak, Hz; 0 where the record is constant.
+        prominence: its power over the median's; white noise alone reaches 40 less than once in 1e6 records.
+    """
+
+    frequency: float
+    prominence: float
+
+
+def psd_peak(record: Record) -> SpectralPeak:
     """The damped frequency, as the peak of the power spectral density.
 
     The mean is taken off, a Hann window keeps the offset and the negative frequencies from leaking into the
@@ -20,7 +35,7 @@ def psd_peak_frequency(record: Record) -> float:
         record: the reading, n samples, rad against s.
 
     Returns:
-        Frequency of the peak, Hz; 0 where the record is constant.
+        The peak.
     """
     centred = record.yaw_rad - record.yaw_rad.mean()
     size = 1 << int(np.ceil(np.log2(_PADDING * centred.size)))
@@ -29,8 +44,10 @@ def psd_peak_frequency(record: Record) -> float:
     lowest = max(1, int(size / centred.size))
     peak = lowest + int(np.argmax(power[lowest:-1]))
     if power[peak] <= 0.0:
-        return 0.0
-    return (peak + _parabola_offset(power[peak - 1 : peak + 2])) * record.sample_rate / size
+        return SpectralPeak(0.0, 0.0)
+    place = peak + _parabola_offset(power[peak - 1 : peak + 2])
+    median = max(float(np.median(power[lowest:])), 1e-300)
+    return SpectralPeak(place * record.sample_rate / size, float(power[peak]) / median)
 
 
 def _parabola_offset(power: Array) -> float:

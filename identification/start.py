@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.damped_oscillation import Decay
 from identification.decay_fit import Reading, projected_cost
-from identification.spectrum import psd_peak_frequency
+from identification.spectrum import psd_peak
 from tunnel_sim.record import Array, Record
 
 _SAMPLES = 1024  # the start is judged on a thinned record; the fit itself sees every sample
@@ -26,7 +26,7 @@ def starting_decay(record: Record) -> Decay | None:
     Returns:
         The start; None where the record is constant.
     """
-    frequency = psd_peak_frequency(record)
+    frequency = psd_peak(record).frequency
     if frequency == 0.0 or np.ptp(record.yaw_rad) == 0.0:
         return None
     thin = _thinned(record, frequency)

@@ -26,7 +26,7 @@ import numpy as np
 from identification.derivatives import has_size, loads
 from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, RunEstimate, Status, by_gravity
 from identification.peaks import PeakDecay, peak_decay
-from identification.spectrum import psd_peak_frequency
+from identification.spectrum import psd_peak
 from identification.springs import wind_off_line
 from identification.uncertainty import widened_covariance
 from tunnel_sim.campaign import Campaign, Run
@@ -34,6 +34,7 @@ from tunnel_sim.record import Array
 
 LN2 = float(np.log(2.0))
 _LEAST_FOR_SCATTER = 3
+_LEAST_PROMINENCE = 40.0  # of the spectral peak; less may be noise
 
 
 @dataclass(frozen=True)
@@ -79,8 +80,9 @@ class _Seen:
 
 
 def _see(run: Run) -> _Seen:
-    frequency = psd_peak_frequency(run.record)
-    return _Seen(run, frequency, peak_decay(run.record, frequency) if frequency > 0.0 else None)
+    peak = psd_peak(run.record)
+    peaks = peak_decay(run.record, peak.frequency) if peak.prominence > _LEAST_PROMINENCE else None
+    return _Seen(run, peak.frequency, peaks)
 
 
 def _run_estimate(seen: _Seen) -> RunEstimate:

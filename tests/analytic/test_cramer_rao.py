@@ -1,0 +1,108 @@
+"""The exact bound against its closed-form long-record limit and against plain numerical information."""
+
+import numpy as np
+import pytest
+
+from identification import identify
+from identification.cramer_rao import campaign_bound, damped_sinusoid_bound
+from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, angle_of, campaign
+from tunnel_sim.errors import TunnelError
+
+NAMES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
+
+
+@pytest.mark.parametrize("zeta", [0.001, 0.003, 0.01])
+@pytest.mark.parametrize("frequency", [0.8, 2.0, 4.0])
+def test_long_record_limit(zeta, frequency):
+    amplitude, noise, rate = 0.35, 5e-4, 1000.0
+    omega_n = 2.0 * np.pi * frequency / np.sqrt(1.0 - zeta**2)
+    sigma = zeta * omega_n
+    time = np.arange(round(9.0 / sigma * rate)) / rate
+    bound = damped_sinusoid_bound(
+        time, amplitude=amplitude, phase=0.4, frequency=frequency, zeta=zeta, noise_std=noise
+    )
+    relative = 4.0 * noise / amplitude * np.sqrt(sigma / rate)
+    # The limit leaves out terms of order ζ (the double frequency, the offset) and e^(−2·9)·9².
+    assert bound.zeta / zeta == pytest.approx(relative, rel=3.0 * zeta + 1e-4)
+    assert bound.frequency / frequency == pytest.approx(zeta * relative, rel=3.0 * zeta + 1e-4)
+
+
+@pytest.mark.parametrize("offset_known", [False, True])
+def test_sinusoid_bound_matches_numerical_information(offset_known):
+    truth = np.array([0.3, 0.7, 2.1, 0.02, 0.01])
+    time = np.arange(2000) / 500.0
+
+    def model(p):
+        sigma = p[3] * 2.0 * np.pi * p[2] / np.sqrt(1.0 - p[3] ** 2)
+        return p[0] * np.exp(-sigma * time) * np.cos(2.0 * np.pi * p[2] * time + p[1]) + p[4]
+
+    columns = []
+    for i in range(4 if offset_known else 5):
+        step = np.zeros(5)
+        step[i] = 1e-6
+        columns.append((model(truth + step) - model(truth - step)) / 2e-6)
+    jacobian = np.array(columns).T
+    deviations = 1e-3 * np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+    bound = damped_sinusoid_bound(
+        time, amplitude=0.3, phase=0.7, frequency=2.1, zeta=0.02, noise_std=1e-3, offset_known=offset_known
+    )
+    got = [bound.amplitude, bound.phase, bound.frequency, bound.zeta, bound.offset]
+    np.testing.assert_allclose(got[: deviations.size], deviations, rtol=1e-6)
+    assert (bound.offset == 0.0) == offset_known
+
+
+def test_campaign_bound_matches_numerical_information():
+    settings = (Setting(16.12, 0.0), Setting(44.84, 12.0, 0.2), Setting(21.02, 24.0, 0.3))
+    data = campaign(settings, duration=4.0, rate=200.0)
+    time = data.runs[0].record.time_s
+    base = np.array([0.49, -0.11, 0.1014, 0.012])
+
+    def model(p):
+        truth = Truth(*p[:4])
+        parts = []
+        for i, setting in enumerate(settings):
+            moved = Setting(setting.spring, setting.speed, p[5 + 2 * i], p[6 + 2 * i])
+            parts.append(angle_of(moved, truth, time) + p[4])
+        return np.concatenate(parts)
+
+    states = [value for setting in settings for value in (setting.release, setting.rate)]
+    point = np.array([*base, 0.0, *states])
+    jacobian = np.array(
+        [(model(point + step) - model(point - step)) / 2e-6 for step in 1e-6 * np.eye(point.size)]
+    ).T
+    expected = 1e-6 * np.linalg.inv(jacobian.T @ jacobian)[:4, :4]
+    bound = campaign_bound(data, **dict(zip(NAMES, base, strict=True)), noise_std=1e-3)
+    assert bound.parameters == NAMES
+    np.testing.assert_allclose(np.array(bound.covariance), expected, rtol=1e-4)
+
+
+def test_estimate_claims_the_bound_when_the_model_is_right():
+    truth = Truth()
+    data = campaign(noise=5e-4, resolution=RESOLUTION, rng=np.random.default_rng(3))
+    estimate = identify(data)
+    noise = float(np.hypot(5e-4, RESOLUTION / np.sqrt(12.0)))
+    bound = campaign_bound(
+        data,
+        **{name: getattr(truth, name) for name in NAMES},
+        noise_std=noise,
+        initial_states=[(setting.release, setting.rate) for setting in TWELVE],
+    )
+    for name in NAMES:
+        assert getattr(estimate, name).std == pytest.approx(bound.std(name), rel=0.01)
+
+
+def test_bound_refuses_what_it_lacks():
+    data = campaign((Setting(None, 0.0),))
+    values = dict.fromkeys(NAMES, 0.1)
+    with pytest.raises(TunnelError, match="spring_stiffness"):
+        campaign_bound(data, **values, noise_std=1e-3)
+    with pytest.raises(TunnelError, match="frontal_area"):
+        campaign_bound(campaign((Setting(16.0, 10.0),), has_size=False), **values, noise_std=1e-3)
+    with pytest.raises(ValueError, match="positive"):
+        damped_sinusoid_bound(
+            np.arange(9.0), amplitude=0.0, phase=0.0, frequency=1.0, zeta=0.1, noise_std=1.0
+        )
+    wind_off = campaign_bound(campaign((Setting(16.0, 0.0),)), **values, noise_std=1e-3)
+    assert wind_off.parameters == ("yaw_inertia", "mechanical_damping")
+    with pytest.raises(KeyError):
+        wind_off.std("cn_beta")

@@ -1,0 +1,221 @@
+"""One suite over every estimator of the registry: what any of them must do, whatever its method."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification import Estimate, Status, identify
+from identification.estimators import ALL_ESTIMATORS, ENTRIES, make_estimator
+from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, campaign, with_records
+from tunnel_sim.errors import TunnelError
+
+NAMES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
+# Relative error on a noise-free campaign of the nominal model. A new estimator states its own here.
+ACCURACY = {"output_error": 1e-6, "conventional": 0.02}
+
+each_estimator = pytest.mark.parametrize("name", ALL_ESTIMATORS)
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    return campaign(noise=5e-4, resolution=RESOLUTION, rng=np.random.default_rng(11))
+
+
+def numbers(value):
+    """Every number in a JSON document."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        return [number for item in value for number in numbers(item)]
+    return [value] if isinstance(value, int | float) and not isinstance(value, bool) else []
+
+
+def checked(estimate, data):
+    """The laws every estimate obeys, whatever it found."""
+    document = estimate.to_json_dict()
+    text = json.dumps(document, allow_nan=False)  # refuses NaN and infinity
+    assert all(np.isfinite(numbers(document)))
+    assert Estimate.from_json_dict(json.loads(text)) == estimate
+    assert [run.id for run in estimate.runs] == [run.id for run in data.runs]
+    for run, found in zip(data.runs, estimate.runs, strict=True):
+        assert (found.omega_n is None) == (found.zeta is None)
+        assert (found.omega_n is None) == found.status.failed
+        assert found.aerodynamic_stiffness is None or run.wind_on
+    given = tuple(name for name in NAMES if getattr(estimate, name) is not None)
+    assert set(estimate.parameters) == set(given)
+    matrix = estimate.covariance_matrix
+    for i, name in enumerate(estimate.parameters):
+        quantity = getattr(estimate, name)
+        assert quantity.std > 0.0
+        assert np.sqrt(matrix[i, i]) == pytest.approx(quantity.std)
+    if given:
+        assert np.linalg.eigvalsh(matrix / np.sqrt(np.outer(np.diag(matrix), np.diag(matrix))))[0] > -1e-9
+    if len(given) < len(NAMES):
+        assert estimate.status is not Status.OK
+    assert Status.OK not in estimate.statuses or estimate.statuses == (Status.OK,)
+    return estimate
+
+
+def test_registry_is_explicit_and_consistent():
+    assert len(set(ALL_ESTIMATORS)) == len(ENTRIES) >= 2
+    assert set(ACCURACY) == set(ALL_ESTIMATORS)
+    for name in ALL_ESTIMATORS:
+        assert make_estimator(name).name == name
+
+
+@each_estimator
+def test_recovers_the_truth_from_noise_free_records(name):
+    data = campaign()
+    estimate = checked(identify(data, name), data)
+    assert estimate.estimator == name
+    assert estimate.statuses == (Status.OK,)
+    for quantity in NAMES:
+        truth = getattr(Truth(), quantity)
+        assert getattr(estimate, quantity).value == pytest.approx(truth, rel=ACCURACY[name])
+    assert estimate.wind_off_inertia.value == pytest.approx(Truth().yaw_inertia, rel=ACCURACY[name])
+
+
+@each_estimator
+@pytest.mark.parametrize("nominal", [None, 0.08, 0.13])
+def test_nominal_inertia_decides_nothing(name, nominal, noisy):
+    told = replace(noisy, rig=replace(noisy.rig, yaw_inertia=nominal))
+    assert identify(told, name) == identify(noisy, name)
+
+
+@each_estimator
+def test_noisy_records_are_identified_within_their_own_deviations(name, noisy):
+    estimate = checked(identify(noisy, name), noisy)
+    for quantity in NAMES:
+        found, truth = getattr(estimate, quantity), getattr(Truth(), quantity)
+        # Six deviations, and the method's own stated error where it is not unbiased.
+        allowed = 6.0 * found.std + ACCURACY[name] * abs(truth)
+        assert abs(found.value - truth) < allowed
+
+
+@each_estimator
+def test_same_input_same_answer_and_input_untouched(name, noisy):
+    before = [np.array(run.record.yaw_rad) for run in noisy.runs]
+    assert not noisy.runs[0].record.yaw_rad.flags.writeable
+    first, second = identify(noisy, name), identify(noisy, name)
+    assert first == second
+    for run, yaw in zip(noisy.runs, before, strict=True):
+        np.testing.assert_array_equal(run.record.yaw_rad, yaw)
+
+
+@each_estimator
+def test_order_of_runs_does_not_matter(name, noisy):
+    turned = replace(noisy, runs=noisy.runs[::-1])
+    straight, back = identify(noisy, name), identify(turned, name)
+    for quantity in NAMES:
+        one, other = getattr(straight, quantity), getattr(back, quantity)
+        assert other.value == pytest.approx(one.value, rel=1e-9)
+
+
+@each_estimator
+def test_sensor_zero_and_sign_do_not_matter(name, noisy):
+    mirrored = with_records(noisy, lambda _, yaw: 0.1 - yaw)
+    straight, other = identify(noisy, name), identify(mirrored, name)
+    for quantity in NAMES:
+        assert getattr(other, quantity).value == pytest.approx(getattr(straight, quantity).value, rel=1e-6)
+
+
+PARTIAL = {
+    "wind-off only": (
+        (Setting(16.12, 0.0), Setting(44.84, 0.0)),
+        {},
+        Status.NO_WIND_ON,
+        ("yaw_inertia", "mechanical_damping"),
+    ),
+    "one wind-off run": (
+        (Setting(16.12, 0.0),),
+        {},
+        Status.NO_WIND_ON,
+        ("yaw_inertia", "mechanical_damping"),
+    ),
+    "no size": (TWELVE[:6], {"has_size": False}, Status.NO_REFERENCE_SIZE, ("yaw_inertia",)),
+    "no stiffness": ((Setting(None, 0.0), Setting(None, 12.0)), {}, Status.NO_STIFFNESS, ()),
+    "one spring": (TWELVE[:3], {}, None, NAMES),
+    "one speed": ((Setting(16.12, 0.0), Setting(16.12, 12.0)), {}, None, NAMES),
+    "some without stiffness": ((*TWELVE[:3], Setting(None, 0.0)), {}, Status.NO_STIFFNESS, NAMES),
+}
+
+
+@each_estimator
+@pytest.mark.parametrize("case", PARTIAL)
+def test_partial_campaigns_give_what_they_can_and_say_the_rest(name, case):
+    settings, options, status, expected = PARTIAL[case]
+    data = campaign(settings, noise=5e-4, rng=np.random.default_rng(5), **options)
+    estimate = checked(identify(data, name), data)
+    for quantity in expected:
+        truth = getattr(Truth(), quantity)
+        assert getattr(estimate, quantity).value == pytest.approx(truth, rel=0.05)
+    assert all(run.omega_n is not None for run in estimate.runs)
+    if status is None:
+        assert estimate.statuses == (Status.OK,)
+    else:
+        assert status in estimate.statuses
+        assert estimate.cn_beta is None or "cn_beta" in expected
+
+
+@each_estimator
+def test_without_size_the_air_is_dimensional(name):
+    data = campaign(TWELVE[:6], has_size=False)
+    estimate = identify(data, name)
+    sized = identify(campaign(TWELVE[:6]), name)
+    assert estimate.cn_beta is None
+    assert estimate.cn_r is None
+    for run, with_size in zip(estimate.runs, sized.runs, strict=True):
+        for field in ("aerodynamic_stiffness", "aerodynamic_damping"):
+            one, other = getattr(run, field), getattr(with_size, field)
+            assert (one is None) == (other is None)
+            if one is not None:
+                assert one.value == pytest.approx(other.value, rel=1e-6)
+
+
+@each_estimator
+@pytest.mark.parametrize("kind", ["constant", "noise"])
+def test_records_without_a_decay_fail_with_a_remedy(name, kind):
+    rng = np.random.default_rng(2)
+    dead = with_records(
+        campaign(TWELVE[:2]),
+        lambda time, _: np.full_like(time, 0.1) if kind == "constant" else 5e-4 * rng.standard_normal(time.size),
+    )
+    with pytest.raises(TunnelError, match="no run could be identified; check"):
+        identify(dead, name)
+    estimate = checked(identify(dead, name, throw=False), dead)
+    assert estimate.status is Status.NO_RUN_IDENTIFIED
+    assert {run.status for run in estimate.runs} == {Status.NO_OSCILLATION}
+
+
+@each_estimator
+def test_a_dead_run_is_left_out_and_named(name, noisy):
+    dead = replace(noisy.runs[4], record=replace(noisy.runs[4].record, yaw_rad=np.zeros(10000)))
+    data = replace(noisy, runs=(*noisy.runs[:4], dead, *noisy.runs[5:]))
+    estimate = checked(identify(data, name), data)
+    assert estimate.status is Status.RUN_LEFT_OUT
+    assert estimate.runs[4].status is Status.NO_OSCILLATION
+    assert estimate.cn_beta.value == pytest.approx(Truth().cn_beta, rel=0.02)
+
+
+@each_estimator
+def test_wind_without_density_is_bad_input(name, noisy):
+    data = replace(noisy, runs=(noisy.runs[0], replace(noisy.runs[1], air_density=None)))
+    with pytest.raises(TunnelError, match="run r02.*air_density"):
+        identify(data, name, throw=False)
+
+
+def test_unknown_names_get_the_closest_one(noisy):
+    with pytest.raises(TunnelError, match="did you mean 'output_error'"):
+        identify(noisy, "output_eror")
+
+
+def test_empty_campaign_is_bad_input(noisy):
+    with pytest.raises(TunnelError, match="without runs"):
+        identify(replace(noisy, runs=()))
+
+
+def test_every_status_says_what_to_do():
+    for status in Status:
+        assert status is Status.OK or len(status.value.split(": ", 1)) == 2

@@ -1,0 +1,94 @@
+"""The paper's Table II, and the rule that flags springs held to its stated false-alarm rate."""
+
+import numpy as np
+import pytest
+
+from identification.datasets import paper_springs
+from identification.springs import FALSE_ALARM_RATE, fit_springs, wind_off_line
+from tunnel_sim.errors import TunnelError
+
+ROWS = paper_springs()
+STIFFNESS = np.array([row.stiffness_n_m_per_rad for row in ROWS])
+FREQUENCY = np.array([row.frequency_hz for row in ROWS])
+SQUARED = (2.0 * np.pi * FREQUENCY) ** 2
+
+
+def test_table_two():
+    fit = fit_springs(STIFFNESS, FREQUENCY)
+    assert round(fit.inertia.value, 4) == 0.1014
+    assert round(fit.intercept.value, 2) == -0.02
+    assert [number for number, flag in enumerate(fit.flagged, 1) if flag] == [4, 7]
+    assert round(fit.residual_percent[3]) == -12
+    assert round(fit.residual_percent[6]) == 10
+    assert fit.p_value < FALSE_ALARM_RATE
+
+
+def test_line_agrees_with_polyfit():
+    fit = fit_springs(STIFFNESS, FREQUENCY)
+    line, covariance = np.polyfit(SQUARED, STIFFNESS, 1, cov=True)
+    assert fit.inertia.value == pytest.approx(line[0])
+    assert fit.intercept.value == pytest.approx(line[1])
+    assert fit.inertia.std == pytest.approx(np.sqrt(covariance[0, 0]))
+
+
+@pytest.mark.parametrize("count", [5, 10])
+def test_false_alarm_rate_holds(count):
+    rng = np.random.default_rng(17)
+    trials = 300
+    alarms = sum(
+        any(
+            fit_springs(
+                0.1 * SQUARED[:count] * (1.0 + 0.03 * rng.standard_normal(count)), FREQUENCY[:count], rng=rng
+            ).flagged
+        )
+        for _ in range(trials)
+    )
+    # Binomial: outside once in 1e4.
+    spread = 3.9 * np.sqrt(FALSE_ALARM_RATE * (1.0 - FALSE_ALARM_RATE) / trials)
+    assert abs(alarms / trials - FALSE_ALARM_RATE) < spread
+
+
+def test_two_bad_springs_do_not_mask_each_other():
+    rng = np.random.default_rng(5)
+    springs = 0.1 * SQUARED * (1.0 + 0.01 * rng.standard_normal(10))
+    springs[2] *= 1.15
+    springs[8] *= 1.14
+    assert np.flatnonzero(fit_springs(springs, FREQUENCY).flagged).tolist() == [2, 8]
+
+
+def test_exact_springs_are_not_flagged():
+    fit = fit_springs(0.1 * SQUARED, FREQUENCY)
+    assert not any(fit.flagged)
+    assert fit.inertia.value == pytest.approx(0.1)
+    assert fit.inertia.std < 1e-12
+
+
+def test_answer_is_repeatable():
+    assert fit_springs(STIFFNESS, FREQUENCY) == fit_springs(STIFFNESS, FREQUENCY)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "frequency", "what"),
+    [
+        ([1.0, 2.0], [0.5, 0.7], "fewer than three"),
+        ([1.0, 2.0, 3.0], [0.5, 0.7], "as many"),
+        ([1.0, -2.0, 3.0], [0.5, 0.7, 0.9], "positive"),
+        ([1.0, 2.0, float("nan")], [0.5, 0.7, 0.9], "positive"),
+        ([1.0, 2.0, 3.0], [0.5, 0.5, 0.5], "the same"),
+    ],
+)
+def test_bad_tables_are_refused(stiffness, frequency, what):
+    with pytest.raises(TunnelError, match=what):
+        fit_springs(stiffness, frequency)
+
+
+def test_wind_off_line_needs_two_springs_for_an_intercept():
+    omega = np.sqrt(np.array([16.0, 16.0]) / 0.1)
+    inertia, intercept = wind_off_line(np.array([16.0, 16.0]), omega, np.full(2, 1e-4))
+    assert intercept is None
+    assert inertia.value == pytest.approx(0.1)
+    assert inertia.std == pytest.approx(0.1 * 2e-4 / omega[0] / np.sqrt(2.0))
+    springs = np.array([16.0, 21.0, 45.0])
+    inertia, intercept = wind_off_line(springs, np.sqrt((springs + 0.5) / 0.1), np.full(3, 1e-4))
+    assert inertia.value == pytest.approx(0.1)
+    assert intercept.value == pytest.approx(-0.5)
