@@ -1,0 +1,84 @@
+"""The forward integrator against the MuJoCo model at the same step, and against SciPy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from law_cases import CASES, FRICTION, RIG, SAMPLE_RATE, Case
+
+from tunnel_sim.forward import backlash, forward_motion, forward_run, integrate
+from tunnel_sim.model import build_model
+from tunnel_sim.moment_law import parameter_vector
+from tunnel_sim.run_settings import RodTwist, RunSettings
+from tunnel_sim.simulate import simulate_motion
+
+
+def _difference(settings: RunSettings) -> float:
+    model = simulate_motion(build_model(RIG, settings), SAMPLE_RATE)
+    forward = forward_motion(RIG, settings, SAMPLE_RATE)
+    assert np.array_equal(model.time_s, forward.time_s)
+    return float(np.max(np.abs(model.angle - forward.angle)))
+
+
+@pytest.mark.parametrize("case", [c for c in CASES if c not in FRICTION], ids=lambda case: case.name)
+@pytest.mark.parametrize("timestep", [1e-3, 2.5e-4])
+def test_equals_the_model(case: Case, timestep: float) -> None:
+    # the same law and the same method: what is left is rounding
+    assert _difference(case.settings(timestep)) < 1e-11
+
+
+@pytest.mark.parametrize("case", FRICTION, ids=lambda case: case.name)
+def test_differs_from_the_model_by_its_treatment_of_reversals_only(case: Case) -> None:
+    assert _difference(case.settings()) < case.tolerance + case.forward_tolerance
+    assert _difference(case.settings(2.5e-4)) < 0.3 * (case.tolerance + case.forward_tolerance)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_matches_the_equation(case: Case) -> None:
+    angle = forward_motion(RIG, case.settings(), SAMPLE_RATE).angle
+    assert np.max(np.abs(angle - case.oracle())) < case.forward_tolerance
+
+
+def test_rate_is_that_of_the_model() -> None:
+    settings = replace(Case("", {"aero_lag": 2.0}, twist=RodTwist(2e-3, 0.3)).settings(), release_rate=0.5)
+    model = simulate_motion(build_model(RIG, settings), SAMPLE_RATE)
+    assert np.max(np.abs(model.rate - forward_motion(RIG, settings, SAMPLE_RATE).rate)) < 1e-11
+
+
+def test_a_batch_of_runs_equals_the_runs_one_by_one() -> None:
+    settings = [case.settings() for case in CASES[:6]]
+    prepared = [forward_run(one) for one in settings]
+    runs = np.concatenate([run for run, _ in prepared])
+    law = np.array([parameter_vector(one.law(RIG)) for one in settings])
+    angle, rate, status = integrate(law, runs, 2000)
+    assert status == 0
+    for i, one in enumerate(settings):
+        alone = forward_motion(RIG, replace(one, duration=2.0), SAMPLE_RATE)
+        assert np.array_equal(angle[i], alone.angle)
+        assert np.array_equal(rate[i], alone.rate)
+
+
+def test_a_run_that_grows_without_bound_is_named() -> None:
+    steady, wild = (
+        Case("").settings(),
+        replace(Case("", {"quadratic_damping": -0.5}).settings(), duration=10.0),
+    )
+    prepared = [forward_run(one) for one in (steady, wild)]
+    law = np.array([parameter_vector(one.law(RIG)) for one in (steady, wild)])
+    assert integrate(law, np.concatenate([run for run, _ in prepared]), 10_000)[2] == 2
+    with pytest.raises(ValueError, match="without bound"):
+        forward_motion(RIG, wild, SAMPLE_RATE)
+
+
+def test_law_of_the_wrong_shape_is_refused() -> None:
+    run, _ = forward_run(Case("").settings())
+    with pytest.raises(ValueError, match="law has shape"):
+        integrate(np.zeros((1, 3)), run, 10)
+
+
+def test_backlash_follows_only_when_pushed() -> None:
+    angle = np.array([0.0, 1.0, 2.0, 1.5, 0.5, -1.0, -0.5, 0.4])
+    assert backlash(angle, 0.5, 0.0) == pytest.approx([0.0, 0.5, 1.5, 1.5, 1.0, -0.5, -0.5, -0.1])
+    assert np.array_equal(backlash(angle, 0.0, 7.0), angle)
