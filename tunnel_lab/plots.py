@@ -201,7 +201,8 @@ def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> F
 
     Args:
         estimates: of one simulated campaign, one per estimator.
-        truth: injected values by name, each in the unit of the estimate's quantity of that name.
+        truth: injected values by name, none of them zero, each in the unit of the estimate's quantity of that
+            name.
 
     Returns:
         A figure with a panel for each quantity: relative error with 95 % intervals, %.
