@@ -17,6 +17,7 @@ class MainsHum(Effect):
 
     Args:
         amplitude: amplitude of the hum, rad.
+        frequency: frequency of the mains, Hz.
     """
 
     name = "mains_hum"
@@ -27,6 +28,9 @@ class MainsHum(Effect):
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
 
     amplitude: float = parameter("a", "rad", "amplitude of the hum", scale=0.0005, lower=0.0, upper=1.0)
+    frequency: float = parameter(
+        "f", "Hz", "frequency of the mains", scale=0.05, lower=45.0, upper=65.0, default=50.0
+    )
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, rng: np.random.Generator) -> Array:
         """Add the hum at a phase of the run's own."""
