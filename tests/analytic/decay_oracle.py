@@ -18,7 +18,7 @@ AREA, LENGTH, WIDTH = 0.036, 0.625, 0.225  # m2, m, m: Table I
 
 @dataclass(frozen=True)
 class Oracle:
-    """One run. `wind` and `forcing` are functions of time; `breaks` are the times at which they have kinks."""
+    """One run. `wind` and `forcing` are functions of time with kinks at `breaks`."""
 
     stiffness: float
     damping: float
@@ -117,12 +117,12 @@ class Oracle:
                 events.append(lambda t, y: friction - abs(self.others(t, y)[0]))
                 events[-1].direction = -1
             else:
-                events.append(lambda t, y: y[1])
+                events.append(lambda _, y: y[1])
                 events[-1].direction = -slip
         if play > 0.0:
             for edge in (play, -play):  # only a crossing onward: this leg may start on the edge itself
                 past = y[0] > edge if abs(y[0] - edge) > 1e-10 else y[1] > 0.0
-                events.append(lambda t, y, edge=edge: y[0] - edge)
+                events.append(lambda _, y, edge=edge: y[0] - edge)
                 events[-1].direction = -1 if past else 1
         for event in events:
             event.terminal = True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +14,7 @@ from tunnel_sim.rig import load_rig
 from tunnel_sim.run_settings import RodTwist, RunSettings, Series
 
 RIG = load_rig()
-DURATION, SAMPLE_RATE = 10.0, 1000.0
+DURATION, SAMPLE_RATE = 6.0, 1000.0
 GUSTS = Series(tuple(20.0 + np.random.default_rng(5).normal(0.0, 1.0, 21)), 0.5)
 TURBULENCE = Series(tuple(np.random.default_rng(6).normal(0.0, 0.02, 101)), 0.1)
 
@@ -56,7 +56,7 @@ class Case:
         return _solve(self.name)
 
 
-def _function(series: Series | None, otherwise: float):  # noqa: ANN202
+def _function(series: Series | None, otherwise: float) -> Callable[[float], float]:
     if series is None:
         return lambda _: otherwise
     times = np.arange(len(series.values)) * series.interval

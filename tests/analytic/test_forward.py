@@ -23,7 +23,7 @@ def _difference(settings: RunSettings) -> float:
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c not in FRICTION], ids=lambda case: case.name)
-@pytest.mark.parametrize("timestep", [1e-3, 2.5e-4])
+@pytest.mark.parametrize("timestep", [1e-3, 5e-4])
 def test_equals_the_model(case: Case, timestep: float) -> None:
     # the same law and the same method: what is left is rounding
     assert _difference(case.settings(timestep)) < 1e-11
@@ -32,7 +32,7 @@ def test_equals_the_model(case: Case, timestep: float) -> None:
 @pytest.mark.parametrize("case", FRICTION, ids=lambda case: case.name)
 def test_differs_from_the_model_by_its_treatment_of_reversals_only(case: Case) -> None:
     assert _difference(case.settings()) < case.tolerance + case.forward_tolerance
-    assert _difference(case.settings(2.5e-4)) < 0.3 * (case.tolerance + case.forward_tolerance)
+    assert _difference(case.settings(5e-4)) < 0.5 * (case.tolerance + case.forward_tolerance)
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from decay_oracle import AREA, LENGTH
-from law_cases import RIG, SAMPLE_RATE, Case, Oracle
+from law_cases import DURATION, RIG, SAMPLE_RATE, Case, Oracle
 from scipy.linalg import expm
 
 from tunnel_sim.aero import aerodynamic_damping, aerodynamic_stiffness
@@ -31,7 +31,7 @@ def _exact(case: Case, samples: int, rate: float) -> np.ndarray:
 @pytest.mark.parametrize("lag", [0.3, 2.0, 20.0, -0.3, -2.0])
 def test_angle_converges_with_order_four(lag: float) -> None:
     case, rate = Case("", {"aero_lag": lag}), 1.0 / 8e-3
-    exact = _exact(case, round(rate * 10.0), rate)
+    exact = _exact(case, round(rate * DURATION), rate)
     errors = []
     for step in STEPS:
         angle = simulate_motion(build_model(RIG, case.settings(step)), rate).angle
