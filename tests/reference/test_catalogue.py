@@ -1,0 +1,121 @@
+"""Every form of every family, and what is drawn from them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.reference.rigs import rig
+from tunnel_sim.reference.catalogue import Group
+from tunnel_sim.reference.draw import KINDS, CampaignDraw, EffectDraw, Mixture, draw_campaign
+from tunnel_sim.reference.forcings import turbulence
+from tunnel_sim.reference.forms import FAMILIES, FORMS, forms_of
+from tunnel_sim.reference.nominal_fit import fit_nominal
+from tunnel_sim.reference.outside import OUTSIDE_FORMS
+from tunnel_sim.reference.severity import bind_effects, read_and_fit, simulate_motions, size_effects
+
+ALL_FORMS = (*FORMS, *OUTSIDE_FORMS)
+
+
+def drawn(form, value, sign=1, seed=3, **changes):
+    c = rig(
+        stiffness=(21.02, 67.98, 21.02, 67.98), speed=(0.0, 0.0, 25.0, 25.0), angle=(0.35,) * 4, **changes
+    )
+    extra = {k: float(v) for k, v in form.draw(np.random.default_rng(seed), c).items()}
+    return CampaignDraw("single", c, (EffectDraw(form, extra, sign, 1.0, value),), seed)
+
+
+def test_there_are_23_families_each_with_one_textbook_form_first():
+    assert len(FAMILIES) == 23
+    for family in FAMILIES:
+        first, *others = forms_of(family)
+        assert first.group is Group.TEXTBOOK
+        assert all(form.group is not Group.TEXTBOOK for form in others)
+    assert len({(f.family, f.name) for f in ALL_FORMS}) == len(ALL_FORMS)
+    assert len(OUTSIDE_FORMS) >= 10
+
+
+@pytest.fixture(scope="module")
+def motions():
+    """Every form at ten times its start (limits kept), and the nominal motion."""
+    draws = [
+        drawn(f, min(10 * f.start, f.limits[1] / 2), f.signs[-1], duration=1.5, resolution=1e-9)
+        for f in ALL_FORMS
+    ]
+    plain = CampaignDraw("none", draws[0].conditions, (), 3)
+    return draws, simulate_motions([*draws, plain], fine=False)
+
+
+@pytest.mark.parametrize("number", range(len(ALL_FORMS)), ids=[f"{f.family}-{f.name}" for f in ALL_FORMS])
+def test_every_form_changes_the_reading_and_only_where_it_acts(number, motions):
+    draws, results = motions
+    draw = draws[number]
+    plain = CampaignDraw("none", draw.conditions, (), draw.seed)
+    reading = read_and_fit(draw, results[number]).readings
+    nominal = read_and_fit(plain, results[-1]).readings
+    changed = np.max(np.abs(reading - nominal), axis=0) > 1e-5
+    assert changed.any()
+    wind = {"wind_speed_drift", "wind_speed_offset", "flow_misalignment", "buffeting", "vortex_shedding",
+            "unsteady_aero_lag", "nonlinear_yaw_moment", "nonlinear_yaw_damping"}  # fmt: skip
+    if draw.effects[0].form.family in wind:
+        assert not changed[:2].any()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_draws_are_reproducible_and_of_their_kind(kind):
+    one, two = (draw_campaign(np.random.default_rng(7), kind=kind) for _ in range(2))
+    assert one.seed == two.seed
+    assert one.conditions.cn_beta == two.conditions.cn_beta
+    assert [e.form for e in one.effects] == [e.form for e in two.effects]
+    assert len(one.effects) == {"single": 1, "pair": 2, "none": 0, "outside": 1}[kind]
+    assert len({e.form.family for e in one.effects}) == len(one.effects)
+
+
+def test_unknown_kind_is_refused():
+    with pytest.raises(ValueError, match="kind must be one of"):
+        draw_campaign(np.random.default_rng(0), kind="triple")
+
+
+def test_tuning_mixture_has_no_rare_forms():
+    for seed in range(60):
+        draw = draw_campaign(
+            np.random.default_rng(seed), kind="pair", mixture=Mixture(textbook=0.2, rare=0.0)
+        )
+        assert all(e.form.group is not Group.RARE for e in draw.effects)
+
+
+def test_nominal_fit_recovers_a_linear_campaign():
+    c = rig(
+        stiffness=(21.02, 67.98, 21.02, 67.98), speed=(0.0, 0.0, 25.0, 15.0), angle=(0.35,) * 4, zero=0.003
+    )
+    draw = CampaignDraw("none", c, (), 1)
+    (motion,) = simulate_motions([draw])
+    fit = fit_nominal(c, motion.angle + c.zero)
+    assert fit.parameters == pytest.approx([0.1, 0.012, 0.45, -0.12], rel=1e-6)
+    assert fit.zero == pytest.approx(0.003, abs=1e-8)
+    assert read_and_fit(draw, motion).excess == pytest.approx(0.0, abs=0.05)
+
+
+def test_effects_are_sized_to_their_target():
+    form = forms_of("quadratic_damping")[0]
+    draw = drawn(form, form.start)
+    (sized,) = size_effects([draw])
+    (motion,) = simulate_motions([sized])
+    assert read_and_fit(sized, motion).excess == pytest.approx(1.0, rel=0.25)
+
+
+@pytest.mark.parametrize("kind", ["band", "dryden", "von_karman", "octave"])
+def test_turbulence_has_unit_variance_and_is_still_wind_off(kind):
+    c = rig(stiffness=(20.0,) * 41, speed=(0.0, *(25.0,) * 40), angle=(0.3,) * 41, duration=10.0)
+    series = turbulence(kind, c, seed=1, scale=5.0 if kind in ("band", "octave") else 0.5)
+    assert np.all(series[0] == 0.0)
+    assert np.mean(series[1:] ** 2) == pytest.approx(1.0, rel=0.1)
+
+
+def test_pairs_with_a_calibration_effect_bind_both():
+    first = drawn(forms_of("wind_speed_offset")[0], 0.5)
+    pair = CampaignDraw("pair", first.conditions, (drawn(forms_of("unsteady_aero_lag")[0], 0.5).effects[0],
+                                                   first.effects[0]), 1)  # fmt: skip
+    conditions, terms = bind_effects(pair)
+    assert conditions.true_speed.max() == 25.5
+    assert terms[0].params["tau1"][-1] == pytest.approx(0.5 * 0.625 / 25.5)

@@ -1,0 +1,135 @@
+"""What one campaign is: its runs' conditions and the true rig, air and sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+FRONTAL_AREA = 0.036
+REFERENCE_LENGTH = 0.625
+WIDTH = 0.225
+NOMINAL_INERTIA = 0.11
+RESOLUTION = 2.0 * np.pi / 3.0 / 4096.0
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A rod that twists between its spring and sensor end (above) and the body (below).
+
+    Args:
+        compliance: 1/Krod, rad/(N m).
+        share: share of Izz above the rod.
+        damping_ratio: of the twist against the inertia above the rod.
+        hardening: h, 1/rad²: the rod's moment is Krod ψ (1 + h ψ²) at twist ψ.
+        held_body: released from the body (the rod twisted by the spring) or from the spring end (untwisted).
+    """
+
+    compliance: float
+    share: float = 0.1
+    damping_ratio: float = 0.01
+    hardening: float = 0.0
+    held_body: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """One campaign's runs and truth; arrays have shape (runs,).
+
+    Args:
+        spring_stiffness: stated Kr, N m/rad.
+        wind_speed: stated V, m/s.
+        release_angle: nominal, rad.
+        start_angle: the angle actually released from (at rest), rad.
+        air_density: ρ, kg/m³.
+        duration: of every run, s.
+        yaw_inertia: Izz, kg m².
+        mechanical_damping: Cr, N m s/rad.
+        cn_beta: Cnβ, 1/rad.
+        cn_r: Cnr, 1/rad.
+        noise_std: standard deviation of the reading's white noise, rad.
+        stated_noise: the same as the campaign states it; None where it does not.
+        zero: the sensor's reading at rest in still air, rad.
+        resolution: step of the reading, rad.
+        sample_rate: Hz.
+        stiffness_scale: true over stated stiffness.
+        speed_offset: true minus stated speed where the wind blows, m/s.
+        rod: the flexible rod; None where it is rigid.
+    """
+
+    spring_stiffness: Array
+    wind_speed: Array
+    release_angle: Array
+    start_angle: Array
+    air_density: float
+    duration: float
+    yaw_inertia: float
+    mechanical_damping: float
+    cn_beta: float
+    cn_r: float
+    noise_std: float
+    stated_noise: float | None = None
+    zero: float = 0.0
+    resolution: float = RESOLUTION
+    sample_rate: float = 1000.0
+    stiffness_scale: Array = field(default_factory=lambda: np.ones(1))
+    speed_offset: Array = field(default_factory=lambda: np.zeros(1))
+    rod: Rod | None = None
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return self.spring_stiffness.size
+
+    @property
+    def samples(self) -> int:
+        """Samples per run."""
+        return round(self.duration * self.sample_rate)
+
+    @property
+    def time(self) -> Array:
+        """Sample times from the release, s, shape (samples,)."""
+        return np.arange(self.samples) / self.sample_rate
+
+    @property
+    def wind_on(self) -> NDArray[np.bool_]:
+        """Whether the wind blows, shape (runs,)."""
+        return self.wind_speed > 0.0
+
+    @property
+    def true_stiffness(self) -> Array:
+        """The springs' true stiffness, N m/rad, shape (runs,)."""
+        return self.spring_stiffness * self.stiffness_scale
+
+    @property
+    def true_speed(self) -> Array:
+        """The true wind speed, m/s, shape (runs,)."""
+        return np.where(self.wind_on, self.wind_speed + self.speed_offset, 0.0)
+
+    @property
+    def reference_moment(self) -> Array:
+        """½ρV²Al at the true speed, N m, shape (runs,)."""
+        return 0.5 * self.air_density * self.true_speed**2 * FRONTAL_AREA * REFERENCE_LENGTH
+
+    @property
+    def air_stiffness(self) -> Array:
+        """Ka = ½ρV²Al Cnβ, N m/rad, shape (runs,)."""
+        return self.reference_moment * self.cn_beta
+
+    @property
+    def air_damping(self) -> Array:
+        """Ca = ½ρVAl² Cnr, N m s/rad, shape (runs,)."""
+        return 0.5 * self.air_density * self.true_speed * FRONTAL_AREA * REFERENCE_LENGTH**2 * self.cn_r
+
+    @property
+    def noise_power(self) -> float:
+        """Variance of noise and of rounding to the resolution, rad²."""
+        return self.noise_std**2 + self.resolution**2 / 12.0
+
+    @property
+    def wind_off_omega(self) -> Array:
+        """√(Kr/Izz), rad/s, shape (runs,)."""
+        return np.sqrt(self.true_stiffness / self.yaw_inertia)
