@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tunnel_sim.reference.conditions import Array
+from tunnel_sim.reference.forcings import RATE
 from tunnel_sim.reference.terms import Params, Rows, Stage
 
 
@@ -111,7 +112,7 @@ def steady_moment(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> Non
 def tabled_moment(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """A moment given at 1 kHz, shape (runs, n), linear in between."""
     table = p["table"]
-    place = s.time * 1000.0 + 1e-9
+    place = s.time * RATE + 1e-9
     k = int(place)
     if k >= table.shape[1] - 1:
         s.body[rows] += table[:, -1]

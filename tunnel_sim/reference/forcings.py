@@ -9,6 +9,11 @@ from tunnel_sim.reference.conditions import WIDTH, Array, Conditions
 RATE = 1000.0
 
 
+def _length(conditions: Conditions) -> int:
+    """Points of a series that covers a run."""
+    return round(conditions.duration * RATE) + 2
+
+
 def _shaped(rng: np.random.Generator, n: int, power: Array) -> Array:
     """Gaussian noise of unit variance whose power spectrum over rfft bins is proportional to ``power``."""
     spectrum = np.sqrt(power) * (rng.standard_normal(power.size) + 1j * rng.standard_normal(power.size))
@@ -28,7 +33,7 @@ def turbulence(kind: str, conditions: Conditions, *, seed: int, scale: float) ->
         seed: of the series.
         scale: Hz or m, as the kind says.
     """
-    n = 2 ** int(np.ceil(np.log2(conditions.samples + 2)))
+    n = 2 ** int(np.ceil(np.log2(_length(conditions))))
     frequency = np.fft.rfftfreq(n, 1.0 / RATE)
     rng = np.random.default_rng(seed)
     out = np.zeros((conditions.runs, n))
@@ -43,13 +48,13 @@ def turbulence(kind: str, conditions: Conditions, *, seed: int, scale: float) ->
         else:
             power = 1.0 / (1.0 + 70.8 * reduced**2) ** (5.0 / 6.0)
         out[run] = _shaped(rng, n, power)
-    return out[:, : conditions.samples + 2]
+    return out[:, : _length(conditions)]
 
 
 def wandering_vortex(conditions: Conditions, *, seed: int, strouhal: float, wander: float) -> Array:
     """The sine of a phase advancing at St V/width and walking by ``wander`` rad per √s, shape (runs, n)."""
     rng = np.random.default_rng(seed)
-    n = conditions.samples + 2
+    n = _length(conditions)
     frequency = strouhal * conditions.true_speed[:, None] / WIDTH
     walk = np.cumsum(rng.standard_normal((conditions.runs, n)), axis=1) * wander / np.sqrt(RATE)
     start = rng.uniform(0.0, 2.0 * np.pi, (conditions.runs, 1))
