@@ -52,6 +52,9 @@ class Model:
 
         Returns:
             A model whose physics equals to the bit that of ``build_model(rig, settings)``.
+
+        Raises:
+            TunnelError: when the plugin refuses the numbers.
         """
         mj = copy.copy(self.mj)
         twist = settings.rod_twist
@@ -64,7 +67,10 @@ class Model:
             mj.joint("rod_twist").damping = twist.damping(settings.yaw_inertia)
             mj.body("rod_end").inertia = _inertia(self.rig, settings.yaw_inertia * share)
         mj.numeric_data[:] = numeric_vector(mj, numerics(self.rig, settings))
-        mujoco.mj_setConst(mj, mujoco.MjData(mj))
+        try:
+            mujoco.mj_setConst(mj, mujoco.MjData(mj))
+        except (ValueError, mujoco.FatalError) as error:
+            raise _refusal(error) from error
         return Model(mj, self.rig, settings, self.spec)
 
     def to_xml(self) -> str:
@@ -108,11 +114,13 @@ def build_model(rig: Rig, settings: RunSettings) -> Model:
     try:
         compiled = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
-        text = " ".join(str(error).split())
-        raise TunnelError(
-            f"the model does not compile: {text}", remedy="correct the run's settings"
-        ) from error
+        raise _refusal(error) from error
     return Model(compiled, rig, settings, spec)
+
+
+def _refusal(error: Exception) -> TunnelError:
+    text = " ".join(str(error).split())
+    return TunnelError(f"MuJoCo refuses the model: {text}", remedy="correct the run's settings")
 
 
 def build_spec(rig: Rig, settings: RunSettings) -> mujoco.MjSpec:
@@ -218,7 +226,9 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
         TunnelError: when a series has an unknown name.
     """
     law = settings.law(rig)
-    values = {name: (value,) for name, value in law.items() if name not in _NATIVE}
+    values: dict[str, tuple[float, ...]] = {
+        name: (value,) for name, value in law.items() if name not in _NATIVE
+    }
     values["wind_speed"] = (settings.wind_speed,)
     for name, series in settings.series.items():
         if name not in _SERIES:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import sqrt
+from math import inf, isfinite, sqrt
 from types import MappingProxyType
 
 from tunnel_sim.aero import AeroDerivatives
@@ -20,6 +20,14 @@ _OWNED = frozenset(
 )  # fmt: skip
 
 
+def _check(name: str, value: float, *, above: float = -inf, least: float = -inf) -> None:
+    if not (isfinite(value) and value > above and value >= least):
+        bound = f" above {above:g}" if above > -inf else f" of {least:g} or more" if least > -inf else ""
+        raise TunnelError(
+            f"{name} = {value!r} must be a finite number{bound}", remedy="correct the run's settings"
+        )
+
+
 @dataclass(frozen=True)
 class Series:
     """A sampled input, linear between samples and held beyond its ends.
@@ -31,6 +39,16 @@ class Series:
 
     values: tuple[float, ...]
     interval: float
+
+    def __post_init__(self) -> None:
+        """Check the samples.
+
+        Raises:
+            TunnelError: when there are none, one is not finite, or the interval is not positive.
+        """
+        if not self.values or not all(map(isfinite, self.values)):
+            raise TunnelError("a series needs samples, all finite", remedy="correct the sampled input")
+        _check("interval of a series", self.interval, above=0.0)
 
 
 @dataclass(frozen=True)
@@ -46,6 +64,17 @@ class RodTwist:
     compliance: float
     inertia_share: float
     damping_ratio: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            TunnelError: when one is out of range.
+        """
+        _check("compliance of the rod", self.compliance, above=0.0)
+        _check("inertia_share of the rod", self.inertia_share, above=0.0)
+        _check("inertia share of the body", 1.0 - self.inertia_share, above=0.0)
+        _check("damping_ratio of the rod", self.damping_ratio, least=0.0)
 
     def damping(self, yaw_inertia: float) -> float:
         """Damping of the rod's twist, N m s/rad, for the whole Izz in kg m²."""
@@ -89,11 +118,20 @@ class RunSettings:
     rod_twist: RodTwist | None = None
 
     def __post_init__(self) -> None:
-        """Check the names of further parameters.
+        """Check names and numbers; bounds of the law's parameters are the plugin's to check.
 
         Raises:
-            TunnelError: when a name is unknown or belongs to another field.
+            TunnelError: when a name is unknown or belongs to another field, or a number is out of range.
         """
+        for name in ("yaw_inertia", "duration", "timestep"):
+            _check(name, getattr(self, name), above=0.0)
+        for name in ("spring_stiffness", "wind_speed", "air_density"):
+            _check(name, getattr(self, name), least=0.0)
+        for name in ("mechanical_damping", "release_angle", "release_rate"):
+            _check(name, getattr(self, name))
+        wind = self.series.get("wind_speed")
+        if wind is not None:
+            _check("least wind_speed of the series", min(wind.values), least=0.0)
         known = [name for name in parameter_names() if name not in _OWNED]
         for name in self.parameters:
             if name not in known:

@@ -19,7 +19,7 @@ from tunnel_sim.run_settings import RunSettings
 from tunnel_sim.sensor import read_motion
 
 Progress = Callable[[int, int], None]
-_CHUNK_SAMPLES = 4_000_000  # recorded angles held at once: bounds the memory of a large batch
+_CHUNK_STEPS = 4_000_000  # steps recorded at once: bounds the memory of a large batch
 
 
 def simulate_motion(model: Model, sample_rate: float) -> Motion:
@@ -153,12 +153,14 @@ def simulate_motions(
     """
     motions: dict[int, Motion] = {}
     for group in _groups(settings):
-        samples, _ = sampling(settings[group[0]], sample_rate)
-        size = max(1, _CHUNK_SAMPLES // samples)
+        samples, steps = sampling(settings[group[0]], sample_rate)
+        size = max(1, _CHUNK_STEPS // (samples * steps))
         for start in range(0, len(group), size):
             chunk = group[start : start + size]
             done = _integrate_chunk(rig, [settings[i] for i in chunk], sample_rate, nthread)
-            motions.update(zip(chunk, done, strict=True))
+            for index, motion in zip(chunk, done, strict=True):
+                _check_finite(motion.angle, f"run {index + 1}")
+                motions[index] = motion
             if progress is not None:
                 progress(len(motions), len(settings))
     return [motions[i] for i in range(len(settings))]
@@ -198,7 +200,6 @@ def _integrate_chunk(rig: Rig, runs: list[RunSettings], sample_rate: float, nthr
     for i in range(len(runs)):
         angle = np.concatenate([qpos[i, at : at + 1], recorded["qpos"][i, steps - 1 :: steps, at]])
         rate = np.concatenate([qvel[i, at : at + 1], recorded["qvel"][i, steps - 1 :: steps, at]])
-        _check_finite(angle, f"run {i + 1}")
         motions.append(Motion(time, angle, rate))
     return motions
 
