@@ -180,7 +180,9 @@ def test_records_without_a_decay_fail_with_a_remedy(name, kind):
     rng = np.random.default_rng(2)
     dead = with_records(
         campaign(TWELVE[:2]),
-        lambda time, _: np.full_like(time, 0.1) if kind == "constant" else 5e-4 * rng.standard_normal(time.size),
+        lambda time, _: (
+            np.full_like(time, 0.1) if kind == "constant" else 5e-4 * rng.standard_normal(time.size)
+        ),
     )
     with pytest.raises(TunnelError, match="no run could be identified; check"):
         identify(dead, name)

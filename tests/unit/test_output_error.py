@@ -39,7 +39,9 @@ def test_joint_fit_converges_to_rounding():
 
 
 def test_a_long_record_of_many_cycles_converges():
-    data = campaign((Setting(67.98, 0.0),), duration=120.0, rate=200.0, noise=5e-4, rng=np.random.default_rng(1))
+    data = campaign(
+        (Setting(67.98, 0.0),), duration=120.0, rate=200.0, noise=5e-4, rng=np.random.default_rng(1)
+    )
     run = identify(data).runs[0]
     assert run.omega_n.value == pytest.approx(np.sqrt(67.98 / Truth().yaw_inertia), rel=1e-4)
 
@@ -72,7 +74,9 @@ def test_unstated_noise_is_had_from_the_residual():
 
 def drifting_stiffness(data, share):
     """Each reading with its phase running ahead as the amplitude decays: a gap of the linear model."""
-    return with_records(data, lambda clock, yaw: np.interp(clock * (1.0 + share * clock / clock[-1]), clock, yaw))
+    return with_records(
+        data, lambda clock, yaw: np.interp(clock * (1.0 + share * clock / clock[-1]), clock, yaw)
+    )
 
 
 @pytest.mark.parametrize("stated", [5e-4, None])
@@ -136,7 +140,9 @@ def test_irregular_clock_offset_is_no_matter():
     data = campaign(TWELVE[:4])
     late = replace(
         data,
-        runs=tuple(replace(run, record=Record(run.record.time_s + 100.0, run.record.yaw_rad)) for run in data.runs),
+        runs=tuple(
+            replace(run, record=Record(run.record.time_s + 100.0, run.record.yaw_rad)) for run in data.runs
+        ),
     )
     assert identify(late).cn_beta.value == pytest.approx(identify(data).cn_beta.value, rel=1e-9)
 
