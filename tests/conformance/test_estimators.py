@@ -178,12 +178,8 @@ def test_without_size_the_air_is_dimensional(name):
 @pytest.mark.parametrize("kind", ["constant", "noise"])
 def test_records_without_a_decay_fail_with_a_remedy(name, kind):
     rng = np.random.default_rng(2)
-    dead = with_records(
-        campaign(TWELVE[:2]),
-        lambda time, _: (
-            np.full_like(time, 0.1) if kind == "constant" else 5e-4 * rng.standard_normal(time.size)
-        ),
-    )
+    level = 0.0 if kind == "constant" else 5e-4
+    dead = with_records(campaign(TWELVE[:2]), lambda time, _: 0.1 + level * rng.standard_normal(time.size))
     with pytest.raises(TunnelError, match="no run could be identified; check"):
         identify(dead, name)
     estimate = checked(identify(dead, name, throw=False), dead)
@@ -204,7 +200,7 @@ def test_a_dead_run_is_left_out_and_named(name, noisy):
 @each_estimator
 def test_wind_without_density_is_bad_input(name, noisy):
     data = replace(noisy, runs=(noisy.runs[0], replace(noisy.runs[1], air_density=None)))
-    with pytest.raises(TunnelError, match="run r02.*air_density"):
+    with pytest.raises(TunnelError, match=r"run r02.*air_density"):
         identify(data, name, throw=False)
 
 

@@ -28,7 +28,8 @@ class Setting:
 
 
 # Three springs, wind-off and two speeds, and three more of other releases: twelve runs.
-TWELVE = tuple(Setting(spring, speed) for spring in (16.12, 21.02, 44.84) for speed in (0.0, 12.0, 24.0)) + (
+TWELVE = (
+    *(Setting(spring, speed) for spring in (16.12, 21.02, 44.84) for speed in (0.0, 12.0, 24.0)),
     Setting(16.12, 0.0, 0.14),
     Setting(16.12, 24.0, 0.14, 0.3),
     Setting(21.02, 18.0, 0.24),

@@ -136,7 +136,7 @@ def test_settings_reach_the_windows():
     assert five[0].duration_s == pytest.approx(5.0 / 3.0 * three[0].duration_s, rel=0.01)
 
 
-def test_irregular_clock_offset_is_no_matter():
+def test_where_the_clock_starts_is_no_matter():
     data = campaign(TWELVE[:4])
     late = replace(
         data,
