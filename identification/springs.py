@@ -55,9 +55,9 @@ def fit_springs(
     studentised residual (Student's t, Bonferroni over the springs left) and taken out, again and again up to
     a third of them; all those up to the *last* one beyond chance are flagged. The nominal level is too
     lenient for ten springs (8.5 % of good sets at 5 %), so it is calibrated on simulated sets of good
-    springs, of normal relative errors: one set in ten raises a flag at all. The line's intercept is zero for
-    springs alone; a stiffness common to all runs (a tilted axis) shows in the intercept and in flags on the softest
-    springs. With three springs nothing is flagged: two good ones cannot outvote a bad one.
+    springs, of normal relative errors: one set in ten raises a flag at all. The line's intercept is zero
+    for springs alone; a stiffness common to all runs (a tilted axis) shows in the intercept and in flags
+    on the softest springs. With three springs nothing is flagged: two good ones cannot outvote a bad one.
 
     Args:
         stiffness: Kr per spring, N m/rad, shape (n,), n ≥ 3.
