@@ -16,7 +16,7 @@ from identification.estimate import Quantity
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.record import Array
 
-# One set in ten, not the usual twenty: a flag costs only a look at a spring. The choice was made with Table II
+# One set in ten, not in twenty: a flag costs only a look at a spring. The choice was made with Table II
 # in view, whose p-value is 0.06: its springs 4 and 7 are flagged at this rate and would not be at 5 %.
 FALSE_ALARM_RATE = 0.10
 _TRIALS = 9999  # sets of good springs the rule is calibrated on
