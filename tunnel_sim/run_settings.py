@@ -81,6 +81,19 @@ class RodTwist:
         share = self.inertia_share
         return 2.0 * self.damping_ratio * sqrt(yaw_inertia * share * (1.0 - share) / self.compliance)
 
+    def frequency(self, yaw_inertia: float, spring_stiffness: float) -> float:
+        """A bound from above on the rod's own frequency.
+
+        Args:
+            yaw_inertia: the whole Izz, kg m².
+            spring_stiffness: Kr, N m/rad.
+
+        Returns:
+            rad/s.
+        """
+        share = self.inertia_share
+        return sqrt((1.0 / (self.compliance * (1.0 - share)) + spring_stiffness) / (yaw_inertia * share))
+
 
 @dataclass(frozen=True)
 class RunSettings:

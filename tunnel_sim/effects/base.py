@@ -90,8 +90,8 @@ class Effect:
         """
         for info in self.parameters():
             value = getattr(self, info.name)
-            good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-            if not good or not info.lower <= value <= info.upper:
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not (number and info.lower <= value <= info.upper and abs(value) < math.inf):
                 raise TunnelError(
                     f"{info.name} = {value!r} is out of range",
                     where=f"effect {self.name}",

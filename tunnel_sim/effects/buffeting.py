@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from math import exp, pi, sqrt
 
 import numpy as np
-from scipy.signal import lfilter
 
 from tunnel_sim.effects.base import Effect, parameter
 from tunnel_sim.run_settings import RunSettings, Series
@@ -55,6 +54,8 @@ class Buffeting(Effect):
         """Add the random moment as a sampled forcing."""
         if stated.wind_speed <= 0.0 or self.is_null:
             return run
+        from scipy.signal import lfilter  # here, because it is slow to load
+
         count = int(run.duration / _INTERVAL) + 2
         decay = exp(-2.0 * pi * self.bandwidth * _INTERVAL)
         kicks = sqrt(1.0 - decay**2) * rng.standard_normal(count)

@@ -23,8 +23,8 @@ class MainsHum(Effect):
     name = "mains_hum"
     channel = "sensor"
     condition = "always"
-    equation = "y = β + a sin(2π·50 t + φ), φ drawn for every run"
-    signature = "A spectral line at 50 Hz in every run, whatever the motion."
+    equation = "y = β + a sin(2π f t + φ), φ drawn for every run"
+    signature = "A spectral line at the mains' frequency in every run, whatever the motion."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
 
     amplitude: float = parameter("a", "rad", "amplitude of the hum", scale=0.0005, lower=0.0, upper=1.0)
@@ -36,6 +36,6 @@ class MainsHum(Effect):
         """Add the hum at a phase of the run's own."""
         del stated
         phase = float(rng.uniform(0.0, 2.0 * np.pi))
-        return (
-            angle + self.amplitude * np.sin(2.0 * np.pi * 50.0 * time_s + phase) if self.amplitude else angle
-        )
+        if self.is_null:
+            return angle
+        return angle + self.amplitude * np.sin(2.0 * np.pi * self.frequency * time_s + phase)

@@ -20,12 +20,12 @@ class SensorQuantisation(Effect):
     name = "sensor_quantisation"
     channel = "sensor"
     condition = "always"
-    equation = "y = step·round(y/step)"
+    equation = "y = q round(y/q); a step finer than the stated resolution does nothing"
     signature = "The reading lies on a lattice coarser than stated, and its error is a sawtooth of the angle."
     references = ("Widrow & Kollár, Quantization Noise, CUP 2008, doi 10.1017/CBO9780511754661",)
 
     step: float = parameter("q", "rad", "true step of the reading", scale=0.002, lower=0.0, upper=1.0)
 
     def on_sensor(self, sensor: SensorModel) -> SensorModel:
-        """Convert at the true step."""
-        return dataclasses.replace(sensor, resolution=self.step) if self.step else sensor
+        """Convert at the true step where it is the coarser one."""
+        return dataclasses.replace(sensor, resolution=max(self.step, sensor.resolution))

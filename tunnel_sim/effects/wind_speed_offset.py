@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Effect, parameter
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.run_settings import RunSettings, Series
 
 
 @dataclass(frozen=True)
@@ -33,4 +33,9 @@ class WindSpeedOffset(Effect):
         del rng
         if stated.wind_speed <= 0.0 or self.is_null:
             return run
-        return dataclasses.replace(run, wind_speed=max(0.0, run.wind_speed + self.offset))
+        series = dict(run.series)
+        if "wind_speed" in series:  # as another effect left it: a drift, say
+            given = series["wind_speed"]
+            values = tuple(max(0.0, value + self.offset) for value in given.values)
+            series["wind_speed"] = Series(values, given.interval)
+        return dataclasses.replace(run, wind_speed=max(0.0, run.wind_speed + self.offset), series=series)
