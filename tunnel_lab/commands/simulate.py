@@ -93,7 +93,7 @@ def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
 
 
 def simulate_with_progress(plan: CampaignPlan) -> Campaign:
-    """Simulate a plan under a progress bar on standard error.
+    """Simulate a plan under a progress bar, where standard error is a terminal.
 
     Args:
         plan: the campaign's plan.
@@ -107,7 +107,9 @@ def simulate_with_progress(plan: CampaignPlan) -> Campaign:
     from tunnel_sim.virtual_campaign import simulate_campaign
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console(stderr=True)) as progress:
+    terminal = console(stderr=True)
+    # No bar into a file or pipe: standard error stays one line there when something goes wrong later.
+    with Progress(*columns, console=terminal, disable=not terminal.is_terminal) as progress:
         task = progress.add_task("simulating runs", total=len(plan.conditions))
         return simulate_campaign(
             plan, progress=lambda done, total: progress.update(task, completed=done, total=total)

@@ -82,9 +82,10 @@ def test_a_bad_plan_is_one_line_and_leaves_nothing(
 
 def test_a_folder_below_a_file_is_refused(tunnel: Tunnel, tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
-    status, _, err = tunnel("simulate", PLAN, "--out", tmp_path / "taken" / "c")
-    assert status == 2
-    assert err.splitlines()[-1].startswith("tunnel: ")
+    status, out, err = tunnel("simulate", PLAN, "--out", tmp_path / "taken" / "c")
+    assert (status, out) == (2, "")
+    assert err.startswith("tunnel: ")
+    assert err.count("\n") == 1
 
 
 def exact(plan: CampaignPlan, name: str = "output_error") -> Estimate:
