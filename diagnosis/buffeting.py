@@ -1,0 +1,89 @@
+"""Buffeting weighed last: a random moment absorbs almost anything, so it must pass for what it claims to be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.least_squares import Fit
+from diagnosis.process_noise import ProcessNoise, fit_process_noise, whiteness
+from diagnosis.rank import Hypothesis
+
+#: Largest departure of the innovations' power by band from white, in its standard deviations. Among 64 to 100
+#: bands the greatest is below 3.5 by chance; a real spectrum is not first-order, which adds some.
+_BAND_LIMIT = 7.0
+#: Likewise of quarters of the record in time.
+_TIME_LIMIT = 5.5
+#: Wind-off runs must be free of a gap: their excess as a share of the wind-on runs'.
+_WIND_OFF_SHARE = 0.05
+#: Single effects that a random moment is tried beside.
+_PARTNERS = 3
+#: A deterministic single effect that leaves less than this needs no random moment.
+_CLOSED = 0.08
+
+
+@dataclass(frozen=True, eq=False)
+class BuffetingAnswer:
+    """A random moment, alone or beside one effect.
+
+    Args:
+        effects: ``buffeting``, and the effect beside it.
+        process: its fit.
+        beside: the fitted effect beside it, or None.
+        share: of the gap left open: the innovations' and the wind-off runs' excess over the nominal one's.
+    """
+
+    effects: tuple[str, ...]
+    process: ProcessNoise
+    beside: Hypothesis | None
+    share: float
+
+
+def weigh_buffeting(nominal: Fit, singles: Sequence[Hypothesis]) -> BuffetingAnswer | None:
+    """Try a random moment, alone and beside the best single effects.
+
+    Args:
+        nominal: the nominal fit.
+        singles: fitted single effects, best first.
+
+    Returns:
+        The first that passes: innovations white by band and steady in time, wind-off runs without a gap. None
+        where none passes, or a single effect closes the gap already.
+    """
+    if singles and max(singles[0].fit.excess, 0.0) < _CLOSED * nominal.excess:
+        return None
+    alone = _try(nominal, None, nominal)
+    if alone is not None:
+        return alone
+    for single in singles[:_PARTNERS]:
+        answer = _try(single.fit, single, nominal)
+        if answer is not None:
+            return answer
+    return None
+
+
+def _try(fit: Fit, beside: Hypothesis | None, nominal: Fit) -> BuffetingAnswer | None:
+    process = fit_process_noise(fit)
+    if process is None or process.drop <= 0.0:
+        return None
+    band, quarter, _ = whiteness(process)
+    if band > _BAND_LIMIT or quarter > _TIME_LIMIT:
+        return None
+    off = wind_off_excess(fit)
+    if off > max(_WIND_OFF_SHARE * nominal.excess, 0.1):
+        return None
+    names = ("buffeting",) if beside is None else tuple(sorted((*beside.effects, "buffeting")))
+    share = (abs(process.excess) + max(off, 0.0)) / max(nominal.excess, 1e-9)
+    return BuffetingAnswer(names, process, beside, share)
+
+
+def wind_off_excess(fit: Fit) -> float:
+    """Mean squared scaled residual minus one of the wind-off runs; 0 where there are none."""
+    off = [
+        float(np.mean(residual**2)) - 1.0
+        for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True)
+        if not run.wind_on
+    ]
+    return float(np.mean(off)) if off else 0.0

@@ -1,0 +1,70 @@
+"""From fitted hypotheses to an answer with probabilities.
+
+Real effects never have exactly a textbook form, and at rig signal-to-noise every misfit of form is significant.
+So hypotheses are weighed by the share of the gap they leave open, not by χ² itself: the weight of a hypothesis
+that leaves the share s is (s + δ)^−γ, δ standing for the misfit of form that is common among true causes. One
+name is preferred to two unless the second closes most of what the first leaves, and ``unknown`` weighs as much
+as a cause that leaves the share `UNKNOWN_SHARE`. The constants come from a tuning set made by another
+integrator with other forms (docs/blind-check.md); test sets are drawn with other seeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Exponent of the share left open.
+STEEPNESS = 3.0
+#: Misfit of form that counts as none.
+FORM_MISFIT = 0.01
+#: Share at which a cause is as likely as an unknown one.
+UNKNOWN_SHARE = 0.33
+#: A second effect must leave less than this share of what the first leaves.
+PAIR_SHARE = 0.40
+#: Answers less likely than this are not called rivals.
+RIVAL_PROBABILITY = 0.05
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """An answer and its probability.
+
+    Args:
+        effects: names, sorted; ``("unknown",)`` for a gap nothing closes.
+        share: of the gap it leaves open, at least 0.
+        probability: among all answers weighed.
+    """
+
+    effects: tuple[str, ...]
+    share: float
+    probability: float
+
+
+def weigh(shares: Sequence[tuple[tuple[str, ...], float]], chance: float) -> list[Weighed]:
+    """Probabilities of the answers.
+
+    Args:
+        shares: effect names and share of the gap they leave open, for singles and pairs.
+        chance: standard deviation of a share by chance alone.
+
+    Returns:
+        All answers, ``unknown`` among them, most probable first.
+    """
+    floor = FORM_MISFIT + 2.0 * chance
+    answers: dict[tuple[str, ...], float] = {}
+    for names, share in shares:
+        key = tuple(sorted(names))
+        answers[key] = min(max(share, 0.0), answers.get(key, np.inf))
+    weights = {names: (share + floor) ** -STEEPNESS * _prior(len(names)) for names, share in answers.items()}
+    weights[("unknown",)] = (UNKNOWN_SHARE + floor) ** -STEEPNESS
+    answers[("unknown",)] = UNKNOWN_SHARE
+    total = sum(weights.values())
+    found = [Weighed(names, answers[names], weight / total) for names, weight in weights.items()]
+    return sorted(found, key=lambda w: -w.probability)
+
+
+def _prior(count: int) -> float:
+    """A pair starts behind by what it must close more than a single effect."""
+    return float(PAIR_SHARE ** (STEEPNESS * max(0, count - 1)))

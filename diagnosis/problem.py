@@ -1,0 +1,308 @@
+"""The model of a campaign as a function of parameters: nominal, or with effects added."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from diagnosis.data import Data, RunData, hermite_means
+from tunnel_sim.aero import AeroDerivatives
+from tunnel_sim.effects import Effect
+from tunnel_sim.forward import forward_run, integrate
+from tunnel_sim.moment_law import parameter_vector
+from tunnel_sim.record import Array
+from tunnel_sim.rig import Rig, load_rig
+from tunnel_sim.run_settings import RunSettings
+
+_LONGEST_STEP = 4.001e-3  # s: RK4 then errs by some 1e-6 rad over 10 s at 2 Hz
+_ROD_RESOLUTION = 0.5  # rad of the rod's own oscillation in one step
+_THREADS = 2
+_SOFT_ROD = 2e-5  # rad/(N m): a stiffer rod's ringing at the release stays below the noise
+_PHASED = ("vortex_shedding", "mains_hum")
+#: Bounds tighter than the effect's own: beyond them the rod rings faster than the integrator steps.
+_FIT_BOUNDS = {"rod_flexibility.compliance": (0.0, 0.01), "rod_flexibility.inertia_share": (0.02, 0.9)}
+_POOL = ThreadPoolExecutor(_THREADS)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A value of every parameter of a problem.
+
+    Args:
+        common: parameters common to the runs, in the order of `Problem.names`.
+        release: of every run its own parameters, shape (runs, own): angle (rad) and rate (rad/s) of the
+            sensor's end at the record's start, then the phase (rad) of each periodic effect.
+    """
+
+    common: Array
+    release: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is fitted: prepared runs, and the effects added to the nominal model.
+
+    Args:
+        data: the runs.
+        effects: effect classes whose parameters are free.
+        fixed: value of effect parameters that are held, as ``effect.parameter``.
+    """
+
+    data: Data
+    effects: tuple[type[Effect], ...] = ()
+    fixed: tuple[tuple[str, float], ...] = ()
+
+    @cached_property
+    def nominal_names(self) -> tuple[str, ...]:
+        """Names of the nominal model's common parameters."""
+        first = "stiffness" if self.data.normalised else "yaw_inertia"
+        air = ("cn_beta", "cn_r") if self.data.wind_on else ()
+        return (first, "mechanical_damping", *air, "zero")
+
+    @cached_property
+    def effect_names(self) -> tuple[str, ...]:
+        """Names of the free effect parameters, as ``effect.parameter``."""
+        names = [f"{kind.name}.{info.name}" for kind in self.effects for info in kind.parameters()]
+        held = dict(self.fixed)
+        return tuple(name for name in names if name not in held)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """All common parameters, the nominal ones first."""
+        return self.nominal_names + self.effect_names
+
+    @cached_property
+    def phased(self) -> tuple[str, ...]:
+        """Names of the effects that have a phase of their own in every run."""
+        return tuple(kind.name for kind in self.effects if kind.name in _PHASED)
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and greatest values of the common parameters."""
+        low = {"yaw_inertia": 1e-9, "stiffness": 1e-9}
+        infos = {f"{kind.name}.{info.name}": info for kind in self.effects for info in kind.parameters()}
+        fit_bounds = {name: (info.lower, info.upper) for name, info in infos.items()} | _FIT_BOUNDS
+        lower = [fit_bounds[name][0] if name in infos else low.get(name, -np.inf) for name in self.names]
+        upper = [fit_bounds[name][1] if name in infos else np.inf for name in self.names]
+        return np.array(lower), np.array(upper)
+
+    def effects_at(self, common: Array) -> tuple[Effect, ...]:
+        """The effects with their parameters.
+
+        Args:
+            common: as in `Point`.
+
+        Returns:
+            One effect per class.
+        """
+        values = dict(zip(self.names, common.tolist(), strict=True)) | dict(self.fixed)
+        return tuple(
+            kind(**{info.name: values[f"{kind.name}.{info.name}"] for info in kind.parameters()})
+            for kind in self.effects
+        )
+
+    def stated(self, common: Array, release: Array, run: RunData) -> RunSettings:
+        """The nominal physics of one run.
+
+        Args:
+            common: as in `Point`.
+            release: of the run, shape (2,).
+            run: conditions.
+
+        Returns:
+            The physics, before any effect.
+        """
+        value = dict(zip(self.names, common.tolist(), strict=True))
+        spring = value["stiffness"] if self.data.normalised else run.spring_stiffness
+        assert spring is not None
+        return RunSettings(
+            spring_stiffness=spring,
+            derivatives=AeroDerivatives(value.get("cn_beta", 0.0), value.get("cn_r", 0.0)),
+            yaw_inertia=1.0 if self.data.normalised else value["yaw_inertia"],
+            mechanical_damping=value["mechanical_damping"],
+            wind_speed=run.wind_speed,
+            air_density=run.air_density,
+            release_angle=float(release[0]),
+            release_rate=float(release[1]),
+            duration=run.duration,
+        )
+
+    def draws(self, own: Array) -> list[np.random.Generator]:
+        """What each effect draws from in one run: its phase.
+
+        Args:
+            own: the run's own parameters, a row of ``Point.release``.
+
+        Returns:
+            One stand-in for a generator per effect.
+        """
+        phases = dict(zip(self.phased, own[2:].tolist(), strict=True))
+        return [_Phase(float(phases.get(kind.name, 0.0))) for kind in self.effects]
+
+    def predict(self, points: Sequence[Point]) -> list[list[Array]]:
+        """Predicted block means.
+
+        Args:
+            points: parameter values.
+
+        Returns:
+            For every point, for every run, the reading's block means, rad; infinite where the motion grows
+            without bound.
+        """
+        cases = [(p, r) for p in range(len(points)) for r in range(len(self.data.runs))]
+        effects = [self.effects_at(point.common) for point in points]
+        jobs = [_Job(self, points[p], effects[p], r) for p, r in cases]
+        half = (len(jobs) + _THREADS - 1) // _THREADS
+        results = list(_POOL.map(_run_jobs, [jobs[i : i + half] for i in range(0, len(jobs), half)]))
+        flat = [values for part in results for values in part]
+        count = len(self.data.runs)
+        return [flat[i * count : (i + 1) * count] for i in range(len(points))]
+
+
+class _Job:
+    """One run at one point."""
+
+    def __init__(self, problem: Problem, point: Point, effects: tuple[Effect, ...], run_index: int) -> None:
+        run = problem.data.runs[run_index]
+        self.run = run
+        self.zero = float(point.common[problem.nominal_names.index("zero")])
+        self.effects = effects
+        self.stated = problem.stated(point.common, point.release[run_index], run)
+        self.draws = problem.draws(point.release[run_index])
+        physics = self.stated
+        for effect, draw in zip(self.effects, self.draws, strict=True):
+            physics = effect.on_run(physics, self.stated, draw)
+        self.rig = campaign_rig(problem.data)
+        physics = held_end(condensed(physics, problem.data))
+        self.row, self.keep_alive = forward_run(physics)
+        self.law = parameter_vector(physics.law(self.rig))
+        substeps = int(np.ceil(run.interval / _longest_step(physics)))
+        self.row["step"], self.row["steps"] = run.interval / substeps, substeps
+
+    def reading(self, angle: Array, rate: Array) -> Array:
+        """Block means of the reading from angle and rate at the blocks' ends."""
+        weights = hermite_means(self.run.block)
+        h = self.run.interval
+        mean: Array = (
+            weights[0] * angle[:-1]
+            + weights[1] * angle[1:]
+            + h * (weights[2] * rate[:-1] + weights[3] * rate[1:])
+        )
+        time = (np.arange(mean.size) + 0.5 * (self.run.block - 1) / self.run.block) * h
+        for effect, draw in zip(self.effects, self.draws, strict=True):
+            mean = effect.on_angle(mean, time, self.stated, draw)
+        mean = mean + self.zero
+        for effect in self.effects:
+            mean = effect.on_reading(mean)
+        return mean
+
+
+class _Phase(np.random.Generator):
+    """Stands in for the generator a periodic effect draws its phase from: in a fit it is given."""
+
+    def __init__(self, phase: float) -> None:
+        super().__init__(_BITS)
+        self._phase = phase
+
+    def uniform(self, *args: object, **kwargs: object) -> float:  # type: ignore[override]
+        """The phase, rad."""
+        del args, kwargs
+        return self._phase
+
+
+_BITS = np.random.PCG64(0)
+
+
+def condensed(physics: RunSettings, data: Data) -> RunSettings:
+    """Replace a rod too stiff to ring visibly by its first-order effect on the slow motion.
+
+    With compliance c, the body leads the sensor's end by φ = a θ, a = c (s Ka + (1 − s) Kr): the inertia at the
+    sensor's end grows by the share (1 − s) a, and the air sees (1 + a) θ. What is dropped is of order (c Kr)².
+
+    Args:
+        physics: of one run.
+        data: gives the reference sizes.
+
+    Returns:
+        The run with a rigid rod, or as it was where the rod is soft.
+    """
+    twist = physics.rod_twist
+    if twist is None or twist.compliance > _SOFT_ROD:
+        return physics
+    share = twist.inertia_share
+    pressure = 0.5 * physics.air_density * physics.wind_speed**2 * data.frontal_area * data.reference_length
+    air = pressure * physics.derivatives.cn_beta
+    lead = twist.compliance * (share * air + (1.0 - share) * physics.spring_stiffness)
+    air_seen = AeroDerivatives(
+        physics.derivatives.cn_beta * (1.0 + lead), physics.derivatives.cn_r * (1.0 + lead)
+    )
+    inertia = physics.yaw_inertia * (1.0 + (1.0 - share) * lead)
+    return dataclasses.replace(physics, rod_twist=None, derivatives=air_seen, yaw_inertia=inertia)
+
+
+def held_end(physics: RunSettings) -> RunSettings:
+    """Take the release as that of the sensor's end, which is what a record shows.
+
+    Args:
+        physics: whose release angle is the sensor's end's.
+
+    Returns:
+        The same with the body's release angle.
+    """
+    if physics.rod_twist is None:
+        return physics
+    body = physics.release_angle * (1.0 + physics.spring_stiffness * physics.rod_twist.compliance)
+    return dataclasses.replace(physics, release_angle=body)
+
+
+def _longest_step(physics: RunSettings) -> float:
+    twist = physics.rod_twist
+    if twist is None:
+        return _LONGEST_STEP
+    share = twist.inertia_share
+    own = np.sqrt(1.0 / (twist.compliance * physics.yaw_inertia * share * (1.0 - share)))
+    return float(min(_LONGEST_STEP, max(_ROD_RESOLUTION / own, 2e-4)))
+
+
+def campaign_rig(data: Data) -> Rig:
+    """A rig of the campaign's own reference sizes.
+
+    Args:
+        data: gives A, l and width.
+
+    Returns:
+        The packaged rig with these.
+    """
+    return _rig(data.frontal_area, data.reference_length, data.width)
+
+
+@lru_cache(maxsize=8)
+def _rig(area: float, length: float, width: float) -> Rig:
+    rig = load_rig()
+    body = dataclasses.replace(rig.body, frontal_area=area, length=length, width=width)
+    return dataclasses.replace(rig, body=body)
+
+
+def _run_jobs(jobs: list[_Job]) -> list[Array]:
+    """Integrate jobs, those of equal length together."""
+    out: list[Array | None] = [None] * len(jobs)
+    lengths = np.array([job.run.reading.size for job in jobs])
+    for length in np.unique(lengths):
+        at = np.flatnonzero(lengths == length)
+        while at.size:
+            rows = np.concatenate([jobs[i].row for i in at])
+            law = np.stack([jobs[i].law for i in at])
+            angle, rate, status = integrate(law, rows, int(length) + 1)
+            done = at if status == 0 else at[: status - 1]
+            for k, i in enumerate(done):
+                out[i] = jobs[i].reading(angle[k], rate[k])
+            if status == 0:
+                break
+            out[at[status - 1]] = np.full(int(length), np.inf)
+            at = at[status:]
+    return [values for values in out if values is not None]

@@ -1,0 +1,112 @@
+"""Which effect: every one of the vocabulary, and pairs, added to the nominal model and fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.least_squares import Fit, FitError, fit
+from diagnosis.start import Lead, leads
+from tunnel_sim.effects import Effect
+
+#: Effects that no deterministic residual fits, or that are read off the record before fitting.
+NOT_FITTED = frozenset({"buffeting", "sensor_quantisation", "mains_hum"})
+_ALWAYS_FITTED = 7  # leads refitted whatever they promise: linear theory ranks well but cannot judge
+_PROMISING = 0.01  # share of χ² beyond which a lead is refitted too
+_BASES = 3  # single effects to which a second is added
+_SECONDS = 4  # second effects refitted for each
+_STARTS = {"rod_flexibility": 3, "sensor_clipping": 2, "unsteady_aero_lag": 2, "spring_miscalibration": 2}
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """The nominal model with effects added, fitted.
+
+    Args:
+        effects: names, in the order they were added.
+        fit: the fit.
+    """
+
+    effects: tuple[str, ...]
+    fit: Fit
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects, sorted."""
+        return tuple(sorted(self.effects))
+
+
+def rank_singles(
+    nominal: Fit, kinds: Sequence[type[Effect]], progress: Progress | None = None
+) -> list[Hypothesis]:
+    """Add each effect alone.
+
+    Args:
+        nominal: the fit without any.
+        kinds: effects to try.
+        progress: told each effect's name.
+
+    Returns:
+        Fitted hypotheses, best first. Effects whose linear promise is negligible are left out.
+    """
+    found = []
+    for kind, starts in _promising(nominal, kinds, _ALWAYS_FITTED):
+        if progress is not None:
+            progress(kind.name)
+        best = _best_fit(starts[: _STARTS.get(kind.name, 1)], nominal)
+        if best is not None:
+            found.append(Hypothesis((kind.name,), best))
+    return sorted(found, key=lambda h: h.fit.total)
+
+
+def rank_pairs(
+    singles: Sequence[Hypothesis], kinds: Sequence[type[Effect]], progress: Progress | None = None
+) -> list[Hypothesis]:
+    """Add a second effect to the best single ones.
+
+    Args:
+        singles: best first.
+        kinds: effects to try.
+        progress: told each pair's names.
+
+    Returns:
+        Fitted pairs, best first.
+    """
+    found: dict[tuple[str, ...], Hypothesis] = {}
+    for single in singles[:_BASES]:
+        others = [kind for kind in kinds if kind.name not in single.effects]
+        for kind, starts in _promising(single.fit, others, 0)[:_SECONDS]:
+            if progress is not None:
+                progress(f"{single.effects[0]} + {kind.name}")
+            best = _best_fit(starts[: _STARTS.get(kind.name, 1)], single.fit)
+            if best is None:
+                continue
+            pair = Hypothesis((*single.effects, kind.name), best)
+            if pair.names not in found or best.total < found[pair.names].fit.total:
+                found[pair.names] = pair
+    return sorted(found.values(), key=lambda h: h.fit.total)
+
+
+def _promising(
+    base: Fit, kinds: Iterable[type[Effect]], always: int
+) -> list[tuple[type[Effect], list[Lead]]]:
+    scored = [(kind, starts) for kind in kinds if (starts := leads(base, kind))]
+    scored.sort(key=lambda item: -item[1][0].promise)
+    limit = 0.0 if always == 0 else _PROMISING * base.total
+    return [item for i, item in enumerate(scored) if i < always or item[1][0].promise > limit]
+
+
+def _best_fit(starts: Sequence[Lead], base: Fit) -> Fit | None:
+    best: Fit | None = None
+    for lead in starts:
+        try:
+            found = fit(lead.problem, lead.point, base=base)
+        except (FitError, np.linalg.LinAlgError):
+            continue
+        if np.isfinite(found.total) and (best is None or found.total < best.total):
+            best = found
+    return best

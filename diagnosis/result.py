@@ -1,0 +1,236 @@
+"""What a diagnosis answers with, and its JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """A value with its standard deviation and unit.
+
+    Args:
+        value: estimate.
+        std: standard deviation.
+        unit: of both.
+    """
+
+    value: float
+    std: float
+    unit: str
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Value, std and unit."""
+        return {"value": self.value, "std": self.std, "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class RunGap:
+    """A run's excess before and after the causes are added.
+
+    Args:
+        id: of the run.
+        before: mean squared residual over the noise variance, minus one, of the nominal model.
+        after: likewise with the causes added, predicted from the other runs.
+    """
+
+    id: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class GapSummary:
+    """The gap of the campaign.
+
+    Args:
+        detected: whether the gap is beyond chance.
+        excess_before: of the nominal model, all runs.
+        excess_after: with the causes added, on runs not used for the fit.
+        closed: share of the gap closed on those runs, 0 to 1.
+        runs: by run.
+        false_alarm_rate: of the test of detection.
+        p_value: of the strongest test, corrected for the number of tests.
+        tests: p-value by name of test.
+    """
+
+    detected: bool
+    excess_before: float
+    excess_after: float
+    closed: float
+    runs: tuple[RunGap, ...]
+    false_alarm_rate: float
+    p_value: float
+    tests: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where the gap is.
+
+    Args:
+        channel: ``stiffness``, ``damping``, ``forcing``, ``sensor`` or ``calibration``; None: nowhere.
+        condition: ``always`` or ``wind_on``; None: nowhere.
+        runs: ids of the runs that show it.
+        time_s: where in the runs most of it lies, s.
+        amplitude_rad: amplitudes at which most of it lies, rad.
+        frequency_hz: frequencies at which most of it lies, Hz.
+        words: the same in a sentence or two.
+    """
+
+    channel: str | None
+    condition: str | None
+    runs: tuple[str, ...] = ()
+    time_s: tuple[float, float] | None = None
+    amplitude_rad: tuple[float, float] | None = None
+    frequency_hz: tuple[float, float] | None = None
+    words: str = ""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An answer weighed.
+
+    Args:
+        effect: name, ``none`` or ``unknown``; two names joined by `` + `` for a pair.
+        probability: that it is the answer.
+        excess_after: with it added, in the fitted runs.
+        closed: share of the gap it closes there.
+        parameters: its fitted parameters by name (``effect.parameter`` for a pair).
+    """
+
+    effect: str
+    probability: float
+    excess_after: float
+    closed: float
+    parameters: Mapping[str, ParameterEstimate] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Coefficients of the nominal model before and after the causes are added.
+
+    Args:
+        before: by name: ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` for runs in normalised form.
+        after: likewise.
+        note: what is meant by them, where that needs saying (a lag changes what Cnr means).
+    """
+
+    before: Mapping[str, ParameterEstimate]
+    after: Mapping[str, ParameterEstimate]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class NoiseSummary:
+    """The noise the gap is measured against.
+
+    Args:
+        std: of one sample, quantisation included, rad.
+        stated_std: likewise as the campaign states it, rad; None where it does not.
+        source: ``stated`` or ``estimated``.
+        reason: why, in words.
+    """
+
+    std: float
+    stated_std: float | None
+    source: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The whole answer.
+
+    Args:
+        campaign: its name.
+        causes: effect names, sorted; empty: no gap; ``unknown``: a gap nothing in the vocabulary closes.
+        verdict: the answer in plain words.
+        gap: how large, before and after.
+        where: where it is.
+        candidates: answers weighed, best first, ``none`` and ``unknown`` among them.
+        ambiguous_with: effects these runs cannot tell from the causes.
+        next_run: the run expected to tell them apart; None where not needed.
+        coefficients: before and after.
+        noise: what the gap is measured against.
+        blind_spots: what these runs cannot show, in sentences.
+        seconds: wall time by step, s.
+    """
+
+    campaign: str
+    causes: tuple[str, ...]
+    verdict: str
+    gap: GapSummary
+    where: Where
+    candidates: tuple[Candidate, ...]
+    ambiguous_with: tuple[str, ...]
+    next_run: Mapping[str, Any] | None
+    coefficients: Coefficients
+    noise: NoiseSummary
+    blind_spots: tuple[str, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The answer in JSON's types, by the published schema."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "campaign": self.campaign,
+            "causes": list(self.causes),
+            "verdict": self.verdict,
+            "gap": {
+                "detected": self.gap.detected,
+                "excess_before": self.gap.excess_before,
+                "excess_after": self.gap.excess_after,
+                "closed": self.gap.closed,
+                "runs": [{"id": run.id, "before": run.before, "after": run.after} for run in self.gap.runs],
+                "false_alarm_rate": self.gap.false_alarm_rate,
+                "p_value": self.gap.p_value,
+                "tests": dict(self.gap.tests),
+            },
+            "where": {
+                "channel": self.where.channel,
+                "condition": self.where.condition,
+                "runs": list(self.where.runs),
+                "time_s": _pair(self.where.time_s),
+                "amplitude_rad": _pair(self.where.amplitude_rad),
+                "frequency_hz": _pair(self.where.frequency_hz),
+                "words": self.where.words,
+            },
+            "candidates": [
+                {
+                    "effect": candidate.effect,
+                    "probability": candidate.probability,
+                    "excess_after": candidate.excess_after,
+                    "closed": candidate.closed,
+                    "parameters": _estimates(candidate.parameters),
+                }
+                for candidate in self.candidates
+            ],
+            "ambiguous_with": list(self.ambiguous_with),
+            "next_run": None if self.next_run is None else dict(self.next_run),
+            "coefficients": {
+                "before": _estimates(self.coefficients.before),
+                "after": _estimates(self.coefficients.after),
+                "note": self.coefficients.note,
+            },
+            "noise": {
+                "std": self.noise.std,
+                "stated_std": self.noise.stated_std,
+                "source": self.noise.source,
+                "reason": self.noise.reason,
+            },
+            "blind_spots": list(self.blind_spots),
+            "seconds": dict(self.seconds),
+        }
+
+
+def _estimates(values: Mapping[str, ParameterEstimate]) -> dict[str, Any]:
+    return {name: value.to_json_dict() for name, value in values.items()}
+
+
+def _pair(values: tuple[float, float] | None) -> list[float] | None:
+    return None if values is None else list(values)
