@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -89,7 +90,9 @@ def test_a_folder_below_a_file_is_refused(tunnel: Tunnel, tmp_path: Path) -> Non
 
 
 def exact(plan: CampaignPlan, name: str = "output_error") -> Estimate:
-    values = {key: Quantity(value, 0.01 * abs(value), "") for key, value in truth_of(plan).items()}
+    values: dict[str, Any] = {
+        key: Quantity(value, 0.01 * abs(value), "") for key, value in truth_of(plan).items()
+    }
     return Estimate("tiny", name, (), **values)
 
 
