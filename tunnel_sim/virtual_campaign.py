@@ -9,8 +9,10 @@ import numpy as np
 
 from tunnel_sim.aero import AeroDerivatives
 from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.effects import Effect, effect_from
-from tunnel_sim.plan import CampaignPlan, Condition, Truth
+from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_from
+from tunnel_sim.effects.spring_miscalibration import SpringMiscalibration
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.plan import CampaignPlan, Condition, EffectSetting, Truth
 from tunnel_sim.rig import Rig, load_rig
 from tunnel_sim.run_settings import RunSettings
 from tunnel_sim.simulate import Progress, simulate_batch
@@ -101,12 +103,48 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         plan: its effects, by name and parameters.
 
     Returns:
-        The effects.
+        The effects in the vocabulary's order, whatever the plan's, so that the campaign does not hang on it.
 
     Raises:
-        TunnelError: when a name is unknown or a value out of range.
+        TunnelError: when a name is unknown or given twice, a severity missing, a value out of range, or a
+            spring none of the plan's.
     """
-    return tuple(effect_from(setting.name, setting.parameters) for setting in plan.effects)
+    effects = [_stated_effect(setting) for setting in plan.effects]
+    names = [effect.name for effect in effects]
+    for effect in effects:
+        if names.count(effect.name) > 1:
+            raise TunnelError(
+                "is given twice",
+                where=f"effect {effect.name}",
+                remedy="give it once, with all its parameters",
+            )
+        if isinstance(effect, SpringMiscalibration):
+            _check_spring(effect, plan)
+    return tuple(sorted(effects, key=lambda effect: ALL_EFFECTS.index(type(effect))))
+
+
+def _stated_effect(setting: EffectSetting) -> Effect:
+    """An effect whose severity is given: by its default it would be injected in name only."""
+    effect = effect_from(setting.name, setting.parameters)
+    severity = effect.parameters()[0]
+    if severity.name not in setting.parameters:
+        raise TunnelError(
+            f"{severity.name} is missing",
+            where=f"effect {effect.name}",
+            remedy=f"give the {severity.meaning} in {severity.unit}, such as {severity.scale:g}",
+        )
+    return effect
+
+
+def _check_spring(effect: SpringMiscalibration, plan: CampaignPlan) -> None:
+    """A spring that no run has would be injected in name only."""
+    springs = sorted({condition.spring_stiffness for condition in plan.conditions})
+    if not effect.is_null and not any(effect.concerns(spring) for spring in springs):
+        raise TunnelError(
+            f"no run has a spring_stiffness of {effect.spring_stiffness:g} N m/rad",
+            where=f"effect {effect.name}",
+            remedy=f"give one of {', '.join(f'{spring:g}' for spring in springs)}",
+        )
 
 
 def truth_document(plan: CampaignPlan) -> dict[str, Any]:
@@ -116,9 +154,9 @@ def truth_document(plan: CampaignPlan) -> dict[str, Any]:
         plan: the plan that was simulated.
 
     Returns:
-        Coefficients, sensor, effects with their parameters, seed and versions, in JSON's types.
+        Coefficients, sensor, effects that act with their parameters, seed and versions, in JSON's types.
     """
-    effects = plan_effects(plan)
+    effects = [effect for effect in plan_effects(plan) if not effect.is_null]
     return {
         "schema_version": 1,
         "cn_beta": plan.truth.cn_beta,

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 
@@ -102,7 +102,7 @@ class Effect:
     def parameters(cls) -> tuple[ParameterInfo, ...]:
         """The effect's parameters, the severity first."""
         return tuple(
-            ParameterInfo(name=field.name, default=field.default, **field.metadata)
+            ParameterInfo(name=field.name, default=cast(float, field.default), **field.metadata)
             for field in dataclasses.fields(cls)
         )
 

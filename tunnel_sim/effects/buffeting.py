@@ -26,7 +26,7 @@ class Buffeting(Effect):
     name = "buffeting"
     channel = "forcing"
     condition = "wind_on"
-    equation = "random moment of standard deviation s ½ρV²Al, exponentially correlated"
+    equation = "random moment of standard deviation s ½ρV²Al, correlated as exp(−2π fb |t − t'|)"
     signature = (
         "The response wanders about the decay in wind-on runs, and after the decay goes on as "
         "narrow-band noise at the rig's own frequency."

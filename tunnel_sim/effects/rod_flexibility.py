@@ -14,6 +14,7 @@ from tunnel_sim.run_settings import RodTwist, RunSettings
 _TURN = 0.5  # rad of the rod's own oscillation in one step: RK4 then errs by less than 1e-5 rad
 _MOST_SUBSTEPS = 64
 
+
 @dataclass(frozen=True)
 class RodFlexibility(Effect):
     """A rod that twists between the spring's and sensor's end and the body.

@@ -24,7 +24,7 @@ class SpringMiscalibration(Effect):
     name = "spring_miscalibration"
     channel = "calibration"
     condition = "always"
-    equation = "one spring is (1 + x) times as stiff as stated"
+    equation = "(1 + x) Kr in place of the stated Kr, in the runs of one spring"
     signature = (
         "All runs of one spring leave the line of stiffness against squared frequency by the same share."
     )
@@ -42,9 +42,20 @@ class SpringMiscalibration(Effect):
         "Kr", "N m/rad", "stated stiffness of the spring in question", scale=1.0, lower=0.0, upper=1000000.0
     )
 
+    def concerns(self, spring_stiffness: float) -> bool:
+        """Whether a spring is the one in question.
+
+        Args:
+            spring_stiffness: as the campaign states it, N m/rad.
+
+        Returns:
+            Whether it is, to the sixth digit.
+        """
+        return isclose(spring_stiffness, self.spring_stiffness, rel_tol=1e-6)
+
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Correct the stiffness of the spring's runs."""
         del rng
-        if self.is_null or not isclose(stated.spring_stiffness, self.spring_stiffness, rel_tol=1e-6):
+        if self.is_null or not self.concerns(stated.spring_stiffness):
             return run
         return dataclasses.replace(run, spring_stiffness=run.spring_stiffness * (1.0 + self.error))

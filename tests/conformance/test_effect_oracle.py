@@ -1,0 +1,200 @@
+"""Every effect against its equation, solved by SciPy: far below the sensor's noise of 5e-4 rad.
+
+Truth here: `tests/reference/effect_oracle.py`, which shares no code with the effects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tests.reference.effect_cases import VALUES, VOCABULARY, settings
+from tests.reference.effect_oracle import NOTHING, Setting, buffeted, fitted_phase, reading
+from tunnel_sim.effects import Effect, effect_from
+from tunnel_sim.forward import forward_motion
+from tunnel_sim.model import build_model
+from tunnel_sim.plan import SensorModel
+from tunnel_sim.rig import load_rig
+from tunnel_sim.sensor import read_motion
+from tunnel_sim.simulate import apply_effects, simulate_motion
+
+RIG = load_rig()
+QUIET = SensorModel(noise_std=0.0, resolution=0.0)
+RUN = Setting()
+
+# Largest error allowed, rad. RK4 with steps of 1 ms leaves less than 1e-8 of a smooth motion of 2 Hz.
+SMOOTH = 1e-7
+# A kink or jump inside a step leaves (ω h)² A, some 1e-4, times the share of the law that jumps; 4 % of the noise.
+KINKED = 2e-5
+TOLERANCE = {
+    "coulomb_friction": KINKED,
+    "free_play": KINKED,
+    # the rod rings at up to 0.5 rad per step, where RK4 turns its phase by 5e-4 of itself per radian
+    "rod_flexibility": KINKED,
+    # the slider turns at the extreme sample, up to ω² A h²/8 = 6e-6 short of the true extreme
+    "sensor_hysteresis": KINKED,
+}
+VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
+    *(
+        (name, values, RUN)
+        for name, values in VALUES.items()
+        if name not in ("buffeting", "sensor_quantisation")
+    ),
+    ("coulomb_friction", {"friction_moment": 0.4}, RUN),  # comes to rest within the run
+    ("coulomb_friction", {"friction_moment": 0.02}, replace(RUN, spring=67.98, speed=0.0, release=-0.2)),
+    ("quadratic_damping", {"coefficient": -0.002}, RUN),
+    ("cubic_stiffness", {"coefficient": -2.0}, replace(RUN, release=-0.3)),
+    ("asymmetric_stiffness", {"coefficient": -0.5}, replace(RUN, release=-0.3)),
+    ("free_play", {"half_width": 0.002}, replace(RUN, spring=44.84, speed=0.0)),
+    ("gravity_stiffness", {"stiffness": -1.0, "rest_angle": -0.4}, RUN),
+    ("rod_flexibility", {"compliance": 5e-4, "inertia_share": 0.1}, RUN),
+    ("rod_flexibility", {"compliance": 5e-4, "inertia_share": 0.01}, RUN),  # needs steps below 1 ms
+    ("rod_flexibility", {"compliance": 1e-5, "inertia_share": 0.1}, replace(RUN, spring=44.84)),
+    ("nonlinear_yaw_moment", {"coefficient": -3.0}, RUN),
+    ("wind_speed_drift", {"drift": -0.2}, RUN),
+    ("nonlinear_yaw_damping", {"coefficient": -20.0}, RUN),
+    ("unsteady_aero_lag", {"lag": 0.01}, RUN),  # a third of a step
+    ("unsteady_aero_lag", {"lag": 15.0}, RUN),
+    ("unsteady_aero_lag", {"lag": -1.5}, RUN),
+    ("vortex_shedding", {"amplitude": 0.1, "strouhal_number": 0.15}, RUN),
+    ("sensor_nonlinearity", {"coefficient": -0.2}, RUN),
+    ("sensor_hysteresis", {"half_width": 0.01}, replace(RUN, release=-0.1)),
+    ("sensor_drift", {"drift": -0.01}, RUN),
+    ("spring_miscalibration", {"error": -0.1, "spring_stiffness": 16.12}, RUN),
+    ("wind_speed_offset", {"offset": -1.5}, RUN),
+]
+each_variant = pytest.mark.parametrize(
+    ("name", "values", "run"), VARIANTS, ids=[f"{n}-{next(iter(v.values())):g}" for n, v, _ in VARIANTS]
+)
+
+
+def simulated(effects: list[Effect], run: Setting, *, forward: bool = False, seed: int = 3) -> np.ndarray:
+    """The reading by MuJoCo, or by the compiled forward integrator."""
+    rng = np.random.default_rng(seed)
+    physics = apply_effects(settings(run), effects, rng)
+    if forward:
+        motion = forward_motion(RIG, physics, run.sample_rate)
+    else:
+        motion = simulate_motion(build_model(RIG, physics), run.sample_rate)
+    return read_motion(motion, settings(run), QUIET, rng, effects).yaw_rad
+
+
+@cache
+def nominal_reading(run: Setting) -> np.ndarray:
+    return reading("", NOTHING, run)
+
+
+def phase_of(name: str, effect: Effect, values: dict[str, float], found: np.ndarray, run: Setting) -> float:
+    """The phase a periodic effect has drawn: of shedding from the run, of hum from the reading."""
+    if name == "vortex_shedding":
+        physics = apply_effects(settings(run), [effect], np.random.default_rng(3))
+        return physics.parameters["shedding_phase"]
+    if name == "mains_hum":
+        return fitted_phase(found - nominal_reading(run), values["frequency"], run)[1]
+    return 0.0
+
+
+def test_no_effect_matches_the_nominal_equation() -> None:
+    assert np.max(np.abs(simulated([], RUN) - nominal_reading(RUN))) < SMOOTH
+
+
+@each_variant
+def test_effect_matches_its_equation(name: str, values: dict[str, float], run: Setting) -> None:
+    effect, tolerance = effect_from(name, values), TOLERANCE.get(name, SMOOTH)
+    for forward in (False, True):
+        found = simulated([effect], run, forward=forward)
+        expected = reading(name, values, run, phase=phase_of(name, effect, values, found, run))
+        assert np.max(np.abs(found - expected)) < tolerance
+    # what both sides leave out would pass: the effect must be seen
+    assert np.max(np.abs(expected - nominal_reading(run))) > max(2e-4, 20.0 * tolerance)
+
+
+def test_every_effect_is_compared() -> None:
+    compared = {name for name, _, _ in VARIANTS} | {"buffeting", "sensor_quantisation"}
+    assert compared == set(VOCABULARY)
+
+
+def test_a_coarse_reading_is_the_rounded_angle() -> None:
+    values = VALUES["sensor_quantisation"]
+    found = simulated([effect_from("sensor_quantisation", values)], RUN)
+    exact = nominal_reading(RUN)
+    place = exact / values["step"]
+    clear = np.abs(place - np.floor(place) - 0.5) * values["step"] > SMOOTH  # not on the edge of two steps
+    assert np.mean(clear) > 0.99
+    assert np.max(np.abs(found - reading("sensor_quantisation", values, RUN))[clear]) < 1e-12
+    assert np.max(np.abs(found - exact)) <= 0.5 * values["step"] + SMOOTH
+
+
+def test_a_resolution_finer_than_stated_changes_nothing() -> None:
+    effect = effect_from("sensor_quantisation", {"step": 0.001})
+    assert effect.on_sensor(SensorModel(resolution=0.002)) == SensorModel(resolution=0.002)
+    assert effect.on_sensor(SensorModel(resolution=0.0)).resolution == 0.001
+
+
+def test_buffeting_matches_the_linear_rig_under_the_same_moment() -> None:
+    effect = effect_from("buffeting", VALUES["buffeting"])
+    series = apply_effects(settings(RUN), [effect], np.random.default_rng(3)).series["forcing"]
+    expected = buffeted(np.array(series.values), series.interval, RUN)
+    for forward in (False, True):
+        assert np.max(np.abs(simulated([effect], RUN, forward=forward) - expected)) < SMOOTH
+    assert np.max(np.abs(expected - nominal_reading(RUN))) > 1e-3
+
+
+def random_moment(intensity: float, bandwidth: float, duration: float, seed: int) -> np.ndarray:
+    effect = effect_from("buffeting", {"intensity": intensity, "bandwidth": bandwidth})
+    run = replace(settings(RUN), duration=duration)
+    (series,) = effect.on_run(run, run, np.random.default_rng(seed)).series.values()
+    assert series.interval == 1e-3
+    return np.array(series.values)
+
+
+def test_buffeting_has_its_spread_and_spectrum() -> None:
+    intensity, bandwidth, interval = 0.02, 8.0, 1e-3
+    moment = random_moment(intensity, bandwidth, 200.0, seed=1)
+    frequency = np.fft.rfftfreq(moment.size, interval)
+    found = interval / moment.size * np.abs(np.fft.rfft(moment)) ** 2  # two-sided
+    decay = np.exp(-2.0 * np.pi * bandwidth * interval)  # of the sampled process with R = s² exp(−2π fb |τ|)
+    turn = np.exp(-2j * np.pi * frequency * interval)
+    expected = intensity**2 * interval * (1.0 - decay**2) / np.abs(1.0 - decay * turn) ** 2
+    edges = [0.02, 1.0, 3.0, 8.0, 20.0, 60.0, 200.0, 499.0]
+    for low, high in pairwise(edges):
+        band = (frequency >= low) & (frequency < high)
+        ratio = np.mean(found[band] / expected[band])  # mean of exponential variates
+        assert abs(ratio - 1.0) < 5.0 / np.sqrt(np.count_nonzero(band))
+    # variance of the mean square of a correlated series: 2 Σ R²/N
+    spread = np.sqrt(2.0 * (1.0 + decay**2) / (1.0 - decay**2) / moment.size)
+    assert abs(np.mean(moment**2) / intensity**2 - 1.0) < 5.0 * spread
+
+
+def test_buffeting_is_steady_from_the_first_sample_on() -> None:
+    first = np.array([random_moment(1.0, 2.0, 0.01, seed)[0] for seed in range(400)])
+    assert abs(np.mean(first**2) - 1.0) < 5.0 * np.sqrt(2.0 / first.size)
+    assert abs(np.mean(first)) < 5.0 / np.sqrt(first.size)
+
+
+def test_an_offset_shifts_a_drifting_wind_in_either_order() -> None:
+    drift, offset = (
+        effect_from("wind_speed_drift", {"drift": 0.1}),
+        effect_from("wind_speed_offset", {"offset": 1.0}),
+    )
+    after = simulated([drift, offset], RUN)
+    expected = reading(
+        "wind_speed_drift", {"drift": 0.1 * RUN.speed / (RUN.speed + 1.0)}, replace(RUN, speed=21.0)
+    )
+    assert np.max(np.abs(after - expected)) < SMOOTH
+    before = simulated([offset, drift], RUN)
+    ahead = reading("wind_speed_drift", {"drift": 0.1}, replace(RUN, speed=21.0))
+    assert np.max(np.abs(before - ahead)) < SMOOTH
+
+
+def test_mains_hum_has_a_phase_of_its_own_in_every_run() -> None:
+    effect = effect_from("mains_hum", {"amplitude": 0.002})
+    found = [
+        fitted_phase(simulated([effect], RUN, seed=seed) - nominal_reading(RUN), 50.0, RUN) for seed in (3, 4)
+    ]
+    assert [amplitude for amplitude, _ in found] == pytest.approx([0.002, 0.002], abs=SMOOTH)
+    assert abs(found[0][1] - found[1][1]) > 1e-3

@@ -1,0 +1,179 @@
+"""One suite over every effect of the registry: the laws an effect obeys, whatever it is."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.reference.effect_cases import VALUES, VOCABULARY, settings
+from tests.reference.effect_oracle import Setting
+from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class, effect_from
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.plan import SensorModel
+from tunnel_sim.record import Record
+from tunnel_sim.rig import load_rig
+from tunnel_sim.simulate import simulate, simulate_batch
+
+RIG = load_rig()
+SENSOR = SensorModel(zero=0.003)
+WIND_ON = settings(Setting(duration=1.0))
+WIND_OFF = replace(WIND_ON, wind_speed=0.0)
+UNITS = {
+    "1", "N m", "N m/rad", "N m s2/rad2", "1/rad", "1/rad2", "rad", "rad/(N m)", "l/V", "Hz", "m/s",
+}  # fmt: skip
+
+each_effect = pytest.mark.parametrize("kind", ALL_EFFECTS, ids=lambda kind: kind.name)
+
+
+def example(kind: type[Effect]) -> Effect:
+    return effect_from(kind.name, VALUES[kind.name])
+
+
+def record(effects: tuple[Effect, ...] = (), run=WIND_ON, seed: int = 1) -> Record:
+    return simulate(RIG, run, SENSOR, np.random.default_rng(seed), effects=effects)
+
+
+def same(one: Record, other: Record) -> bool:
+    return np.array_equal(one.yaw_rad, other.yaw_rad) and np.array_equal(one.time_s, other.time_s)
+
+
+@pytest.fixture(scope="module")
+def bare() -> Record:
+    return record()
+
+
+@pytest.fixture(scope="module")
+def bare_wind_off() -> Record:
+    return record(run=WIND_OFF)
+
+
+def test_the_vocabulary_is_whole_and_in_its_order() -> None:
+    assert [kind.name for kind in ALL_EFFECTS] == list(VOCABULARY)
+    assert len(ALL_EFFECTS) == 23
+    assert list(VALUES) == list(VOCABULARY)
+
+
+@each_effect
+def test_channel_and_condition_are_the_vocabularys(kind: type[Effect]) -> None:
+    assert (kind.channel, kind.condition) == VOCABULARY[kind.name]
+    assert effect_class(kind.name) is kind
+
+
+@each_effect
+def test_metadata_is_complete(kind: type[Effect]) -> None:
+    infos = kind.parameters()
+    assert kind.equation
+    assert kind.signature.endswith(".")
+    assert kind.references
+    assert all(kind.references)
+    assert (kind.__doc__ or "").splitlines()[0].endswith(".")
+    assert infos[0].default == 0.0  # the severity, whose null is zero
+    assert len({info.name for info in infos}) == len({info.symbol for info in infos}) == len(infos)
+    for info in infos:
+        assert info.meaning
+        assert info.unit in UNITS
+        assert info.symbol.removeprefix("1/") in kind.equation
+        assert math.isfinite(info.lower)
+        assert math.isfinite(info.upper)
+        assert info.lower <= info.default <= info.upper
+        assert 0.0 < info.scale < math.inf
+        # only a mains frequency lies so far from zero that its typical size is no value of it
+        assert info.lower <= info.scale <= info.upper or info.lower > info.scale == 0.05
+
+
+@each_effect
+def test_at_its_null_the_record_is_that_of_no_effect_to_the_bit(kind: type[Effect], bare: Record) -> None:
+    severity = kind.parameters()[0].name
+    elsewhere = effect_from(kind.name, {**VALUES[kind.name], severity: 0.0})
+    for effect in (kind(), elsewhere):
+        assert effect.is_null
+        assert same(record((effect,)), bare)
+
+
+@each_effect
+def test_beyond_its_null_it_is_seen(kind: type[Effect], bare: Record) -> None:
+    # the laws of the null and of the wind would hold of an effect that never acts
+    assert not example(kind).is_null
+    assert not same(record((example(kind),)), bare)
+
+
+@each_effect
+def test_the_wind_off_run_knows_only_what_acts_always(kind: type[Effect], bare_wind_off: Record) -> None:
+    unchanged = same(record((example(kind),), WIND_OFF), bare_wind_off)
+    assert unchanged == (kind.condition == "wind_on")
+
+
+@each_effect
+def test_it_goes_through_json_by_name(kind: type[Effect]) -> None:
+    for effect in (example(kind), kind()):
+        document = json.loads(json.dumps(effect.to_json_dict(), allow_nan=False))
+        assert document["name"] == kind.name
+        assert effect_from(**document) == effect
+
+
+@each_effect
+def test_unknown_names_get_did_you_mean(kind: type[Effect]) -> None:
+    misspelt = kind.name.replace("i", "j", 1) if "i" in kind.name else kind.name[:-1]
+    with pytest.raises(TunnelError, match=f"did you mean '{kind.name}'"):
+        effect_from(misspelt, {})
+    known = kind.parameters()[0].name
+    with pytest.raises(TunnelError, match=f"effect {kind.name}: .*did you mean '{known}'"):
+        effect_from(kind.name, {known[:-1]: 0.0})
+
+
+@each_effect
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf, True, 10**400, "0.1", None])
+def test_no_number_is_refused_in_one_line(kind: type[Effect], wrong: object) -> None:
+    for info in kind.parameters():
+        with pytest.raises(TunnelError) as refusal:
+            effect_from(kind.name, {info.name: wrong})  # type: ignore[dict-item]
+        text = str(refusal.value)
+        assert "\n" not in text
+        assert f"effect {kind.name}: {info.name} = " in text
+        assert f"give a number from {info.lower:g} to {info.upper:g} in {info.unit}" in text
+
+
+@each_effect
+def test_the_bounds_are_those_stated(kind: type[Effect]) -> None:
+    for info in kind.parameters():
+        for bound, outward in ((info.lower, -math.inf), (info.upper, math.inf)):
+            assert getattr(effect_from(kind.name, {info.name: bound}), info.name) == bound
+            with pytest.raises(TunnelError, match="out of range"):
+                effect_from(kind.name, {info.name: math.nextafter(bound, outward)})
+
+
+@each_effect
+def test_the_same_seed_gives_the_same_bits_at_any_thread_count(kind: type[Effect]) -> None:
+    effects, runs = (example(kind),), [replace(WIND_ON, duration=0.4), replace(WIND_OFF, duration=0.4)] * 2
+    one, two, three = (
+        simulate_batch(
+            RIG, runs, SENSOR, [np.random.default_rng([7, i]) for i in range(4)], effects=effects, nthread=n
+        )
+        for n in (1, 2, 3)
+    )
+    loop = [record(effects, run, seed=[7, i]) for i, run in enumerate(runs)]  # type: ignore[arg-type]
+    for others in (two, three, loop):
+        assert all(same(a, b) for a, b in zip(one, others, strict=True))
+
+
+@each_effect
+def test_another_seed_gives_another_draw_only_where_one_is_drawn(kind: type[Effect]) -> None:
+    quiet = SensorModel(noise_std=0.0, resolution=0.0)
+    one, other = (
+        simulate(RIG, WIND_ON, quiet, np.random.default_rng(seed), effects=(example(kind),))
+        for seed in (1, 2)
+    )
+    drawn = {"buffeting", "vortex_shedding", "mains_hum"}  # a moment, and two phases
+    assert same(one, other) == (kind.name not in drawn)
+
+
+def test_a_rod_too_stiff_for_any_step_is_refused_in_one_line() -> None:
+    stiff = effect_from("rod_flexibility", {"compliance": 1e-9, "inertia_share": 0.001})
+    with pytest.raises(TunnelError, match="too fast for steps") as refusal:
+        record((stiff,))
+    assert "\n" not in str(refusal.value)
+    assert "larger compliance" in str(refusal.value)
