@@ -20,7 +20,7 @@ _TIME_LIMIT = 5.5
 _WIND_OFF_SHARE = 0.05
 #: Single effects that a random moment is tried beside.
 _PARTNERS = 3
-#: A deterministic single effect that leaves less than this needs no random moment.
+#: Where deterministic effects leave less than this, no random moment is needed.
 _CLOSED = 0.08
 
 
@@ -41,18 +41,21 @@ class BuffetingAnswer:
     share: float
 
 
-def weigh_buffeting(nominal: Fit, singles: Sequence[Hypothesis]) -> BuffetingAnswer | None:
+def weigh_buffeting(
+    nominal: Fit, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis] = ()
+) -> BuffetingAnswer | None:
     """Try a random moment, alone and beside the best single effects.
 
     Args:
         nominal: the nominal fit.
         singles: fitted single effects, best first.
+        pairs: fitted pairs.
 
     Returns:
         The first that passes: innovations white by band and steady in time, wind-off runs without a gap. None
-        where none passes, or a single effect closes the gap already.
+        where none passes, or one or two deterministic effects close the gap already.
     """
-    if singles and max(singles[0].fit.excess, 0.0) < _CLOSED * nominal.excess:
+    if any(max(hypothesis.fit.excess, 0.0) < _CLOSED * nominal.excess for hypothesis in (*singles, *pairs)):
         return None
     alone = _try(nominal, None, nominal)
     if alone is not None:

@@ -36,13 +36,15 @@ def full_rate_residuals(fit: Fit, campaign: Campaign) -> dict[str, Array]:
     residuals: dict[str, Array] = {}
     for rate, indices in by_rate.items():
         stated = [_stated(fit, i, campaign, rate) for i in indices]
-        physics = [_with_effects(fit, i, run, effects) for i, run in zip(indices, stated, strict=True)]
+        physics = [
+            _with_effects(fit, i, settings, effects) for i, settings in zip(indices, stated, strict=True)
+        ]
         motions = simulate_motions(campaign_rig(problem.data), physics, rate)
-        for i, run, motion in zip(indices, stated, motions, strict=True):
+        for i, settings, motion in zip(indices, stated, motions, strict=True):
             angle = motion.angle
             draws = problem.draws(fit.point.release[i])
             for effect, draw in zip(effects, draws, strict=True):
-                angle = effect.on_angle(angle, motion.time_s, run, draw)
+                angle = effect.on_angle(angle, motion.time_s, settings, draw)
             predicted = angle + zero
             for effect in effects:
                 predicted = effect.on_reading(predicted)

@@ -1,199 +1,54 @@
-"""The diagnosis, composed: gap, hypotheses, answer, and how far the gap closes."""
+"""The diagnosis of a campaign, in one call."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
-import numpy as np
-
-from diagnosis.buffeting import BuffetingAnswer, weigh_buffeting
-from diagnosis.data import Data, prepare
-from diagnosis.decide import Weighed, weigh
-from diagnosis.gap import GapTest, test_gap
-from diagnosis.least_squares import Fit, FitError, fit
-from diagnosis.mains import Hum, find_hum, remove_hum
-from diagnosis.noise import Noise, NoiseTrend, campaign_noise, noise_trend, reading_step
-from diagnosis.problem import Problem
-from diagnosis.rank import NOT_FITTED, Hypothesis, rank_pairs, rank_singles
-from diagnosis.start import nominal_start
+from diagnosis.assemble import assemble, plain_where
+from diagnosis.result import Diagnosis
+from diagnosis.study import Progress, study
 from tunnel_sim.campaign import Campaign
-from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
 from tunnel_sim.errors import TunnelError
 
-Progress = Callable[[str], None]
-
-#: A reading's step beyond this multiple of the stated resolution is coarser than stated.
-COARSER = 1.5
-#: A single effect that leaves less than this share needs no second one looked for.
-_CLOSED = 0.01
+_FEWEST_RUNS = 1
 
 
-@dataclass(frozen=True, eq=False)
-class Study:
-    """Everything a diagnosis found, before it is put in words.
+def diagnose(
+    campaign: Campaign, *, kinds: Sequence[type[Effect]] = ALL_EFFECTS, progress: Progress | None = None
+) -> Diagnosis:
+    """Say where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
     Args:
-        campaign: as given.
-        cleaned: without hum, where one was found.
-        noise: of the records.
-        trend: of the noise with the motion.
-        step: of the lattice of the readings, rad; 0 where continuous.
-        coarse: whether that is coarser than stated.
-        hum: taken out, or None.
-        nominal: the nominal fit.
-        test: of the gap, hum taken out.
-        hypotheses: fitted effects and pairs.
-        weighed: answers with probabilities; empty where there is no gap.
-        buffeting: the random moment weighed, or None.
-        seconds: wall time by step.
-    """
-
-    campaign: Campaign
-    cleaned: Campaign
-    noise: Noise
-    trend: NoiseTrend
-    step: float
-    coarse: bool
-    hum: Hum | None
-    nominal: Fit
-    test: GapTest
-    hypotheses: tuple[Hypothesis, ...] = ()
-    weighed: tuple[Weighed, ...] = ()
-    buffeting: BuffetingAnswer | None = None
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def read_off(self) -> tuple[str, ...]:
-        """Causes read off the records before fitting."""
-        names = ["mains_hum"] if self.hum is not None else []
-        return tuple([*names, "sensor_quantisation"] if self.coarse else names)
-
-    @property
-    def fitted(self) -> tuple[str, ...]:
-        """Causes the fits answer with: none, one, two, or ``unknown``."""
-        return self.weighed[0].effects if self.weighed else ()
-
-    @property
-    def causes(self) -> tuple[str, ...]:
-        """The answer."""
-        if self.fitted == ("unknown",):
-            return ("unknown",)
-        return tuple(sorted({*self.read_off, *self.fitted}))
-
-    def hypothesis(self, names: Sequence[str]) -> Hypothesis | None:
-        """The fitted hypothesis of these effects, None where they were not fitted together."""
-        key = tuple(sorted(names))
-        return next((h for h in self.hypotheses if h.names == key), None)
-
-
-def study(
-    campaign: Campaign, kinds: Sequence[type[Effect]] = ALL_EFFECTS, progress: Progress | None = None
-) -> Study:
-    """Fit, test and weigh.
-
-    Args:
-        campaign: the runs.
+        campaign: measured or simulated runs.
         kinds: the vocabulary to answer in.
         progress: told what is being done.
 
     Returns:
-        What was found.
+        The answer.
 
     Raises:
-        TunnelError: when the runs are too few or not oscillating enough to fit the nominal model.
+        TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    clock = _Clock(progress)
-    allowed = {kind.name for kind in kinds}
-    with clock.step("noise"):
-        noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
-        stated = campaign.sensor.resolution
-        coarse = "sensor_quantisation" in allowed and stated is not None and step > COARSER * stated
-    with clock.step("nominal fit"):
-        nominal = fit_nominal(prepare(campaign, noise.variance))
-        cleaned, hum = campaign, None
-        line = find_hum(nominal) if "mains_hum" in allowed else None
-        if line is not None:
-            cleaned, hum = remove_hum(campaign, line.parameter, float(np.mean(list(noise.variance.values()))))
-            noise = campaign_noise(cleaned)
-            nominal = fit_nominal(prepare(cleaned, noise.variance))
-        test = test_gap(nominal, noise, trend, coarse_step=coarse)
-    found = Study(campaign, cleaned, noise, trend, step, coarse, hum, nominal, test, seconds=clock.seconds)
-    return _weigh_effects(found, kinds, clock) if test.detected else found
+    found = study(campaign, kinds, progress)
+    return assemble(found, plain_where(found))
 
 
-def fit_nominal(data: Data) -> Fit:
-    """Fit the nominal model.
+def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:
+    """The effects to answer in.
 
     Args:
-        data: prepared runs.
+        include: names to restrict to; empty: all.
+        exclude: names to withhold.
 
     Returns:
-        The fit.
+        Effect classes in the order of the vocabulary.
 
     Raises:
-        TunnelError: when no nominal model can be fitted.
+        TunnelError: when a name is unknown, or nothing is left.
     """
-    try:
-        return fit(Problem(data), nominal_start(data))
-    except (FitError, np.linalg.LinAlgError) as error:
-        raise TunnelError(
-            "the nominal model cannot be fitted",
-            remedy="check spring stiffness, wind speed and that the runs are free decays of three cycles or more",
-        ) from error
-
-
-def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
-    fitted_kinds = [kind for kind in kinds if kind.name not in NOT_FITTED]
-    nominal = found.nominal
-    with clock.step("single effects"):
-        singles = rank_singles(nominal, fitted_kinds, clock.progress)
-    pairs: list[Hypothesis] = []
-    if singles and _share(singles[0].fit, nominal) > _CLOSED:
-        with clock.step("pairs"):
-            pairs = rank_pairs(singles, fitted_kinds, clock.progress)
-    hypotheses = [*singles, *pairs]
-    shares = [(h.effects, _share(h.fit, nominal)) for h in hypotheses]
-    buffeting = None
-    if any(kind.name == "buffeting" for kind in kinds):
-        with clock.step("buffeting"):
-            buffeting = weigh_buffeting(nominal, singles)
-        if buffeting is not None:
-            shares.append((buffeting.effects, buffeting.share))
-    chance = float(np.sqrt(2.0 / nominal.count)) / max(nominal.excess, 1e-3)
-    weighed = weigh(shares, chance)
-    if found.test.noisy and nominal.excess < _share_of_noise(found):
-        weighed = [Weighed(("unknown",), 1.0, 1.0), *(Weighed(w.effects, w.share, 0.0) for w in weighed)]
-    return Study(
-        found.campaign, found.cleaned, found.noise, found.trend, found.step, found.coarse, found.hum, nominal,
-        found.test, tuple(hypotheses), tuple(weighed), buffeting, clock.seconds,
-    )  # fmt: skip
-
-
-def _share(fitted: Fit, nominal: Fit) -> float:
-    """Share of the nominal gap that a fit leaves open."""
-    return max(fitted.excess, 0.0) / max(nominal.excess, 1e-9)
-
-
-def _share_of_noise(found: Study) -> float:
-    """Excess of block means below which a misbehaving noise is the whole gap."""
-    return 1.0 * found.nominal.problem.data.runs[0].block
-
-
-class _Clock:
-    """Wall time by step, and the progress call."""
-
-    def __init__(self, progress: Progress | None) -> None:
-        self.seconds: dict[str, float] = {}
-        self.progress = progress
-
-    @contextmanager
-    def step(self, name: str) -> Iterator[None]:
-        """Time a step."""
-        if self.progress is not None:
-            self.progress(name)
-        begun = time.perf_counter()
-        yield
-        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begun
+    wanted = {effect_class(name) for name in include} if include else set(ALL_EFFECTS)
+    kinds = tuple(kind for kind in ALL_EFFECTS if kind in wanted - {effect_class(name) for name in exclude})
+    if not kinds:
+        raise TunnelError("no effect is left to answer with", remedy="exclude fewer effects")
+    return kinds

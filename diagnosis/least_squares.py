@@ -227,7 +227,8 @@ def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> li
     result = []
     for r, run in enumerate(problem.data.runs):
         scale = np.sqrt(run.noise_variance)
-        changes = [(moved[r] - predictions[0][r]) / scale for moved in predictions[1:]]
+        with np.errstate(invalid="ignore"):  # a run that grew without bound; the caller looks for it
+            changes = [(moved[r] - predictions[0][r]) / scale for moved in predictions[1:]]
         common = [c / steps[known + i] for i, c in enumerate(changes[: steps.size - known])]
         ends = [c / release_steps[known_own + j][r] for j, c in enumerate(changes[steps.size - known :])]
         if base is None:
@@ -291,8 +292,8 @@ def _step(
 def _covariance(jacobian: list[tuple[Array, Array]]) -> Array:
     matrix, _, _ = normal_equations(jacobian, [np.zeros(c.shape[0]) for c, _ in jacobian])
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    inverse = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
-    return inverse / np.outer(scale, scale)
+    inverse: Array = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+    return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64)
 
 
 def fit_releases(problem: Problem, start: Point, slopes: list[Array]) -> list[Array]:
@@ -331,5 +332,5 @@ def project_release(change: Array, slopes: Array) -> Array:
     Returns:
         The remainder, shape (n,).
     """
-    absorbed: Array = slopes @ np.linalg.lstsq(slopes, change, rcond=1e-10)[0]
-    return change - absorbed
+    left: Array = change - slopes @ np.linalg.lstsq(slopes, change, rcond=1e-10)[0]
+    return left

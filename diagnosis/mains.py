@@ -6,15 +6,20 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from diagnosis.least_squares import Fit
-from diagnosis.spectra import Line, mains_line
-from tunnel_sim.campaign import Campaign, Run
+from diagnosis.spectra import mains_line, residual_spectra
+from tunnel_sim.campaign import Campaign
 from tunnel_sim.record import Array, Record
 
 _HARMONICS = 5
-#: Drop of χ² over that beside the line, for two parameters a run: by chance below 1 in 10 000 campaigns.
-_CONTRAST = 3.0
+#: A run shows the line when taking it out lowers χ² by this much: by chance in one run of 2000.
+_RUN_DROP = 15.0
+#: Share of the runs that must show it: the mains hum in every run.
+_RUN_SHARE = 0.75
+#: Drop of χ² at the line over the largest beside it, all runs together.
+_CONTRAST = 4.0
 
 
 @dataclass(frozen=True)
@@ -34,22 +39,41 @@ class Hum:
     excess: float
 
 
-def find_hum(nominal: Fit) -> Line | None:
+def find_hum(nominal: Fit) -> float | None:
     """The hum in the residuals of the nominal fit.
 
     Args:
         nominal: its residuals.
 
     Returns:
-        The line, None where there is none beyond chance. A ringing rod or harmonics of a clipped motion raise the
-        floor beside the line as well, and do not pass.
+        Its frequency, Hz; None where there is none beyond chance. A ringing rod and harmonics of a motion with
+        corners raise the spectrum beside the line as well, and do not pass.
     """
     line = mains_line(nominal)
-    if line is None:
+    if line is None or line.contrast < _CONTRAST:
         return None
-    runs = len(nominal.residuals)
-    beyond_chance = line.drop > 2.0 * runs + 6.0 * 2.0 * np.sqrt(runs) + 20.0
-    return line if beyond_chance and line.contrast > _CONTRAST else None
+    shown = [spectrum.power(line.parameter) > _RUN_DROP for spectrum in residual_spectra(nominal)]
+    return line.parameter if np.mean(shown) >= _RUN_SHARE else None
+
+
+def refine_frequency(campaign: Campaign, frequency: float) -> float:
+    """The mains' frequency to a small part of a spectral bin.
+
+    Args:
+        campaign: the runs.
+        frequency: Hz, to within 0.02 Hz.
+
+    Returns:
+        The frequency at which sines and their harmonics take most out of all records, Hz.
+    """
+
+    def left(trial: float) -> float:
+        return -float(sum(_line_power(run.record, trial) for run in campaign.runs))
+
+    found = minimize_scalar(
+        left, bounds=(frequency - 0.02, frequency + 0.02), method="bounded", options={"xatol": 1e-4}
+    )
+    return float(found.x)
 
 
 def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[Campaign, Hum]:
@@ -69,16 +93,25 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
         cleaned.append(dataclasses.replace(run, record=record))
         squares.append(amplitude**2)
         powers.append(power)
-    count = np.mean([run.record.yaw_rad.size for run in campaign.runs])
+    count = sum(run.record.yaw_rad.size for run in campaign.runs) / len(campaign.runs)
     noise = 4.0 * variance / count  # of a squared amplitude
-    amplitude = float(np.sqrt(max(np.mean(squares) - noise, 0.0)))
+    amplitude = float(np.sqrt(max(sum(squares) / len(squares) - noise, 0.0)))
     std = float(np.sqrt(2.0 * variance / (count * len(squares))))
     hum = Hum(frequency, amplitude, std, float(np.mean(powers)) / variance)
-    return dataclasses.replace(campaign, runs=tuple(_typed(cleaned))), hum
+    return dataclasses.replace(campaign, runs=tuple(cleaned)), hum
 
 
-def _typed(runs: list[Run]) -> list[Run]:
-    return runs
+def _line_power(record: Record, frequency: float) -> float:
+    """Squared amplitudes of the windowed record at a frequency and its harmonics, summed."""
+    time = record.time_s - record.time_s[0]
+    values = _detrended(record.yaw_rad) * np.hanning(time.size)
+    wave = np.exp(-2j * np.pi * frequency * time)
+    turn, total = wave, 0.0
+    for k in range(1, _HARMONICS + 1):
+        if k * frequency < 0.48 * record.sample_rate:
+            total += float(abs(values @ turn) ** 2)
+        turn = turn * wave
+    return total
 
 
 def _remove(record: Record, frequency: float) -> tuple[Record, float, float]:

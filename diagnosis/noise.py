@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import get_window, periodogram
 
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.record import Array, Record
@@ -59,10 +58,10 @@ def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
     Returns:
         Frequencies, Hz, and power, unit²/Hz.
     """
-    frequency, power = periodogram(
-        values, fs=rate, window=get_window("hann", values.size), detrend="linear", scaling="density"
-    )
-    return frequency, power
+    window = np.hanning(values.size)
+    spectrum = np.fft.rfft((values - np.mean(values)) * window)
+    power = 2.0 * np.abs(spectrum) ** 2 / (rate * float(window @ window))
+    return np.asarray(np.fft.rfftfreq(values.size, 1.0 / rate), np.float64), power
 
 
 def campaign_noise(campaign: Campaign) -> Noise:

@@ -193,7 +193,9 @@ class _Job:
             + weights[1] * angle[1:]
             + h * (weights[2] * rate[:-1] + weights[3] * rate[1:])
         )
-        time = (np.arange(mean.size) + 0.5 * (self.run.block - 1) / self.run.block) * h
+        time = np.asarray(
+            (np.arange(mean.size) + 0.5 * (self.run.block - 1) / self.run.block) * h, np.float64
+        )
         for effect, draw in zip(self.effects, self.draws, strict=True):
             mean = effect.on_angle(mean, time, self.stated, draw)
         mean = mean + self.zero

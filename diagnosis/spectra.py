@@ -32,7 +32,8 @@ class Spectrum:
     def at(self, frequency: float | Array) -> np.ndarray:
         """Complex amplitude at any frequency (nearest of the padded grid)."""
         index = np.round(np.asarray(frequency) / self.frequency[1]).astype(int)
-        return self.transform[np.clip(index, 0, self.transform.size - 1)]
+        found: np.ndarray = self.transform[np.clip(index, 0, self.transform.size - 1)]
+        return found
 
     def power(self, frequency: float | Array) -> Array:
         """Drop of χ² when a sine of free amplitude and phase is taken out."""
@@ -53,7 +54,14 @@ def residual_spectra(fit: Fit) -> list[Spectrum]:
     for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
         size = _PADDING * residual.size
         transform = np.fft.rfft(residual, size) * 2.0 / residual.size
-        spectra.append(Spectrum(np.fft.rfftfreq(size, run.interval), transform, run.duration, residual.size))
+        spectra.append(
+            Spectrum(
+                np.asarray(np.fft.rfftfreq(size, run.interval), np.float64),
+                transform,
+                run.duration,
+                residual.size,
+            )
+        )
     return spectra
 
 
@@ -64,7 +72,7 @@ class Line:
     Args:
         parameter: frequency in Hz for the mains, Strouhal number for shedding.
         drop: of χ² by taking it out of the runs concerned.
-        contrast: drop at the line over the mean drop beside it.
+        contrast: drop at the line over the drop beside it (the greatest for the mains, the median for shedding).
         amplitude: rad at the sensor for the mains, moment coefficient for shedding.
         phases: of sine, rad, by run; zero for runs not concerned.
         runs: how many runs it was sought in.
@@ -94,8 +102,10 @@ def mains_line(fit: Fit) -> Line | None:
     grid = np.arange(49.5, 50.5, 0.005)
     total = np.sum([s.power(grid) for s in spectra], axis=0)
     best = float(grid[np.argmax(total)])
-    beside = np.concatenate([np.arange(44.0, 48.5, 0.05), np.arange(51.5, 56.0, 0.05)])
-    floor = float(np.mean(np.sum([s.power(beside) for s in spectra], axis=0)))
+    beside = np.concatenate(
+        [np.arange(best - 4.0, best - 0.6, 0.02), np.arange(best + 0.6, best + 4.0, 0.02)]
+    )
+    floor = float(np.max(np.sum([_smooth(s).power(beside) for s in spectra], axis=0)))
     drop = float(total.max())
     gain = [_block_gain(best, run.interval, run.block) for run in data.runs]
     scale = [np.sqrt(run.noise_variance) / g for run, g in zip(data.runs, gain, strict=True)]
@@ -105,6 +115,15 @@ def mains_line(fit: Fit) -> Line | None:
     # transform is of cos − i sin: a sine a sin(ωt + φ) gives a exp(i(φ − π/2))
     phases = np.array([float(np.angle(s.at(best))) + np.pi / 2 for s in spectra])
     return Line(best, drop, drop / max(floor, 1e-9), amplitude, phases, len(spectra))
+
+
+def _smooth(spectrum: Spectrum) -> Spectrum:
+    """The spectrum with the leakage of a strong line taken down (Hann window, in the frequency domain)."""
+    step = _PADDING
+    values = spectrum.transform
+    hann = 0.5 * values.copy()
+    hann[step:-step] -= 0.25 * (values[: -2 * step] + values[2 * step :])
+    return Spectrum(spectrum.frequency, hann * np.sqrt(8.0 / 3.0), spectrum.duration, spectrum.count)
 
 
 def _block_gain(frequency: float, interval: float, block: int) -> float:

@@ -112,7 +112,7 @@ class Potentiometer:
     @property
     def resolution(self) -> float:
         """Step of the reading, rad."""
-        return 2.0 * radians(self.half_range_deg) / 2**self.bits
+        return 2.0 * radians(self.half_range_deg) / float(2**self.bits)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,124 @@
+"""Coefficients before and after the causes are added, with intervals that remain valid under model error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from decimal import Decimal
+
+import numpy as np
+
+from diagnosis.decide import Weighed
+from diagnosis.held_out import HeldOut
+from diagnosis.least_squares import Fit
+from diagnosis.rank import Hypothesis
+from diagnosis.result import ParameterEstimate
+from tunnel_sim.campaign import Campaign
+
+_UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1"}
+#: Excess of block means beyond which the residuals are no longer white, and runs must speak for the scatter.
+_COLOURED = 0.03
+
+
+def coefficients(
+    fit: Fit, held_out: HeldOut, campaign: Campaign, rivals: Sequence[tuple[Fit, float]] = ()
+) -> dict[str, ParameterEstimate]:
+    """The coefficients of a fit.
+
+    Args:
+        fit: nominal, or with causes added.
+        held_out: the same without groups of runs.
+        campaign: for the digits to which air density is stated.
+        rivals: other fits and their probabilities.
+
+    Returns:
+        ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` in normalised form. The variance is that of the fit
+        scaled by its excess, or of the delete-a-group jackknife where the residuals are coloured and that is
+        larger, plus the rounding of the air density, plus the spread over rivals.
+    """
+    names = ("omega_n", "zeta") if fit.problem.data.normalised else ("cn_beta", "cn_r")
+    result = {}
+    for name in names:
+        value, std = _value(fit, held_out, name)
+        if value is None:
+            continue
+        spread = sum(
+            p * (other - value) ** 2 for f, p in rivals if (other := _value_only(f, name)) is not None
+        )
+        rounding = abs(value) * _density_rounding(campaign) if name.startswith("cn_") else 0.0
+        result[name] = ParameterEstimate(value, math.sqrt(std**2 + rounding**2 + spread), _UNITS[name])
+    return result
+
+
+def rival_fits(
+    weighed: Sequence[Weighed], hypotheses: Sequence[Hypothesis], chosen: Fit
+) -> list[tuple[Fit, float]]:
+    """Fits of the answers that were not chosen, with their probabilities.
+
+    Args:
+        weighed: answers.
+        hypotheses: their fits.
+        chosen: the fit of the answer.
+
+    Returns:
+        Fit and probability of each fitted rival.
+    """
+    found = []
+    for answer in weighed:
+        for hypothesis in hypotheses:
+            if hypothesis.names == answer.effects and hypothesis.fit is not chosen:
+                found.append((hypothesis.fit, answer.probability))
+    return found
+
+
+def _value(fit: Fit, held_out: HeldOut, name: str) -> tuple[float | None, float]:
+    value = _value_only(fit, name)
+    if value is None:
+        return None, 0.0
+    scale = math.sqrt(1.0 + max(fit.excess, 0.0))
+    std = _formal_std(fit, name) * scale
+    if fit.excess > _COLOURED and len(held_out.common) > 1:
+        values = [_derived(held_out.names, row, name) for row in held_out.common]
+        count = len(values)
+        jackknife = math.sqrt((count - 1.0) / count * sum((v - value) ** 2 for v in values if v is not None))
+        std = max(std, jackknife)
+    return value, std
+
+
+def _value_only(fit: Fit, name: str) -> float | None:
+    return _derived(fit.problem.names, fit.point.common, name)
+
+
+def _derived(names: tuple[str, ...], common: np.ndarray, name: str) -> float | None:
+    value = dict(zip(names, common.tolist(), strict=True))
+    if name == "omega_n":
+        return math.sqrt(max(value["stiffness"], 0.0))
+    if name == "zeta":
+        return float(value["mechanical_damping"] / (2.0 * math.sqrt(max(value["stiffness"], 1e-300))))
+    found = value.get(name)
+    return None if found is None else float(found)
+
+
+def _formal_std(fit: Fit, name: str) -> float:
+    """Standard deviation from the fit's covariance, to first order."""
+    if name == "omega_n":
+        return fit.std("stiffness") / (2.0 * math.sqrt(max(fit.value("stiffness"), 1e-300)))
+    if name == "zeta":
+        stiffness, damping = fit.value("stiffness"), fit.value("mechanical_damping")
+        zeta = damping / (2.0 * math.sqrt(max(stiffness, 1e-300)))
+        relative = fit.std("stiffness") / (2.0 * max(stiffness, 1e-300))
+        return math.hypot(
+            fit.std("mechanical_damping") / (2.0 * math.sqrt(max(stiffness, 1e-300))), zeta * relative
+        )
+    return fit.std(name)
+
+
+def _density_rounding(campaign: Campaign) -> float:
+    """Relative standard deviation that the stated digits of the air density leave."""
+    worst = 0.0
+    for run in campaign.runs:
+        if run.wind_on and run.air_density:
+            exponent = Decimal(repr(run.air_density)).as_tuple().exponent
+            digits = -exponent if isinstance(exponent, int) else 4
+            worst = max(worst, 0.5 * 10.0 ** -min(digits, 8) / math.sqrt(3.0) / run.air_density)
+    return worst
