@@ -13,7 +13,7 @@ from typing import Annotated, cast
 
 import typer
 
-from tunnel_lab.commands import demo, identify, plot, simulate, springs
+from tunnel_lab.commands import demo, effects, identify, plot, simulate, springs
 from tunnel_sim.errors import TunnelError
 
 BAD_INPUT = 2
@@ -60,6 +60,7 @@ def tunnel(
       tunnel simulate plan.toml --out c  a campaign of your own, into folder c
       tunnel identify c --json est.json  its coefficients; measured ones alike
       tunnel plot c                      its figures
+      tunnel effects                     what a plan may add to the model
 
     [bold]Units[/bold]
       SI and radians throughout.
@@ -73,7 +74,7 @@ def tunnel(
         typer.echo(context.get_help())
 
 
-for _command in (demo, simulate, identify, plot, springs):
+for _command in (demo, simulate, identify, plot, springs, effects):
     app.command(_command.NAME)(_command.run)
 
 

@@ -18,7 +18,7 @@ import pytest
 
 PACKAGES = ("tunnel_sim", "identification", "tunnel_lab")
 # Typer turns the arguments of a command into its help; test_cli.py reads that.
-COMMANDS = {f"tunnel_lab.commands.{name}.run" for name in ("demo", "simulate", "identify", "plot", "springs")}
+COMMANDS = {f"tunnel_lab.commands.{name}.run" for name in ("demo", "simulate", "identify", "plot", "springs", "effects")}
 EXEMPT = {"tunnel_lab.cli.tunnel", *COMMANDS}
 # The reference simulator is a test oracle with conventions of its own, not an interface.
 ORACLES = ("tunnel_sim.reference.",)

@@ -30,11 +30,20 @@ def run(
     seed: Annotated[
         int | None, typer.Option("--seed", min=0, help="Seed of the noise, in place of the plan's.")
     ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--effect",
+            metavar="NAME:PARAMETER=VALUE",
+            help="Add an effect beyond the nominal model, as often as wanted; further parameters after commas. "
+            "tunnel effects lists them.",
+        ),
+    ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the campaign that is in the folder already.")
     ] = False,
 ) -> None:
-    """Simulate a campaign: springs × wind speeds × release angles × repeats.
+    r"""Simulate a campaign: springs × wind speeds × release angles × repeats.
 
     The folder then holds campaign.toml, a file for each run (time in s, yaw
     angle in rad) and truth.json with what was injected. The same plan and seed
@@ -54,18 +63,24 @@ def run(
     [bold]Examples[/bold]
       tunnel simulate plan.toml --out my-campaign
       tunnel simulate plan.toml --out again --format csv --seed 7
+      tunnel simulate plan.toml --out dry \
+        --effect coulomb_friction:friction_moment=0.004
 
     [bold]Exit status[/bold]
       0 written, 2 bad input; nothing is written then.
     """
+    from tunnel_lab.effect_option import parse_effect
     from tunnel_lab.tables import say
     from tunnel_sim.campaign_io import write_campaign
     from tunnel_sim.plan import load_plan
-    from tunnel_sim.virtual_campaign import truth_document
+    from tunnel_sim.virtual_campaign import plan_effects, truth_document
 
+    added = tuple(parse_effect(text) for text in effect or ())
     loaded = load_plan(plan)
     if seed is not None:
         loaded = replace(loaded, seed=seed)
+    loaded = replace(loaded, effects=loaded.effects + added)
+    plan_effects(loaded)  # refuses what cannot be injected before anything is simulated
     refuse_occupied(out, overwrite=overwrite)
     campaign = simulate_with_progress(loaded)
     folder = write_campaign(

@@ -39,7 +39,7 @@ class SpringMiscalibration(Effect):
         upper=9.0,
     )
     spring_stiffness: float = parameter(
-        "Kr", "N m/rad", "stated stiffness of the spring in question", scale=1.0, lower=0.0, upper=1000000.0
+        "Kr", "N m/rad", "stated stiffness of the spring in question", scale=16.12, lower=0.0, upper=1000000.0
     )
 
     def concerns(self, spring_stiffness: float) -> bool:

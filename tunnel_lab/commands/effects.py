@@ -1,0 +1,59 @@
+"""``tunnel effects``: the vocabulary of effects beyond the nominal model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+NAME = "effects"
+
+
+def run(
+    name: Annotated[
+        str | None,
+        typer.Argument(help="An effect to show whole. Default: a list of all.", show_default=False),
+    ] = None,
+    json: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write them as JSON.")] = None,
+    markdown: Annotated[
+        Path | None, typer.Option("--markdown", metavar="FILE", help="Write them as a reference page.")
+    ] = None,
+) -> None:
+    """What the nominal model leaves out: every effect by name.
+
+    These names are what tunnel simulate injects. Each has a channel (stiffness,
+    damping, forcing, sensor or calibration), a condition (always or wind_on), an
+    equation, and parameters with units, of which the first is the severity.
+
+    [bold]Examples[/bold]
+      tunnel effects
+      tunnel effects coulomb_friction
+      tunnel effects --json effects.json
+
+    [bold]Exit status[/bold]
+      0 shown, 2 bad input.
+    """
+    from tunnel_lab import effect_listing, files, tables
+    from tunnel_sim.effects import ALL_EFFECTS, effect_class
+
+    kinds = ALL_EFFECTS if name is None else (effect_class(name),)
+    written = []
+    if json is not None:
+        written.append(files.write_json(json, effect_listing.document(kinds)))
+    if markdown is not None:
+        written.append(files.write_whole(markdown, effect_listing.markdown(kinds).encode()))
+    for path in written:
+        tables.say(f"Written: {path}")
+    if written:
+        return
+    if name is None:
+        tables.show_tables(effect_listing.listing(kinds))
+        tables.say(effect_listing.ABOUT_DIRECTIONS)
+        tables.say("All about one: tunnel effects NAME")
+        return
+    for line in effect_listing.lines(kinds[0]):
+        tables.say(line)
+    tables.show_tables(effect_listing.parameter_table(kinds[0]))
+    tables.say(effect_listing.ABOUT_DIRECTIONS)
+    tables.say(f"To inject it: tunnel simulate plan.toml --out FOLDER {effect_listing.example(kinds[0])}")
