@@ -1,0 +1,114 @@
+"""Backbone curves: frequency and damping of every run against its amplitude, with bands.
+
+A linear rig shows level lines; how they bend is the mark of an effect of stiffness or of damping.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.data import RunData
+from diagnosis.least_squares import Fit
+from diagnosis.spectra import linear_coefficients
+from identification.damped_oscillation import Decay
+from identification.decay_fit import Reading, fit_run
+from identification.estimate import NoiseLevel
+from identification.windows import fit_windows
+from tunnel_sim.record import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Backbone:
+    """One run's frequency and damping by windows of three cycles.
+
+    Args:
+        id: of the run.
+        time: mid-window, shape (n,), s.
+        amplitude: at mid-window, shape (n,), rad.
+        frequency: undamped natural frequency, shape (n,), Hz.
+        frequency_std: of each, shape (n,), Hz, widened where a window's residual is not white.
+        zeta: damping ratio, shape (n,).
+        zeta_std: likewise, shape (n,).
+        nominal_frequency: of the nominal model, Hz.
+        nominal_zeta: of the nominal model, dimensionless.
+        alone_frequency: of a linear fit to this run alone, Hz; None where that fails.
+        alone_zeta: likewise, dimensionless.
+        alone_excess: mean squared scaled residual of that fit minus one, a ratio.
+    """
+
+    id: str
+    time: Array
+    amplitude: Array
+    frequency: Array
+    frequency_std: Array
+    zeta: Array
+    zeta_std: Array
+    nominal_frequency: float
+    nominal_zeta: float
+    alone_frequency: float | None
+    alone_zeta: float | None
+    alone_excess: float | None
+
+
+def backbones(fit: Fit) -> list[Backbone]:
+    """The backbone of every run.
+
+    Args:
+        fit: of the nominal model; gives zero, noise and starting values.
+
+    Returns:
+        One per run, in order; without windows where a run decays too soon for any.
+    """
+    return [_backbone(fit, i, run) for i, run in enumerate(fit.problem.data.runs)]
+
+
+def _backbone(fit: Fit, index: int, run: RunData) -> Backbone:
+    inertia, damping, stiffness = linear_coefficients(fit, index)
+    decay = Decay(0.5 * damping / inertia, max(stiffness, 1e-12) / inertia)
+    std = float(np.sqrt(run.noise_variance))
+    reading = Reading(run.interval * np.arange(run.reading.size, dtype=np.float64), run.reading)
+    departs = float(np.mean(fit.residuals[index] ** 2)) > 1.5
+    noise = NoiseLevel(std, "residual", std, 1.0, departs, disagrees=False)
+    windows = fit_windows(reading, decay, fit.value("zero"), noise)
+    alone = fit_run(reading, decay)
+    settled = alone.runs[0] if alone.runs and alone.runs[0].decay.omega_n > 0.0 else None
+    return Backbone(
+        run.id,
+        np.array([w.start_s + 0.5 * w.duration_s for w in windows]),
+        np.array([w.amplitude.value for w in windows]),
+        np.array([w.omega_n.value for w in windows]) / (2.0 * np.pi),
+        np.array([w.omega_n.std for w in windows]) / (2.0 * np.pi),
+        np.array([w.zeta.value for w in windows]),
+        np.array([w.zeta.std for w in windows]),
+        decay.omega_n / (2.0 * np.pi),
+        decay.zeta,
+        None if settled is None else settled.decay.omega_n / (2.0 * np.pi),
+        None if settled is None else settled.decay.zeta,
+        None if settled is None else float(np.mean((settled.residual / std) ** 2)) - 1.0,
+    )
+
+
+def drift(curves: list[Backbone]) -> tuple[float, float]:
+    """How far the curves are from level.
+
+    Args:
+        curves: by run.
+
+    Returns:
+        χ² beyond that of level lines, of frequency and of damping: an effect of stiffness bends the first, one
+        of damping the second. Window for window the two are known equally well in ω, so they compare.
+    """
+    return (
+        sum(_departure(c.frequency, c.frequency_std) for c in curves),
+        sum(_departure(c.zeta, c.zeta_std) for c in curves),
+    )
+
+
+def _departure(values: Array, std: Array) -> float:
+    if values.size < 2:
+        return 0.0
+    weight = 1.0 / np.maximum(std, 1e-300) ** 2
+    mean = float(weight @ values / weight.sum())
+    return float(weight @ (values - mean) ** 2) - (values.size - 1)

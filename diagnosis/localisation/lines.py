@@ -1,0 +1,84 @@
+"""Narrow lines in single runs' residuals, away from the motion and its harmonics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.localisation.excess import FALSE_ALARM_RATE, RunExcess, chance
+from tunnel_sim.record import Array
+
+_WIDTH = 5  # coefficients a line spreads over
+_AROUND = 60  # coefficients on either side that show what a line stands out from
+_CONTRAST = 8.0  # a line is this many times the median around it; a resonance's skirt is not
+_HARMONIC = 0.2  # of the run's frequency: nearer to a harmonic it is the motion's own
+_OWN = 0.4  # likewise of the motion itself, whose frequency may drift
+_LOWEST = 0.5  # of the run's frequency: below, drifts look like lines
+_PER_RUN = 2
+
+
+@dataclass(frozen=True)
+class ResidualLine:
+    """A line in one run.
+
+    Args:
+        run: id.
+        frequency: Hz.
+        share: of the run's excess squared residual, a fraction.
+        amplitude: of the reading, rad.
+    """
+
+    run: str
+    frequency: float
+    share: float
+    amplitude: float
+
+
+def residual_lines(runs: list[RunExcess], noise_std: list[float]) -> tuple[ResidualLine, ...]:
+    """The lines that stand out of the residual of single runs.
+
+    Args:
+        runs: squared residuals by frequency.
+        noise_std: of one residual, rad, by run.
+
+    Returns:
+        At most two per run, strongest first in each, in the order of the runs.
+    """
+    return tuple(
+        line for run, std in zip(runs, noise_std, strict=True) for line in _lines(run, std, len(runs))
+    )
+
+
+def _lines(run: RunExcess, noise_std: float, runs: int) -> list[ResidualLine]:
+    local = np.convolve(run.power, np.ones(_WIDTH), mode="same")
+    order = run.frequency / run.resonance
+    harmonic = (np.abs(order - np.round(order)) < _HARMONIC) & (order < 3.5)
+    harmonic |= np.abs(order - 1.0) < _OWN
+    open_to = (order > _LOWEST) & ~harmonic
+    found: list[ResidualLine] = []
+    for index in np.argsort(np.where(open_to, local, 0.0))[::-1][: 20 * _PER_RUN].tolist():
+        excess = float(local[index]) - _WIDTH
+        unlikely = runs * run.power.size * chance(float(local[index]), _WIDTH, run.relative)
+        if unlikely > FALSE_ALARM_RATE or len(found) == _PER_RUN:
+            break
+        near = any(abs(line.frequency - run.frequency[index]) < 0.1 * run.resonance for line in found)
+        if not open_to[index] or near or local[index] < _CONTRAST * _around(local, index):
+            continue
+        whole = max(float(run.power.sum()) - run.power.size, excess)
+        amplitude = noise_std * float(np.sqrt(2.0 * excess / run.power.size))
+        frequency = float(np.average(run.frequency[_near(index, run)], weights=run.power[_near(index, run)]))
+        found.append(ResidualLine(run.id, frequency, excess / whole, amplitude))
+    return found
+
+
+def _near(index: int, run: RunExcess) -> slice:
+    return slice(max(index - _WIDTH // 2, 0), min(index + _WIDTH // 2 + 1, run.power.size))
+
+
+def _around(local: Array, index: int) -> float:
+    """Median of the smoothed power on either side."""
+    beside = np.concatenate(
+        [local[max(index - _AROUND, 0) : max(index - _WIDTH, 0)], local[index + _WIDTH : index + _AROUND]]
+    )
+    return float(np.median(beside)) if beside.size else 0.0

@@ -1,0 +1,262 @@
+"""Drawing up the maps of a campaign's residuals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.data import RunData
+from diagnosis.least_squares import Fit
+from diagnosis.localisation.backbone import backbones
+from diagnosis.localisation.excess import (
+    Profile,
+    RunExcess,
+    band_excesses,
+    profile,
+    run_excesses,
+    telling_bands,
+    within_bands,
+)
+from diagnosis.localisation.lines import residual_lines
+from diagnosis.localisation.maps import GroupExcess, Maps, RunMap, Trace
+from diagnosis.localisation.phase_plane import apparent_moment, motion, phase_plane
+from tunnel_sim.campaign import Campaign
+from tunnel_sim.record import Array
+
+_TIME_BINS = 60
+_AMPLITUDE_BINS = 40
+_FREQUENCY_BINS = 110  # of equal ratio, for the picture
+_FINE_BINS = 1500  # of equal width, for the interval
+_TRACES = 2
+_TRACE_POINTS = 600
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """Maps, and what the words about them need besides.
+
+    Args:
+        maps: the maps.
+        excesses: by run.
+        frequency_interval: shortest interval of frequency that holds most of the excess, Hz.
+        moment_energy: of the apparent moment beyond that of noise by bin of time, shape (n,), in variances.
+        moment_z: its sum over the standard deviation white noise gives it, a ratio.
+    """
+
+    maps: Maps
+    excesses: list[RunExcess]
+    frequency_interval: tuple[float, float] | None
+    moment_energy: Array
+    moment_z: float
+
+
+def survey(
+    campaign: Campaign, nominal: Fit, scaled: Fit, best: Fit | None, chosen: tuple[str, ...]
+) -> Survey:
+    """Draw up all maps.
+
+    Args:
+        campaign: the records.
+        nominal: fit of the nominal model.
+        scaled: the same with residuals in units of the noise that counts.
+        best: fit with the causes added, if any.
+        chosen: ids of the runs the phase plane is taken over; all where empty.
+
+    Returns:
+        The survey.
+    """
+    excesses = run_excesses(campaign, scaled)
+    bands = band_excesses(excesses)
+    inside = [
+        within_bands(r, run, telling_bands(bands)) for r, run in zip(scaled.residuals, excesses, strict=True)
+    ]
+    time = _time_profile(scaled, inside)
+    energy, z = _moment_energy(nominal, time.edges)
+    after = None if best is None else _spectrum(run_excesses(campaign, best), _log_edges(excesses)).mean
+    resonances = [run.resonance for run in excesses]
+    noise = [float(np.sqrt(run.noise_variance)) for run in nominal.problem.data.runs]
+    maps = Maps(
+        runs=_run_maps(scaled, excesses),
+        groups=_groups(scaled, excesses),
+        time=time,
+        time_by_run=_time_by_run(scaled, time.edges),
+        moment_time=np.maximum(energy, 0.0) / max(float(np.maximum(energy, 0.0).sum()), 1e-300),
+        amplitude=_amplitude_profile(scaled, inside),
+        frequency=_spectrum(excesses, _log_edges(excesses)),
+        frequency_after=after,
+        resonance=(min(resonances), max(resonances)),
+        bands=bands,
+        lines=residual_lines(excesses, noise),
+        backbones=tuple(backbones(nominal)),
+        phase_plane=phase_plane(nominal, chosen),
+        traces=_traces(nominal, best, excesses),
+    )
+    return Survey(maps, excesses, _frequency_interval(excesses), energy, z)
+
+
+def _shares(excesses: list[RunExcess]) -> list[float]:
+    energy = [max(float(run.power.sum()) - run.power.size, 0.0) for run in excesses]
+    whole = max(sum(energy), 1e-300)
+    return [value / whole for value in energy]
+
+
+def amplitudes(fit: Fit, index: int) -> Array:
+    """Amplitude of the fitted motion of one run at every residual, shape (n,), rad."""
+    angle, rate = motion(fit, index)
+    return np.hypot(angle, rate)
+
+
+def _run_maps(fit: Fit, excesses: list[RunExcess]) -> tuple[RunMap, ...]:
+    return tuple(
+        RunMap(
+            id=run.id,
+            spring_stiffness=run.spring_stiffness,
+            wind_speed=run.wind_speed,
+            amplitude=float(amplitudes(fit, i)[0]),
+            frequency=excess.resonance,
+            excess=excess.excess / run.block,
+            std=excess.std / run.block,
+            p_value=excess.p_value(),
+            share=share,
+        )
+        for i, (run, excess, share) in enumerate(
+            zip(fit.problem.data.runs, excesses, _shares(excesses), strict=True)
+        )
+    )
+
+
+def _groups(fit: Fit, excesses: list[RunExcess]) -> tuple[GroupExcess, ...]:
+    """Mean excess of the runs that share a condition; conditions that do not vary are left out."""
+    runs = fit.problem.data.runs
+    levels = [(e.excess / run.block, e.std / run.block) for e, run in zip(excesses, runs, strict=True)]
+    start = [float(amplitudes(fit, i)[0]) for i in range(len(runs))]
+    keys = {
+        "wind": ["on" if run.wind_on else "off" for run in runs],
+        "spring": [
+            "" if run.spring_stiffness is None else f"{run.spring_stiffness:g} N m/rad" for run in runs
+        ],
+        "speed": [f"{run.wind_speed:g} m/s" for run in runs],
+        "amplitude": [f"{0.05 * round(value / 0.05):.2f} rad" for value in start],
+    }
+    result = []
+    for by, labels in keys.items():
+        distinct = sorted(set(labels), key=_leading_number)
+        if len(distinct) < 2:
+            continue
+        for label in distinct:
+            group = [pair for pair, own in zip(levels, labels, strict=True) if own == label]
+            mean = float(np.mean([e for e, _ in group]))
+            std = float(np.sqrt(np.sum([s**2 for _, s in group]))) / len(group)
+            result.append(GroupExcess(by, label, len(group), mean, std))
+    return tuple(result)
+
+
+def _leading_number(label: str) -> tuple[float, str]:
+    head = label.split(" ")[0]
+    return (float(head) if head.replace(".", "", 1).isdigit() else 0.0, label)
+
+
+def _times(fit: Fit) -> list[Array]:
+    return [_mid_times(run) for run in fit.problem.data.runs]
+
+
+def _mid_times(run: RunData) -> Array:
+    result: Array = (np.arange(run.reading.size, dtype=np.float64) + 0.5) * run.interval
+    return result
+
+
+def _time_profile(fit: Fit, inside: list[tuple[Array, float]]) -> Profile:
+    longest = max(run.duration for run in fit.problem.data.runs)
+    edges = np.linspace(0.0, longest, _TIME_BINS + 1)
+    return profile(edges, _times(fit), *_by_sample(fit, inside))
+
+
+def _by_sample(fit: Fit, inside: list[tuple[Array, float]]) -> tuple[list[Array], list[float], list[float]]:
+    """Squared residuals, their mean and variance under noise, as shares of the variance of one sample.
+
+    What a model lacks is the same in a block mean as in its samples, and the noise is less by the block's size.
+    """
+    blocks = [run.block for run in fit.problem.data.runs]
+    return (
+        [r**2 / block for (r, _), block in zip(inside, blocks, strict=True)],
+        [share / block for (_, share), block in zip(inside, blocks, strict=True)],
+        # squares of filtered noise go together: as many count as independent as coefficients pass
+        [2.0 * share / block**2 for (_, share), block in zip(inside, blocks, strict=True)],
+    )
+
+
+def _amplitude_profile(fit: Fit, inside: list[tuple[Array, float]]) -> Profile:
+    place = [amplitudes(fit, i) for i in range(len(inside))]
+    edges = np.linspace(0.0, 1.0001 * max(float(p.max()) for p in place), _AMPLITUDE_BINS + 1)
+    return profile(edges, place, *_by_sample(fit, inside))
+
+
+def _time_by_run(fit: Fit, edges: Array) -> Array:
+    rows = []
+    for run, time, residual in zip(fit.problem.data.runs, _times(fit), fit.residuals, strict=True):
+        rows.append(
+            profile(edges, [time], [residual**2 / run.block], [1.0 / run.block], [2.0 / run.block**2]).mean
+        )
+    return np.stack(rows)
+
+
+def _moment_energy(fit: Fit, edges: Array) -> tuple[Array, float]:
+    """Energy of the apparent moment by time, in variances of its noise, and how far its sum is beyond chance."""
+    energy, variance = np.zeros(edges.size - 1), 0.0
+    for index, run in enumerate(fit.problem.data.runs):
+        found = apparent_moment(fit, index)
+        if found is None:
+            continue
+        spread = float(found.kernel @ found.kernel) * found.noise_std**2
+        time = (found.start + np.arange(found.moment.size) + 0.5) * run.interval
+        energy += np.histogram(time, edges, weights=found.moment**2 / spread - 1.0)[0]
+        variance += 2.0 * found.moment.size * found.kernel.size  # neighbours within the kernel go together
+    return energy, float(energy.sum()) / float(np.sqrt(max(variance, 1.0)))
+
+
+def _log_edges(excesses: list[RunExcess]) -> Array:
+    low = min(float(run.frequency[1]) for run in excesses)
+    high = max(float(run.frequency[-1]) for run in excesses)
+    edges = np.geomspace(low, high * 1.0001, _FREQUENCY_BINS + 1)
+    edges[0] = 0.0
+    return edges
+
+
+def _spectrum(excesses: list[RunExcess], edges: Array) -> Profile:
+    ones = [1.0] * len(excesses)
+    places, powers = [run.frequency for run in excesses], [run.power for run in excesses]
+    return profile(edges, places, powers, ones, [2.0] * len(excesses))
+
+
+def _frequency_interval(excesses: list[RunExcess]) -> tuple[float, float] | None:
+    """Shortest interval in Hz that holds most of the excess, of the bands where there is any."""
+    names = telling_bands(band_excesses(excesses))
+    index = [i for i, name in enumerate(("0", "f0", "2f0", "3f0", "above")) if name in names]
+    kept = [np.where(np.isin(run.band, index), run.power, 1.0) for run in excesses]
+    high = max(float(run.frequency[-1]) for run in excesses)
+    # no bin is narrower than the shortest record resolves
+    resolved = max(float(run.frequency[1]) for run in excesses)
+    edges = np.linspace(0.0, high * 1.0001, max(2, min(_FINE_BINS, int(high / resolved))) + 1)
+    places, ones = [run.frequency for run in excesses], [1.0] * len(kept)
+    return profile(edges, places, kept, ones, [2.0] * len(kept)).interval()
+
+
+def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[Trace, ...]:
+    order = sorted(range(len(excesses)), key=lambda i: -excesses[i].excess)[:_TRACES]
+    return tuple(_trace(nominal, best, i) for i in order)
+
+
+def _trace(nominal: Fit, best: Fit | None, index: int) -> Trace:
+    run = nominal.problem.data.runs[index]
+    group = max(1, -(-run.reading.size // _TRACE_POINTS))
+    count = run.reading.size // group
+    std = float(np.sqrt(run.noise_variance))
+
+    def means(values: Array) -> Array:
+        grouped: Array = values[: count * group].reshape(count, group).mean(axis=1)
+        return grouped
+
+    time = means(_mid_times(run))
+    after = None if best is None else means(best.residuals[index] * std)
+    return Trace(run.id, time, means(nominal.residuals[index] * std), after, std / float(np.sqrt(group)))

@@ -1,0 +1,223 @@
+"""What the pictures of a diagnosis show: plain arrays, small enough to travel inside its JSON."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from diagnosis.localisation.backbone import Backbone
+from diagnosis.localisation.excess import BandExcess, Profile
+from diagnosis.localisation.lines import ResidualLine
+from diagnosis.localisation.phase_plane import PhasePlane
+from tunnel_sim.record import Array
+
+_DIGITS = 5  # significant: more than any picture shows
+
+
+@dataclass(frozen=True)
+class RunMap:
+    """One run in the map of runs.
+
+    Args:
+        id: of the run.
+        spring_stiffness: stated, N m/rad; None in normalised form.
+        wind_speed: stated, m/s.
+        amplitude: at the start of the record, rad.
+        frequency: of the free motion in the nominal model, Hz.
+        excess: mean squared residual over the noise variance, minus one, a ratio.
+        std: of it where there is no gap, a ratio.
+        p_value: chance of as much without a gap, a probability.
+        share: of the campaign's excess, a fraction.
+    """
+
+    id: str
+    spring_stiffness: float | None
+    wind_speed: float
+    amplitude: float
+    frequency: float
+    excess: float
+    std: float
+    p_value: float
+    share: float
+
+
+@dataclass(frozen=True)
+class GroupExcess:
+    """Runs that share a condition.
+
+    Args:
+        by: ``wind``, ``spring``, ``speed`` or ``amplitude``.
+        label: in words, with unit.
+        runs: how many.
+        excess: mean over the runs, a ratio.
+        std: of it where there is no gap, a ratio.
+    """
+
+    by: str
+    label: str
+    runs: int
+    excess: float
+    std: float
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """The residual of one run against time.
+
+    Args:
+        id: of the run.
+        time: s, shape (n,).
+        before: of the nominal model, shape (n,), rad.
+        after: with the causes added, shape (n,), rad; None where nothing was added.
+        noise_std: of one value, rad.
+    """
+
+    id: str
+    time: Array
+    before: Array
+    after: Array | None
+    noise_std: float
+
+
+@dataclass(frozen=True, eq=False)
+class Maps:
+    """All maps of a campaign.
+
+    Args:
+        runs: by run.
+        groups: by condition.
+        time: excess over time since the start of the record, s.
+        time_by_run: mean excess by run (rows) and bin of time (columns); NaN after a run's end.
+        moment_time: energy of the apparent moment over time, by bin of ``time``, as shares of the whole.
+        amplitude: excess over the amplitude of the motion, rad.
+        frequency: excess over frequency, Hz.
+        frequency_after: mean by bin with the causes added, shape of ``frequency.mean``; None where not added.
+        resonance: least and greatest frequency of the runs' free motion, Hz.
+        bands: the residual by multiples of the runs' own frequency.
+        lines: narrow lines.
+        backbones: by run.
+        phase_plane: missing moment by angle and rate; None where there is none.
+        traces: residuals of the runs with the largest excess.
+    """
+
+    runs: tuple[RunMap, ...]
+    groups: tuple[GroupExcess, ...]
+    time: Profile
+    time_by_run: Array
+    moment_time: Array
+    amplitude: Profile
+    frequency: Profile
+    frequency_after: Array | None
+    resonance: tuple[float, float]
+    bands: tuple[BandExcess, ...]
+    lines: tuple[ResidualLine, ...]
+    backbones: tuple[Backbone, ...]
+    phase_plane: PhasePlane | None
+    traces: tuple[Trace, ...]
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name with their units, in JSON's types; null where a bin is empty."""
+        after = self.frequency_after
+        return {
+            "runs": [_run(run) for run in self.runs],
+            "groups": [vars(group) for group in self.groups],
+            "time": {
+                "edges_s": numbers(self.time.edges),
+                "excess": numbers(self.time.mean),
+                "std": numbers(self.time.std),
+                "by_run": [numbers(row) for row in self.time_by_run],
+                "moment_share": numbers(self.moment_time),
+            },
+            "amplitude": _profile(self.amplitude, "edges_rad"),
+            "frequency": {
+                **_profile(self.frequency, "edges_hz"),
+                "after": None if after is None else numbers(after),
+                "resonance_hz": list(self.resonance),
+            },
+            "bands": [vars(band) for band in self.bands],
+            "lines": [
+                {
+                    "run": line.run,
+                    "frequency_hz": line.frequency,
+                    "share": line.share,
+                    "amplitude_rad": line.amplitude,
+                }
+                for line in self.lines
+            ],
+            "backbones": [_backbone(curve) for curve in self.backbones],
+            "phase_plane": None if self.phase_plane is None else _plane(self.phase_plane),
+            "traces": [_trace(trace) for trace in self.traces],
+        }
+
+
+def numbers(values: Array) -> list[float | None]:
+    """An array as JSON's numbers.
+
+    Args:
+        values: of any shape, flattened, shape (n,).
+
+    Returns:
+        Five significant digits each; None for what is not finite.
+    """
+    return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in np.ravel(values).tolist()]
+
+
+def _profile(values: Profile, edges: str) -> dict[str, Any]:
+    return {edges: numbers(values.edges), "excess": numbers(values.mean), "std": numbers(values.std)}
+
+
+def _run(run: RunMap) -> dict[str, Any]:
+    return {
+        "id": run.id,
+        "spring_stiffness": run.spring_stiffness,
+        "wind_speed": run.wind_speed,
+        "amplitude_rad": run.amplitude,
+        "frequency_hz": run.frequency,
+        "excess": run.excess,
+        "std": run.std,
+        "p_value": run.p_value,
+        "share": run.share,
+    }
+
+
+def _backbone(curve: Backbone) -> dict[str, Any]:
+    return {
+        "id": curve.id,
+        "time_s": numbers(curve.time),
+        "amplitude_rad": numbers(curve.amplitude),
+        "frequency_hz": [float(f"{v:.8g}") for v in curve.frequency],
+        "frequency_std": numbers(curve.frequency_std),
+        "zeta": [float(f"{v:.8g}") for v in curve.zeta],
+        "zeta_std": numbers(curve.zeta_std),
+        "nominal_frequency_hz": curve.nominal_frequency,
+        "nominal_zeta": curve.nominal_zeta,
+        "alone_frequency_hz": curve.alone_frequency,
+        "alone_zeta": curve.alone_zeta,
+        "alone_excess": curve.alone_excess,
+    }
+
+
+def _plane(plane: PhasePlane) -> dict[str, Any]:
+    return {
+        "edges_rad": numbers(plane.edges),
+        "moment": [numbers(row) for row in plane.moment],
+        "std": [numbers(row) for row in plane.std],
+        "by_angle": numbers(plane.by_angle),
+        "by_angle_std": numbers(plane.by_angle_std),
+        "by_rate": numbers(plane.by_rate),
+        "by_rate_std": numbers(plane.by_rate_std),
+        "unit": plane.unit,
+        "runs": list(plane.runs),
+    }
+
+
+def _trace(trace: Trace) -> dict[str, Any]:
+    return {
+        "id": trace.id,
+        "time_s": numbers(trace.time),
+        "before_rad": numbers(trace.before),
+        "after_rad": None if trace.after is None else numbers(trace.after),
+        "noise_std_rad": trace.noise_std,
+    }

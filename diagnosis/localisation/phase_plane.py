@@ -1,0 +1,190 @@
+"""The moment the nominal model lacks, as it appears from the residuals, over angle and rate.
+
+A small moment m added to the model changes the angle by ρ with I ρ̈ + C ρ̇ + K ρ = m: the residual put through the
+fitted run's own equation gives the missing moment back, smoothed over part of a cycle. This is the restoring-force
+surface of Masri & Caughey, J. Appl. Mech. 46 (1979) 433, doi 10.1115/1.3424568, of residuals in place of readings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import savgol_coeffs
+
+from diagnosis.data import RunData
+from diagnosis.least_squares import Fit
+from diagnosis.spectra import linear_coefficients, resonance
+from tunnel_sim.record import Array
+
+_WINDOW = (
+    0.4  # of a cycle: passes the third harmonic at half height and keeps the noise of two derivatives down
+)
+_BINS = 15  # along each axis of the map
+_LEAST = 8  # residuals in a bin worth showing
+
+
+@dataclass(frozen=True, eq=False)
+class Apparent:
+    """The missing moment along one run.
+
+    Args:
+        angle: of the motion, shape (n,), rad.
+        rate: of the motion over its angular frequency, shape (n,), rad.
+        moment: smoothed, shape (n,), N m; rad/s² in normalised form.
+        start: index of the first residual these belong to.
+        kernel: weights on residuals in rad that gave the moment, shape (m,).
+        noise_std: of one residual, rad.
+    """
+
+    angle: Array
+    rate: Array
+    moment: Array
+    start: int
+    kernel: Array
+    noise_std: float
+
+    def summed(self, inside: np.ndarray) -> tuple[float, float]:
+        """The moment summed over some instants, and what white noise makes of that sum.
+
+        Args:
+            inside: which instants, shape (n,), true or false.
+
+        Returns:
+            Sum of the moment over the instants and the variance of that sum.
+        """
+        weight = np.convolve(inside.astype(np.float64), self.kernel)
+        return float(self.moment[inside].sum()), float(weight @ weight) * self.noise_std**2
+
+
+def motion(fit: Fit, index: int) -> tuple[Array, Array]:
+    """Angle and rate of the fitted motion of one run.
+
+    Args:
+        fit: any.
+        index: of the run.
+
+    Returns:
+        Angle from the zero, rad, and rate over the angular frequency, rad, each of shape (n,).
+    """
+    run: RunData = fit.problem.data.runs[index]
+    angle = run.reading - fit.residuals[index] * np.sqrt(run.noise_variance) - fit.value("zero")
+    omega = 2.0 * np.pi * resonance(fit, index)
+    return angle, np.gradient(angle, run.interval) / omega
+
+
+def apparent_moment(fit: Fit, index: int) -> Apparent | None:
+    """The moment one run lacks.
+
+    Args:
+        fit: of the nominal model.
+        index: of the run.
+
+    Returns:
+        The moment; None where the run is sampled too slowly or too short.
+    """
+    run = fit.problem.data.runs[index]
+    inertia, damping, stiffness = linear_coefficients(fit, index)
+    frequency = resonance(fit, index)
+    width = 2 * round(0.5 * _WINDOW / (frequency * run.interval)) + 1
+    if width < 5 or width > run.reading.size // 4:
+        return None
+    kernel = _kernel(width, run.interval, frequency, (stiffness, damping, inertia))
+    scale = float(np.sqrt(run.noise_variance))
+    angle, rate = motion(fit, index)
+    half = width // 2
+    inner = slice(half, run.reading.size - half)
+    moment = np.convolve(fit.residuals[index] * scale, kernel, mode="valid")
+    return Apparent(angle[inner], rate[inner], moment, half, kernel, scale)
+
+
+def _kernel(width: int, interval: float, frequency: float, coefficients: tuple[float, float, float]) -> Array:
+    """Weights of K ρ + C ρ̇ + I ρ̈, smoothed, and exact at the run's own frequency."""
+    omega = 2.0 * np.pi * frequency
+    phase = np.exp(-1j * omega * interval * (np.arange(width) - width // 2))
+    result = np.zeros(width)
+    for order, coefficient in enumerate(coefficients):
+        weights = savgol_coeffs(width, 3, deriv=order, delta=interval)
+        gain = complex(weights @ phase) / (1j * omega) ** order
+        # derivatives of the local cubic fall short by a few per cent, as much as the moment sought
+        result += coefficient * weights / gain.real
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class PhasePlane:
+    """Mean missing moment by angle and rate.
+
+    Args:
+        edges: of the bins of both axes, shape (n + 1,), rad.
+        moment: mean by rate (rows) and angle (columns), shape (n, n); NaN where too few residuals fall.
+        std: of each mean under white noise, shape (n, n).
+        by_angle: mean over all rates, shape (n,).
+        by_angle_std: likewise, shape (n,).
+        by_rate: mean over all angles, shape (n,).
+        by_rate_std: likewise, shape (n,).
+        unit: of the moment: ``N m``, or ``rad/s2`` in normalised form.
+        runs: ids of the runs it is taken over.
+    """
+
+    edges: Array
+    moment: Array
+    std: Array
+    by_angle: Array
+    by_angle_std: Array
+    by_rate: Array
+    by_rate_std: Array
+    unit: str
+    runs: tuple[str, ...]
+
+
+def phase_plane(fit: Fit, run_ids: tuple[str, ...]) -> PhasePlane | None:
+    """The map of the missing moment.
+
+    Args:
+        fit: of the nominal model.
+        run_ids: runs to take it over; all where empty.
+
+    Returns:
+        The map; None where no run gives a moment.
+    """
+    data = fit.problem.data
+    chosen = [i for i, run in enumerate(data.runs) if not run_ids or run.id in run_ids]
+    found = [(data.runs[i].id, a) for i in chosen if (a := apparent_moment(fit, i)) is not None]
+    if not found:
+        return None
+    runs = [a for _, a in found]
+    reach = max(float(np.max(np.hypot(a.angle, a.rate))) for a in runs)
+    edges = np.linspace(-reach, reach, _BINS + 1)
+    columns = [np.clip(np.digitize(a.angle, edges) - 1, 0, _BINS - 1) for a in runs]
+    rows = [np.clip(np.digitize(a.rate, edges) - 1, 0, _BINS - 1) for a in runs]
+    cells = [r * _BINS + c for r, c in zip(rows, columns, strict=True)]
+    plane, plane_std = _binned(runs, cells, _BINS * _BINS)
+    by_angle, by_angle_std = _binned(runs, columns, _BINS)
+    by_rate, by_rate_std = _binned(runs, rows, _BINS)
+    return PhasePlane(
+        edges,
+        plane.reshape(_BINS, _BINS),
+        plane_std.reshape(_BINS, _BINS),
+        by_angle,
+        by_angle_std,
+        by_rate,
+        by_rate_std,
+        "rad/s2" if data.normalised else "N m",
+        tuple(name for name, _ in found),
+    )
+
+
+def _binned(runs: list[Apparent], cells: list[np.ndarray], count: int) -> tuple[Array, Array]:
+    """Mean and standard deviation by cell, over all runs."""
+    total, variance, number = np.zeros(count), np.zeros(count), np.zeros(count)
+    for run, cell in zip(runs, cells, strict=True):
+        for index in np.unique(cell):
+            inside = cell == index
+            summed, spread = run.summed(inside)
+            total[index] += summed
+            variance[index] += spread
+            number[index] += int(inside.sum())
+    shown = number >= _LEAST
+    number = np.maximum(number, 1.0)
+    return np.where(shown, total / number, np.nan), np.where(shown, np.sqrt(variance) / number, np.nan)

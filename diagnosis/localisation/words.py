@@ -1,0 +1,122 @@
+"""The place of a gap in sentences."""
+
+from __future__ import annotations
+
+from diagnosis.localisation.excess import FALSE_ALARM_RATE
+from diagnosis.localisation.inference import Finding
+from diagnosis.localisation.mapping import Survey
+from diagnosis.result import Where
+
+_SPREAD = 0.7  # of the whole: an interval as long as this says no place
+_LISTED = 12  # ids a sentence bears
+_BAND_WORDS = {
+    "0": "slower than the oscillation",
+    "f0": "at the oscillation itself",
+    "2f0": "at twice its frequency",
+    "3f0": "at three times its frequency",
+    "above": "faster than its third harmonic",
+}
+_CHANNEL_WORDS = {
+    "stiffness": "the restoring moment (stiffness)",
+    "damping": "the damping",
+    "forcing": "the rig as a moment that does not come from its motion (forcing)",
+    "sensor": "the reading (sensor)",
+    "calibration": "what is stated of the runs (calibration)",
+}
+_CONDITION_WORDS = {"always": "with the wind on and off", "wind_on": "only with the wind on"}
+
+
+def nowhere(found: Survey) -> str:
+    """The sentence for a campaign without a gap.
+
+    Args:
+        found: the maps.
+
+    Returns:
+        One sentence.
+    """
+    count = len(found.maps.runs)
+    least = min(1.0, count * min(run.p_value for run in found.maps.runs))
+    return (
+        f"Nowhere: over {count} runs the residual is that of the noise "
+        f"(p = {least:.2g} for the run farthest from it, all runs considered)."
+    )
+
+
+def describe(
+    where: Where, found: Survey, bands: tuple[str, ...], channel: Finding, condition: Finding
+) -> str:
+    """The place in sentences.
+
+    Args:
+        where: its fields.
+        found: the maps.
+        bands: names of the bands that show it.
+        channel: with its reason.
+        condition: likewise.
+
+    Returns:
+        A few sentences.
+    """
+    parts = [_runs(where, found), _extent(where, found), _bands(found, bands), _nature(channel, condition)]
+    return " ".join(part for part in parts if part)
+
+
+def _runs(where: Where, found: Survey) -> str:
+    count = len(found.maps.runs)
+    if not where.runs:
+        return (
+            f"No run by itself is beyond chance (false-alarm rate {FALSE_ALARM_RATE:.0%} over all runs); "
+            "what is found shows in all of them together."
+        )
+    share = sum(run.share for run in found.maps.runs if run.id in where.runs)
+    named = f" ({', '.join(where.runs)})" if len(where.runs) <= _LISTED else ""
+    if len(where.runs) == count:
+        text = f"All {count} runs show the gap" if count > 1 else "The run shows the gap"
+    elif len(where.runs) == 1:
+        text = f"{share:.0%} of the gap is in one run of {count}{named}"
+    else:
+        text = f"{share:.0%} of the gap is in {len(where.runs)} of {count} runs{named}"
+    return f"{text}{_wind_contrast(found)}."
+
+
+def _wind_contrast(found: Survey) -> str:
+    groups = {group.label: group for group in found.maps.groups if group.by == "wind"}
+    if len(groups) < 2:
+        return ""
+    return f"; mean excess {groups['on'].excess:.2g} with the wind on, {groups['off'].excess:.2g} with it off"
+
+
+def _extent(where: Where, found: Survey) -> str:
+    """Time, amplitude and frequency."""
+    places = []
+    length = float(found.maps.time.edges[-1])
+    if where.time_s is not None and where.time_s[1] - where.time_s[0] < _SPREAD * length:
+        places.append(f"between {where.time_s[0]:.1f} and {where.time_s[1]:.1f} s of the record")
+    greatest = float(found.maps.amplitude.edges[-1])
+    amplitude = where.amplitude_rad
+    if amplitude is not None and amplitude[1] - amplitude[0] < _SPREAD * greatest:
+        places.append(f"at amplitudes from {amplitude[0]:.2f} to {amplitude[1]:.2f} rad")
+    if where.frequency_hz is not None:
+        places.append(f"at {where.frequency_hz[0]:.2f} to {where.frequency_hz[1]:.2f} Hz")
+    return f"Four fifths of it lie {', '.join(places)}." if places else ""
+
+
+def _bands(found: Survey, bands: tuple[str, ...]) -> str:
+    whole = sum(max(band.excess, 0.0) for band in found.maps.bands)
+    shown = [b for b in found.maps.bands if b.band in bands and b.excess > 0.05 * whole]
+    if not shown or whole <= 0.0:
+        return ""
+    shown.sort(key=lambda band: -band.excess)
+    listed = ", ".join(f"{band.excess / whole:.0%} {_BAND_WORDS[band.band]}" for band in shown)
+    return f"By frequency: {listed}."
+
+
+def _nature(channel: Finding, condition: Finding) -> str:
+    acts = f"It acts on {_CHANNEL_WORDS[channel.value]}" if channel.value else "On what it acts is open"
+    if condition.value is None:
+        return f"{acts}: {channel.reason}; {condition.reason}."
+    when = _CONDITION_WORDS[condition.value]
+    if channel.reason == condition.reason:
+        return f"{acts}, {when}, {channel.reason}."
+    return f"{acts}: {channel.reason}. It is there {when}: {condition.reason}."
