@@ -55,7 +55,7 @@ def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
     Returns:
         The verdict at `FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
     """
-    tests = dict(zip(BANDS, band_p_values(fit), strict=True))
+    tests = dict(zip(BANDS, band_p_values(fit), strict=True)) | {"offset": offset_p_value(fit)}
     noisy = {}
     if not coarse_step:
         noisy["noise against amplitude"] = float(2.0 * norm.sf(abs(trend.amplitude_z)))
@@ -73,6 +73,20 @@ def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
         everything,
         any(p < limit * 0.01 for p in noisy.values()),
     )
+
+
+def offset_p_value(fit: Fit) -> float:
+    """Chance that white noise alone moves the runs' means from the common zero as far as they lie.
+
+    Args:
+        fit: its residuals, in noise standard deviations.
+
+    Returns:
+        The p-value, one degree of freedom given to the zero.
+    """
+    total = sum(float(np.sum(residual)) ** 2 / residual.size for residual in fit.residuals)
+    runs = len(fit.residuals)
+    return float(chi2.sf(total / (1.0 + _FLOOR_TOLERANCE), runs - 1)) if runs > 1 else 1.0
 
 
 def band_p_values(fit: Fit) -> tuple[float, ...]:

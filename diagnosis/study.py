@@ -29,6 +29,10 @@ Progress = Callable[[str], None]
 COARSER = 1.5
 #: A single effect that leaves less than this share needs no second one looked for.
 _CLOSED = 0.01
+#: Power that a coarse step's error may leave outside the noise floor, in step²/12 (at most all of it, and chance).
+_STEP_POWER = 1.2
+#: Share of a hum's power that may be left once the line and its harmonics are out.
+_HUM_SHARE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +169,9 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
             shares.append((buffeting.effects, buffeting.share))
     chance = float(np.sqrt(2.0 / nominal.count)) / max(nominal.excess, 1e-3)
     weighed = weigh(shares, chance)
-    if found.test.noisy and nominal.excess < _share_of_noise(found):
+    if weighed[0].effects == ("unknown",) and _read_off_explains(found):
+        weighed = []  # what is left belongs to the cause read off the records
+    elif found.test.noisy and nominal.excess < _share_of_noise(found):
         weighed = [Weighed(("unknown",), 1.0, 1.0), *(Weighed(w.effects, w.share, 0.0) for w in weighed)]
     return Study(
         found.campaign, found.cleaned, found.noise, found.trend, found.step, found.coarse, found.hum, nominal,
@@ -176,6 +182,19 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
 def _share(fitted: Fit, nominal: Fit) -> float:
     """Share of the nominal gap that a fit leaves open."""
     return max(fitted.excess, 0.0) / max(nominal.excess, 1e-9)
+
+
+def _read_off_explains(found: Study) -> bool:
+    """Whether what is left is no more than a coarse step or a removed hum leaves by itself.
+
+    The error of a coarse step is not white: its power is step²/12, wherever in the spectrum it lies. A hum that
+    is no pure line leaves a small share of itself.
+    """
+    left = found.nominal.excess / found.nominal.problem.data.runs[0].block
+    variance = float(np.mean(list(found.noise.variance.values())))
+    if found.coarse and left * variance < _STEP_POWER * found.step**2 / 12.0:
+        return True
+    return found.hum is not None and left < _HUM_SHARE * found.hum.excess
 
 
 def _share_of_noise(found: Study) -> float:
