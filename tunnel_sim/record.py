@@ -40,7 +40,9 @@ class Record:
         object.__setattr__(self, "time_s", read_only(self.time_s))
         object.__setattr__(self, "yaw_rad", read_only(self.yaw_rad))
         if self.time_s.ndim != 1 or self.time_s.shape != self.yaw_rad.shape or self.time_s.size < 2:
-            raise ValueError("time_s and yaw_rad must be one-dimensional, equally long and of two samples or more")
+            raise ValueError(
+                "time_s and yaw_rad must be one-dimensional, equally long and of two samples or more"
+            )
 
     @property
     def sample_interval(self) -> float:
