@@ -103,7 +103,8 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         plan: its effects, by name and parameters.
 
     Returns:
-        The effects in the vocabulary's order, whatever the plan's, so that the campaign does not hang on it.
+        The effects in the vocabulary's order, whatever the plan's, so that the campaign does not hang on it;
+        but the backlash between rod and sensor ahead of what the sensor itself does.
 
     Raises:
         TunnelError: when a name is unknown or given twice, a severity missing, a value out of range, or a
@@ -120,7 +121,11 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
             )
         if isinstance(effect, SpringMiscalibration):
             _check_spring(effect, plan)
-    return tuple(sorted(effects, key=lambda effect: ALL_EFFECTS.index(type(effect))))
+    return tuple(
+        sorted(
+            effects, key=lambda effect: (effect.name != "sensor_hysteresis", ALL_EFFECTS.index(type(effect)))
+        )
+    )
 
 
 def _stated_effect(setting: EffectSetting) -> Effect:

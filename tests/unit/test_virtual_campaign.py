@@ -81,6 +81,18 @@ def test_effects_act_and_their_order_in_the_plan_does_not_matter(plan: CampaignP
     assert same(simulate_campaign(nulls), simulate_campaign(replace(plan, effects=())))
 
 
+def test_backlash_acts_ahead_of_the_sensors_own_effects(plan: CampaignPlan) -> None:
+    stated = with_effects(
+        plan,
+        ("sensor_nonlinearity", {"coefficient": 0.1}),
+        ("coulomb_friction", {"friction_moment": 0.05}),
+        ("sensor_hysteresis", {"half_width": 0.002}),
+        ("sensor_clipping", {"limit": 0.3}),
+    )
+    names = [effect.name for effect in plan_effects(stated)]
+    assert names == ["sensor_hysteresis", "coulomb_friction", "sensor_nonlinearity", "sensor_clipping"]
+
+
 def test_progress_counts_every_run(plan: CampaignPlan) -> None:
     calls: list[tuple[int, int]] = []
     simulate_campaign(plan, progress=lambda done, total: calls.append((done, total)))

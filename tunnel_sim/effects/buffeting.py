@@ -32,7 +32,7 @@ class Buffeting(Effect):
         "narrow-band noise at the rig's own frequency."
     )
     references = (
-        "Dryden, NACA Report 342 (1930)",
+        "Dryden & Kuethe, NACA Report 342 (1930)",
         "Gauss–Markov process: Gillespie, Phys. Rev. E 54 (1996) 2084, doi 10.1103/PhysRevE.54.2084",
     )
     stochastic = True

@@ -23,7 +23,7 @@ class FreePlay(Effect):
     condition = "always"
     equation = "−Kr dz(β), dz = 0 within ±δ and β ∓ δ beyond"
     signature = "The frequency falls steeply as the amplitude nears the dead zone."
-    references = ("Tang, Dowell & Virgin, J. Fluids Struct. 12 (1998) 379, doi 10.1006/jfls.1997.0148",)
+    references = ("Conner, Tang, Dowell & Virgin, J. Fluids Struct. 11 (1997) 89",)
 
     half_width: float = parameter(
         "δ", "rad", "half width of the dead zone", scale=0.002, lower=0.0, upper=0.2

@@ -23,9 +23,7 @@ class NonlinearYawMoment(Effect):
     condition = "wind_on"
     equation = "Ka (1 + κa β²) β in place of Ka β"
     signature = "As cubic stiffness, but in proportion to V² and absent with the wind off."
-    references = (
-        "Mansor & Passmore, J. Wind Eng. Ind. Aerodyn. 96 (2008) 1218, doi 10.1016/j.jweia.2007.05.008",
-    )
+    references = ("Mansor & Passmore, J. Wind Eng. Ind. Aerodyn. 96 (2008) 1218",)
 
     coefficient: float = parameter(
         "κa", "1/rad2", "share of Ka per squared angle", scale=1.0, lower=-100.0, upper=100.0

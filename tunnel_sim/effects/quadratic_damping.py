@@ -23,7 +23,7 @@ class QuadraticDamping(Effect):
     condition = "always"
     equation = "−C2 |β̇| β̇"
     signature = "The damping ratio falls in proportion to the amplitude."
-    references = ("Faltinsen et al., roll damping of ships: B1 p + B2 |p| p; ITTC 7.5-02-07-04.5",)
+    references = ("ITTC Recommended Procedure 7.5-02-07-04.5, roll damping of ships: B1 p + B2 |p| p",)
 
     coefficient: float = parameter(
         "C2", "N m s2/rad2", "coefficient of the squared rate", scale=0.002, lower=-1.0, upper=1.0

@@ -24,8 +24,8 @@ class SensorNonlinearity(Effect):
     condition = "always"
     equation = "y = β + s β³"
     signature = (
-        "A third harmonic in fixed proportion to the amplitude cubed, with the frequency and "
-        "decay of the fundamental untouched."
+        "A third harmonic of s A³/4; the frequency is untouched, and the decay looks faster by the share "
+        "(3/2) s A², whatever spring and wind."
     )
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
 

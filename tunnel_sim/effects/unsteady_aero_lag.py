@@ -29,7 +29,7 @@ class UnsteadyAeroLag(Effect):
         "and shows across springs and speeds."
     )
     references = (
-        "Theissen, Unsteady Aerodynamics of Passenger Cars (dissertation), TU München 2012",
+        "Theissen, Unsteady Vehicle Aerodynamics in Gusty Crosswind (dissertation), TU München 2012",
         "Jones, NACA Report 681 (1940)",
     )
 
