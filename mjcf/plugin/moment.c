@@ -23,11 +23,11 @@ double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
   if (!(speed > 0)) {
     return 0;
   }
-  const double scale = 0.5 * p->air_density * speed * speed * p->frontal_area * p->reference_length;
-  // paper, eqs 4 and 5: Ka = scale*Cnb and Ca = scale*Cnr*l/V
-  const double stiffness = scale * p->cn_beta;
-  const double damping = scale * p->cn_r * p->reference_length / speed;
-  const double lag = vwt_lag_time(p, speed);
+  const double flow = 0.5 * p->air_density * speed * p->frontal_area * p->reference_length;
+  const double scale = flow * speed;
+  const double stiffness = scale * p->cn_beta;                   // Ka (paper, eq. 4)
+  const double damping = flow * p->reference_length * p->cn_r;  // Ca (paper, eq. 5)
+  const double lag = p->aero_lag;
   // A lag reads the state x; a lead (lag < 0) mirrors it about the angle, b + (b - x), because the lag's
   // own equation is unstable with a negative time constant.
   const double angle = lag > 0 ? s->lagged : lag < 0 ? 2 * s->angle - s->lagged : s->angle;

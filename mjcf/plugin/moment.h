@@ -29,9 +29,6 @@ extern "C" {
   X(strouhal_number, "1", 0)                     \
   X(shedding_phase, "rad", -VWT_ANY)             \
   /* the mechanism */                            \
-  X(spring_stiffness, "N m/rad", 0)              \
-  X(mechanical_damping, "N m s/rad", 0)          \
-  X(yaw_inertia, "kg m2", 0)                     \
   X(friction_moment, "N m", 0)                   \
   X(quadratic_damping, "N m s2/rad2", -VWT_ANY)  \
   X(loss_factor, "1", -VWT_ANY)                  \
@@ -39,7 +36,11 @@ extern "C" {
   X(stiffness_quadratic, "1/rad", -VWT_ANY)      \
   X(free_play, "rad", 0)                         \
   X(gravity_stiffness, "N m/rad", -VWT_ANY)      \
-  X(gravity_angle, "rad", -VWT_ANY)
+  X(gravity_angle, "rad", -VWT_ANY)              \
+  /* last, what joint and body own in MuJoCo */  \
+  X(spring_stiffness, "N m/rad", 0)              \
+  X(mechanical_damping, "N m s/rad", 0)          \
+  X(yaw_inertia, "kg m2", 0)
 
 #define VWT_ANY 1e300
 

@@ -19,24 +19,26 @@ typedef struct {
   mjtNum time, angle, rate, twist, twist_rate;
 } Motion;
 
+// Parameters that follow one another in the law as their numerics do in the model.
+typedef struct {
+  int parameter, numeric, count;
+} Span;
+
 typedef struct {
   int dof;                                // yaw of the spring's end of the rod
   int twist_dof;                          // of the body against that end; -1: the rod is rigid
   int joint, twist_joint;
   int wind_speed, wind_interval;          // ids of numerics; intervals -1 where constant
   int forcing, forcing_interval;          // ids of numerics, -1 where absent
-  int count;                              // how many parameters the model gives
-  int parameter[VWT_PARAMETER_COUNT];     // which they are
-  int numeric[VWT_PARAMETER_COUNT];       // and the ids of their numerics
+  int aero_lag;                           // likewise
+  int span_count;
+  Span span[VWT_PARAMETER_COUNT];         // the parameters that the model gives
   int names_size;                         // of the names of all numerics, which the ids stand for
   char names[];
 } Instance;
 
-// what a MuJoCo element owns is read there, never given again as a numeric
-static int is_native(int parameter) {
-  return parameter == VWT_INDEX_spring_stiffness || parameter == VWT_INDEX_mechanical_damping ||
-         parameter == VWT_INDEX_yaw_inertia;
-}
+// The law's last parameters belong to joint and body: they are read there, never given again as a numeric.
+enum { kOwn = VWT_INDEX_spring_stiffness };
 
 // The names of the model's numerics, one after the other, and their size in bytes.
 static const char* numeric_names(const mjModel* m, int* size) {
@@ -49,9 +51,8 @@ static const char* numeric_names(const mjModel* m, int* size) {
 // One mjData may serve many models, but the ids found for the first hold only where the others list the same
 // numerics in the same order: anything else would give one coefficient the value of another.
 static void check_same_numerics(const mjModel* m, const Instance* self) {
-  int size = 0;
-  if (m->nnumeric < 1 || (numeric_names(m, &size), size != self->names_size) ||
-      memcmp(numeric_names(m, &size), self->names, size)) {
+  const int start = m->nnumeric > 0 ? m->name_numericadr[0] : (int)m->nnames;
+  if (start + self->names_size > (int)m->nnames || memcmp(m->names + start, self->names, self->names_size)) {
     mju_error("vwt.yaw_moment: this model's numerics are not those of the model its mjData was made for; give "
               "all models of a rollout or batch the same numerics in the same order");
   }
@@ -67,19 +68,25 @@ static mjtNum series_at(const mjModel* m, int values, int interval, mjtNum time)
 }
 
 static void read_parameters(const mjModel* m, const mjData* d, const Instance* self, vwt_parameters* p) {
-  double table[VWT_PARAMETER_COUNT] = {0};
-  for (int i = 0; i < self->count; i++) {
-    table[self->parameter[i]] = m->numeric_data[m->numeric_adr[self->numeric[i]]];
+  double* table = (double*)p;  // a structure of doubles only, in the order of the law
+  if (self->span[0].count == kOwn) {  // all in one piece, as build_model writes them: much the fastest
+    memcpy(p, m->numeric_data + m->numeric_adr[self->span[0].numeric], kOwn * sizeof(double));
+  } else {
+    memset(p, 0, sizeof(*p));
+    for (int i = 0; i < self->span_count; i++) {
+      const Span* span = &self->span[i];
+      memcpy(table + span->parameter, m->numeric_data + m->numeric_adr[span->numeric], span->count * sizeof(double));
+    }
   }
-  table[VWT_INDEX_spring_stiffness] = m->jnt_stiffness[self->joint];
-  table[VWT_INDEX_mechanical_damping] = m->dof_damping[self->dof];
-  table[VWT_INDEX_yaw_inertia] = mass_diagonal(m, d, self->dof);
-  memcpy(p, table, sizeof(table));
+  p->spring_stiffness = m->jnt_stiffness[self->joint];
+  p->mechanical_damping = m->dof_damping[self->dof];
+  p->yaw_inertia = mass_diagonal(m, d, self->dof);
 }
 
 static mjtNum wind_speed_at(const mjModel* m, const mjData* d, const Instance* self, mjtNum time) {
   const mjtNum live = m->nuserdata > 0 ? d->userdata[0] : 0;  // live input: departure from the series
-  return fmax(0, series_at(m, self->wind_speed, self->wind_interval, time) + live);
+  const mjtNum speed = series_at(m, self->wind_speed, self->wind_interval, time) + live;
+  return speed > 0 ? speed : 0;
 }
 
 static Motion present_motion(const mjModel* m, const mjData* d, const Instance* self) {
@@ -119,7 +126,7 @@ static mjtNum air_moment(const mjModel* m, const mjData* d, const Instance* self
       .wind_speed = wind_speed_at(m, d, self, at->time),
       .angle = at->angle + at->twist,
       .rate = at->rate + at->twist_rate,
-      .lagged = lagged_at(m, d, self, p, state, at),
+      .lagged = p->aero_lag != 0 ? lagged_at(m, d, self, p, state, at) : 0,
       .forcing = self->forcing < 0 ? 0 : series_at(m, self->forcing, self->forcing_interval, at->time),
   };
   return vwt_air_moment(p, &air);
@@ -160,7 +167,6 @@ static void apply_moments(const mjModel* m, mjData* d, const Instance* self, con
 }
 
 static void sense_moment(const mjModel* m, mjData* d, const Instance* self, const mjtNum* state, int instance) {
-  check_same_numerics(m, self);
   vwt_parameters p;
   read_parameters(m, d, self, &p);
   const Motion now = present_motion(m, d, self);
@@ -186,10 +192,14 @@ static void advance(const mjModel* m, mjData* d, int instance) {
   const Instance* self = (const Instance*)d->plugin_data[instance];
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   check_same_numerics(m, self);
-  vwt_parameters p;
-  read_parameters(m, d, self, &p);
   const Motion now = present_motion(m, d, self);
-  state[kLagged] = lagged_at(m, d, self, &p, state, &now);
+  mjtNum lagged = now.angle + now.twist;
+  if (self->aero_lag >= 0 && m->numeric_data[m->numeric_adr[self->aero_lag]] != 0) {
+    vwt_parameters p;
+    read_parameters(m, d, self, &p);
+    lagged = lagged_at(m, d, self, &p, state, &now);
+  }
+  state[kLagged] = lagged;
   state[kAngle] = now.angle;
   state[kRate] = now.rate;
   state[kTwist] = now.twist;
@@ -273,7 +283,8 @@ static void find_series(const mjModel* m, Instance* self) {
 }
 
 static void find_parameters(const mjModel* m, Instance* self) {
-  self->count = 0;
+  self->span_count = 0;
+  self->aero_lag = find_numeric(m, "aero_lag");
   for (int i = 0; i < VWT_PARAMETER_COUNT; i++) {
     const char* name = vwt_parameter_names[i];
     const int id = find_numeric(m, name);
@@ -285,7 +296,7 @@ static void find_parameters(const mjModel* m, Instance* self) {
       }
       continue;
     }
-    if (is_native(i)) {
+    if (i >= kOwn) {
       mju_error("vwt.yaw_moment: numeric %s repeats what the joint or body owns; remove it", name);
     }
     const mjtNum value = m->numeric_data[m->numeric_adr[id]];
@@ -294,8 +305,12 @@ static void find_parameters(const mjModel* m, Instance* self) {
       mju_error("vwt.yaw_moment: numeric %s must be one finite number%s in %s", name,
                 bounded ? " of zero or more" : "", vwt_parameter_units[i]);
     }
-    self->parameter[self->count] = i;
-    self->numeric[self->count++] = id;
+    Span* last = self->span_count ? &self->span[self->span_count - 1] : NULL;
+    if (last && i == last->parameter + last->count && id == last->numeric + last->count) {
+      last->count++;
+    } else {
+      self->span[self->span_count++] = (Span){i, id, 1};
+    }
   }
 }
 
@@ -383,7 +398,9 @@ mjPLUGIN_LIB_INIT(vwt_yaw_moment) {
   plugin.nattribute = sizeof(attributes) / sizeof(attributes[0]);
   plugin.attributes = attributes;
   plugin.capabilityflags = mjPLUGIN_PASSIVE | mjPLUGIN_SENSOR;
-  plugin.needstage = mjSTAGE_VEL;
+  // The sensor reads the state alone. Asking for the velocity stage would have MuJoCo compute velocities of
+  // subtrees in every step, which nobody reads.
+  plugin.needstage = mjSTAGE_POS;
   plugin.nstate = nstate;
   plugin.nsensordata = nsensordata;
   plugin.init = init;
