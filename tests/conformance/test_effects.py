@@ -16,7 +16,8 @@ from tunnel_sim.errors import TunnelError
 from tunnel_sim.plan import SensorModel
 from tunnel_sim.record import Record
 from tunnel_sim.rig import load_rig
-from tunnel_sim.simulate import simulate, simulate_batch
+from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.simulate import apply_effects, simulate, simulate_batch
 
 RIG = load_rig()
 SENSOR = SensorModel(zero=0.003)
@@ -33,7 +34,7 @@ def example(kind: type[Effect]) -> Effect:
     return effect_from(kind.name, VALUES[kind.name])
 
 
-def record(effects: tuple[Effect, ...] = (), run=WIND_ON, seed: int = 1) -> Record:
+def record(effects: tuple[Effect, ...] = (), run: RunSettings = WIND_ON, seed: int | list[int] = 1) -> Record:
     return simulate(RIG, run, SENSOR, np.random.default_rng(seed), effects=effects)
 
 
@@ -155,7 +156,7 @@ def test_the_same_seed_gives_the_same_bits_at_any_thread_count(kind: type[Effect
         )
         for n in (1, 2, 3)
     )
-    loop = [record(effects, run, seed=[7, i]) for i, run in enumerate(runs)]  # type: ignore[arg-type]
+    loop = [record(effects, run, seed=[7, i]) for i, run in enumerate(runs)]
     for others in (two, three, loop):
         assert all(same(a, b) for a, b in zip(one, others, strict=True))
 
@@ -177,3 +178,17 @@ def test_a_rod_too_stiff_for_any_step_is_refused_in_one_line() -> None:
         record((stiff,))
     assert "\n" not in str(refusal.value)
     assert "larger compliance" in str(refusal.value)
+
+
+@pytest.mark.parametrize("compliance", [1e-2, 1e-3, 5e-4, 1e-4, 1e-5])
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.5, 0.95])
+def test_a_rod_gets_steps_short_enough_for_its_own_oscillation(compliance: float, share: float) -> None:
+    effect = effect_from("rod_flexibility", {"compliance": compliance, "inertia_share": share})
+    run = apply_effects(WIND_ON, [effect], np.random.default_rng(0))
+    own = np.sqrt(
+        1.0 / (compliance * WIND_ON.yaw_inertia * share * (1.0 - share))
+    )  # of two free masses, rad/s
+    assert own * run.timestep <= 0.5
+    shorter = WIND_ON.timestep / run.timestep
+    assert shorter == pytest.approx(round(shorter), abs=1e-12)  # a sample is a whole number of steps
+    assert shorter < 2.5 * max(1.0, own * WIND_ON.timestep / 0.5)  # and no more of them than it needs

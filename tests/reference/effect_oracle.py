@@ -7,9 +7,10 @@ ends, and starting again there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, pi, sin, sqrt
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -80,8 +81,8 @@ def buffeted(forcing: np.ndarray, interval: float, run: Setting) -> np.ndarray:
     )
     times = interval * np.arange(forcing.size)
     assert interval * run.sample_rate == 1.0  # its samples are the sensor's
-    angle = lsim(system, pressure(run.speed) * forcing, times, X0=[run.release, 0.0])[1]
-    return np.asarray(angle)[: run.times.size]
+    states: Any = lsim(system, pressure(run.speed) * forcing, times, X0=[run.release, 0.0])  # type: ignore[call-overload]
+    return np.asarray(states[1])[: run.times.size]
 
 
 def nominal(spring: float, speed: float) -> Moment:
@@ -144,16 +145,34 @@ OTHER_CONDITIONS: dict[str, Callable[[Parameters, Setting], Moment]] = {
 }
 
 
-def _solve(derivative, y0, run, *, start=0.0, events=()):
+def _solve(
+    derivative: Callable[[float, Any], Any],
+    y0: Sequence[float],
+    run: Setting,
+    *,
+    start: float = 0.0,
+    events: Sequence[Any] = (),
+) -> Any:
     return solve_ivp(
         derivative, (start, float(run.times[-1])), y0, method="DOP853", rtol=1e-11, atol=1e-14,
         max_step=0.02, events=events or None, dense_output=True,
     )  # fmt: skip
 
 
+def _crossing(index: int, value: float, direction: float) -> Any:
+    """An event that ends a leg where a state passes a value in a direction."""
+
+    def event(_: float, y: np.ndarray) -> float:
+        return float(y[index] - value)
+
+    marked: Any = event
+    marked.terminal, marked.direction = True, direction
+    return marked
+
+
 def _smooth(moment: Moment, run: Setting) -> np.ndarray:
     leg = _solve(lambda t, y: (y[1], moment(t, y[0], y[1]) / INERTIA), (run.release, 0.0), run)
-    return leg.sol(run.times)[0]
+    return np.asarray(leg.sol(run.times)[0])
 
 
 def _with_lag(a: float, run: Setting) -> np.ndarray:
@@ -162,12 +181,12 @@ def _with_lag(a: float, run: Setting) -> np.ndarray:
     ka = pressure(run.speed) * CN_BETA
     base = nominal(run.spring, run.speed)
 
-    def derivative(t, y):
+    def derivative(t: float, y: np.ndarray) -> tuple[float, ...]:
         b, r, x = y
         seen = x if a > 0.0 else 2.0 * b - x
         return r, (base(t, b, r) + ka * (seen - b)) / INERTIA, (b - x) / tau
 
-    return _solve(derivative, (run.release, 0.0, run.release), run).sol(run.times)[0]
+    return np.asarray(_solve(derivative, (run.release, 0.0, run.release), run).sol(run.times)[0])
 
 
 def _two_masses(p: Parameters, run: Setting) -> np.ndarray:
@@ -177,13 +196,13 @@ def _two_masses(p: Parameters, run: Setting) -> np.ndarray:
     viscous = 2.0 * ROD_DAMPING_RATIO * sqrt(rod * upper * lower / (upper + lower))
     ka, ca = pressure(run.speed) * CN_BETA, air_damping(run.speed)
 
-    def derivative(_, y):
+    def derivative(_: float, y: np.ndarray) -> tuple[float, ...]:
         e, er, b, br = y
         twist = rod * (b - e) + viscous * (br - er)
         return er, (-run.spring * e - DAMPING * er + twist) / upper, br, (ka * b + ca * br - twist) / lower
 
     held = run.release * rod / (rod + run.spring)  # the body is held, the end hangs between rod and spring
-    return _solve(derivative, (held, 0.0, run.release, 0.0), run).sol(run.times)[0]
+    return np.asarray(_solve(derivative, (held, 0.0, run.release, 0.0), run).sol(run.times)[0])
 
 
 def _with_friction(limit: float, run: Setting) -> np.ndarray:
@@ -191,10 +210,6 @@ def _with_friction(limit: float, run: Setting) -> np.ndarray:
     base = nominal(run.spring, run.speed)
     angle, start, at = np.empty(run.times.size), 0.0, run.release
 
-    def reversal(_, y):
-        return y[1]
-
-    reversal.terminal = True
     while True:
         pull = base(start, at, 0.0)
         here = run.times >= start
@@ -202,12 +217,12 @@ def _with_friction(limit: float, run: Setting) -> np.ndarray:
             angle[here] = at
             return angle
         sign = np.sign(pull)
-        reversal.direction = -sign
-        slip = -limit * sign
-        leg = _solve(
-            lambda t, y, slip=slip: (y[1], (base(t, y[0], y[1]) + slip) / INERTIA),
-            (at, 0.0), run, start=start, events=[reversal],
-        )  # fmt: skip
+        slip = -limit * float(sign)
+
+        def slipping(t: float, y: np.ndarray, slip: float = slip) -> tuple[float, float]:
+            return y[1], (base(t, y[0], y[1]) + slip) / INERTIA
+
+        leg = _solve(slipping, (at, 0.0), run, start=start, events=[_crossing(1, 0.0, -sign)])
         angle[here] = leg.sol(run.times[here])[0]
         if not leg.t_events[0].size:
             return angle
@@ -220,22 +235,16 @@ def _with_free_play(half: float, run: Setting) -> np.ndarray:
     angle, start, y = np.empty(run.times.size), 0.0, (run.release, 0.0)
     zone = 1 if run.release > half else -1 if run.release < -half else 0
 
-    def edge(value, direction):
-        def event(_, y):
-            return y[0] - value
-
-        event.terminal, event.direction = True, direction
-        return event
-
     while True:
-        leave = [edge(zone * half, -zone)] if zone else [edge(half, 1), edge(-half, -1)]
-        leg = _solve(
-            lambda t, y, zone=zone: (
-                y[1],
-                (without(t, y[0], y[1]) - (run.spring * (y[0] - zone * half) if zone else 0.0)) / INERTIA,
-            ),
-            y, run, start=start, events=leave,
-        )  # fmt: skip
+        leave = (
+            [_crossing(0, zone * half, -zone)] if zone else [_crossing(0, half, 1), _crossing(0, -half, -1)]
+        )
+
+        def within(t: float, y: np.ndarray, zone: int = zone) -> tuple[float, float]:
+            spring = run.spring * (y[0] - zone * half) if zone else 0.0
+            return y[1], (without(t, y[0], y[1]) - spring) / INERTIA
+
+        leg = _solve(within, y, run, start=start, events=leave)
         here = run.times >= start
         angle[here] = leg.sol(run.times[here])[0]
         left = [i for i, times in enumerate(leg.t_events) if times.size]
@@ -258,7 +267,7 @@ def _play(angle: np.ndarray, p: Parameters, run: Setting, _phase: float) -> np.n
         at = min(max(at, b - w), b + w)
         slider[i] = at
     del angle
-    return slider[::16]
+    return np.asarray(slider[::16])
 
 
 SENSOR: dict[str, Callable[[np.ndarray, Parameters, Setting, float], np.ndarray]] = {

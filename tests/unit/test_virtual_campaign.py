@@ -151,7 +151,7 @@ def test_effects_that_cannot_be_meant_are_refused_in_one_line(
 ) -> None:
     for refused in (plan_effects, simulate_campaign, truth_document):
         with pytest.raises(TunnelError) as refusal:
-            refused(with_effects(plan, *effects))  # type: ignore[operator]
+            refused(with_effects(plan, *effects))
         assert "\n" not in str(refusal.value)
         for part in parts:
             assert part in str(refusal.value)
