@@ -1,0 +1,159 @@
+"""Throughput of the rig's model: with the plugin against without, and batches on two threads against one.
+
+Run as ``python benchmarks/throughput.py``; see README.md beside it. Every repetition measures both sides one
+after the other, so that other load on the machine meets both, and the ratio is taken within the repetition.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from statistics import median
+
+import mujoco
+import numpy as np
+from mujoco import batch as mujoco_batch
+from rich.console import Console
+from rich.table import Table
+
+from tunnel_sim.aero import AeroDerivatives
+from tunnel_sim.model import build_model, build_spec
+from tunnel_sim.rig import load_rig
+from tunnel_sim.run_settings import RodTwist, RunSettings
+
+LINEAR = RunSettings(
+    16.12, AeroDerivatives(0.35, -0.7), 0.1014, 0.018, wind_speed=20.0, air_density=1.204, release_angle=0.3
+)
+EVERYTHING = {
+    "aero_lag": 2.0, "friction_moment": 0.01, "moment_cubic": 1.0, "damping_quadratic": 1.0,
+    "quadratic_damping": 0.01, "stiffness_cubic": 1.0, "free_play": 0.001, "gravity_stiffness": 0.1,
+    "shedding_amplitude": 0.01, "strouhal_number": 0.2,
+}  # fmt: skip
+SIMULATIONS = 32
+
+
+def without_plugin(settings: RunSettings) -> mujoco.MjModel:
+    """The same model, with the plugin and its sensor taken out."""
+    spec = build_spec(load_rig(), settings)
+    spec.delete(spec.sensor("aerodynamic_moment"))
+    for plugin in list(spec.plugins):
+        spec.delete(plugin)
+    model = spec.compile()
+    if model.nplugin:
+        raise RuntimeError("the plugin is still in the model")
+    return model
+
+
+def stepping(model: mujoco.MjModel, steps: int) -> Callable[[], float]:
+    """A repetition on one thread: CPU time of `steps` steps, s."""
+    data = mujoco.MjData(model)
+
+    def repetition() -> float:
+        mujoco.mj_resetData(model, data)
+        data.qpos[0] = LINEAR.release_angle
+        begin = time.thread_time()
+        mujoco.mj_step(model, data, steps)
+        return time.thread_time() - begin
+
+    return repetition
+
+
+def batching(model: mujoco.MjModel, steps: int, threads: int) -> Callable[[], float]:
+    """A repetition of `SIMULATIONS` simulations on a pool: elapsed time, s."""
+    batch = mujoco_batch.Batch(model, nsim=SIMULATIONS, nthread=threads)
+    angles = batch.bind("qpos")
+
+    def repetition() -> float:
+        batch.reset()
+        angles[:, 0] = np.linspace(0.1, 0.3, SIMULATIONS)
+        begin = time.perf_counter()
+        batch.step(nstep=steps)
+        return time.perf_counter() - begin
+
+    return repetition
+
+
+def plain_threads(model: mujoco.MjModel, steps: int, threads: int) -> Callable[[], float]:
+    """The same work without mujoco.batch, on Python threads: elapsed time, s. What the machine has to give."""
+    data = [mujoco.MjData(model) for _ in range(threads)]
+
+    def share(one: mujoco.MjData) -> None:
+        for _ in range(SIMULATIONS // threads):
+            mujoco.mj_resetData(model, one)
+            mujoco.mj_step(model, one, steps)  # releases the interpreter's lock
+
+    def repetition() -> float:
+        begin = time.perf_counter()
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(share, data))
+        return time.perf_counter() - begin
+
+    return repetition
+
+
+def interleaved(
+    one: Callable[[], float], other: Callable[[], float], repetitions: int
+) -> tuple[list[float], list[float]]:
+    """Times of both, measured by turns; the first turn warms up and is not kept."""
+    times: tuple[list[float], list[float]] = ([], [])
+    for turn in range(repetitions + 1):
+        order = (0, 1) if turn % 2 else (1, 0)
+        for side in order:
+            elapsed = (one, other)[side]()
+            if turn:
+                times[side].append(elapsed)
+    return times
+
+
+def ratio(one: list[float], other: list[float]) -> tuple[float, float]:
+    """How many times as fast the second is as the first: median over repetitions, and of the best times."""
+    return median(a / b for a, b in zip(one, other, strict=True)), min(one) / min(other)
+
+
+def row(
+    table: Table, name: str, steps: int, baseline: list[float], subject: list[float], target: str
+) -> None:
+    """One line: speeds by the medians, ratio within the repetitions and of the best."""
+    middle, best = ratio(baseline, subject)
+    speeds = [f"{steps / median(times):,.0f}" for times in (baseline, subject)]
+    table.add_row(name, *speeds, f"{middle:.3f}", f"{best:.3f}", target)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=20_000, help="steps of each repetition on one thread")
+    parser.add_argument("--repetitions", type=int, default=25, help="repetitions of each side")
+    options = parser.parse_args()
+    steps, repetitions = options.steps, options.repetitions
+
+    rig = load_rig()
+    twist = RodTwist(1e-3, 0.3)
+    linear = build_model(rig, LINEAR).mj
+    busy = build_model(rig, RunSettings(**{**vars(LINEAR), "parameters": EVERYTHING})).mj
+    rod = RunSettings(**{**vars(LINEAR), "rod_twist": twist})
+    table = Table(title="Throughput, RK4 steps per second")
+    for head in ("comparison", "baseline", "subject", "ratio (median)", "ratio (best)", "target"):
+        table.add_column(head, justify="left" if head == "comparison" else "right")
+
+    def single(name: str, subject: mujoco.MjModel, settings: RunSettings, target: str) -> None:
+        bare = stepping(without_plugin(settings), steps)
+        row(table, name, steps, *interleaved(bare, stepping(subject, steps), repetitions), target)
+
+    single("plugin against none", linear, LINEAR, "≥ 0.95")
+    single("the same, rod that twists", build_model(rig, rod).mj, rod, "")
+    single("every term of the law against none", busy, LINEAR, "")
+    each = max(1, steps // 20)
+    for name, kind, goal in (
+        ("batch, two threads against one", batching, "≥ 1.8"),
+        ("two plain threads against one", plain_threads, "(the machine's)"),
+    ):
+        times = interleaved(kind(linear, each, 1), kind(linear, each, 2), 2 * repetitions)
+        row(table, name, each * SIMULATIONS, *times, goal)
+    Console(width=110).print(table)
+
+
+if __name__ == "__main__":
+    main()
