@@ -17,8 +17,11 @@ import numpy as np
 
 #: Exponent of the share left open.
 STEEPNESS = 3.0
-#: Misfit of form that counts as none.
+#: Misfit of form that counts as none, as a share of the gap.
 FORM_MISFIT = 0.01
+#: Excess of block means beyond which that share no longer grows with the gap: a motion missed grossly is no
+#: reason to overlook a second effect a thousand times the noise.
+FORM_MISFIT_UP_TO = 1000.0
 #: Share at which a cause is as likely as an unknown one.
 UNKNOWN_SHARE = 0.33
 #: A second effect must leave less than this share of what the first leaves.
@@ -42,17 +45,30 @@ class Weighed:
     probability: float
 
 
-def weigh(shares: Sequence[tuple[tuple[str, ...], float]], chance: float) -> list[Weighed]:
+def form_floor(excess: float) -> float:
+    """Share of the gap that a misfit of form may leave.
+
+    Args:
+        excess: of the nominal model's block means.
+
+    Returns:
+        The share.
+    """
+    return FORM_MISFIT * min(1.0, FORM_MISFIT_UP_TO / max(excess, 1e-9))
+
+
+def weigh(shares: Sequence[tuple[tuple[str, ...], float]], chance: float, excess: float) -> list[Weighed]:
     """Probabilities of the answers.
 
     Args:
         shares: effect names and share of the gap they leave open, for singles and pairs.
         chance: standard deviation of a share by chance alone.
+        excess: of the nominal model's block means.
 
     Returns:
         All answers, ``unknown`` among them, most probable first.
     """
-    floor = FORM_MISFIT + 2.0 * chance
+    floor = form_floor(excess) + 2.0 * chance
     answers: dict[tuple[str, ...], float] = {}
     for names, share in shares:
         key = tuple(sorted(names))

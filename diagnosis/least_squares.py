@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +11,7 @@ from diagnosis.problem import Point, Problem
 from tunnel_sim.record import Array
 
 _MAX_ITERATIONS = 25
+_TRIES = 9  # dampings tried in a step, each ten times the last
 
 
 class FitError(ArithmeticError):
@@ -106,6 +108,33 @@ def fit(
     return state.result(iterations, converged)
 
 
+_HORIZONS = (0.25, 0.4, 0.6, 0.8)
+
+
+def fit_growing(problem: Problem, start: Point) -> Fit:
+    """Minimise χ² over the records' beginnings first, then over ever longer parts.
+
+    Args:
+        problem: runs and effects.
+        start: parameter values to start from; they may run out of phase well before the records end.
+
+    Returns:
+        The fit of the whole records.
+
+    Raises:
+        FitError: when the model cannot be integrated.
+    """
+    point = start
+    for share in _HORIZONS:
+        runs = tuple(
+            dataclasses.replace(run, reading=run.reading[: max(20, int(share * run.reading.size))])
+            for run in problem.data.runs
+        )
+        shorter = Problem(dataclasses.replace(problem.data, runs=runs), problem.effects, problem.fixed)
+        point = fit(shorter, point, tolerance=1e-3, max_iterations=15).point
+    return fit(problem, point)
+
+
 class _State:
     """Where a minimisation stands."""
 
@@ -124,7 +153,7 @@ class _State:
 
     def improve(self) -> float:
         """Take one damped step; returns the drop of χ², 0 where no step lowers it."""
-        for _ in range(6):
+        for _ in range(_TRIES):
             trial = clip(
                 self.problem, _step(self.problem, self.point, self.residuals, self.jacobian, self.damping)
             )
@@ -244,13 +273,14 @@ def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> li
 
 
 def normal_equations(
-    jacobian: list[tuple[Array, Array]], residuals: list[Array]
+    jacobian: list[tuple[Array, Array]], residuals: list[Array], damping: float = 0.0
 ) -> tuple[Array, Array, list[Array]]:
     """Normal matrix and gradient of the common parameters with every run's release eliminated.
 
     Args:
         jacobian: from `sensitivities`.
         residuals: scaled.
+        damping: of the release's own step, as a share of its diagonal.
 
     Returns:
         Matrix (common, common), gradient (common,), and per run the (2, common + 1) solution that gives the
@@ -263,7 +293,7 @@ def normal_equations(
         inner = release.T @ release
         cross = np.column_stack([release.T @ common, release.T @ r])
         size = np.sqrt(np.maximum(np.diag(inner), 1e-300))
-        ridge = inner / np.outer(size, size) + 1e-12 * np.eye(len(size))
+        ridge = inner / np.outer(size, size) + (1e-12 + damping) * np.eye(len(size))
         solution = np.linalg.solve(ridge, cross / size[:, None]) / size[:, None]
         matrix += common.T @ common - cross[:, :-1].T @ solution[:, :-1]
         gradient += common.T @ r - cross[:, :-1].T @ solution[:, -1]
@@ -278,7 +308,7 @@ def _step(
     jacobian: list[tuple[Array, Array]],
     damping: float,
 ) -> Point:
-    matrix, gradient, solutions = normal_equations(jacobian, residuals)
+    matrix, gradient, solutions = normal_equations(jacobian, residuals, damping)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     scaled = matrix / np.outer(scale, scale)
     step = np.linalg.lstsq(scaled + damping * np.eye(len(scale)), gradient / scale, rcond=1e-13)[0] / scale

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from diagnosis.least_squares import Fit
-from diagnosis.spectra import mains_line, residual_spectra
+from diagnosis.spectra import mains_line, smooth_spectra
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.record import Array, Record
 
@@ -52,7 +52,7 @@ def find_hum(nominal: Fit) -> float | None:
     line = mains_line(nominal)
     if line is None or line.contrast < _CONTRAST:
         return None
-    shown = [spectrum.power(line.parameter) > _RUN_DROP for spectrum in residual_spectra(nominal)]
+    shown = [spectrum.power(line.parameter) > _RUN_DROP for spectrum in smooth_spectra(nominal)]
     return line.parameter if np.mean(shown) >= _RUN_SHARE else None
 
 

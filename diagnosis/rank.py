@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.least_squares import Fit, FitError, fit
-from diagnosis.start import Lead, leads
+from diagnosis.least_squares import Fit, FitError, fit, fit_growing
+from diagnosis.start import Lead, is_gross, leads
 from tunnel_sim.effects import Effect
 
 #: Effects that no deterministic residual fits, or that are read off the record before fitting.
@@ -57,7 +57,7 @@ def rank_singles(
     for kind, starts in _promising(nominal, kinds, _ALWAYS_FITTED):
         if progress is not None:
             progress(kind.name)
-        best = _best_fit(starts[: _STARTS.get(kind.name, 1)], nominal)
+        best = _best_fit(_tried(kind, starts, nominal), nominal)
         if best is not None:
             found.append(Hypothesis((kind.name,), best))
     return sorted(found, key=lambda h: h.fit.total)
@@ -82,7 +82,7 @@ def rank_pairs(
         for kind, starts in _promising(single.fit, others, 0)[:_SECONDS]:
             if progress is not None:
                 progress(f"{single.effects[0]} + {kind.name}")
-            best = _best_fit(starts[: _STARTS.get(kind.name, 1)], single.fit)
+            best = _best_fit(_tried(kind, starts, single.fit), single.fit)
             if best is None:
                 continue
             pair = Hypothesis((*single.effects, kind.name), best)
@@ -100,11 +100,21 @@ def _promising(
     return [item for i, item in enumerate(scored) if i < always or item[1][0].promise > limit]
 
 
+def _tried(kind: type[Effect], starts: Sequence[Lead], base: Fit) -> Sequence[Lead]:
+    return starts if is_gross(base) else starts[: _STARTS.get(kind.name, 1)]
+
+
 def _best_fit(starts: Sequence[Lead], base: Fit) -> Fit | None:
     best: Fit | None = None
+    if is_gross(base):
+        # linear promise means nothing there: the balance of moments goes first
+        starts = sorted(starts, key=lambda lead: not lead.balanced)[:2]
     for lead in starts:
         try:
-            found = fit(lead.problem, lead.point, base=base)
+            if is_gross(base):
+                found = fit_growing(lead.problem, lead.point)
+            else:
+                found = fit(lead.problem, lead.point, base=base)
         except (FitError, np.linalg.LinAlgError):
             continue
         if np.isfinite(found.total) and (best is None or found.total < best.total):

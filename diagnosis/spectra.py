@@ -98,14 +98,14 @@ def mains_line(fit: Fit) -> Line | None:
     data = fit.problem.data
     if any(1.0 / run.interval < 130.0 for run in data.runs):
         return None
-    spectra = residual_spectra(fit)
+    spectra = smooth_spectra(fit)
     grid = np.arange(49.5, 50.5, 0.005)
     total = np.sum([s.power(grid) for s in spectra], axis=0)
     best = float(grid[np.argmax(total)])
     beside = np.concatenate(
         [np.arange(best - 4.0, best - 0.6, 0.02), np.arange(best + 0.6, best + 4.0, 0.02)]
     )
-    floor = float(np.max(np.sum([_smooth(s).power(beside) for s in spectra], axis=0)))
+    floor = float(np.max(np.sum([s.power(beside) for s in spectra], axis=0)))
     drop = float(total.max())
     gain = [_block_gain(best, run.interval, run.block) for run in data.runs]
     scale = [np.sqrt(run.noise_variance) / g for run, g in zip(data.runs, gain, strict=True)]
@@ -115,6 +115,11 @@ def mains_line(fit: Fit) -> Line | None:
     # transform is of cos − i sin: a sine a sin(ωt + φ) gives a exp(i(φ − π/2))
     phases = np.array([float(np.angle(s.at(best))) + np.pi / 2 for s in spectra])
     return Line(best, drop, drop / max(floor, 1e-9), amplitude, phases, len(spectra))
+
+
+def smooth_spectra(fit: Fit) -> list[Spectrum]:
+    """`residual_spectra` with a Hann window, whose leakage from the motion does not reach the mains."""
+    return [_smooth(spectrum) for spectrum in residual_spectra(fit)]
 
 
 def _smooth(spectrum: Spectrum) -> Spectrum:

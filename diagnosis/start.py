@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.data import Data, RunData
-from diagnosis.least_squares import Fit, normal_equations
+from diagnosis.equation_error import equation_error_start
+from diagnosis.least_squares import Fit, clip, normal_equations, scaled_residuals
 from diagnosis.problem import Point, Problem
 from diagnosis.spectra import Line, mains_line, shedding_line
 from tunnel_sim.effects import Effect
 from tunnel_sim.record import Array
 
+_GROSS = 0.01  # share of the reading's power
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
@@ -74,11 +76,13 @@ class Lead:
         problem: the fit with the effect added.
         point: where to start.
         promise: drop of χ² by linear theory.
+        balanced: whether the point comes from the balance of moments.
     """
 
     problem: Problem
     point: Point
     promise: float
+    balanced: bool = False
 
 
 def leads(base: Fit, kind: type[Effect]) -> list[Lead]:
@@ -98,7 +102,38 @@ def leads(base: Fit, kind: type[Effect]) -> list[Lead]:
         line = mains_line(base) if kind.name == "mains_hum" else shedding_line(base)
         return [] if line is None else [_line_lead(base, kind, line)]
     found = [_lead(base, kind, trial) for trial in _trials(data, kind)]
+    if is_gross(base):
+        found.append(_balance_lead(base, kind))
     return sorted((lead for lead in found if lead is not None), key=lambda lead: -lead.promise)
+
+
+def is_gross(fit: Fit) -> bool:
+    """Whether a fit misses the motion itself, so that its sensitivities say little.
+
+    Args:
+        fit: any fit.
+
+    Returns:
+        True where the residual holds more than a hundredth of the reading's power.
+    """
+    readings = sum(
+        float(np.sum((r.reading - np.mean(r.reading)) ** 2 / r.noise_variance)) for r in fit.problem.data.runs
+    )
+    return fit.total > _GROSS * readings
+
+
+def _balance_lead(base: Fit, kind: type[Effect]) -> Lead | None:
+    # where gravity is most of the stiffness, its rest angle and the sensor's zero are one
+    fixed = dict(base.problem.fixed) | (
+        {"gravity_stiffness.rest_angle": 0.0} if kind.name == "gravity_stiffness" else {}
+    )
+    problem = Problem(base.problem.data, (*base.problem.effects, kind), tuple(fixed.items()))
+    point = equation_error_start(problem)
+    if point is None:
+        return None
+    point = clip(problem, point)
+    total = sum(float(r @ r) for r in scaled_residuals(problem, point))
+    return Lead(problem, point, base.total - total, balanced=True) if np.isfinite(total) else None
 
 
 def _line_lead(base: Fit, kind: type[Effect], line: Line) -> Lead:

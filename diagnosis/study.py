@@ -10,15 +10,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from diagnosis.buffeting import BuffetingAnswer, weigh_buffeting
-from diagnosis.data import Data, prepare
-from diagnosis.decide import Weighed, weigh
+from diagnosis.data import Data, prepare, without_start
+from diagnosis.decide import Weighed, form_floor, weigh
 from diagnosis.gap import GapTest, test_gap
 from diagnosis.least_squares import Fit, FitError, fit
 from diagnosis.mains import Hum, find_hum, refine_frequency, remove_hum
 from diagnosis.noise import Noise, NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.problem import Problem
 from diagnosis.rank import NOT_FITTED, Hypothesis, rank_pairs, rank_singles
-from diagnosis.start import nominal_start
+from diagnosis.start import is_gross, nominal_start
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.errors import TunnelError
@@ -27,8 +27,6 @@ Progress = Callable[[str], None]
 
 #: A reading's step beyond this multiple of the stated resolution is coarser than stated.
 COARSER = 1.5
-#: A single effect that leaves less than this share needs no second one looked for.
-_CLOSED = 0.01
 #: Power that a coarse step's error may leave outside the noise floor, in step²/12 (at most all of it, and chance).
 _STEP_POWER = 1.2
 #: Share of a hum's power that may be left once the line and its harmonics are out.
@@ -49,6 +47,7 @@ class Study:
         hum: taken out, or None.
         nominal: the nominal fit.
         test: of the gap, hum taken out.
+        started_late: whether the runs' starts were left out, because the nominal model misses the motion grossly.
         hypotheses: fitted effects and pairs.
         weighed: answers with probabilities; empty where there is no gap.
         buffeting: the random moment weighed, or None.
@@ -64,6 +63,7 @@ class Study:
     hum: Hum | None
     nominal: Fit
     test: GapTest
+    started_late: bool = False
     hypotheses: tuple[Hypothesis, ...] = ()
     weighed: tuple[Weighed, ...] = ()
     buffeting: BuffetingAnswer | None = None
@@ -124,8 +124,13 @@ def study(
             cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
             noise = campaign_noise(cleaned)
             nominal = fit_nominal(prepare(cleaned, noise.variance))
+        started_late = is_gross(nominal)
+        if started_late:
+            nominal = fit_nominal(without_start(nominal.problem.data))
         test = test_gap(nominal, noise, trend, coarse_step=coarse)
-    found = Study(campaign, cleaned, noise, trend, step, coarse, hum, nominal, test, seconds=clock.seconds)
+    found = Study(
+        campaign, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late, seconds=clock.seconds
+    )
     return _weigh_effects(found, kinds, clock) if test.detected else found
 
 
@@ -156,7 +161,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     with clock.step("single effects"):
         singles = rank_singles(nominal, fitted_kinds, clock.progress)
     pairs: list[Hypothesis] = []
-    if singles and _share(singles[0].fit, nominal) > _CLOSED:
+    if singles and _share(singles[0].fit, nominal) > form_floor(nominal.excess):
         with clock.step("pairs"):
             pairs = rank_pairs(singles, fitted_kinds, clock.progress)
     hypotheses = [*singles, *pairs]
@@ -168,14 +173,14 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
         if buffeting is not None:
             shares.append((buffeting.effects, buffeting.share))
     chance = float(np.sqrt(2.0 / nominal.count)) / max(nominal.excess, 1e-3)
-    weighed = weigh(shares, chance)
+    weighed = weigh(shares, chance, nominal.excess)
     if weighed[0].effects == ("unknown",) and _read_off_explains(found):
         weighed = []  # what is left belongs to the cause read off the records
     elif found.test.noisy and nominal.excess < _share_of_noise(found):
         weighed = [Weighed(("unknown",), 1.0, 1.0), *(Weighed(w.effects, w.share, 0.0) for w in weighed)]
     return Study(
         found.campaign, found.cleaned, found.noise, found.trend, found.step, found.coarse, found.hum, nominal,
-        found.test, tuple(hypotheses), tuple(weighed), buffeting, clock.seconds,
+        found.test, found.started_late, tuple(hypotheses), tuple(weighed), buffeting, clock.seconds,
     )  # fmt: skip
 
 

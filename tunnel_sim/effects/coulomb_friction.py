@@ -28,7 +28,7 @@ class CoulombFriction(Effect):
     )
     references = ("Feeny & Liang, J. Sound Vib. 195 (1996) 149, doi 10.1006/jsvi.1996.0411",)
 
-    friction_moment: float = parameter("Tc", "N m", "moment of friction", scale=0.004, lower=0.0, upper=1.0)
+    friction_moment: float = parameter("Tc", "N m", "moment of friction", scale=0.004, lower=0.0, upper=1e4)
 
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Set the moment law's term."""

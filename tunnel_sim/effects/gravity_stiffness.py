@@ -30,7 +30,7 @@ class GravityStiffness(Effect):
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
 
     stiffness: float = parameter(
-        "Kg", "N m/rad", "greatest restoring moment", scale=0.3, lower=-20.0, upper=20.0
+        "Kg", "N m/rad", "greatest restoring moment", scale=0.3, lower=-1e5, upper=1e5
     )
     rest_angle: float = parameter(
         "βg", "rad", "angle at which gravity is in balance", scale=0.1, lower=-3.2, upper=3.2

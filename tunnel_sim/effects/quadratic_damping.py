@@ -26,7 +26,7 @@ class QuadraticDamping(Effect):
     references = ("ITTC Recommended Procedure 7.5-02-07-04.5, roll damping of ships: B1 p + B2 |p| p",)
 
     coefficient: float = parameter(
-        "C2", "N m s2/rad2", "coefficient of the squared rate", scale=0.002, lower=-1.0, upper=1.0
+        "C2", "N m s2/rad2", "coefficient of the squared rate", scale=0.002, lower=-1e4, upper=1e4
     )
 
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
