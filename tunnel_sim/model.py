@@ -12,6 +12,7 @@ from math import pi
 import mujoco
 import numpy as np
 
+from tunnel_sim import scenery
 from tunnel_sim.davis import davis_vertices
 from tunnel_sim.errors import TunnelError, did_you_mean
 from tunnel_sim.plugin import load_plugin
@@ -20,7 +21,6 @@ from tunnel_sim.rig import Rig
 from tunnel_sim.run_settings import RunSettings
 
 _FASTEST_TURN = 2.5  # rad of the rod's own oscillation in one step; RK4 is unstable beyond 2.8
-_WALL = 0.02  # m, drawn thickness of walls
 _SERIES = ("wind_speed", "forcing")
 _NATIVE = frozenset({"spring_stiffness", "mechanical_damping", "yaw_inertia"})  # owned by joint and body
 
@@ -162,27 +162,28 @@ def build_spec(rig: Rig, settings: RunSettings) -> mujoco.MjSpec:
 
 
 def _place_scenery(spec: mujoco.MjSpec, rig: Rig) -> None:
-    section = rig.working_section
-    half_x, half_y = section.length / 2, section.width / 2
-    boxes = {
-        "floor": ((half_x, half_y, _WALL / 2), (0.0, 0.0, -_WALL / 2)),
-        "left_wall": ((half_x, _WALL / 2, section.height / 2), (0.0, half_y, section.height / 2)),
-        "right_wall": ((half_x, _WALL / 2, section.height / 2), (0.0, -half_y, section.height / 2)),
-        "ceiling": ((half_x, half_y, _WALL / 2), (0.0, 0.0, section.height + _WALL / 2)),
-        "support": ((0.16, 0.16, _WALL / 2), (0.0, 0.0, section.height + rig.rod.length_above_ceiling)),
+    section, rod = rig.working_section, rig.rod
+    spring = scenery.coil(
+        2.4 * rod.diameter, rod.diameter / 4, section.height + 0.25 * rod.length_above_ceiling,
+        section.height + 0.9 * rod.length_above_ceiling, turns=7,
+    )  # fmt: skip
+    pieces = {
+        "floor": scenery.floor(section),
+        "glass": scenery.glass(section),
+        "frame": scenery.frame(rig),
+        "marks": scenery.marks(rig),
+        "spring": spring,
     }
-    for name, (size, pos) in boxes.items():
-        spec.geom(name).size, spec.geom(name).pos = size, pos
-    spring = spec.geom("spring")
-    spring.size = (2.2 * rig.rod.diameter, rig.rod.length_above_ceiling / 4, 0.0)
-    spring.pos = (0.0, 0.0, section.height + 0.55 * rig.rod.length_above_ceiling)
-    spec.body("view_centre").pos = (0.0, 0.0, 0.42 * section.height)
+    for name, piece in pieces.items():
+        mesh = spec.mesh(name)
+        mesh.uservert, mesh.userface = piece.vertices.ravel(), piece.faces.ravel()
+    spec.body("view_centre").pos = (0.0, 0.0, 0.45 * section.height)
 
 
 def _place_rig(spec: mujoco.MjSpec, rig: Rig) -> None:
     body = rig.body
     centre = body.ground_clearance + body.height / 2
-    top = rig.working_section.height + rig.rod.length_above_ceiling
+    top = rig.working_section.height + 1.2 * rig.rod.length_above_ceiling  # the pointer turns above the yoke
     spec.body("davis").pos = (0.0, 0.0, centre)
     spec.site("nose").pos = (body.length / 2, 0.0, 0.0)
     spec.mesh("davis_body").uservert = davis_vertices(body).ravel()
@@ -191,7 +192,7 @@ def _place_rig(spec: mujoco.MjSpec, rig: Rig) -> None:
     rod.pos = (0.0, 0.0, (top + centre) / 2)
     pointer = spec.geom("pointer")
     pointer.size = (0.07, rig.rod.diameter / 5, rig.rod.diameter / 5)
-    pointer.pos = (0.07, 0.0, top + 2 * _WALL)
+    pointer.pos = (0.07, 0.0, top)
 
 
 def _set_dynamics(spec: mujoco.MjSpec, rig: Rig, settings: RunSettings) -> None:
