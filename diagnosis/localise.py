@@ -19,7 +19,7 @@ from diagnosis.verdict import plain
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 
-_CARRIED = 0.9  # of the significant excess, by the runs that are named
+_LITTLE = 0.1  # of the largest excess: runs with less are not named
 _NAMES = frozenset(kind.name for kind in ALL_EFFECTS)
 
 
@@ -64,20 +64,13 @@ def telling_runs(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
         fit: of the nominal model.
 
     Returns:
-        Of the runs beyond chance (false-alarm rate 1 % over all of them) the fewest that carry nine tenths of
-        these runs' excess, in the campaign's order.
+        Those beyond chance (false-alarm rate 1 % over all of them) that have a tenth or more of the largest
+        excess among them, in the campaign's order.
     """
     excesses = run_excesses(campaign, fit)
-    clear = [run for run in excesses if run.p_value() * len(excesses) < FALSE_ALARM_RATE]
-    energy = {run.id: max(float(run.power.sum()) - run.power.size, 0.0) for run in clear}
-    wanted, carried = _CARRIED * sum(energy.values()), 0.0
-    named: set[str] = set()
-    for name in sorted(energy, key=lambda key: -energy[key]):
-        if named and carried >= wanted:
-            break
-        named.add(name)
-        carried += energy[name]
-    return tuple(run.id for run in excesses if run.id in named)
+    clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < FALSE_ALARM_RATE}
+    least = _LITTLE * max(clear.values(), default=0.0)
+    return tuple(name for name, excess in clear.items() if excess > least)
 
 
 def _as_measured(campaign: Campaign, nominal: Fit, causes: tuple[str, ...]) -> tuple[Fit, float]:

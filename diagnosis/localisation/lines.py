@@ -15,6 +15,7 @@ _CONTRAST = 8.0  # a line is this many times the median around it; a resonance's
 _HARMONIC = 0.2  # of the run's frequency: nearer to a harmonic it is the motion's own
 _OWN = 0.4  # likewise of the motion itself, whose frequency may drift
 _LOWEST = 0.5  # of the run's frequency: below, drifts look like lines
+_APART = 0.5  # of the run's frequency, between two lines: nearer, it is the same line's skirt
 _PER_RUN = 2
 
 
@@ -62,7 +63,7 @@ def _lines(run: RunExcess, noise_std: float, runs: int) -> list[ResidualLine]:
         unlikely = runs * run.power.size * chance(float(local[index]), _WIDTH, run.relative)
         if unlikely > FALSE_ALARM_RATE or len(found) == _PER_RUN:
             break
-        near = any(abs(line.frequency - run.frequency[index]) < 0.1 * run.resonance for line in found)
+        near = any(abs(line.frequency - run.frequency[index]) < _APART * run.resonance for line in found)
         if not open_to[index] or near or local[index] < _CONTRAST * _around(local, index):
             continue
         whole = max(float(run.power.sum()) - run.power.size, excess)

@@ -1,0 +1,79 @@
+"""Small campaigns with a known gap, from the forward integrator: a few milliseconds each."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from diagnosis.data import Data, RunData, prepare
+from diagnosis.least_squares import Fit, fit
+from diagnosis.noise import campaign_noise
+from diagnosis.problem import Point, Problem
+from diagnosis.start import nominal_start
+from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.effects import Effect
+from tunnel_sim.record import Array, Record
+
+INTERVAL = 4e-3
+DURATION = 10.0
+NOISE = 4e-4
+CONDITIONS = tuple((spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
+INERTIA, DAMPING, CN_BETA, CN_R = 0.11, 0.008, 0.45, -0.25
+
+
+def campaign(effect: Effect | None = None, *, added: Array | None = None, seed: int = 3) -> Campaign:
+    """Six runs of two springs and three speeds, one effect, and something added to every reading."""
+    count = round(DURATION / INTERVAL)
+    runs = tuple(
+        RunData(
+            f"r{i + 1}", np.zeros(count), 1, INTERVAL, NOISE**2, spring, speed, 1.2 * (speed > 0), DURATION
+        )
+        for i, (spring, speed) in enumerate(CONDITIONS)
+    )
+    problem = Problem(
+        Data(runs, 0.036, 0.625, 0.225, False, INERTIA), () if effect is None else (type(effect),)
+    )
+    values = [] if effect is None else [getattr(effect, info.name) for info in effect.parameters()]
+    common = np.array([INERTIA, DAMPING, CN_BETA, CN_R, 0.001, *values])
+    release = np.array([[0.35, 0.0]] * len(runs))
+    rng = np.random.default_rng(seed)
+    time = INTERVAL * np.arange(count)
+    readings = problem.predict([Point(common, release)])[0]
+    return Campaign(
+        "small",
+        RigProperties(INERTIA, 0.036, 0.625, 0.225),
+        SensorProperties(1.0 / INTERVAL, None, NOISE),
+        tuple(
+            Run(
+                run.id,
+                Record(time, values + (0.0 if added is None else added) + rng.normal(0.0, NOISE, count)),
+                run.wind_speed,
+                run.spring_stiffness,
+                run.air_density or None,
+                0.35,
+            )
+            for run, values in zip(runs, readings, strict=True)
+        ),
+    )
+
+
+def with_blow(data: Campaign, impulse: float, when: float) -> Campaign:
+    """The same campaign with a blow to every run: exact, since the nominal model is linear."""
+    area = 0.5 * 1.2 * 0.036 * 0.625
+    runs = []
+    for run in data.runs:
+        assert run.spring_stiffness is not None
+        stiffness = run.spring_stiffness - area * run.wind_speed**2 * CN_BETA
+        decay = 0.5 * (DAMPING - area * 0.625 * run.wind_speed * CN_R) / INERTIA
+        omega = np.sqrt(stiffness / INERTIA - decay**2)
+        since = np.maximum(run.record.time_s - when, 0.0)
+        swing = impulse / (INERTIA * omega) * np.exp(-decay * since) * np.sin(omega * since)
+        runs.append(dataclasses.replace(run, record=Record(run.record.time_s, run.record.yaw_rad + swing)))
+    return dataclasses.replace(data, runs=tuple(runs))
+
+
+def nominal(data: Campaign) -> Fit:
+    """The nominal model fitted."""
+    prepared = prepare(data, campaign_noise(data).variance)
+    return fit(Problem(prepared), nominal_start(prepared))

@@ -1,0 +1,191 @@
+"""Where the gap is: on campaigns whose gap was put in one place, the place is found."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from diagnosis.least_squares import fit
+from diagnosis.localisation.backbone import backbones, drift
+from diagnosis.localisation.excess import RunExcess, run_excesses, shortest_interval
+from diagnosis.localisation.phase_plane import apparent_moment
+from diagnosis.localise import localise, telling_runs
+from diagnosis.problem import Problem
+from diagnosis.spectra import linear_coefficients
+from diagnosis.start import leads
+from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, nominal, with_blow
+from tunnel_sim.effects import effect_class, effect_from
+
+UNKNOWN = ("unknown",)
+
+
+def test_a_gap_that_needs_wind_is_found_in_the_wind_on_runs():
+    data = campaign(effect_from("nonlinear_yaw_moment", {"coefficient": -1.0}))
+    where, maps = localise(data, nominal(data), None, UNKNOWN)
+    assert where.condition == "wind_on"
+    assert where.channel == "stiffness"
+    # how much of the misfit the joint fit moves to wind-off runs is its own affair: the strong ones are windy
+    assert {"r3", "r6"} <= set(where.runs)
+    groups = {group.label: group.excess for group in maps.groups if group.by == "wind"}
+    assert groups["on"] > 5.0 * groups["off"]
+    assert "only with the wind on" in where.words
+
+
+def test_a_mechanical_gap_shows_with_the_wind_off():
+    data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
+    where, _ = localise(data, nominal(data), None, UNKNOWN)
+    assert (where.channel, where.condition) == ("damping", "always")
+
+
+def test_a_known_cause_gives_channel_and_condition():
+    data = campaign(effect_from("wind_speed_offset", {"offset": 0.6}))
+    where, _ = localise(data, nominal(data), None, ("wind_speed_offset",))
+    kind = effect_class("wind_speed_offset")
+    assert (where.channel, where.condition) == (kind.channel, kind.condition)
+
+
+def test_of_two_causes_the_one_that_closes_more_is_named():
+    strong = effect_from("quadratic_damping", {"coefficient": 0.01})
+    drift_too = 4e-4 * np.linspace(0.0, 1.0, round(DURATION / INTERVAL))
+    data = campaign(strong, added=drift_too)
+    base = nominal(data)
+    best = base
+    for name in ("quadratic_damping", "sensor_drift"):
+        lead = leads(best, effect_class(name))[0]
+        best = fit(lead.problem, lead.point, base=best)
+    for causes in (("quadratic_damping", "sensor_drift"), ("sensor_drift", "quadratic_damping")):
+        where, _ = localise(data, base, best, causes)
+        assert where.channel == "damping"
+
+
+def test_a_blow_is_found_in_time():
+    data = with_blow(campaign(), 0.02, 5.5)
+    where, _ = localise(data, nominal(data), None, UNKNOWN)
+    assert where.channel == "forcing"
+    assert where.time_s is not None
+    assert where.time_s[0] <= 5.5 <= where.time_s[1]
+    assert where.time_s[1] - where.time_s[0] < 0.1 * DURATION
+
+
+def test_a_drift_is_found_below_the_oscillation():
+    data = campaign(added=0.004 * np.linspace(0.0, 1.0, round(DURATION / INTERVAL)))
+    where, maps = localise(data, nominal(data), None, UNKNOWN)
+    assert (where.channel, where.condition) == ("sensor", "always")
+    assert where.frequency_hz is not None
+    assert where.frequency_hz[1] < 0.5 * maps.resonance[0]
+
+
+def test_hum_in_the_records_is_found_though_the_fit_had_it_taken_out():
+    clean = campaign()
+    hum = 5e-4 * np.sin(2.0 * np.pi * 50.0 * INTERVAL * np.arange(round(DURATION / INTERVAL)))
+    where, maps = localise(campaign(added=hum), nominal(clean), None, ("mains_hum",))
+    assert where.channel == "sensor"
+    assert where.frequency_hz is not None
+    assert where.frequency_hz[0] < 50.0 < where.frequency_hz[1]
+    assert where.frequency_hz[1] - where.frequency_hz[0] < 1.0
+    assert {line.run for line in maps.lines} == {run.id for run in clean.runs}
+    for line in maps.lines:
+        assert line.frequency == pytest.approx(50.0, abs=0.1)
+        assert line.amplitude == pytest.approx(5e-4, rel=0.2)
+
+
+def test_no_cause_gives_no_place():
+    data = campaign()
+    where, maps = localise(data, nominal(data), None, ())
+    assert (where.channel, where.condition, where.runs) == (None, None, ())
+    assert (where.time_s, where.amplitude_rad, where.frequency_hz) == (None, None, None)
+    assert where.words.startswith("Nowhere")
+    assert maps.lines == ()
+
+
+def test_maps_are_small_and_plain_json():
+    data = campaign(effect_from("coulomb_friction", {"friction_moment": 0.003}))
+    _, maps = localise(data, nominal(data), None, ("coulomb_friction",))
+    text = json.dumps(maps.to_json_dict(), allow_nan=False)
+    assert len(text) < 100_000
+    assert len(json.loads(text)["time"]["by_run"]) == len(data.runs)
+
+
+def test_runs_are_named_by_chance_no_oftener_than_stated():
+    rng = np.random.default_rng(11)
+    frequency = np.arange(600) / 12.0
+    trials = 1500
+    alarms = sum(
+        RunExcess("r", frequency, rng.chisquare(1.0, 600), 2.0, 0.0, 0.0).p_value() < 0.05
+        for _ in range(trials)
+    )
+    assert alarms <= binom.ppf(0.9999, trials, 0.05)
+    # a gap that is there is seen: twice the noise power in one band
+    power = rng.chisquare(1.0, 600)
+    power[(frequency > 1.0) & (frequency < 3.0)] *= 3.0
+    assert RunExcess("r", frequency, power, 2.0, 0.0, 0.0).p_value() < 1e-3
+
+
+def test_gap_free_runs_are_not_named():
+    named = 0
+    for seed in range(8):
+        data = campaign(seed=100 + seed)
+        named += bool(telling_runs(data, nominal(data)))
+    assert named <= binom.ppf(0.9999, 8, 0.01)
+
+
+def test_excess_keeps_the_sum_of_squares():
+    data = campaign(effect_from("cubic_stiffness", {"coefficient": 0.05}))
+    found = nominal(data)
+    for run, residual in zip(run_excesses(data, found), found.residuals, strict=True):
+        assert run.power.sum() == pytest.approx(residual @ residual, rel=1e-12)
+
+
+def test_shortest_interval_holds_its_share():
+    edges = np.linspace(0.0, 10.0, 11)
+    energy = np.array([0.0, 1.0, 0.0, 8.0, 8.0, 1.0, -0.5, 0.5, 1.0, 1.0])
+    assert shortest_interval(edges, energy, 0.8) == (3.0, 5.0)
+    assert shortest_interval(edges, energy, 1.0) == (1.0, 10.0)
+    assert shortest_interval(edges, -energy, 0.8) is None
+
+
+def test_the_apparent_moment_gives_a_moment_back():
+    found = nominal(campaign())
+    index, amplitude = 1, 0.01
+    inertia, damping, stiffness = linear_coefficients(found, index)
+    run = found.problem.data.runs[index]
+    for ratio in (0.5, 1.0, 1.5):
+        omega = ratio * np.sqrt(stiffness / inertia)
+        time = run.interval * np.arange(run.reading.size)
+        gain = 1.0 / (stiffness - inertia * omega**2 + 1j * omega * damping)
+        response = amplitude * (gain * np.exp(1j * omega * time)).real / np.sqrt(run.noise_variance)
+        planted = dataclasses.replace(
+            found, residuals=[response if i == index else r for i, r in enumerate(found.residuals)]
+        )
+        moment = apparent_moment(planted, index)
+        assert moment is not None
+        inner = slice(moment.start, moment.start + moment.moment.size)
+        expected = amplitude * np.cos(omega * time)[inner]
+        # the smoothing is exact at resonance and fades away from it
+        assert np.max(np.abs(moment.moment - expected)) < (0.02 if ratio == 1.0 else 0.25) * amplitude
+
+
+def test_backbones_are_level_for_a_linear_rig_and_bend_for_friction():
+    level = backbones(nominal(campaign()))
+    assert all(curve.time.size >= 4 for curve in level)
+    count = sum(curve.time.size - 1 for curve in level)
+    assert max(np.abs(drift(level))) < 6.0 * np.sqrt(2.0 * count)
+    data = campaign(effect_from("coulomb_friction", {"friction_moment": 0.004}))
+    bent = backbones(nominal(data))
+    frequency, damping = drift(bent)
+    assert damping > 20.0 * max(frequency, 1.0)
+    first = bent[0]
+    assert np.all(np.diff(first.amplitude) < 0.0)
+    assert first.zeta[-1] > first.zeta[0]
+
+
+def test_the_fit_itself_is_left_alone():
+    data = campaign(effect_from("cubic_stiffness", {"coefficient": 0.05}))
+    found = nominal(data)
+    before = [r.copy() for r in found.residuals]
+    localise(data, found, None, UNKNOWN)
+    assert isinstance(found.problem, Problem)
+    for old, new in zip(before, found.residuals, strict=True):
+        np.testing.assert_array_equal(old, new)

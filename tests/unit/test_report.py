@@ -1,0 +1,186 @@
+"""The report says what the document says, needs no other file, and is the same every time."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from diagnosis.least_squares import fit
+from diagnosis.localise import localise
+from diagnosis.result import (
+    Candidate,
+    Coefficients,
+    Diagnosis,
+    GapSummary,
+    NoiseSummary,
+    ParameterEstimate,
+    RunGap,
+)
+from diagnosis.start import leads
+from tests.unit.gap_campaigns import campaign, nominal
+from tunnel_lab.diagnosis_plots import diagnosis_figures, save_diagnosis_figures
+from tunnel_lab.report import render_report, write_report
+from tunnel_lab.report.page import DESCRIPTIONS
+from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.errors import TunnelError
+
+CAUSE = "quadratic_damping"
+
+
+@pytest.fixture(scope="module")
+def data():
+    return campaign(effect_from(CAUSE, {"coefficient": 0.003}))
+
+
+@pytest.fixture(scope="module")
+def document(data):
+    base = nominal(data)
+    lead = leads(base, effect_class(CAUSE))[0]
+    best = fit(lead.problem, lead.point, base=base)
+    where, maps = localise(data, base, best, (CAUSE,))
+    ids = [run.id for run in data.runs]
+    excess = [
+        (float(a @ a) / a.size - 1.0, float(b @ b) / b.size - 1.0)
+        for a, b in zip(base.residuals, best.residuals, strict=True)
+    ]
+    after = ParameterEstimate(best.value("cn_r"), best.std("cn_r"), "1/rad")
+    answer = Diagnosis(
+        campaign="<script>alert(1)</script>",
+        causes=(CAUSE,),
+        verdict="The gap comes from quadratic damping & nothing else.",
+        gap=GapSummary(
+            True, base.excess, best.excess, 0.987, tuple(RunGap(i, *e) for i, e in zip(ids, excess, strict=True)),
+            0.01, 1e-9, {"f0": 1e-9},
+        ),
+        where=where,
+        candidates=(
+            Candidate(CAUSE, 0.912, best.excess, 0.987, {"coefficient": ParameterEstimate(0.003, 1e-5, "N m")}),
+            Candidate("coulomb_friction", 0.08, 1.5, 0.5),
+            Candidate("unknown", 0.007, base.excess, 0.0),
+            Candidate("none", 0.001, base.excess, 0.0),
+        ),
+        ambiguous_with=("coulomb_friction",),
+        next_run={"spring_stiffness": 80.0, "wind_speed": 0.0, "release_angle": 0.35, "duration": 30.0},
+        coefficients=Coefficients({"cn_r": ParameterEstimate(-0.31, 0.02, "1/rad")}, {"cn_r": after}, "A note."),
+        noise=NoiseSummary(4e-4, 4e-4, "estimated", "from the records"),
+        blind_spots=("an error of the clock",),
+        seconds={"nominal fit": 0.5},
+    )  # fmt: skip
+    return json.loads(json.dumps(answer.to_json_dict() | {"maps": maps.to_json_dict()}, allow_nan=False))
+
+
+@pytest.fixture(scope="module")
+def page(document, data):
+    return render_report(document, data)
+
+
+class Page(HTMLParser):
+    """Collects ids, outside references and text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.ids, self.references, self.words, self.tags = [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(value)
+            if name in ("src", "href", "xlink:href", "srcset", "data", "action"):
+                self.references.append(value)
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+    @property
+    def text(self):
+        return re.sub(r"\s+", " ", " ".join(self.words))
+
+
+def test_the_verdict_comes_first(page, document):
+    text = Page(page.split("</style>", 1)[1]).text
+    places = [
+        text.index(words)
+        for words in (document["verdict"], document["where"]["words"], "Coefficients before")
+    ]
+    assert places == sorted(places)
+    assert places[0] < text.index("Where the model departs")
+
+
+def test_nothing_is_loaded_from_elsewhere(page):
+    found = Page(page)
+    assert all(value.startswith(("#", "data:image/png;base64,")) for value in found.references)
+    assert "http" not in page.replace("\n", "").lower()
+    assert "@import" not in page
+    assert not re.search(r"url\((?!#)", page)
+    assert not [tag for tag, _ in found.tags if tag in ("script", "link", "iframe", "img", "object")]
+
+
+def test_ids_are_unique_and_references_lead_somewhere(page):
+    found = Page(page)
+    assert len(found.ids) == len(set(found.ids))
+    inside = {value[1:] for value in found.references if value.startswith("#")}
+    inside |= set(re.findall(r"url\(#([^)]+)\)", page))
+    assert inside <= set(found.ids)
+
+
+def test_text_of_the_campaign_cannot_become_markup(page):
+    assert "<script" not in page
+    assert "&lt;script&gt;alert(1)" in page
+
+
+def test_figures_have_words_for_those_who_cannot_see_them(page):
+    pictures = [attrs for tag, attrs in Page(page).tags if tag == "svg"]
+    assert [attrs["aria-label"] for attrs in pictures] == list(DESCRIPTIONS.values())
+    assert all(attrs["role"] == "img" for attrs in pictures)
+    assert page.count("<figcaption>") == len(pictures)
+
+
+def test_numbers_are_those_of_the_document(page, document):
+    text = Page(page).text.replace("\u00a0", " ")
+    assert "91.2 %" in text
+    assert "98.7 %" in text
+    assert "0.003000 ± 0.000010 N m" in text
+    assert "−0.310 ± 0.020" in text
+    for run in document["gap"]["runs"]:
+        shown = f"{run['before']:.3f}" if abs(run["before"]) < 1.0 else f"{run['before']:#.3g}".rstrip(".")
+        assert shown.replace("-", "−") in text
+    assert "an error of the clock" in text
+    assert "Spring stiffness 80.0 N m/rad" in text
+    assert effect_class(CAUSE).signature in text
+
+
+def test_the_same_document_gives_the_same_page(page, document, data):
+    assert render_report(document, data) == page
+
+
+def test_a_document_without_maps_is_rendered_too(document, data, tmp_path):
+    bare = {key: value for key, value in document.items() if key != "maps"}
+    path = write_report(bare, data, tmp_path / "report.html")
+    text = path.read_text("utf-8")
+    assert document["where"]["words"] in Page(text).text
+    assert text.count("<svg") == 3
+
+
+def test_no_gap_is_said_so(document, data):
+    calm = document | {
+        "causes": [], "verdict": "No gap: all is noise.", "ambiguous_with": [], "next_run": None, "maps": None,
+        "where": document["where"] | {"channel": None, "condition": None, "runs": [], "time_s": None},
+    }  # fmt: skip
+    text = Page(render_report(calm, data)).text
+    assert "No gap: all is noise." in text
+    assert "Share closed" not in text
+
+
+def test_a_page_that_cannot_be_written_is_one_line(document, data, tmp_path):
+    with pytest.raises(TunnelError, match="cannot be written"):
+        write_report(document | {"maps": None}, data, tmp_path / "nowhere" / "report.html")
+
+
+def test_figures_for_papers(document, data, tmp_path):
+    written = save_diagnosis_figures(document | {"maps": None}, data, tmp_path / "figures")
+    assert [path.stem for path in written] == ["which", "how-far", "coefficients"]
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in written)
+    assert list(diagnosis_figures(document, data)) == list(DESCRIPTIONS)

@@ -1,0 +1,50 @@
+"""Figures as SVG that can stand inside an HTML page."""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_NOT_HTML = (
+    re.compile(r"^.*?(?=<svg)", re.DOTALL),  # the XML declaration and document type, which name an address
+    re.compile(r"<metadata>.*?</metadata>\s*", re.DOTALL),
+    re.compile(r'\s+xmlns(:\w+)?="[^"]*"'),  # HTML knows SVG's names by itself
+)
+_OPENING = re.compile(r"<svg[^>]*>")
+_SIZE = re.compile(r' (width|height)="[^"]*"')
+_ID = re.compile(r'\bid="([^"]+)"')
+_REFERENCE = re.compile(r'(href="#|url\(#)([^")]+)')
+
+
+def inline_svg(figure: Figure, name: str, description: str) -> str:
+    """A figure as an SVG element.
+
+    Args:
+        figure: drawn by matplotlib; its text stays text, in the page's own fonts.
+        name: unique in the page; every id in the element begins with it.
+        description: what a reader who cannot see it is told.
+
+    Returns:
+        The element, the same to the letter for the same figure, without any address outside the page.
+    """
+    from matplotlib import rc_context
+
+    buffer = io.StringIO()
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": name, "font.family": "sans-serif"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=True)
+    text = buffer.getvalue()
+    for pattern in _NOT_HTML:
+        text = pattern.sub("", text)
+    text = _ID.sub(rf'id="{name}-\1"', text)
+    text = _REFERENCE.sub(rf"\1{name}-\2", text)
+    text = _OPENING.sub(lambda found: _SIZE.sub("", found[0]), text, count=1)
+    label = _escaped(description)
+    return text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
