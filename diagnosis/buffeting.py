@@ -20,6 +20,9 @@ _TIME_LIMIT = 5.5
 _WIND_OFF_SHARE = 0.05
 #: Single effects that a random moment is tried beside.
 _PARTNERS = 3
+#: −2 ln L by which an effect beside the random moment must improve on the moment alone: a parameter fitted by
+#: least squares to a random motion takes some ten of it for nothing.
+_EVIDENCE = 60.0
 #: Where deterministic effects leave less than this, no random moment is needed.
 _CLOSED = 0.08
 
@@ -52,19 +55,18 @@ def weigh_buffeting(
         pairs: fitted pairs.
 
     Returns:
-        The first that passes: innovations white by band and steady in time, wind-off runs without a gap. None
+        The likeliest that passes, alone unless the evidence for an effect beside it is strong. To pass,
+        innovations must be white by band and steady in time, and wind-off runs without a gap. None
         where none passes, or one or two deterministic effects close the gap already.
     """
     if any(max(hypothesis.fit.excess, 0.0) < _CLOSED * nominal.excess for hypothesis in (*singles, *pairs)):
         return None
     alone = _try(nominal, None, nominal)
-    if alone is not None:
-        return alone
-    for single in singles[:_PARTNERS]:
-        answer = _try(single.fit, single, nominal)
-        if answer is not None:
-            return answer
-    return None
+    beside = [a for single in singles[:_PARTNERS] if (a := _try(single.fit, single, nominal)) is not None]
+    best = min(beside, key=lambda a: a.process.cost, default=None)
+    if alone is None or (best is not None and best.process.cost < alone.process.cost - _EVIDENCE):
+        return best
+    return alone
 
 
 def _try(fit: Fit, beside: Hypothesis | None, nominal: Fit) -> BuffetingAnswer | None:

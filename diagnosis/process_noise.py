@@ -29,6 +29,7 @@ class ProcessNoise:
         intensity: standard deviation of the moment coefficient.
         bandwidth: corner frequency of its spectrum, Hz.
         drop: of −2 ln L against white measurement noise alone, wind-on runs.
+        cost: −2 ln L without constants, wind-on runs.
         white_excess: mean squared scaled residual minus one of the same samples, without the moment.
         excess: likewise of the scaled innovations.
         innovations: scaled, by wind-on run.
@@ -39,6 +40,7 @@ class ProcessNoise:
     intensity: float
     bandwidth: float
     drop: float
+    cost: float
     white_excess: float
     excess: float
     innovations: list[Array]
@@ -93,6 +95,7 @@ def fit_process_noise(fit: Fit) -> ProcessNoise | None:
         intensity,
         bandwidth,
         white - float(found.fun),
+        float(found.fun),
         sum(float(np.sum(c.residual[k:] ** 2)) / c.variance for c, k in zip(channels, skip, strict=True))
         / count
         - 1.0,
