@@ -13,7 +13,7 @@ from typing import Annotated, cast
 
 import typer
 
-from tunnel_lab.commands import demo, effects, identify, plot, simulate, springs
+from tunnel_lab.commands import blind, demo, diagnose, effects, identify, plot, simulate, springs
 from tunnel_sim.errors import TunnelError
 
 BAD_INPUT = 2
@@ -47,7 +47,7 @@ def tunnel(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
     ] = False,
 ) -> None:
-    """A virtual wind tunnel: simulate free-decay runs of a yawing model, identify real ones.
+    """A virtual wind tunnel: simulate free-decay runs of a yawing model, identify and diagnose real ones.
 
     A model on a vertical rod and a spring is released at a yaw angle. The
     swings that follow, with the wind off and on, give its yaw-moment derivatives
@@ -59,8 +59,10 @@ def tunnel(
       tunnel springs                     the paper's spring table, its inertia
       tunnel simulate plan.toml --out c  a campaign of your own, into folder c
       tunnel identify c --json est.json  its coefficients; measured ones alike
+      tunnel diagnose c                  why the model departs from it
       tunnel plot c                      its figures
       tunnel effects                     what a plan may add to the model
+      tunnel blind                       checks of the diagnosis, truth sealed
 
     [bold]Units[/bold]
       SI and radians throughout.
@@ -74,8 +76,9 @@ def tunnel(
         typer.echo(context.get_help())
 
 
-for _command in (demo, simulate, identify, plot, springs, effects):
+for _command in (demo, simulate, identify, diagnose, plot, springs, effects):
     app.command(_command.NAME)(_command.run)
+app.add_typer(blind.app, name=blind.NAME)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

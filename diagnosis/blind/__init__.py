@@ -1,0 +1,11 @@
+"""Blind checks: campaigns whose truth lies in a sealed key, answers that are hashed, and their score.
+
+`make_blind` draws campaigns with the reference simulator (another integrator and other forms of the effects than
+the fits use), `answer_set` diagnoses them without the key, `score_set` checks all hashes, opens the key and counts.
+"""
+
+from diagnosis.blind.answer import answer_set, answers_folder
+from diagnosis.blind.make import make_blind
+from diagnosis.blind.score import Score, score_set
+
+__all__ = ["Score", "answer_set", "answers_folder", "make_blind", "score_set"]

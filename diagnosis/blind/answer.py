@@ -1,0 +1,144 @@
+"""Answers a blind set, one file for each campaign, without opening the key."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from diagnosis.blind.files import (
+    SCHEMA_VERSION,
+    SEAL,
+    campaign_folders,
+    file_hash,
+    folder_hash,
+    read_document,
+    write_document,
+)
+from diagnosis.diagnose import diagnose, vocabulary
+from tunnel_sim.campaign_io import read_campaign
+from tunnel_sim.errors import TunnelError
+
+Told = Callable[[int, int, str], None]
+
+
+def answers_folder(folder: Path, excluded: Sequence[str] = ()) -> Path:
+    """Where the answers to a set go.
+
+    Args:
+        folder: of the set.
+        excluded: effects withheld from the vocabulary.
+
+    Returns:
+        ``answers`` inside the set, or ``answers-without-…``.
+    """
+    return folder / "-".join(["answers", *(["without", *sorted(set(excluded))] if excluded else [])])
+
+
+def answer_set(
+    folder: Path, *, excluded: Sequence[str] = (), jobs: int = 1, progress: Told | None = None
+) -> str:
+    """Diagnose every campaign of a set that has no answer yet.
+
+    An interrupted run leaves whole answers only, and the next one goes on from there. A campaign that cannot be
+    diagnosed gets an answer that says why; it counts as wrong.
+
+    Args:
+        folder: of the set.
+        excluded: effects withheld from the vocabulary.
+        jobs: number of processes.
+        progress: told campaigns answered, their number, and the last one's name.
+
+    Returns:
+        SHA-256 over all answers, in hexadecimal: publish it before the key is opened.
+
+    Raises:
+        TunnelError: when the set holds no campaign, an effect is unknown, or an answer was changed afterwards.
+    """
+    campaigns = campaign_folders(folder)
+    vocabulary(exclude=excluded)
+    target = answers_folder(folder, excluded)
+    target.mkdir(exist_ok=True)
+    hashes = _answered(target)
+    names = {path.name for path in campaigns}
+    left = [path for path in campaigns if path.name not in hashes]
+    if progress is not None:
+        progress(len(names & hashes.keys()), len(campaigns), "")
+    for name, answer in _answers(left, sorted(set(excluded)), jobs):
+        hashes[name] = write_document(target / f"{name}.json", answer)
+        _write_seal(target, hashes, excluded)
+        if progress is not None:
+            progress(len(names & hashes.keys()), len(campaigns), name)
+    return file_hash(target / SEAL)
+
+
+def _answered(target: Path) -> dict[str, str]:
+    """Hashes of the answers there are, after a look at their files."""
+    if not (target / SEAL).exists():
+        return {}
+    hashes: dict[str, str] = read_document(target / SEAL, "remove the folder and answer again")[
+        "answers_sha256"
+    ]
+    for name, known in hashes.items():
+        path = target / f"{name}.json"
+        if not path.exists() or file_hash(path) != known:
+            raise TunnelError(
+                "is not the answer that was given",
+                where=str(path),
+                remedy=f"remove {target} and answer all campaigns again",
+            )
+    return hashes
+
+
+def _write_seal(target: Path, hashes: dict[str, str], excluded: Sequence[str]) -> None:
+    document = {
+        "schema_version": SCHEMA_VERSION,
+        "excluded": sorted(set(excluded)),
+        "answers_sha256": dict(sorted(hashes.items())),
+    }
+    write_document(target / SEAL, document)
+
+
+def _answers(
+    campaigns: Sequence[Path], excluded: Sequence[str], jobs: int
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name and answer of each campaign, as they come."""
+    work = partial(answer_campaign, excluded=tuple(excluded))
+    if jobs <= 1 or len(campaigns) <= 1:
+        yield from map(work, campaigns)
+        return
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(min(jobs, len(campaigns)), initializer=_ignore_interrupt) as pool:
+        yield from pool.imap_unordered(work, campaigns)
+
+
+def _ignore_interrupt() -> None:
+    """Leave Ctrl-C to the parent, which ends the pool."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def answer_campaign(folder: Path, excluded: Sequence[str] = ()) -> tuple[str, dict[str, Any]]:
+    """Diagnose one campaign of a set.
+
+    Args:
+        folder: of the campaign.
+        excluded: effects withheld from the vocabulary.
+
+    Returns:
+        Its name and its answer: the diagnosis' JSON document with ``wall_s`` (s) and ``data_sha256``, or, where
+        there is none, ``causes`` null and the ``error``.
+    """
+    begun = time.perf_counter()
+    try:
+        found = diagnose(read_campaign(folder), kinds=vocabulary(exclude=excluded))
+        answer = found.to_json_dict()
+    except Exception as error:  # one bad campaign must not end a night's work; the score counts it as wrong
+        said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
+        answer = {"schema_version": SCHEMA_VERSION, "campaign": folder.name, "causes": None, "error": said}
+    answer["data_sha256"] = folder_hash(folder)
+    answer["wall_s"] = time.perf_counter() - begun
+    return folder.name, answer

@@ -1,0 +1,141 @@
+"""A campaign's truth beside the answer to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+NAMES = ("cn_beta", "cn_r")
+MODERATE = (1.0, 10.0)
+"""Excess of a moderate gap: 1 to 10 times the noise power."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One campaign.
+
+    Args:
+        name: of the campaign.
+        truth: its effects, sorted; ``("unknown",)`` outside the vocabulary, empty for none.
+        withheld: whether one of its effects was excluded from the vocabulary, which makes the truth unknown.
+        severity: excess of the nominal model; None where the truth does not say.
+        coefficients: true ``cn_beta`` and ``cn_r``, 1/rad.
+        answer: the diagnosis' document.
+    """
+
+    name: str
+    truth: tuple[str, ...]
+    withheld: bool
+    severity: float | None
+    coefficients: Mapping[str, float]
+    answer: Mapping[str, Any]
+
+    @property
+    def causes(self) -> tuple[str, ...] | None:
+        """What was answered; None where there is no answer."""
+        found = self.answer["causes"]
+        return None if found is None else tuple(found)
+
+    @property
+    def right(self) -> bool:
+        """Whether the causes are exactly the true ones."""
+        return self.causes == self.truth
+
+    @property
+    def kind(self) -> str:
+        """``none``, ``single``, ``pair``, ``outside`` or ``withheld``."""
+        if self.withheld:
+            return "withheld"
+        if self.truth == ("unknown",):
+            return "outside"
+        return ("none", "single", "pair")[min(len(self.truth), 2)]
+
+    @property
+    def severity_class(self) -> str:
+        """``below 1``, ``1 to 10``, ``above 10`` or, where it is not known, empty."""
+        if self.severity is None:
+            return ""
+        if self.severity < MODERATE[0]:
+            return "below 1"
+        return "1 to 10" if self.severity <= MODERATE[1] else "above 10"
+
+    @property
+    def named_rightly(self) -> bool:
+        """Whether effects act and are exactly the ones named."""
+        return self.right and self.truth not in ((), ("unknown",))
+
+    @property
+    def probability(self) -> float | None:
+        """Of the answer that was given; None where it is not among the candidates."""
+        wanted = " + ".join(self.causes or ()) or "none"
+        for candidate in self.answer.get("candidates", ()):
+            if candidate["effect"] == wanted:
+                return float(candidate["probability"])
+        return None
+
+    @property
+    def rival(self) -> bool:
+        """Whether a single true effect was not the answer but named as one it cannot be told from."""
+        return not self.right and set(self.truth) <= {
+            *(self.causes or ()),
+            *self.answer.get("ambiguous_with", ()),
+        }
+
+    def error(self, name: str, when: str) -> tuple[float, float] | None:
+        """Error of a coefficient.
+
+        Args:
+            name: ``cn_beta`` or ``cn_r``.
+            when: ``before`` or ``after`` the causes are added.
+
+        Returns:
+            Estimate minus truth, in standard deviations and as a share of the truth; None where there is none.
+        """
+        found = self.answer.get("coefficients", {}).get(when, {}).get(name)
+        if found is None or name not in self.coefficients or not found["std"] > 0.0:
+            return None
+        error = found["value"] - self.coefficients[name]
+        return error / found["std"], error / abs(self.coefficients[name])
+
+
+def case(
+    name: str, truth: Mapping[str, Any], answer: Mapping[str, Any], excluded: Sequence[str] = ()
+) -> Case:
+    """Put a truth and an answer together.
+
+    Args:
+        name: of the campaign.
+        truth: from the key.
+        answer: the diagnosis' document.
+        excluded: effects that were withheld from the vocabulary.
+
+    Returns:
+        The case; its truth is ``unknown`` where one of its effects was withheld.
+    """
+    effects = tuple(sorted(truth["effects"]))
+    withheld = bool(set(effects) & set(excluded))
+    return Case(
+        name=name,
+        truth=("unknown",) if withheld else effects,
+        withheld=withheld,
+        severity=truth.get("severity"),
+        coefficients={key: float(truth[key]) for key in NAMES if key in truth},
+        answer=answer,
+    )
+
+
+def label(names: Sequence[str] | None) -> str:
+    """An answer or a truth in a word, for the confusion matrix.
+
+    Args:
+        names: effects, sorted.
+
+    Returns:
+        The effect's name, ``none``, ``unknown``, ``two or more`` or, for None, ``no answer``.
+    """
+    if names is None:
+        return "no answer"
+    if not names:
+        return "none"
+    return names[0] if len(names) == 1 else "two or more"

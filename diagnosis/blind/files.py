@@ -1,0 +1,111 @@
+"""Files of a blind set and their hashes.
+
+A set is a folder: a folder for each campaign, ``seal.json`` (published: hashes of the key and of the campaigns) and
+``key.json`` (the truth; may lie elsewhere). Answers stand in a folder of their own, with a ``seal.json``, too.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tunnel_sim.errors import TunnelError
+
+SCHEMA_VERSION = 1
+SEAL = "seal.json"
+KEY = "key.json"
+_CAMPAIGN = "campaign.toml"
+
+
+def write_document(path: Path, document: Mapping[str, Any]) -> str:
+    """Write JSON whole or not at all.
+
+    Args:
+        path: the file; replaced when it exists.
+        document: plain values, no NaN.
+
+    Returns:
+        SHA-256 of what was written, in hexadecimal.
+
+    Raises:
+        ValueError: when the document holds NaN or infinity.
+    """
+    content = (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+        Path(name).chmod(0o644)
+        Path(name).replace(path)
+    finally:
+        Path(name).unlink(missing_ok=True)
+    return hashlib.sha256(content).hexdigest()
+
+
+def read_document(path: Path, remedy: str) -> dict[str, Any]:
+    """Read a JSON document.
+
+    Args:
+        path: the file.
+        remedy: what to do when it is missing or broken.
+
+    Returns:
+        Its content.
+
+    Raises:
+        TunnelError: when it is missing or no JSON object.
+    """
+    try:
+        found = json.loads(path.read_bytes())
+    except FileNotFoundError as error:
+        raise TunnelError("does not exist", where=str(path), remedy=remedy) from error
+    except (ValueError, UnicodeDecodeError) as error:
+        raise TunnelError("is no JSON", where=str(path), remedy=remedy) from error
+    if not isinstance(found, dict):
+        raise TunnelError("is no JSON object", where=str(path), remedy=remedy)
+    return found
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def folder_hash(folder: Path) -> str:
+    """SHA-256 over names and contents of a folder's files, in hexadecimal.
+
+    Args:
+        folder: with subfolders; hidden files are left out.
+
+    Returns:
+        A hash that changes when any file is changed, added, removed or renamed.
+    """
+    found = hashlib.sha256()
+    for path in sorted(p for p in folder.rglob("*") if p.is_file() and not p.name.startswith(".")):
+        found.update(f"{path.relative_to(folder).as_posix()}\0{file_hash(path)}\n".encode())
+    return found.hexdigest()
+
+
+def campaign_folders(folder: Path) -> list[Path]:
+    """Campaigns of a set, by name.
+
+    Args:
+        folder: of the set.
+
+    Returns:
+        Its subfolders that hold a campaign.
+
+    Raises:
+        TunnelError: when there are none.
+    """
+    found = sorted(path.parent for path in folder.glob(f"*/{_CAMPAIGN}"))
+    if not found:
+        raise TunnelError(
+            "holds no campaign", where=str(folder), remedy="make a set first: tunnel blind make FOLDER"
+        )
+    return found

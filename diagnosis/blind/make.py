@@ -1,0 +1,114 @@
+"""Makes a blind set: campaigns without their truth, a sealed key, and the hash that holds it to its word."""
+
+from __future__ import annotations
+
+import secrets
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from diagnosis.blind.files import KEY, SCHEMA_VERSION, SEAL, folder_hash, write_document
+from tunnel_sim.campaign_io import write_campaign
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.reference.draw import DEFAULT_SHARES, Mixture
+from tunnel_sim.reference.make import as_campaign, draw_set, simulate_set, truth_of
+
+CHUNK = 100
+"""Campaigns simulated together: their runs advance in one array, so that few at a time would cost as much."""
+
+Told = Callable[[int, int], None]
+
+
+def make_blind(
+    out: Path,
+    *,
+    count: int,
+    seed: int,
+    shares: Mapping[str, float] = DEFAULT_SHARES,
+    mixture: Mixture | None = None,
+    key: Path | None = None,
+    progress: Told | None = None,
+    tell_steps: bool = False,
+) -> Path:
+    """Draw, simulate and write campaigns whose truth goes only into the key.
+
+    The key begins with 32 random bytes (the salt), so that its published hash cannot be found by guessing truths,
+    and neither can the key be changed later. The seed stands in the key, too, since it tells the truth.
+
+    Args:
+        out: folder to make.
+        count: number of campaigns.
+        seed: of everything drawn; the same arguments give the same campaigns.
+        shares: weight of each kind of campaign: single, pair, none, outside.
+        mixture: how often forms other than the textbook's are drawn.
+        key: file of the key; inside the folder, beside the campaigns, when None.
+        progress: told campaigns written and their number.
+        tell_steps: say on standard error how sizing the effects goes.
+
+    Returns:
+        The file of the key.
+
+    Raises:
+        TunnelError: when the folder or the key exists already, or the count is not above zero.
+    """
+    if count < 1:
+        raise TunnelError(f"{count} campaigns make no set", where="--count", remedy="give 1 or more")
+    target = out / KEY if key is None else key
+    for path in (out, target):
+        if path.is_file() or (path.is_dir() and any(path.iterdir())):
+            raise TunnelError("exists already", where=str(path), remedy="name another")
+    mixture = mixture or Mixture()
+    out.parent.mkdir(parents=True, exist_ok=True)
+    partial = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}.", suffix=".part"))
+    try:
+        truths = _write_campaigns(partial, count, seed, shares, mixture, progress, tell_steps)
+        document = {
+            "schema_version": SCHEMA_VERSION,
+            "salt": secrets.token_hex(32),
+            "made_with": {
+                "count": count,
+                "seed": seed,
+                "kinds": dict(shares),
+                "textbook": mixture.textbook,
+                "rare": mixture.rare,
+            },
+            "truths": truths,
+        }
+        sealed = write_document(partial / KEY, document)
+        hashes = {name: folder_hash(partial / name) for name in truths}
+        write_document(
+            partial / SEAL,
+            {"schema_version": SCHEMA_VERSION, "key_sha256": sealed, "campaigns_sha256": hashes},
+        )
+        partial.chmod(0o755)
+        if key is not None:
+            shutil.move(partial / KEY, key)
+        partial.replace(out)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+    return target
+
+
+def _write_campaigns(
+    folder: Path,
+    count: int,
+    seed: int,
+    shares: Mapping[str, float],
+    mixture: Mixture,
+    progress: Told | None,
+    tell_steps: bool,
+) -> dict[str, Any]:
+    """Write the campaigns; their truths by name."""
+    draws = draw_set(count, seed, dict(shares), mixture)
+    width = max(4, len(str(count)))
+    truths: dict[str, Any] = {}
+    for start in range(0, count, CHUNK):
+        for simulated in simulate_set(draws[start : start + CHUNK], progress=tell_steps):
+            name = f"c{len(truths) + 1:0{width}d}"
+            write_campaign(as_campaign(simulated, name), folder / name)
+            truths[name] = truth_of(simulated)
+            if progress is not None:
+                progress(len(truths), count)
+    return truths

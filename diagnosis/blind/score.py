@@ -1,0 +1,278 @@
+"""Checks the hashes of a blind set and of its answers, opens the key and counts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from diagnosis.blind.answer import answers_folder
+from diagnosis.blind.cases import NAMES, Case, case, label
+from diagnosis.blind.files import KEY, SEAL, campaign_folders, file_hash, folder_hash, read_document
+from diagnosis.blind.statistics import CalibrationBin, Share, calibration, share_of
+from tunnel_sim.errors import TunnelError
+
+CLOSED = 0.95
+WITHIN = 3.0
+"""Errors of coefficients are counted within this many standard deviations."""
+
+
+@dataclass(frozen=True)
+class CoefficientErrors:
+    """Errors of one coefficient over some campaigns.
+
+    Args:
+        group: which campaigns.
+        name: ``cn_beta`` or ``cn_r``.
+        when: ``before`` or ``after`` the causes are added.
+        within: how many lie within 3 standard deviations of the truth.
+        median: median absolute error as a share of the truth.
+    """
+
+    group: str
+    name: str
+    when: str
+    within: Share
+    median: float
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """A set scored.
+
+    Args:
+        cases: truth and answer of every campaign.
+        excluded: effects withheld from the vocabulary.
+        key_sha256: hash of the key, as published before; empty for an open set.
+        answers_sha256: hash over the answers, as published before the key was opened.
+        made_with: arguments the set was made with; empty where unknown.
+        sealed: whether the truth was sealed; else it lay beside the data and this is no blind check.
+    """
+
+    cases: tuple[Case, ...]
+    excluded: tuple[str, ...]
+    key_sha256: str
+    answers_sha256: str
+    made_with: dict[str, Any]
+    sealed: bool
+
+    def exact(self) -> dict[str, Share]:
+        """Exact match of the causes, by kind of campaign and severity (times the noise power)."""
+        found = {}
+        for kind in ("single", "pair", "none", "outside", "withheld"):
+            cases = [c for c in self.cases if c.kind == kind]
+            found[kind] = share_of([c.right for c in cases])
+            if kind == "single":
+                for level in ("below 1", "1 to 10", "above 10"):
+                    found[f"single, {level}"] = share_of(
+                        [c.right for c in cases if c.severity_class == level]
+                    )
+        found["all"] = share_of([c.right for c in self.cases])
+        return {name: share for name, share in found.items() if share.total}
+
+    def confusion(self) -> dict[str, dict[str, int]]:
+        """Numbers by truth and answer; pairs and ``no answer`` are rows and columns of their own."""
+        found: dict[str, dict[str, int]] = {}
+        for c in self.cases:
+            row = found.setdefault("withheld" if c.withheld else label(c.truth), {})
+            row[label(c.causes)] = row.get(label(c.causes), 0) + 1
+        return found
+
+    def pairs(self) -> dict[str, int]:
+        """What was answered where two effects act."""
+        found = dict.fromkeys(
+            ("both", "one of them", "one of them and another", "unknown", "none", "others"), 0
+        )
+        for c in self.cases:
+            if c.kind == "pair":
+                found[_pair_outcome(c)] += 1
+        return found
+
+    def calibration(self) -> tuple[float, tuple[CalibrationBin, ...]]:
+        """Expected calibration error of the probability of the answer given, and its table."""
+        given = [(c.probability, c.right) for c in self.cases]
+        known = [(p, right) for p, right in given if p is not None]
+        return calibration([p for p, _ in known], [right for _, right in known])
+
+    def false_alarms(self) -> Share:
+        """How many campaigns without a gap were given a cause, ``unknown`` included."""
+        return share_of([not c.right for c in self.cases if c.kind == "none"])
+
+    def missed(self) -> Share:
+        """How many campaigns with a gap were said to have none."""
+        return share_of([c.causes == () for c in self.cases if c.kind != "none"])
+
+    def rivals(self) -> Share:
+        """Of wrong answers to one or two effects, how many name the truth as what they cannot be told from."""
+        wrong = [c for c in self.cases if c.kind in ("single", "pair") and not c.right]
+        return share_of([c.rival for c in wrong])
+
+    def closure(self) -> tuple[Share, float, float]:
+        """Of campaigns named rightly: how many close 0.95 on held-out runs; median and 5th percentile closed."""
+        closed = [float(c.answer["gap"]["closed"]) for c in self.cases if c.named_rightly]
+        if not closed:
+            return Share(0, 0), 0.0, 0.0
+        return (
+            share_of([v >= CLOSED for v in closed]),
+            float(np.median(closed)),
+            float(np.quantile(closed, 0.05)),
+        )
+
+    def coefficients(self) -> list[CoefficientErrors]:
+        """Errors of Cnβ and Cnr before and after, by what became of the answer."""
+        groups: dict[str, Callable[[Case], bool]] = {
+            "named rightly": lambda c: c.named_rightly,
+            "no gap, none found": lambda c: c.kind == "none" and c.right,
+            "unknown, rightly": lambda c: c.right and c.truth == ("unknown",),
+            "answered wrongly": lambda c: not c.right,
+            "all": lambda _: True,
+        }
+        found = []
+        for group, belongs in groups.items():
+            cases = [c for c in self.cases if belongs(c)]
+            for name in NAMES:
+                for when in ("before", "after"):
+                    errors = [e for c in cases if (e := c.error(name, when)) is not None]
+                    if errors:
+                        within = share_of([abs(stds) <= WITHIN for stds, _ in errors])
+                        median = float(np.median([abs(share) for _, share in errors]))
+                        found.append(CoefficientErrors(group, name, when, within, median))
+        return found
+
+    def seconds(self) -> tuple[float, float, float]:
+        """Wall time per campaign, s: median, 90th percentile and largest; zeros where it is not known."""
+        times = [float(c.answer["wall_s"]) for c in self.cases if "wall_s" in c.answer]
+        if not times:
+            return 0.0, 0.0, 0.0
+        return float(np.median(times)), float(np.quantile(times, 0.9)), max(times)
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """All figures, and every campaign's truth and answer."""
+        error, bins = self.calibration()
+        share, median, low = self.closure()
+        times = self.seconds()
+        return {
+            "schema_version": 1,
+            "sealed": self.sealed,
+            "key_sha256": self.key_sha256,
+            "answers_sha256": self.answers_sha256,
+            "made_with": self.made_with,
+            "excluded": list(self.excluded),
+            "exact": {name: found.to_json_dict() for name, found in self.exact().items()},
+            "confusion": self.confusion(),
+            "pairs": self.pairs(),
+            "calibration": {
+                "error": error,
+                "bins": [
+                    {"low": b.low, "high": b.high, "mean": b.mean, "right": b.right.to_json_dict()} for b in bins
+                ],
+            },
+            "false_alarms": self.false_alarms().to_json_dict(),
+            "missed": self.missed().to_json_dict(),
+            "rivals_named": self.rivals().to_json_dict(),
+            "closure": {"at_least_0.95": share.to_json_dict(), "median": median, "percentile_5": low},
+            "coefficients": [
+                {"group": e.group, "name": e.name, "when": e.when, "within_3_std": e.within.to_json_dict(),
+                 "median_relative_error": e.median}
+                for e in self.coefficients()
+            ],
+            "seconds": dict(zip(("median", "percentile_90", "largest"), times, strict=True)),
+            "cases": [
+                {"name": c.name, "truth": list(c.truth), "causes": None if c.causes is None else list(c.causes),
+                 "probability": c.probability, "right": c.right, "severity": c.severity}
+                for c in self.cases
+            ],
+        }  # fmt: skip
+
+
+def score_set(folder: Path, *, excluded: Sequence[str] = (), key: Path | None = None) -> Score:
+    """Check a set and its answers against their hashes, open the key and put both together.
+
+    A folder without a seal, but with ``truth.json`` in every campaign, is scored as an open set.
+
+    Args:
+        folder: of the set.
+        excluded: effects that were withheld when it was answered.
+        key: file of the key; the set's own when None.
+
+    Returns:
+        The score.
+
+    Raises:
+        TunnelError: when a campaign is not answered, or key, campaign or answer is not what its hash says.
+    """
+    campaigns = campaign_folders(folder)
+    answers, answers_sha256 = _checked_answers(folder, campaigns, excluded)
+    if (folder / SEAL).exists():
+        document, key_sha256 = _checked_key(folder, campaigns, answers, key)
+        truths, made_with = document["truths"], document["made_with"]
+    else:
+        open_truth = "seal the set (tunnel blind make) or put a truth.json into every campaign"
+        truths = {path.name: read_document(path / "truth.json", open_truth) for path in campaigns}
+        key_sha256, made_with = "", {}
+    cases = tuple(case(p.name, truths[p.name], answers[p.name], excluded) for p in campaigns)
+    return Score(cases, tuple(sorted(set(excluded))), key_sha256, answers_sha256, made_with, bool(key_sha256))
+
+
+def _checked_answers(
+    folder: Path, campaigns: Sequence[Path], excluded: Sequence[str]
+) -> tuple[dict[str, dict[str, Any]], str]:
+    """Answers by campaign, and the hash over all."""
+    target = answers_folder(folder, excluded)
+    again = f"answer the set first: tunnel blind diagnose {folder}" + "".join(
+        f" --exclude {e}" for e in excluded
+    )
+    hashes = read_document(target / SEAL, again)["answers_sha256"]
+    left = [path.name for path in campaigns if path.name not in hashes]
+    if left:
+        raise TunnelError(
+            f"{len(left)} of {len(campaigns)} campaigns have no answer", where=str(target), remedy=again
+        )
+    answers = {}
+    for path in campaigns:
+        file = target / f"{path.name}.json"
+        answers[path.name] = read_document(file, again)
+        if file_hash(file) != hashes[path.name]:
+            raise TunnelError("is not the answer that was given", where=str(file), remedy="restore it")
+    return answers, file_hash(target / SEAL)
+
+
+def _checked_key(
+    folder: Path, campaigns: Sequence[Path], answers: dict[str, dict[str, Any]], key: Path | None
+) -> tuple[dict[str, Any], str]:
+    """The key, once everything is what it was when it was sealed."""
+    seal = read_document(folder / SEAL, "restore it")
+    hashes = seal["campaigns_sha256"]
+    if set(hashes) != {path.name for path in campaigns}:
+        raise TunnelError("campaigns were added or taken away", where=str(folder), remedy="restore the set")
+    for path in campaigns:
+        if folder_hash(path) != hashes[path.name]:
+            raise TunnelError("is not the campaign that was sealed", where=str(path), remedy="restore it")
+        if answers[path.name].get("data_sha256") != hashes[path.name]:
+            raise TunnelError(
+                "was answered from other data", where=str(path), remedy="remove the answers and answer again"
+            )
+    source = folder / KEY if key is None else key
+    document = read_document(source, "name the key with --key")
+    if file_hash(source) != seal["key_sha256"]:
+        raise TunnelError(
+            "is not the key that was sealed", where=str(source), remedy="name the right one: --key"
+        )
+    return document, seal["key_sha256"]
+
+
+def _pair_outcome(c: Case) -> str:
+    """What was answered to a pair, in words."""
+    causes = set(c.causes or ("no answer",))
+    if c.right:
+        return "both"
+    if not c.causes:
+        return "none" if c.causes is not None else "others"
+    if causes == {"unknown"}:
+        return "unknown"
+    if causes < set(c.truth):
+        return "one of them"
+    return "one of them and another" if causes & set(c.truth) else "others"

@@ -1,0 +1,194 @@
+"""``tunnel blind``: campaigns with sealed truth, answered and scored."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tunnel_lab.commands.diagnose import refuse_unwritable, split_names
+
+NAME = "blind"
+HELP = """Blind checks: campaigns with sealed truth, diagnosed, then scored.
+
+Campaigns are drawn and simulated by the reference simulator, whose integrator
+and forms of effects are not those of the fits. Their truth goes into a key
+only; its salted SHA-256 is published beside the data.
+
+[bold]Order[/bold]
+  tunnel blind make set --count 200 --seed 1
+  tunnel blind diagnose set
+  tunnel blind score set --markdown docs/blind-check.md
+"""
+
+app = typer.Typer(help=HELP, rich_markup_mode="rich", no_args_is_help=True)
+
+Folder = Annotated[Path, typer.Argument(help="Folder of the set.")]
+Excluded = Annotated[
+    list[str] | None,
+    typer.Option("--exclude", metavar="EFFECT", help="Withhold effects from the vocabulary; their campaigns "
+                 "then count as unknown."),
+]  # fmt: skip
+KeyFile = Annotated[
+    Path | None, typer.Option("--key", metavar="FILE", help="The key. Default: key.json in the set.")
+]
+
+
+@app.command("make")
+def make(
+    out: Annotated[Path, typer.Argument(help="Folder to make.")],
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything drawn.")],
+    count: Annotated[int, typer.Option("--count", min=1, help="Number of campaigns.")] = 200,
+    kinds: Annotated[
+        str | None,
+        typer.Option("--kinds", metavar="KIND:WEIGHT,…", help="single, pair, none, outside, with weights."),
+    ] = None,
+    textbook: Annotated[
+        float, typer.Option("--textbook", min=0, max=1, help="Share of textbook forms.")
+    ] = 0.5,
+    rare: Annotated[
+        float, typer.Option("--rare", min=0, max=1, help="Share of rare forms in the rest.")
+    ] = 0.5,
+    key: KeyFile = None,
+) -> None:
+    """Make a set: campaigns without truth, the sealed key, and its published hash.
+
+    Every campaign draws springs, speeds, releases, coefficients and noise; one
+    effect, two, none, or one outside the vocabulary, in the textbook's form or
+    another, sized to 1–100 times the noise power. The same seed gives the same
+    campaigns. Allow two minutes and half a second more for each campaign.
+
+    [bold]Exit status[/bold]
+      0 made, 2 bad input, 130 interrupted; nothing is left half made.
+    """
+    from diagnosis.blind import make_blind
+    from diagnosis.blind.files import SEAL, read_document
+    from tunnel_lab.tables import say
+    from tunnel_sim.reference.draw import DEFAULT_SHARES, Mixture
+    from tunnel_sim.reference.make import parse_shares
+
+    shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
+    if key is not None:
+        refuse_unwritable(key)
+    with _bar("writing campaigns", count) as tell:
+        where = make_blind(
+            out, count=count, seed=seed, shares=shares, mixture=Mixture(textbook, rare), key=key,
+            progress=lambda done, total: tell(done, total, ""), tell_steps=_terminal(),
+        )  # fmt: skip
+    say(f"Written: {out} ({count} campaigns), key {where}")
+    say(f"Key sha256 {read_document(out / SEAL, '')['key_sha256']}, in {out / SEAL}")
+
+
+@app.command("diagnose")
+def diagnose(
+    folder: Folder,
+    exclude: Excluded = None,
+    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Campaigns diagnosed at a time.")] = 1,
+) -> None:
+    """Answer every campaign of a set; go on where an interrupted run ended.
+
+    One JSON for each campaign goes to FOLDER/answers (answers-without-… with
+    --exclude), its SHA-256 to the seal.json beside it. The key is not read.
+
+    [bold]Exit status[/bold]
+      0 all answered, 2 bad input, 130 interrupted (what is answered stays).
+    """
+    from diagnosis.blind import answer_set, answers_folder
+    from tunnel_lab.tables import say
+
+    names = split_names(exclude)
+    with _bar("diagnosing", None) as tell:
+        sealed = answer_set(folder, excluded=names, jobs=jobs, progress=tell)
+    say(f"Answers: {answers_folder(folder, names)}")
+    say(f"Answers sha256 {sealed}")
+
+
+@app.command("score")
+def score(
+    folder: Folder,
+    exclude: Excluded = None,
+    key: KeyFile = None,
+    markdown: Annotated[
+        Path | None, typer.Option("--markdown", metavar="FILE", help="Write the score as a page, too.")
+    ] = None,
+    json: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write all figures and cases as JSON, too.")
+    ] = None,
+) -> None:
+    """Verify all hashes, open the key and count.
+
+    Shown are exact matches by kind with Wilson's intervals, alarms, calibration,
+    closure on held-out runs, errors of Cnβ and Cnr before and after, and what was
+    answered to each truth. A folder without seal.json but with a truth.json in
+    every campaign is scored as an open set, and said to be one.
+
+    [bold]Exit status[/bold]
+      0 scored, 2 bad input: not all answered, or a file is not what was sealed.
+    """
+    from diagnosis.blind import score_set
+    from diagnosis.diagnose import vocabulary
+    from tunnel_lab import blind_page
+    from tunnel_lab.files import write_json, write_whole
+    from tunnel_lab.tables import say, show_tables
+
+    names = split_names(exclude)
+    vocabulary(exclude=names)
+    for path in (markdown, json):
+        if path is not None:
+            refuse_unwritable(path)
+    found = score_set(folder, excluded=names, key=key)
+    for line in blind_page.origin_lines(found):
+        say(line)
+    say("")
+    for section in blind_page.sections(found):
+        show_tables(blind_page.as_table(section))
+        if section.note:
+            say(section.note + "\n")
+    if markdown is not None:
+        say(f"Written: {write_whole(markdown, blind_page.markdown(found, str(folder)).encode())}")
+    if json is not None:
+        say(f"Written: {write_json(json, found.to_json_dict())}")
+
+
+def _terminal() -> bool:
+    """Whether standard error is a terminal."""
+    from tunnel_lab.tables import console
+
+    return console(stderr=True).is_terminal
+
+
+@contextmanager
+def _bar(what: str, total: int | None) -> Iterator[Callable[[int, int, str], None]]:
+    """A progress bar with the time left, on standard error where that is a terminal.
+
+    Yields:
+        What to tell campaigns done, their number and the last one's name to.
+    """
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    from tunnel_lab.tables import console
+
+    terminal = console(stderr=True)
+    columns = (
+        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        TextColumn("left"), TimeRemainingColumn(elapsed_when_finished=False),
+    )  # fmt: skip
+    with Progress(
+        *columns, console=terminal, disable=not terminal.is_terminal, speed_estimate_period=600
+    ) as bar:
+        task = bar.add_task(what, total=total)
+
+        def tell(done: int, count: int, name: str) -> None:
+            bar.update(task, completed=done, total=count, description=f"{what} {name}".rstrip())
+
+        yield tell

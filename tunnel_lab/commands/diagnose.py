@@ -1,0 +1,184 @@
+"""``tunnel diagnose``: where the nominal model departs from the runs, which effect causes it, how far it closes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from diagnosis.result import Diagnosis
+    from tunnel_sim.campaign import Campaign
+    from tunnel_sim.effects import Effect
+
+NAME = "diagnose"
+STEPS = {
+    "noise": "estimating the noise",
+    "nominal fit": "fitting the nominal model",
+    "single effects": "trying effects",
+    "pairs": "trying pairs of effects",
+    "buffeting": "weighing buffeting",
+}
+"""Steps of the study in words; anything else it tells is the name of an effect or a pair."""
+
+
+def run(
+    campaign: Annotated[Path, typer.Argument(help="Folder of the campaign: campaign.toml and its runs.")],
+    json: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write the answer as JSON; - for standard output."),
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="FILE.html", help="Write a report, one HTML page.")
+    ] = None,
+    effects: Annotated[
+        list[str] | None,
+        typer.Option("--effects", metavar="A,B", help="Answer with these effects only."),
+    ] = None,
+    exclude: Annotated[
+        list[str] | None,
+        typer.Option("--exclude", metavar="C", help="Withhold these effects; tunnel effects lists all."),
+    ] = None,
+) -> None:
+    """Say why the nominal model departs from a campaign's runs, and how far the gap closes.
+
+    The nominal model is fitted to all runs. What it leaves is tested against the
+    noise; then every effect of the vocabulary, and pairs of them, are fitted and
+    weighed. The answer is one or two effects, "none" (there is no gap) or
+    "unknown" (no effect known here closes it), each with a probability. Gap and
+    coefficients are given before and after; "after" is predicted for runs held
+    out of the fit.
+
+    [bold]Examples[/bold]
+      tunnel diagnose my-campaign
+      tunnel diagnose my-campaign --json answer.json --report report.html
+      tunnel diagnose my-campaign --exclude buffeting,mains_hum
+      tunnel diagnose my-campaign --json - | jq .causes
+
+    [bold]Exit status[/bold]
+      0 answered, whatever the verdict; 2 bad input; 130 interrupted. A file is
+      written whole or not at all.
+    """
+    from diagnosis.diagnose import vocabulary
+    from tunnel_lab.files import json_text, write_json
+    from tunnel_lab.tables import say
+    from tunnel_sim.campaign_io import read_campaign
+
+    kinds = vocabulary(split_names(effects), split_names(exclude))
+    data = read_campaign(campaign)
+    to_stdout = json is not None and str(json) == "-"
+    for path in (None if to_stdout else json, report):
+        if path is not None:
+            refuse_unwritable(path)
+    document = diagnose_with_progress(data, kinds).to_json_dict()
+    if to_stdout:
+        typer.echo(json_text(document), nl=False)
+    else:
+        if json is not None:
+            write_json(json, document)
+        show(document)
+    if report is not None:
+        from tunnel_lab.report import write_report
+
+        write_report(document, data, report)
+    if not to_stdout:
+        for path in (json, report):
+            if path is not None:
+                say(f"Written: {path}")
+
+
+def split_names(words: list[str] | None) -> tuple[str, ...]:
+    """Names given one by one, after commas, or both.
+
+    Args:
+        words: as typed.
+
+    Returns:
+        Names without blanks, in the order given.
+    """
+    return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())
+
+
+def refuse_unwritable(path: Path) -> None:
+    """Refuse, before the work is done, a file that could not be written after it.
+
+    Args:
+        path: the file.
+
+    Raises:
+        TunnelError: when it is a folder, or its folder does not exist.
+    """
+    from tunnel_sim.errors import TunnelError
+
+    if path.is_dir():
+        raise TunnelError("is a folder, not a file", where=str(path), remedy="name a file")
+    if not path.parent.is_dir():
+        raise TunnelError("its folder does not exist", where=str(path), remedy=f"make {path.parent} first")
+
+
+def diagnose_with_progress(campaign: Campaign, kinds: tuple[type[Effect], ...]) -> Diagnosis:
+    """Diagnose, telling step and effect on standard error where that is a terminal.
+
+    Args:
+        campaign: the runs.
+        kinds: effects to answer with.
+
+    Returns:
+        The diagnosis.
+    """
+    from diagnosis.diagnose import diagnose
+
+    with step_display() as tell:
+        return diagnose(campaign, kinds=kinds, progress=tell)
+
+
+@contextmanager
+def step_display() -> Iterator[Callable[[str], None]]:
+    """A spinner with the step, the effect tried and the time.
+
+    Yields:
+        What to tell each step to.
+    """
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from tunnel_lab.tables import console
+
+    terminal = console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=terminal, disable=not terminal.is_terminal, transient=True) as progress:
+        task = progress.add_task("starting", total=None)
+        step = ""
+
+        def tell(text: str) -> None:
+            nonlocal step
+            if text in STEPS:
+                step = STEPS[text]
+                progress.update(task, description=step)
+            else:
+                progress.update(task, description=f"{step}: {text}")
+
+        yield tell
+
+
+def show(document: dict[str, Any]) -> None:
+    """Print an answer: the verdict in words, then the figures behind it.
+
+    Args:
+        document: of a diagnosis.
+    """
+    from tunnel_lab import diagnosis_tables as parts
+    from tunnel_lab.tables import say, show_tables
+
+    say(document["verdict"])
+    for line in (parts.where_line(document), *parts.rival_lines(document)):
+        if line:
+            say(line)
+    say("")
+    show_tables(
+        parts.candidates_table(document), parts.gap_table(document), parts.coefficients_table(document)
+    )
+    for line in parts.closing_lines(document):
+        say(line)
