@@ -57,6 +57,8 @@ class Data:
         width: m; likewise.
         normalised: whether the runs are fitted per unit inertia with a common stiffness.
         yaw_inertia: nominal Izz, kg m²; None where the campaign does not state it.
+        windy: whether the runs are part of a campaign with the wind on, though none of these may be: the model
+            then keeps its aerodynamic parameters.
     """
 
     runs: tuple[RunData, ...]
@@ -65,6 +67,7 @@ class Data:
     width: float
     normalised: bool
     yaw_inertia: float | None
+    windy: bool = False
 
     @property
     def springs(self) -> tuple[float, ...]:
@@ -73,8 +76,19 @@ class Data:
 
     @property
     def wind_on(self) -> bool:
-        """Whether any run has the wind on."""
-        return any(run.wind_on for run in self.runs)
+        """Whether any run of the campaign has the wind on."""
+        return self.windy or any(run.wind_on for run in self.runs)
+
+    def with_runs(self, runs: tuple[RunData, ...]) -> Data:
+        """Other runs of the same campaign, whose model has the same parameters.
+
+        Args:
+            runs: some of the runs, or further ones.
+
+        Returns:
+            The data of these runs.
+        """
+        return dataclasses.replace(self, runs=runs, windy=self.wind_on)
 
     def subset(self, keep: tuple[str, ...]) -> Data:
         """The runs of the given ids.
@@ -85,10 +99,7 @@ class Data:
         Returns:
             The smaller data.
         """
-        runs = tuple(run for run in self.runs if run.id in keep)
-        return Data(
-            runs, self.frontal_area, self.reference_length, self.width, self.normalised, self.yaw_inertia
-        )
+        return self.with_runs(tuple(run for run in self.runs if run.id in keep))
 
 
 def prepare(campaign: Campaign, noise_variance: dict[str, float]) -> Data:
