@@ -33,8 +33,8 @@ def coefficients(
 
     Returns:
         ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` in normalised form. The variance is that of the fit
-        scaled by its excess, or of the delete-a-group jackknife where the residuals are coloured and that is
-        larger, plus the rounding of the air density, plus the spread over rivals.
+        scaled by its excess, or of the delete-a-group jackknife (Kott, J. Off. Stat. 17 (2001) 521) where the
+        residuals are coloured and that is larger, plus the rounding of the air density, plus the spread over rivals.
     """
     names = ("omega_n", "zeta") if fit.problem.data.normalised else ("cn_beta", "cn_r")
     result = {}
@@ -118,7 +118,7 @@ def _density_rounding(campaign: Campaign) -> float:
     worst = 0.0
     for run in campaign.runs:
         if run.wind_on and run.air_density:
-            exponent = Decimal(repr(run.air_density)).as_tuple().exponent
+            exponent = Decimal(repr(float(run.air_density))).as_tuple().exponent
             digits = -exponent if isinstance(exponent, int) else 4
             worst = max(worst, 0.5 * 10.0 ** -min(digits, 8) / math.sqrt(3.0) / run.air_density)
     return worst

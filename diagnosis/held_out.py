@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.data import Data
+from diagnosis.data import Data, RunData
 from diagnosis.least_squares import Fit, FitError, fit, fit_releases
 from diagnosis.problem import Point, Problem
 from tunnel_sim.record import Array
@@ -28,20 +28,6 @@ class HeldOut:
     common: Array
     names: tuple[str, ...]
 
-    def jackknife_std(self, name: str, whole: float) -> float:
-        """Standard deviation of a common parameter by leaving groups of runs out.
-
-        Args:
-            name: of the parameter.
-            whole: its estimate from all runs.
-
-        Returns:
-            Delete-a-group jackknife (Kott, J. Off. Stat. 17 (2001) 521), in the parameter's unit.
-        """
-        values = self.common[:, self.names.index(name)]
-        count = len(values)
-        return float(np.sqrt((count - 1.0) / count * np.sum((values - whole) ** 2))) if count > 1 else 0.0
-
 
 def folds(data: Data, count: int = _FOLDS) -> list[tuple[str, ...]]:
     """Groups of runs to leave out in turn.
@@ -51,16 +37,31 @@ def folds(data: Data, count: int = _FOLDS) -> list[tuple[str, ...]]:
         count: number of groups, fewer where there are few runs.
 
     Returns:
-        Ids by group. Runs alike in wind and spring go to different groups, and a run that alone stands for its
-        spring is left out of none: without it nothing could be said of that spring.
+        Ids by group. Runs alike in wind and spring go to different groups, and what is kept always has every
+        spring, wind-off runs and wind-on runs: without them nothing could be said of what is left out. A run
+        that alone stands for one of these is left out of none.
     """
     order = sorted(data.runs, key=lambda run: (run.wind_on, run.spring_stiffness or 0.0, run.wind_speed))
-    springs = [run.spring_stiffness for run in data.runs]
-    free = [run.id for run in order if springs.count(run.spring_stiffness) > 1]
+    free = [run for run in order if _covers(data, [run])]
     count = min(count, len(free))
     if count < 2:
         return []
-    return [tuple(free[i::count]) for i in range(count)]
+    groups: list[list[RunData]] = [[] for _ in range(count)]
+    for i, run in enumerate(free):
+        for turn in range(count):
+            group = groups[(i + turn) % count]
+            if _covers(data, [*group, run]):
+                group.append(run)
+                break
+    return [tuple(run.id for run in group) for group in groups if group]
+
+
+def _covers(data: Data, left_out: list[RunData]) -> bool:
+    """Whether the other runs have every spring, and wind on and off, as all runs have."""
+    gone = {run.id for run in left_out}
+    kept = [run for run in data.runs if run.id not in gone]
+    springs = {run.spring_stiffness for run in data.runs} == {run.spring_stiffness for run in kept}
+    return springs and {run.wind_on for run in data.runs} == {run.wind_on for run in kept}
 
 
 def predict_held_out(whole: Fit) -> HeldOut:
