@@ -177,7 +177,8 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     if weighed[0].effects == ("unknown",) and _read_off_explains(found):
         weighed = []  # what is left belongs to the cause read off the records
     elif found.test.noisy and nominal.excess < _share_of_noise(found):
-        weighed = [Weighed(("unknown",), 1.0, 1.0), *(Weighed(w.effects, w.share, 0.0) for w in weighed)]
+        named = [Weighed(w.effects, w.share, 0.0) for w in weighed if w.effects != ("unknown",)]
+        weighed = [Weighed(("unknown",), 1.0, 1.0), *named]
     return Study(
         found.campaign, found.cleaned, found.noise, found.trend, found.step, found.coarse, found.hum, nominal,
         found.test, found.started_late, tuple(hypotheses), tuple(weighed), buffeting, clock.seconds,
