@@ -32,9 +32,10 @@ def coefficients(
         rivals: other fits and their probabilities.
 
     Returns:
-        ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` in normalised form. The variance is that of the fit
-        scaled by its excess, or of the delete-a-group jackknife (Kott, J. Off. Stat. 17 (2001) 521) where the
-        residuals are coloured and that is larger, plus the rounding of the air density, plus the spread over rivals.
+        ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` in normalised form. The variance is that of the
+        fit scaled by its excess, or of the delete-a-group jackknife (Kott, J. Off. Stat. 17 (2001) 521) where
+        the residuals are coloured and that is larger, plus the rounding of the air density, plus the spread
+        over rivals.
     """
     names = ("omega_n", "zeta") if fit.problem.data.normalised else ("cn_beta", "cn_r")
     result = {}
