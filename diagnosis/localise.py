@@ -86,6 +86,8 @@ def _as_measured(campaign: Campaign, nominal: Fit, causes: tuple[str, ...]) -> t
     ratio = level / stated if stated else 1.0
     given = prepare(campaign, {run.id: run.noise_variance * run.block / ratio for run in data.runs})
     readings = {run.id: run.reading for run in given.runs}
+    # the fit may leave a record's start out; both end together
+    readings = {run.id: readings[run.id][-run.reading.size :] for run in data.runs}
     residuals = [
         (r + (readings[run.id] - run.reading) / np.sqrt(run.noise_variance)) * np.sqrt(ratio)
         for r, run in zip(nominal.residuals, data.runs, strict=True)

@@ -5,6 +5,7 @@ A linear rig shows level lines; how they bend is the mark of an effect of stiffn
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,7 @@ class Backbone:
 
     Args:
         id: of the run.
-        time: mid-window, shape (n,), s.
+        time: mid-window since the start of the record, shape (n,), s.
         amplitude: at mid-window, shape (n,), rad.
         frequency: undamped natural frequency, shape (n,), Hz.
         frequency_std: of each, shape (n,), Hz, widened where a window's residual is not white.
@@ -52,19 +53,22 @@ class Backbone:
     alone_excess: float | None
 
 
-def backbones(fit: Fit) -> list[Backbone]:
+def backbones(fit: Fit, starts: Sequence[float] = ()) -> list[Backbone]:
     """The backbone of every run.
 
     Args:
         fit: of the nominal model; gives zero, noise and starting values.
+        starts: what the fit left out of every record, s; nothing where empty.
 
     Returns:
         One per run, in order; without windows where a run decays too soon for any.
     """
-    return [_backbone(fit, i, run) for i, run in enumerate(fit.problem.data.runs)]
+    return [
+        _backbone(fit, i, run, starts[i] if starts else 0.0) for i, run in enumerate(fit.problem.data.runs)
+    ]
 
 
-def _backbone(fit: Fit, index: int, run: RunData) -> Backbone:
+def _backbone(fit: Fit, index: int, run: RunData, start: float) -> Backbone:
     inertia, damping, stiffness = linear_coefficients(fit, index)
     decay = Decay(0.5 * damping / inertia, max(stiffness, 1e-12) / inertia)
     std = float(np.sqrt(run.noise_variance))
@@ -76,7 +80,7 @@ def _backbone(fit: Fit, index: int, run: RunData) -> Backbone:
     settled = alone.runs[0] if alone.runs and alone.runs[0].decay.omega_n > 0.0 else None
     return Backbone(
         run.id,
-        np.array([w.start_s + 0.5 * w.duration_s for w in windows]),
+        np.array([start + w.start_s + 0.5 * w.duration_s for w in windows]),
         np.array([w.amplitude.value for w in windows]),
         np.array([w.omega_n.value for w in windows]) / (2.0 * np.pi),
         np.array([w.omega_n.std for w in windows]) / (2.0 * np.pi),

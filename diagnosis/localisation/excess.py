@@ -84,7 +84,7 @@ def chance(total: float, freedom: float, relative: float) -> float:
     """Chance that white noise reaches a sum of squares.
 
     Args:
-        total: sum of squares, in noise variances.
+        total: sum of squares, in units of the noise variance.
         freedom: degrees of freedom, a number of coefficients.
         relative: standard deviation of the noise variance, as a share of it.
 
@@ -135,9 +135,9 @@ class BandExcess:
 
     Args:
         band: its name in `BANDS`.
-        excess: sum of power beyond that of white noise, in noise variances.
-        mean: the same by coefficient.
-        p_value: chance of as much without a gap.
+        excess: sum of power beyond that of white noise, in units of the noise variance.
+        mean: the same by coefficient, a ratio.
+        p_value: chance of as much without a gap, a probability.
     """
 
     band: str
@@ -258,7 +258,7 @@ def shortest_interval(edges: Array, energy: Array, share: float) -> tuple[float,
     Args:
         edges: of the bins, shape (n + 1,).
         energy: by bin, shape (n,); single bins may be negative.
-        share: of the sum, 0 to 1.
+        share: of the sum, a fraction.
 
     Returns:
         Its ends; None where the sum is not positive.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,7 +59,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     lone = _lone_run(found)
     if lone is not None and lone not in off:
         return Finding(None, f"one run alone ({lone}) cannot say whether it needs wind")
-    data = nominal.problem.data.subset(off)
+    data = replace(nominal.problem.data.subset(off), windy=False)  # without coefficients these runs lack
     try:
         alone = fit(Problem(data), nominal_start(data))
     except FitError:

@@ -71,8 +71,10 @@ def survey(
     inside = [
         within_bands(r, run, telling_bands(bands)) for r, run in zip(scaled.residuals, excesses, strict=True)
     ]
-    time = _time_profile(scaled, inside)
-    energy, z = _moment_energy(nominal, time.edges)
+    starts = record_starts(campaign, nominal)
+    times = [s + _mid_times(run) for s, run in zip(starts, nominal.problem.data.runs, strict=True)]
+    time = _time_profile(scaled, inside, times)
+    energy, z = _moment_energy(nominal, times, time.edges)
     after = None if best is None else _spectrum(run_excesses(campaign, best), _log_edges(excesses)).mean
     resonances = [run.resonance for run in excesses]
     noise = [float(np.sqrt(run.noise_variance)) for run in nominal.problem.data.runs]
@@ -80,7 +82,7 @@ def survey(
         runs=_run_maps(scaled, excesses),
         groups=_groups(scaled, excesses),
         time=time,
-        time_by_run=_time_by_run(scaled, time.edges),
+        time_by_run=_time_by_run(scaled, times, time.edges),
         moment_time=np.maximum(energy, 0.0) / max(float(np.maximum(energy, 0.0).sum()), 1e-300),
         amplitude=_amplitude_profile(scaled, inside),
         frequency=_spectrum(excesses, _log_edges(excesses)),
@@ -88,9 +90,9 @@ def survey(
         resonance=(min(resonances), max(resonances)),
         bands=bands,
         lines=residual_lines(excesses, noise),
-        backbones=tuple(backbones(nominal)),
+        backbones=tuple(backbones(nominal, starts)),
         phase_plane=phase_plane(nominal, chosen),
-        traces=_traces(nominal, best, excesses),
+        traces=_traces(nominal, best, excesses, times),
     )
     return Survey(maps, excesses, _frequency_interval(excesses), energy, z)
 
@@ -102,7 +104,15 @@ def _shares(excesses: list[RunExcess]) -> list[float]:
 
 
 def amplitudes(fit: Fit, index: int) -> Array:
-    """Amplitude of the fitted motion of one run at every residual, shape (n,), rad."""
+    """Amplitude of the fitted motion of one run.
+
+    Args:
+        fit: any.
+        index: of the run.
+
+    Returns:
+        At every residual, shape (n,), rad.
+    """
     angle, rate = motion(fit, index)
     return np.hypot(angle, rate)
 
@@ -157,8 +167,18 @@ def _leading_number(label: str) -> tuple[float, str]:
     return (float(head) if head.replace(".", "", 1).isdigit() else 0.0, label)
 
 
-def _times(fit: Fit) -> list[Array]:
-    return [_mid_times(run) for run in fit.problem.data.runs]
+def record_starts(campaign: Campaign, fit: Fit) -> list[float]:
+    """What the fit left out at the start of every record.
+
+    Args:
+        campaign: the records.
+        fit: of these or of their later parts, which end with them.
+
+    Returns:
+        By run, s.
+    """
+    sizes = {run.id: run.record.yaw_rad.size for run in campaign.runs}
+    return [(sizes[r.id] // r.block - r.reading.size) * r.interval for r in fit.problem.data.runs]
 
 
 def _mid_times(run: RunData) -> Array:
@@ -166,10 +186,10 @@ def _mid_times(run: RunData) -> Array:
     return result
 
 
-def _time_profile(fit: Fit, inside: list[tuple[Array, float]]) -> Profile:
-    longest = max(run.duration for run in fit.problem.data.runs)
+def _time_profile(fit: Fit, inside: list[tuple[Array, float]], times: list[Array]) -> Profile:
+    longest = max(float(time[-1] + 0.5 * (time[1] - time[0])) for time in times)
     edges = np.linspace(0.0, longest, _TIME_BINS + 1)
-    return profile(edges, _times(fit), *_by_sample(fit, inside))
+    return profile(edges, times, *_by_sample(fit, inside))
 
 
 def _by_sample(fit: Fit, inside: list[tuple[Array, float]]) -> tuple[list[Array], list[float], list[float]]:
@@ -192,24 +212,24 @@ def _amplitude_profile(fit: Fit, inside: list[tuple[Array, float]]) -> Profile:
     return profile(edges, place, *_by_sample(fit, inside))
 
 
-def _time_by_run(fit: Fit, edges: Array) -> Array:
+def _time_by_run(fit: Fit, times: list[Array], edges: Array) -> Array:
     rows = []
-    for run, time, residual in zip(fit.problem.data.runs, _times(fit), fit.residuals, strict=True):
+    for run, time, residual in zip(fit.problem.data.runs, times, fit.residuals, strict=True):
         rows.append(
             profile(edges, [time], [residual**2 / run.block], [1.0 / run.block], [2.0 / run.block**2]).mean
         )
     return np.stack(rows)
 
 
-def _moment_energy(fit: Fit, edges: Array) -> tuple[Array, float]:
+def _moment_energy(fit: Fit, times: list[Array], edges: Array) -> tuple[Array, float]:
     """Energy of the apparent moment by time, in variances of its noise, and how far its sum is beyond chance."""
     energy, variance = np.zeros(edges.size - 1), 0.0
-    for index, run in enumerate(fit.problem.data.runs):
+    for index, whole in enumerate(times):
         found = apparent_moment(fit, index)
         if found is None:
             continue
         spread = float(found.kernel @ found.kernel) * found.noise_std**2
-        time = (found.start + np.arange(found.moment.size) + 0.5) * run.interval
+        time = whole[found.start : found.start + found.moment.size]
         energy += np.histogram(time, edges, weights=found.moment**2 / spread - 1.0)[0]
         variance += 2.0 * found.moment.size * found.kernel.size  # neighbours within the kernel go together
     return energy, float(energy.sum()) / float(np.sqrt(max(variance, 1.0)))
@@ -242,12 +262,14 @@ def _frequency_interval(excesses: list[RunExcess]) -> tuple[float, float] | None
     return profile(edges, places, kept, ones, [2.0] * len(kept)).interval()
 
 
-def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[Trace, ...]:
+def _traces(
+    nominal: Fit, best: Fit | None, excesses: list[RunExcess], times: list[Array]
+) -> tuple[Trace, ...]:
     order = sorted(range(len(excesses)), key=lambda i: -excesses[i].excess)[:_TRACES]
-    return tuple(_trace(nominal, best, i) for i in order)
+    return tuple(_trace(nominal, best, i, times[i]) for i in order)
 
 
-def _trace(nominal: Fit, best: Fit | None, index: int) -> Trace:
+def _trace(nominal: Fit, best: Fit | None, index: int, times: Array) -> Trace:
     run = nominal.problem.data.runs[index]
     group = max(1, -(-run.reading.size // _TRACE_POINTS))
     count = run.reading.size // group
@@ -257,6 +279,6 @@ def _trace(nominal: Fit, best: Fit | None, index: int) -> Trace:
         grouped: Array = values[: count * group].reshape(count, group).mean(axis=1)
         return grouped
 
-    time = means(_mid_times(run))
+    time = means(times)
     after = None if best is None else means(best.residuals[index] * std)
     return Trace(run.id, time, means(nominal.residuals[index] * std), after, std / float(np.sqrt(group)))

@@ -89,8 +89,8 @@ class Maps:
         runs: by run.
         groups: by condition.
         time: excess over time since the start of the record, s.
-        time_by_run: mean excess by run (rows) and bin of time (columns); NaN after a run's end.
-        moment_time: energy of the apparent moment over time, by bin of ``time``, as shares of the whole.
+        time_by_run: mean excess by run (rows) and bin of time (columns), shape (runs, n); NaN after a run's end.
+        moment_time: energy of the apparent moment by bin of ``time``, shape (n,), as shares of the whole.
         amplitude: excess over the amplitude of the motion, rad.
         frequency: excess over frequency, Hz.
         frequency_after: mean by bin with the causes added, shape of ``frequency.mean``; None where not added.

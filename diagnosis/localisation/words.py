@@ -58,7 +58,9 @@ def describe(
     Returns:
         A few sentences.
     """
-    parts = [_runs(where, found), _extent(where, found), _bands(found, bands), _nature(channel, condition)]
+    parts = [_runs(where, found), _extent(where, found), _bands(found, bands)]
+    both = any(group.by == "wind" for group in found.maps.groups)
+    parts.append(_nature(channel, condition, both))
     return " ".join(part for part in parts if part)
 
 
@@ -66,7 +68,7 @@ def _runs(where: Where, found: Survey) -> str:
     count = len(found.maps.runs)
     if not where.runs:
         return (
-            f"No run by itself is beyond chance (false-alarm rate {FALSE_ALARM_RATE:.0%} over all runs); "
+            f"No run by itself is beyond chance (false-alarm rate {100.0 * FALSE_ALARM_RATE:.0f} % over all runs); "
             "what is found shows in all of them together."
         )
     share = sum(run.share for run in found.maps.runs if run.id in where.runs)
@@ -74,9 +76,9 @@ def _runs(where: Where, found: Survey) -> str:
     if len(where.runs) == count:
         text = f"All {count} runs show the gap" if count > 1 else "The run shows the gap"
     elif len(where.runs) == 1:
-        text = f"{share:.0%} of the gap is in one run of {count}{named}"
+        text = f"{100.0 * share:.0f} % of the gap is in one run of {count}{named}"
     else:
-        text = f"{share:.0%} of the gap is in {len(where.runs)} of {count} runs{named}"
+        text = f"{100.0 * share:.0f} % of the gap is in {len(where.runs)} of {count} runs{named}"
     return f"{text}{_wind_contrast(found)}."
 
 
@@ -108,15 +110,18 @@ def _bands(found: Survey, bands: tuple[str, ...]) -> str:
     if not shown or whole <= 0.0:
         return ""
     shown.sort(key=lambda band: -band.excess)
-    listed = ", ".join(f"{band.excess / whole:.0%} {_BAND_WORDS[band.band]}" for band in shown)
+    listed = ", ".join(f"{100.0 * band.excess / whole:.0f} % {_BAND_WORDS[band.band]}" for band in shown)
     return f"By frequency: {listed}."
 
 
-def _nature(channel: Finding, condition: Finding) -> str:
+def _nature(channel: Finding, condition: Finding, both: bool) -> str:
+    """Channel and condition; without runs of both kinds the latter goes unsaid."""
     acts = f"It acts on {_CHANNEL_WORDS[channel.value]}" if channel.value else "On what it acts is open"
     if condition.value is None:
         return f"{acts}: {channel.reason}; {condition.reason}."
     when = _CONDITION_WORDS[condition.value]
     if channel.reason == condition.reason:
-        return f"{acts}, {when}, {channel.reason}."
+        return f"{acts}{f', {when}' if both else ''}, {channel.reason}."
+    if not both:
+        return f"{acts}: {channel.reason}."
     return f"{acts}: {channel.reason}. It is there {when}: {condition.reason}."

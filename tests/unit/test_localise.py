@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from diagnosis.data import without_start
 from diagnosis.least_squares import fit
 from diagnosis.localisation.backbone import backbones, drift
 from diagnosis.localisation.excess import RunExcess, run_excesses, shortest_interval
@@ -14,7 +15,7 @@ from diagnosis.localisation.phase_plane import apparent_moment
 from diagnosis.localise import localise, telling_runs
 from diagnosis.problem import Problem
 from diagnosis.spectra import linear_coefficients
-from diagnosis.start import leads
+from diagnosis.start import leads, nominal_start
 from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, nominal, with_blow
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -189,3 +190,15 @@ def test_the_fit_itself_is_left_alone():
     assert isinstance(found.problem, Problem)
     for old, new in zip(before, found.residuals, strict=True):
         np.testing.assert_array_equal(old, new)
+
+
+def test_times_count_from_the_start_of_the_record_though_the_fit_begins_later():
+    data = with_blow(campaign(), 0.02, 5.5)
+    late = without_start(nominal(data).problem.data)
+    found = fit(Problem(late), nominal_start(late))
+    assert found.residuals[0].size < round(DURATION / INTERVAL)
+    where, maps = localise(data, found, None, UNKNOWN)
+    assert where.time_s is not None
+    assert where.time_s[0] <= 5.5 <= where.time_s[1]
+    assert maps.time.edges[-1] == pytest.approx(DURATION)
+    assert all(trace.time[-1] == pytest.approx(DURATION, abs=0.05) for trace in maps.traces)

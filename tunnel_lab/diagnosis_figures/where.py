@@ -94,6 +94,7 @@ def profiles_figure(document: Document) -> Figure:
     fig = figure(5.4)
     axes = fig.subplot_mosaic([["time", "amplitude"], ["frequency", "frequency"]])
     _profile(axes["time"], maps["time"], "edges_s", where["time_s"])
+    _moment(axes["time"], maps["time"])
     axes["time"].set_xlabel("time since the start of the record [s]")
     _profile(axes["amplitude"], maps["amplitude"], "edges_rad", where["amplitude_rad"])
     axes["amplitude"].set_xlabel("amplitude of the motion [rad]")
@@ -110,6 +111,18 @@ def _profile(axes: Axes, values: Document, edges: str, interval: list[float] | N
     axes.set_ylim(min(-4.0 * float(np.nanmedian(std)), 1.05 * float(np.nanmin(mean))), None)
     axes.set_ylabel("excess (noise variances)")
     quiet(axes)
+
+
+def _moment(axes: Axes, values: Document) -> None:
+    """The missing moment's energy behind the excess: it shows when something acts, not how long it is seen."""
+    beside = axes.twinx()
+    share = 100.0 * array(values["moment_share"])
+    beside.stairs(share, array(values["edges_s"]), fill=True, color=AFTER, alpha=0.3)
+    beside.set_ylim(0.0, 1.05 * max(float(share.max()), 20.0))
+    beside.set_ylabel("missing moment [%]", color=AFTER, fontsize=9)
+    beside.spines["top"].set_visible(False)
+    axes.set_zorder(beside.get_zorder() + 1)
+    axes.patch.set_visible(False)
 
 
 def _spectrum(axes: Axes, values: Document, interval: list[float] | None) -> None:
