@@ -11,6 +11,7 @@ from tunnel_sim.record import Array, Record
 
 _FLOOR_FROM = 60.0  # Hz: above the motion, the rod's ringing and the mains
 _LN2 = float(np.log(2.0))  # median of a unit exponential: the periodogram of white noise
+_APART = 4.065  # standard deviations from the mean at which a run's noise is its own
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,9 @@ def estimate_variance(record: Record) -> tuple[float, float]:
     low = min(_FLOOR_FROM, 0.25 * rate)
     frequency, power = floor_periodogram(record.yaw_rad, rate)
     floor = power[(frequency > low) & (frequency < 0.49 * rate)]
-    # the Hann window correlates neighbouring bins: 1.5 bins carry what one would without it
-    return float(np.median(floor) / _LN2 * rate / 2.0), float(1.2 * np.sqrt(1.5 / floor.size))
+    # a median of n exponentials scatters by 1/√n of its mean ln 2; the Hann window correlates neighbouring
+    # bins: 1.57 of them carry what one would without it
+    return float(np.median(floor) / _LN2 * rate / 2.0), float(np.sqrt(1.57 / floor.size) / _LN2)
 
 
 def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
@@ -81,7 +83,7 @@ def campaign_noise(campaign: Campaign) -> Noise:
     stated = None
     if sensor.noise_std is not None:
         stated = sensor.noise_std**2 + (sensor.resolution or 0.0) ** 2 / 12.0
-    uniform = bool(np.all(np.abs(variances / pooled - 1.0) < 5.0 * relative))
+    uniform = bool(np.all(np.abs(variances / pooled - 1.0) < _APART * relative))
     use = {run.id: pooled if uniform else estimates[run.id][0] for run in campaign.runs}
     if stated is None:
         return Noise(use, None, "estimated", "the campaign states no noise")
@@ -98,7 +100,7 @@ def reading_step(campaign: Campaign) -> float:
 
     Returns:
         The smallest difference between distinct readings, rad: the true resolution where the record visits
-        neighbouring steps, as every decay does; 0 where readings are continuous.
+        neighbouring steps, as every decay does; far below any step where readings are continuous.
     """
     steps = []
     for run in campaign.runs:
@@ -117,7 +119,8 @@ class NoiseTrend:
     Args:
         amplitude_z: slope of the local noise variance against the squared amplitude, in its standard deviations.
         rate_z: likewise against the squared rate.
-        spread_z: excess scatter of local variances over that of Gaussian white noise, likewise.
+        spread_z: excess of the local variances' standard deviation over what their quartiles give, times the root
+            of their number: heavy tails.
     """
 
     amplitude_z: float
@@ -137,7 +140,8 @@ def noise_trend(campaign: Campaign) -> NoiseTrend:
 
     Returns:
         Trends of the variance of fourth differences of the reading in windows of 20 ms, pooled over runs. Under
-        steady white noise every figure is about standard normal.
+        steady white noise the slopes are about standard normal; the scatter lies above zero, for mean squares of
+        few samples are skewed, and the more so the more windows there are.
     """
     levels, squares, rates = [], [], []
     for run in campaign.runs:

@@ -1,0 +1,147 @@
+"""The noise of a record: its variance, the reading's step, and whether it follows the motion."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from diagnosis.noise import (
+    campaign_noise,
+    estimate_variance,
+    floor_periodogram,
+    noise_trend,
+    reading_step,
+)
+from tests.reference import free_decays
+from tests.reference.free_decays import Setting, with_records
+from tunnel_sim.record import Record
+
+NOISE = 5e-4
+SETTINGS = (Setting(16.12, 0.0), Setting(16.12, 20.0), Setting(44.84, 0.0), Setting(44.84, 20.0))
+
+
+def decays(seed=1, *, rate=500.0, duration=5.0, **options):
+    """Four runs of the nominal model in closed form, with white noise."""
+    return free_decays.campaign(
+        SETTINGS,
+        noise=options.pop("noise", NOISE),
+        rate=rate,
+        duration=duration,
+        rng=np.random.default_rng(seed),
+        **options,
+    )
+
+
+def test_the_variance_is_found_beside_motion_and_hum():
+    time = np.arange(20_000) / 1000.0
+    rng = np.random.default_rng(4)
+    motion = 0.35 * np.exp(-0.08 * time) * np.cos(13.0 * time)
+    hum = 2e-3 * sum(np.sin(2.0 * np.pi * 50.0 * k * time + k) for k in (1, 2, 3))
+    variance, relative = estimate_variance(Record(time, motion + hum + rng.normal(0.0, NOISE, time.size)))
+    assert abs(variance / NOISE**2 - 1.0) < 4.0 * relative
+    assert relative < 0.02
+
+
+def test_the_variance_is_as_certain_as_it_says():
+    rng = np.random.default_rng(5)
+    time = np.arange(2500) / 500.0
+    pulls = []
+    for _ in range(400):
+        variance, relative = estimate_variance(Record(time, rng.normal(0.0, 1.0, time.size)))
+        pulls.append((variance - 1.0) / relative)
+    spread = np.array(pulls)
+    assert abs(spread.mean()) < 4.0 / np.sqrt(400)
+    assert chi2.ppf(1e-4, 399) < 399 * spread.var() < chi2.isf(1e-4, 399)
+
+
+def test_the_periodogram_keeps_the_power():
+    values = np.random.default_rng(6).normal(0.0, 2.0, 50_000)
+    frequency, power = floor_periodogram(values, 800.0)
+    assert power.sum() * frequency[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_quantisation_adds_a_twelfth_of_its_square():
+    step = 1.5e-3
+    found = campaign_noise(decays(resolution=step))
+    assert np.mean(list(found.variance.values())) == pytest.approx(NOISE**2 + step**2 / 12.0, rel=0.1)
+
+
+def test_the_noise_is_held_against_what_is_stated():
+    data = decays(stated_noise=2.0 * NOISE)
+    found = campaign_noise(data)
+    assert found.stated_variance == pytest.approx(4.0 * NOISE**2)
+    assert found.source == "estimated"
+    assert "2.0" in found.reason or "1.9" in found.reason
+    assert campaign_noise(decays(stated_noise=None)).stated_variance is None
+
+
+def test_runs_of_equal_noise_share_its_estimate_and_others_keep_their_own():
+    quiet = decays()
+    assert len(set(campaign_noise(quiet).variance.values())) == 1
+    rng = np.random.default_rng(8)
+    runs = list(quiet.runs)
+    record = runs[2].record
+    louder = record.yaw_rad + rng.normal(0.0, 3.0 * NOISE, record.yaw_rad.size)
+    runs[2] = replace(runs[2], record=Record(record.time_s, louder))
+    variance = campaign_noise(replace(quiet, runs=tuple(runs))).variance
+    assert variance[runs[2].id] == pytest.approx(10.0 * NOISE**2, rel=0.3)
+    assert variance[runs[0].id] == pytest.approx(NOISE**2, rel=0.3)
+
+
+@pytest.mark.parametrize("step", [2.0 * np.pi / 3.0 / 4096.0, 2e-3, 5e-3])
+def test_the_step_of_the_lattice_is_found(step):
+    assert reading_step(decays(resolution=step)) == pytest.approx(step, rel=1e-6)
+
+
+def test_the_step_survives_being_printed_and_shifted():
+    step = 1.7e-3
+    data = with_records(decays(), lambda _t, y: np.round(step * np.floor(y / step) + 0.3 * step, 7))
+    assert reading_step(data) == pytest.approx(step, abs=2e-7)
+
+
+def test_continuous_readings_have_a_step_far_below_any_sensor():
+    assert reading_step(decays()) < 0.1 * NOISE
+
+
+def trends(count, change=None):
+    """Trends of campaigns of white noise, the reading passed through ``change``."""
+    found = []
+    for seed in range(count):
+        data = decays(seed + 100, rate=1000.0, duration=4.0)
+        trend = noise_trend(data if change is None else with_records(data, change(seed)))
+        found.append((trend.amplitude_z, trend.rate_z, trend.spread_z))
+    return np.array(found)
+
+
+def test_trends_of_white_noise_are_standard_normal():
+    found = trends(200)[:, :2]
+    assert np.all(np.abs(found.mean(axis=0)) < 4.0 / np.sqrt(200))
+    low, high = chi2.ppf([1e-5, 1.0 - 1e-5], 199) / 199
+    assert np.all((low < found.var(axis=0)) & (found.var(axis=0) < high))
+
+
+def test_noise_that_follows_the_motion_is_loud():
+    def by_rate(seed):
+        rng = np.random.default_rng(seed)
+        return lambda t, y: y + rng.normal(0.0, 1.0, y.size) * 2e-4 * np.abs(np.gradient(y, t))
+
+    def by_amplitude(seed):
+        rng = np.random.default_rng(seed)
+        return lambda _t, y: y + rng.normal(0.0, 1.0, y.size) * 3e-3 * np.abs(y)
+
+    assert np.all(trends(3, by_rate)[:, 1] > 8.0)
+    assert np.all(trends(3, by_amplitude)[:, 0] > 8.0)
+
+
+def test_bursts_are_louder_than_any_steady_noise():
+    def bursts(seed):
+        rng = np.random.default_rng(seed)
+        return lambda t, y: y + rng.normal(0.0, 5.0 * NOISE, y.size) * (np.sin(2.0 * t) > 0.95)
+
+    assert np.min(trends(3, bursts)[:, 2]) > 2.0 * np.max(trends(30)[:, 2])
+
+
+def test_too_slow_a_sampling_has_no_trend():
+    trend = noise_trend(decays(rate=250.0))
+    assert (trend.amplitude_z, trend.rate_z, trend.spread_z) == (0.0, 0.0, 0.0)
