@@ -20,7 +20,15 @@ def plain(names: Sequence[str]) -> str:
     return " and ".join(name.replace("_", " ") for name in names)
 
 
-def verdict(causes: Sequence[str], *, before: float, after: float, closed: float, probability: float) -> str:
+def verdict(
+    causes: Sequence[str],
+    *,
+    before: float,
+    after: float,
+    closed: float,
+    probability: float,
+    held_out: bool = True,
+) -> str:
     """The answer in one paragraph.
 
     Args:
@@ -29,6 +37,7 @@ def verdict(causes: Sequence[str], *, before: float, after: float, closed: float
         after: excess on held-out runs with the causes added.
         closed: share of the gap closed there.
         probability: of the answer.
+        held_out: whether any run could be held out; else ``after`` and ``closed`` are those of the fitted runs.
 
     Returns:
         Sentences.
@@ -44,11 +53,12 @@ def verdict(causes: Sequence[str], *, before: float, after: float, closed: float
             f"Do not trust the coefficients beyond the intervals given."
         )
     sources = "; ".join(_source(name) for name in causes)
+    runs = "on runs held out of the fit" if held_out else "in the fitted runs (none could be held out)"
     return (
         f"The gap ({before:.2f} times the noise power) comes from {plain(causes)} "
         f"(probability {probability:.2f}): "
         f"{sources}. With {'it' if len(causes) == 1 else 'them'} added, {100.0 * closed:.1f} % of the gap "
-        f"closes on runs held out of the fit, and {after:.3f} times the noise power is left."
+        f"closes {runs}, and {max(after, 0.0):.3f} times the noise power is left."
     )
 
 

@@ -173,12 +173,29 @@ def _closure(score: Score) -> Section:
 
 
 def _coefficients(score: Score) -> Section:
-    rows = tuple(
-        (e.group, f"{NAMES[e.name]} {e.when}", f"{100.0 * e.median:.3g} %", *_share(e.within))
-        for e in score.coefficients()
+    found = {(e.group, e.name, e.when): e for e in score.coefficients()}
+    rows = []
+    for (group, name, when), after in found.items():
+        before = found.get((group, name, "before"))
+        if when == "before" or before is None:
+            continue
+        low, high = after.within.interval
+        rows.append(
+            (
+                f"{group}: {NAMES[name]}",
+                f"{100.0 * before.median:.2g}",
+                f"{100.0 * after.median:.2g}",
+                f"{before.within.count}/{before.within.total}",
+                f"{after.within.count}/{after.within.total}",
+                f"{100.0 * low:.1f}–{100.0 * high:.1f} %",
+            )
+        )
+    headings = ("campaigns", "error before [%]", "after [%]", "≤ 3 std before", "after", "95 %")
+    note = (
+        "Errors are medians of |estimate − truth| over |truth|; ≤ 3 std counts errors within three standard "
+        "deviations of the estimate."
     )
-    headings = ("campaigns", "coefficient", "median error", "within 3 std", "of", "share", "95 %")
-    return Section("Coefficients before and after the causes are added", headings, rows)
+    return Section("Coefficients before and after the causes are added", headings, tuple(rows), note)
 
 
 def _pairs(score: Score) -> Section:
@@ -239,4 +256,4 @@ def _order(name: str) -> tuple[int, str]:
 def _share(share: Share) -> tuple[str, str, str, str]:
     low, high = share.interval
     value = "–" if share.value is None else f"{100.0 * share.value:.1f} %"
-    return str(share.count), str(share.total), value, f"{100.0 * low:.1f} to {100.0 * high:.1f} %"
+    return str(share.count), str(share.total), value, f"{100.0 * low:.1f}–{100.0 * high:.1f} %"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
 
-from tunnel_lab.formatting import significant, unit, with_std
+from tunnel_lab.formatting import significant, with_std
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -76,7 +77,7 @@ def parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
     for name, given in parameters.items():
         fixed = given["std"] == 0.0
         value = significant(given["value"]) if fixed else with_std(given["value"], given["std"])
-        mark = "" if given["unit"] == "1" else " " + unit(given["unit"])[1:-1]
+        mark = "" if given["unit"] == "1" else " " + re.sub(r"(?<=[a-z])2\b", "²", given["unit"])
         lines += [f"{name} =", f"  {value}{mark}"]
     return lines
 
@@ -101,9 +102,10 @@ def gap_table(document: Document) -> Table:
     if not gap["detected"]:
         return result
     named = document["causes"] != ["unknown"]
-    rows = [{"id": "all", "before": gap["excess_before"], "after": gap["excess_after"]}, *gap["runs"]]
-    for row in rows:
-        result.add_row(Text(row["id"]), _excess(row["before"]), _excess(row["after"]) if named else "–")
+    result.add_row("all", _excess(gap["excess_before"]), _excess(gap["excess_after"]) if named else "–")
+    for row in gap["runs"]:
+        after = _excess(row["after"]) + ("" if row["held_out"] else " (fitted)")
+        result.add_row(Text(row["id"]), _excess(row["before"]), after if named else "–")
     return result
 
 
@@ -210,6 +212,7 @@ def closing_lines(document: Document) -> list[str]:
     lines = [f"Noise: {noise['std']:.3g} rad, {noise['source']} ({noise['reason']})"]
     if note:
         lines.append(f"Note: {note}")
+    lines += [f"Caution: {text}" for text in document["cautions"]]
     if document["blind_spots"]:
         lines.append("These runs cannot show:")
         lines += [f"- {text}" for text in document["blind_spots"]]

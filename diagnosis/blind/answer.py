@@ -136,6 +136,7 @@ def answer_campaign(folder: Path, excluded: Sequence[str] = ()) -> tuple[str, di
     try:
         found = diagnose(read_campaign(folder), kinds=vocabulary(exclude=excluded))
         answer = found.to_json_dict()
+        answer.pop("maps", None)  # pictures' data: larger than the records, and nothing is scored by them
     except Exception as error:  # one bad campaign must not end a night's work; the score counts it as wrong
         said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
         answer = {"schema_version": SCHEMA_VERSION, "campaign": folder.name, "causes": None, "error": said}

@@ -125,9 +125,9 @@ class Score:
         """Errors of Cnβ and Cnr before and after, by what became of the answer."""
         groups: dict[str, Callable[[Case], bool]] = {
             "named rightly": lambda c: c.named_rightly,
-            "no gap, none found": lambda c: c.kind == "none" and c.right,
+            "none, rightly": lambda c: c.kind == "none" and c.right,
             "unknown, rightly": lambda c: c.right and c.truth == ("unknown",),
-            "answered wrongly": lambda c: not c.right,
+            "wrong": lambda c: not c.right,
             "all": lambda _: True,
         }
         found = []

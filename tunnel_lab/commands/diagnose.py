@@ -21,6 +21,7 @@ STEPS = {
     "single effects": "trying effects",
     "pairs": "trying pairs of effects",
     "buffeting": "weighing buffeting",
+    "where, and how far it closes": "locating the gap, holding runs out",
 }
 """Steps of the study in words; anything else it tells is the name of an effect or a pair."""
 

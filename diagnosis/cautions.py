@@ -1,0 +1,82 @@
+"""What an answer rests on less firmly than its figures look, each with the remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from diagnosis.noise import Noise
+from diagnosis.result import RunGap
+from tunnel_sim.campaign import Campaign
+
+_FEW = 3
+#: Stated noise this many times too small or too large is said; its rounding to one digit reaches half of that.
+_CONTRADICTED = 3.0
+
+
+def cautions(campaign: Campaign, noise: Noise, runs: Sequence[RunGap], *, named: bool) -> tuple[str, ...]:
+    """Say what is missing for a firm answer.
+
+    Args:
+        campaign: the runs.
+        noise: found in them, rad².
+        runs: which of them could be held out.
+        named: whether effects are named, so that there is something to hold runs out of.
+
+    Returns:
+        Sentences; none where nothing is missing.
+    """
+    found = [*_stiffness(campaign), *_reference(campaign), *_noise(noise)]
+    if len(campaign.runs) < _FEW:
+        number = "one run" if len(campaign.runs) == 1 else f"{len(campaign.runs)} runs"
+        found.append(
+            f"There {'is' if len(campaign.runs) == 1 else 'are'} {number} only: causes are told apart by the form "
+            f"of the decay alone. Add runs with other springs, wind speeds and release angles."
+        )
+    fitted = [run.id for run in runs if not run.held_out]
+    if named and len(fitted) == len(runs):
+        found.append(
+            "No run could be held out of the fit, so the closure stated is that of the fitted runs, no prediction. "
+            "Repeat every spring, with the wind off and on."
+        )
+    elif named and fitted:
+        found.append(
+            f"Not held out, since no other run has their spring or wind: {', '.join(fitted)}. "
+            f"Their gap after is that of the fit; repeat them."
+        )
+    return tuple(found)
+
+
+def _stiffness(campaign: Campaign) -> list[str]:
+    bare = [run.id for run in campaign.runs if run.spring_stiffness is None]
+    if not bare or len(campaign.runs) == 1:
+        return []
+    which = "No run states" if len(bare) == len(campaign.runs) else f"{', '.join(bare)}: without"
+    return [
+        f"{which} spring_stiffness, so all runs are taken to have the same spring. State it, or leave out runs "
+        f"with another spring: a different spring looks like a gap."
+    ]
+
+
+def _reference(campaign: Campaign) -> list[str]:
+    rig = campaign.rig
+    values = {"frontal_area": rig.frontal_area, "reference_length": rig.reference_length}
+    missing = [name for name, value in values.items() if value is None]
+    windy = any(run.wind_on for run in campaign.runs)
+    if not missing or not windy or any(run.spring_stiffness is None for run in campaign.runs):
+        return []
+    return [
+        f"[rig] states no {' and no '.join(missing)}, taken as 1: the coefficients are not Cnβ and Cnr before "
+        f"{'they are' if len(missing) > 1 else 'it is'} stated."
+    ]
+
+
+def _noise(noise: Noise) -> list[str]:
+    if noise.stated_variance is None:
+        return []
+    ratio = (sum(noise.variance.values()) / len(noise.variance) / noise.stated_variance) ** 0.5
+    if 1.0 / _CONTRADICTED < ratio < _CONTRADICTED:
+        return []
+    return [
+        f"The records' noise is {ratio:.3g} times what noise_std and resolution state. If that is how the sensor "
+        f"is, correct noise_std or leave it out: noise above the stated counts as a gap."
+    ]
