@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
+from diagnosis.cautions import cautions
 from diagnosis.coefficients import coefficients, rival_fits
 from diagnosis.decide import RIVAL_PROBABILITY, Weighed
 from diagnosis.gap import FALSE_ALARM_RATE
 from diagnosis.held_out import HeldOut, predict_held_out
 from diagnosis.least_squares import Fit
+from diagnosis.localisation.maps import Maps
 from diagnosis.next_run import separating_run
 from diagnosis.result import (
     Candidate,
@@ -26,7 +29,8 @@ from diagnosis.result import (
 )
 from diagnosis.study import Study
 from diagnosis.verdict import blind_spots, cnr_note, verdict
-from tunnel_sim.effects import effect_class
+
+_PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
 
 @dataclass(frozen=True)
@@ -44,12 +48,13 @@ class Base:
     hum: float
 
 
-def assemble(study: Study, where: Where) -> Diagnosis:
+def assemble(study: Study, where: Where, maps: Maps) -> Diagnosis:
     """Compose the answer.
 
     Args:
         study: what was found.
         where: where the gap is.
+        maps: the pictures' data.
 
     Returns:
         The diagnosis.
@@ -58,7 +63,7 @@ def assemble(study: Study, where: Where) -> Diagnosis:
     chosen = chosen_fit(study)
     nominal_out = predict_held_out(study.nominal)
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
-    gap = _gap(study, base, nominal_out, chosen_out)
+    gap = _gap(study, base, chosen, nominal_out, chosen_out)
     probability = study.weighed[0].probability if study.weighed else 1.0 - gap.false_alarm_rate
     rivals = rival_fits(study.weighed, study.hypotheses, chosen)
     data = study.nominal.problem.data
@@ -71,9 +76,11 @@ def assemble(study: Study, where: Where) -> Diagnosis:
             after=gap.excess_after,
             closed=gap.closed,
             probability=probability,
+            held_out=any(run.held_out for run in gap.runs),
         ),
         gap=gap,
         where=where,
+        maps=maps.to_json_dict(),
         candidates=_candidates(study, base),
         ambiguous_with=_rival_names(study),
         next_run=_next_run(study, chosen),
@@ -93,6 +100,10 @@ def assemble(study: Study, where: Where) -> Diagnosis:
             normalised=data.normalised,
         ),
         seconds=study.seconds,
+        provenance={"versions": {name: version(name) for name in _PACKAGES}},
+        cautions=cautions(
+            study.campaign, study.noise, gap.runs, named=bool(study.causes) and study.causes != ("unknown",)
+        ),
     )
 
 
@@ -127,23 +138,24 @@ def excess_base(study: Study) -> Base:
     return Base(estimated, 0.0, hum)
 
 
-def _gap(study: Study, base: Base, nominal_out: HeldOut, chosen_out: HeldOut) -> GapSummary:
+def _gap(study: Study, base: Base, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> GapSummary:
     data = study.nominal.problem.data
     ratio = base.extra + 1.0  # of the estimated noise to the base
     explained = 0.0 if study.coarse and "sensor_quantisation" in study.causes else base.extra
     runs, sizes = [], []
     before_out, after_out = [], []
-    for run, residual in zip(data.runs, study.nominal.residuals, strict=True):
+    for run, residual, kept in zip(data.runs, study.nominal.residuals, chosen.residuals, strict=True):
         fitted = (float(np.mean(residual**2)) - 1.0) / run.block * ratio
         before = fitted + base.hum + base.extra
         left = chosen_out.excess.get(run.id)
-        after = before if left is None else left / run.block * ratio + explained
+        open_ = float(np.mean(kept**2)) - 1.0 if left is None else left
+        after = open_ / run.block * ratio + explained
         if study.buffeting is not None and "buffeting" in study.causes and run.wind_on:
             after = study.buffeting.process.excess / run.block * ratio + explained
         if left is not None and run.id in nominal_out.excess:
             before_out.append(nominal_out.excess[run.id] / run.block * ratio + base.hum + base.extra)
             after_out.append(after)
-        runs.append(RunGap(run.id, before, after))
+        runs.append(RunGap(run.id, before, after, held_out=left is not None))
         sizes.append(run.reading.size * run.block)
     weight = np.array(sizes) / np.sum(sizes)
     total_before = float(weight @ [run.before for run in runs])
@@ -159,7 +171,7 @@ def _gap(study: Study, base: Base, nominal_out: HeldOut, chosen_out: HeldOut) ->
         excess_before=total_before,
         excess_after=total_after if named else total_before,
         closed=closed,
-        runs=tuple(runs) if named else tuple(RunGap(run.id, run.before, run.before) for run in runs),
+        runs=tuple(runs) if named else tuple(replace(run, after=run.before) for run in runs),
         false_alarm_rate=FALSE_ALARM_RATE,
         p_value=0.0 if study.read_off else study.test.p_value,
         tests=study.test.tests,
@@ -274,12 +286,3 @@ def _noise(study: Study) -> NoiseSummary:
     variance = float(np.mean(list(noise.variance.values())))
     stated = None if noise.stated_variance is None else float(np.sqrt(noise.stated_variance))
     return NoiseSummary(float(np.sqrt(variance)), stated, noise.source, noise.reason)
-
-
-def plain_where(study: Study) -> Where:
-    """Channel and condition as the causes' own definitions say, where nothing finer is known."""
-    names = [name for name in study.causes if name != "unknown"]
-    if not names:
-        return Where(None, None)
-    kind = effect_class(names[0])
-    return replace(Where(kind.channel, kind.condition))

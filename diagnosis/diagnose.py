@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis.assemble import assemble, plain_where
+from diagnosis.assemble import assemble, chosen_fit
+from diagnosis.localise import localise
 from diagnosis.result import Diagnosis
 from diagnosis.study import Progress, study
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
 from tunnel_sim.errors import TunnelError
-
-_FEWEST_RUNS = 1
 
 
 def diagnose(
@@ -31,7 +30,11 @@ def diagnose(
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
     found = study(campaign, kinds, progress)
-    return assemble(found, plain_where(found))
+    if progress is not None:
+        progress("where, and how far it closes")
+    best = chosen_fit(found)
+    where, maps = localise(campaign, found.nominal, None if best is found.nominal else best, found.causes)
+    return assemble(found, where, maps)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

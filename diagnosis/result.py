@@ -35,12 +35,14 @@ class RunGap:
     Args:
         id: of the run.
         before: mean squared residual over the noise variance, minus one, of the nominal model.
-        after: likewise with the causes added, predicted from the other runs.
+        after: likewise with the causes added, predicted from the other runs where it could be held out.
+        held_out: whether it could; else ``after`` is that of the fit of all runs.
     """
 
     id: str
     before: float
     after: float
+    held_out: bool = True
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,8 @@ class GapSummary:
     Args:
         detected: whether the gap is beyond chance.
         excess_before: of the nominal model, all runs.
-        excess_after: with the causes added, on runs not used for the fit.
-        closed: share of the gap closed on those runs, 0 to 1.
+        excess_after: with the causes added, on runs not used for the fit, as far as runs could be held out.
+        closed: share of the gap closed on runs held out, 0 to 1; of all runs where none could be.
         runs: by run.
         false_alarm_rate: of the test of detection.
         p_value: of the strongest test, corrected for the number of tests.
@@ -159,6 +161,9 @@ class Diagnosis:
         noise: what the gap is measured against.
         blind_spots: what these runs cannot show, in sentences.
         seconds: wall time by step, s.
+        cautions: what the answer rests on less firmly than its figures look, in sentences.
+        maps: the pictures' data in JSON's types.
+        provenance: versions.
     """
 
     campaign: str
@@ -173,6 +178,9 @@ class Diagnosis:
     noise: NoiseSummary
     blind_spots: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
+    cautions: tuple[str, ...] = ()
+    maps: Mapping[str, Any] | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""
@@ -186,7 +194,10 @@ class Diagnosis:
                 "excess_before": self.gap.excess_before,
                 "excess_after": self.gap.excess_after,
                 "closed": self.gap.closed,
-                "runs": [{"id": run.id, "before": run.before, "after": run.after} for run in self.gap.runs],
+                "runs": [
+                    {"id": run.id, "before": run.before, "after": run.after, "held_out": run.held_out}
+                    for run in self.gap.runs
+                ],
                 "false_alarm_rate": self.gap.false_alarm_rate,
                 "p_value": self.gap.p_value,
                 "tests": dict(self.gap.tests),
@@ -224,7 +235,10 @@ class Diagnosis:
                 "reason": self.noise.reason,
             },
             "blind_spots": list(self.blind_spots),
+            "cautions": list(self.cautions),
             "seconds": dict(self.seconds),
+            "maps": None if self.maps is None else dict(self.maps),
+            "provenance": dict(self.provenance),
         }
 
 
