@@ -1,0 +1,272 @@
+"""The least squares behind a diagnosis: derivatives, elimination, borrowed sensitivities, recovery."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from diagnosis.data import prepare
+from diagnosis.least_squares import (
+    FitError,
+    clip,
+    fit,
+    fit_growing,
+    fit_releases,
+    normal_equations,
+    project_release,
+    scaled_residuals,
+    sensitivities,
+)
+from diagnosis.problem import Point, Problem, condensed, held_end
+from diagnosis.start import nominal_start
+from tests.reference import free_decays
+from tests.reference.free_decays import Setting, Truth
+from tests.unit.gap_campaigns import campaign, nominal
+from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
+
+NOISE = 4e-4
+SIX = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
+
+
+def prepared(seed=1, *, noise=NOISE, settings=SIX, **options):
+    """Six runs of the nominal model in closed form, 5 s at 500 Hz."""
+    rng = np.random.default_rng(seed)
+    data = free_decays.campaign(settings, noise=noise, rate=500.0, duration=5.0, rng=rng, **options)
+    return prepare(data, {run.id: NOISE**2 for run in data.runs})
+
+
+def test_the_truth_is_recovered_from_closed_form_records():
+    truth = Truth()
+    data = prepared()
+    found = fit(Problem(data), nominal_start(data))
+    assert found.converged
+    names = ("yaw_inertia", "mechanical_damping", "cn_beta", "cn_r")
+    for name in (*names, "zero"):
+        expected = 0.004 if name == "zero" else getattr(truth, name)
+        assert abs(found.value(name) - expected) < 4.0 * found.std(name)
+    assert abs(found.excess) < 5.0 * np.sqrt(2.0 / found.count)
+    np.testing.assert_allclose(found.point.release[:, 0], 0.35, atol=5 * NOISE)
+
+
+def test_without_noise_the_truth_is_exact():
+    data = prepared(noise=0.0)
+    found = fit(Problem(data), nominal_start(data), tolerance=1e-9)
+    assert found.value("cn_r") == pytest.approx(-0.11, abs=1e-4)
+    assert found.total < 0.1  # of 7500 residuals in noise standard deviations
+
+
+def test_intervals_are_as_wide_as_the_scatter():
+    pulls = []
+    for seed in range(30):
+        data = prepared(seed, settings=SIX[:3])
+        found = fit(Problem(data), nominal_start(data))
+        truth = {"yaw_inertia": 0.1014, "mechanical_damping": 0.012, "cn_beta": 0.49, "cn_r": -0.11}
+        pulls.append([(found.value(n) - v) / found.std(n) for n, v in truth.items()])
+    square = np.mean(np.square(pulls), axis=0)
+    # χ² of 30 lies within 0.30 and 2.3 times 30 but for one in 10 000 on either side
+    assert np.all((square > 0.30) & (square < 2.3))
+
+
+def test_normalised_runs_give_frequency_and_damping():
+    data = prepared(settings=(Setting(None, 0.0), Setting(None, 0.0, 0.2)))
+    found = fit(Problem(data), nominal_start(data))
+    assert found.problem.names == ("stiffness", "mechanical_damping", "zero")
+    truth = Truth()
+    assert abs(found.value("stiffness") - 16.12 / truth.yaw_inertia) < 4.0 * found.std("stiffness")
+    damping = truth.mechanical_damping / truth.yaw_inertia
+    assert abs(found.value("mechanical_damping") - damping) < 4.0 * found.std("mechanical_damping")
+
+
+SMOOTH = {
+    "quadratic_damping": {"coefficient": 0.005},
+    "cubic_stiffness": {"coefficient": 0.3},
+    "gravity_stiffness": {"stiffness": 0.1, "rest_angle": 0.1},
+    "unsteady_aero_lag": {"lag": 0.5},
+    "rod_flexibility": {"compliance": 1e-3, "inertia_share": 0.3},
+    "wind_speed_drift": {"drift": 0.02},
+    "vortex_shedding": {"amplitude": 0.02, "strouhal_number": 0.12},
+    "sensor_nonlinearity": {"coefficient": 0.05},
+    "wind_speed_offset": {"offset": 0.4},
+}
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_sensitivities_agree_with_central_differences(name):
+    problem = Problem(prepared(settings=SIX[:2]), (effect_class(name),))
+    common = np.array([0.1014, 0.012, 0.49, -0.11, 0.004, *SMOOTH[name].values()])
+    own = [[0.35, 0.1, *[0.7] * len(problem.phased)], [0.3, -0.2, *[0.4] * len(problem.phased)]]
+    point = Point(common, np.array(own))
+    for r, (by_common, by_own) in enumerate(sensitivities(problem, point)):
+        for columns, which in ((by_common, "common"), (by_own, "release")):
+            for j in range(columns.shape[1]):
+                h = 1e-4 * max(abs(getattr(point, which)[..., j].max()), 1e-2)
+                ends = []
+                for side in (-1.0, 1.0):
+                    moved = getattr(point, which).copy()
+                    moved[..., j] += side * h
+                    ends.append(replace(point, **{which: moved}))
+                low, high = (scaled_residuals(problem, end)[r] for end in ends)
+                central = (low - high) / (2.0 * h)
+                scale = np.linalg.norm(central)
+                assert np.linalg.norm(columns[:, j] - central) <= 3e-3 * scale + 1e-6
+
+
+def random_system(rng, runs=5, common=4, own=3, count=40):
+    jacobian = [(rng.normal(size=(count, common)), rng.normal(size=(count, own))) for _ in range(runs)]
+    return jacobian, [rng.normal(size=count) for _ in range(runs)]
+
+
+def dense_solution(jacobian, residuals):
+    """All parameters in one least-squares problem: common, then every run's own."""
+    runs, own = len(jacobian), jacobian[0][1].shape[1]
+    rows = []
+    for r, (common, release) in enumerate(jacobian):
+        blocks = [np.zeros((len(common), own)) for _ in range(runs)]
+        blocks[r] = release
+        rows.append(np.column_stack([common, *blocks]))
+    matrix = np.concatenate(rows)
+    return np.linalg.lstsq(matrix, np.concatenate(residuals), rcond=None)[0], matrix
+
+
+def test_eliminated_releases_give_the_dense_solution():
+    jacobian, residuals = random_system(np.random.default_rng(2))
+    expected, matrix = dense_solution(jacobian, residuals)
+    normal, gradient, solutions = normal_equations(jacobian, residuals)
+    step = np.linalg.solve(normal, gradient)
+    np.testing.assert_allclose(step, expected[:4], rtol=1e-8)
+    own = [s[:, -1] - s[:, :-1] @ step for s in solutions]
+    np.testing.assert_allclose(np.concatenate(own), expected[4:], rtol=1e-8)
+    covariance = np.linalg.inv(matrix.T @ matrix)[:4, :4]
+    np.testing.assert_allclose(np.linalg.inv(normal), covariance, rtol=1e-8)
+
+
+def test_a_parameter_without_any_say_does_no_harm():
+    """The phase of shed vortices means nothing in a run without wind."""
+    jacobian, residuals = random_system(np.random.default_rng(3))
+    expected, _ = dense_solution(jacobian, residuals)
+    padded = [(common, np.column_stack([release, np.zeros(40)])) for common, release in jacobian]
+    normal, gradient, solutions = normal_equations(padded, residuals)
+    step = np.linalg.solve(normal, gradient)
+    np.testing.assert_allclose(step, expected[:4], rtol=1e-8)
+    assert all((s[:, -1] - s[:, :-1] @ step)[-1] == 0.0 for s in solutions)
+
+
+@pytest.mark.parametrize("name", ["quadratic_damping", "coulomb_friction", "unsteady_aero_lag"])
+def test_borrowed_sensitivities_lead_to_the_same_optimum(name):
+    values = {"coulomb_friction": {"friction_moment": 0.002}, "quadratic_damping": {"coefficient": 0.003},
+              "unsteady_aero_lag": {"lag": 1.0}}[name]  # fmt: skip
+    base = nominal(campaign(effect_from(name, values)))
+    problem = Problem(base.problem.data, (effect_class(name),))
+    start = Point(np.append(base.point.common, 0.5 * next(iter(values.values()))), base.point.release)
+    full = fit(problem, start, tolerance=1e-6)
+    borrowed = fit(problem, start, base=base, tolerance=1e-6)
+    assert borrowed.total == pytest.approx(full.total, abs=1.0)
+    key = problem.effect_names[0]
+    assert abs(borrowed.value(key) - full.value(key)) < 0.1 * full.std(key)
+    assert abs(full.value(key) - next(iter(values.values()))) < 4.0 * full.std(key)
+
+
+def test_a_fit_stays_inside_its_bounds():
+    base = nominal(campaign())
+    problem = Problem(base.problem.data, (effect_class("coulomb_friction"),))
+    low = clip(problem, Point(np.append(base.point.common, -1.0), base.point.release))
+    assert low.common[-1] == 0.0
+    found = fit(problem, Point(np.append(base.point.common, 1e-4), base.point.release), base=base)
+    assert 0.0 <= found.value("coulomb_friction.friction_moment") < 1e-4
+
+
+def test_a_model_that_grows_without_bound_is_refused():
+    data = prepared(settings=SIX[:2])
+    start = nominal_start(data)
+    wild = start.common.copy()
+    wild[1] = -500.0  # mechanical damping
+    with pytest.raises(FitError):
+        fit(Problem(data), Point(wild, start.release))
+
+
+def test_only_releases_are_fitted_where_only_they_may_move():
+    data = prepared()
+    truth = Truth()
+    common = np.array([truth.yaw_inertia, truth.mechanical_damping, truth.cn_beta, truth.cn_r, 0.004])
+    problem = Problem(data)
+    wrong = Point(common, np.tile([0.31, 0.4], (6, 1)))
+    slopes = [own for _, own in sensitivities(problem, Point(common, np.tile([0.35, 0.0], (6, 1))))]
+    left = fit_releases(problem, wrong, slopes)
+    assert sum(float(r @ r) for r in left) / sum(r.size for r in left) == pytest.approx(1.0, abs=0.1)
+
+
+def test_what_a_release_cannot_absorb_is_orthogonal_to_it():
+    rng = np.random.default_rng(5)
+    slopes, change = rng.normal(size=(50, 2)), rng.normal(size=50)
+    left = project_release(change, slopes)
+    np.testing.assert_allclose(slopes.T @ left, 0.0, atol=1e-10)
+    np.testing.assert_allclose(project_release(slopes @ [2.0, -3.0], slopes), 0.0, atol=1e-10)
+
+
+def test_growing_horizons_reach_a_truth_far_out_of_phase():
+    data = prepared(noise=NOISE)
+    start = nominal_start(data)
+    far = start.common.copy()
+    far[0] *= 1.05  # half a radian out of phase every three seconds: over a cycle at the end
+    found = fit_growing(Problem(data), Point(far, start.release))
+    assert abs(found.value("yaw_inertia") - Truth().yaw_inertia) < 4.0 * found.std("yaw_inertia")
+    assert abs(found.excess) < 5.0 * np.sqrt(2.0 / found.count)
+
+
+def two_inertias(run, compliance, share, time):
+    """The rod's end of the two-inertia model, by SciPy; the body is held, so the rod starts twisted."""
+    truth = Truth()
+    top, body = share * truth.yaw_inertia, (1.0 - share) * truth.yaw_inertia
+    rod = 1.0 / compliance
+    twist_damping = 2.0 * 0.01 * np.sqrt(truth.yaw_inertia * share * (1.0 - share) * rod)
+    per = 0.5 * run.air_density * 0.036 * 0.625 * run.wind_speed
+
+    def slope(_t, s):
+        theta, omega, beta, rate = s
+        between = rod * (beta - theta) + twist_damping * (rate - omega)
+        air = per * (run.wind_speed * truth.cn_beta * beta + 0.625 * truth.cn_r * rate)
+        spring = run.spring_stiffness * theta + truth.mechanical_damping * omega
+        return [omega, (between - spring) / top, rate, (air - between) / body]
+
+    start = [0.35, 0.0, 0.35 * (1.0 + run.spring_stiffness * compliance), 0.0]
+    found = solve_ivp(slope, (0.0, time[-1]), start, "DOP853", time, rtol=1e-10, atol=1e-12, max_step=5e-4)
+    return found.y[0]
+
+
+@pytest.mark.parametrize("speed", [0.0, 25.0])
+@pytest.mark.parametrize("share", [0.1, 0.5])
+def test_a_stiff_rod_condensed_moves_as_the_two_inertias_do(speed, share):
+    """What is dropped is of the square of c Kr = 9e-4, and the ringing after the release."""
+    compliance = 2e-5
+    data = prepared(settings=(Setting(44.84, speed),))
+    data = replace(data, runs=tuple(replace(run, reading=run.reading[:500]) for run in data.runs), windy=True)
+    problem = Problem(data, (effect_class("rod_flexibility"),))
+    truth = Truth()
+    common = [truth.yaw_inertia, truth.mechanical_damping, truth.cn_beta, truth.cn_r, 0.0, compliance, share]
+    point = Point(np.array(common), np.array([[0.35, 0.0]]))
+    physics = problem.effects_at(point.common)[0].on_run(
+        *[problem.stated(point.common, point.release[0], data.runs[0])] * 2, np.random.default_rng(0)
+    )
+    assert held_end(condensed(physics, data)).rod_twist is None
+    moved = problem.predict([point])[0][0]
+    time = np.arange(1000) / 500.0
+    expected = two_inertias(data.runs[0], compliance, share, time).reshape(500, 2).mean(axis=1)
+    rigid = Problem(data).predict([Point(point.common[:5], point.release)])[0][0]
+    effect = np.max(np.abs(rigid - expected))
+    assert effect > 2.0 * NOISE
+    assert np.max(np.abs(moved - expected)) < min(0.1 * effect, 0.25 * NOISE)
+
+
+@pytest.mark.parametrize("kind", [k for k in ALL_EFFECTS if k.name not in ("sensor_clipping", "buffeting")])
+def test_an_effect_at_its_null_predicts_as_without(kind):
+    data = prepared(settings=SIX[:2])
+    values = [0.0 if i == 0 else info.default for i, info in enumerate(kind.parameters())]
+    common = np.array([0.1014, 0.012, 0.49, -0.11, 0.004])
+    release = np.array([[0.35, 0.0], [0.35, 0.0]])
+    problem = Problem(data, (kind,))
+    own = np.column_stack([release, *[np.zeros(2)] * len(problem.phased)])
+    with_effect = problem.predict([Point(np.append(common, values), own)])[0]
+    without = Problem(data).predict([Point(common, release)])[0]
+    for one, other in zip(with_effect, without, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)

@@ -1,0 +1,115 @@
+"""Is there a gap: chance is let pass at the stated rate, and a misfit in any band is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom, kstest
+
+from diagnosis import gap  # its test_gap would be collected here by name
+from diagnosis.noise import Noise, NoiseTrend
+from diagnosis.spectra import resonance
+from tests.unit.gap_campaigns import campaign, nominal
+
+STEADY = NoiseTrend(0.0, 0.0, 0.0)
+NOISE = Noise({"r1": 1.6e-7}, None, "estimated", "")
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return nominal(campaign())
+
+
+def white(fitted, rng):
+    return replace(fitted, residuals=[rng.normal(size=r.size) for r in fitted.residuals])
+
+
+def verdict(fit, *, noise=NOISE, trend=STEADY, coarse_step=False):
+    return gap.test_gap(fit, noise, trend, coarse_step=coarse_step)
+
+
+def test_white_residuals_raise_no_more_alarms_than_stated(fitted):
+    rng = np.random.default_rng(12)
+    trials = 2000
+    alarms = sum(
+        verdict(white(fitted, rng), trend=NoiseTrend(*rng.normal(size=2), 0.0)).detected
+        for _ in range(trials)
+    )
+    assert alarms <= binom.ppf(0.9999, trials, gap.FALSE_ALARM_RATE)
+
+
+def test_p_values_of_white_residuals_are_uniform_but_for_the_tolerance(fitted, monkeypatch):
+    monkeypatch.setattr(gap, "_FLOOR_TOLERANCE", 0.0)
+    rng = np.random.default_rng(13)
+    values = []
+    for _ in range(300):
+        fit = white(fitted, rng)
+        values.append([*gap.band_p_values(fit)[1:4], gap.offset_p_value(fit)])
+    for column in np.array(values)[:, :3].T:
+        assert kstest(column, "uniform").pvalue > 1e-4
+    # the fit takes one degree of freedom of the means; raw noise has it still, so p is a little small here
+    assert np.mean(np.array(values)[:, 3] < 0.5) < 0.8
+
+
+def test_the_tolerance_makes_the_tests_milder(fitted, monkeypatch):
+    fit = white(fitted, np.random.default_rng(14))
+    with_tolerance = gap.band_p_values(fit)
+    monkeypatch.setattr(gap, "_FLOOR_TOLERANCE", 0.0)
+    assert all(a >= b for a, b in zip(with_tolerance, gap.band_p_values(fit), strict=True))
+
+
+@pytest.mark.parametrize(("band", "multiple"), [("below", 0.25), ("f0", 1.0), ("2f0", 2.0), ("3f0", 3.0),
+                                                ("above", 9.0)])  # fmt: skip
+def test_a_line_in_any_band_is_seen_there(fitted, band, multiple):
+    fit = white(fitted, np.random.default_rng(15))
+    residuals = []
+    for i, r in enumerate(fit.residuals):
+        time = fit.problem.data.runs[i].interval * np.arange(r.size)
+        residuals.append(r + 0.5 * np.sin(2.0 * np.pi * multiple * resonance(fit, i) * time))
+    found = verdict(replace(fit, residuals=residuals))
+    assert found.detected
+    assert min(found.tests, key=found.tests.__getitem__) == band
+    assert not found.noisy
+
+
+def test_runs_of_their_own_zero_are_seen_in_the_means(fitted):
+    fit = white(fitted, np.random.default_rng(16))
+    sides = (1.0, -1.0) * 3
+    found = verdict(replace(fit, residuals=[r + 0.15 * s for r, s in zip(fit.residuals, sides, strict=True)]))
+    assert found.detected
+    assert min(found.tests, key=found.tests.__getitem__) == "offset"
+    alone = replace(fit, residuals=fit.residuals[:1])
+    assert gap.offset_p_value(alone) == 1.0
+
+
+def test_noise_that_misbehaves_is_a_gap_unless_a_coarse_step_explains_it(fitted):
+    fit = white(fitted, np.random.default_rng(17))
+    loud = Noise({"r1": 4.0}, 1.0, "estimated", "")
+    cases = (
+        ("noise against rate", {"trend": NoiseTrend(0.0, 9.0, 0.0)}),
+        ("noise against amplitude", {"trend": NoiseTrend(-9.0, 0.0, 0.0)}),
+        ("noise in bursts", {"trend": NoiseTrend(0.0, 0.0, 60.0)}),
+        ("noise level", {"noise": loud}),
+    )
+    for name, options in cases:
+        found = verdict(fit, **options)
+        assert found.detected
+        assert found.noisy
+        assert min(found.tests, key=found.tests.__getitem__) == name
+        quiet = verdict(fit, **options, coarse_step=True)
+        assert not quiet.detected
+        assert not quiet.noisy
+
+
+def test_the_p_value_counts_the_tests(fitted):
+    found = verdict(white(fitted, np.random.default_rng(18)))
+    assert found.p_value == pytest.approx(min(1.0, min(found.tests.values()) * len(found.tests)))
+    assert found.detected == (found.p_value < gap.FALSE_ALARM_RATE)
+
+
+def test_a_step_in_the_reading_a_thousandth_of_a_swing_is_seen():
+    """A gap that a χ² over all samples would miss: a drift of one standard deviation."""
+    data = campaign(added=4e-4 * np.linspace(-0.5, 0.5, 2500))
+    fit = nominal(data)
+    assert abs(fit.excess) < 0.15
+    assert verdict(fit).detected
