@@ -15,6 +15,7 @@ from scipy.signal import savgol_filter
 
 from diagnosis.data import Data, RunData
 from diagnosis.problem import Point, Problem
+from tunnel_sim.effects import Effect
 from tunnel_sim.record import Array
 
 _SMOOTHING = 0.05  # of a period: the length of the smoothing polynomial
@@ -71,8 +72,16 @@ def _solution_bounds(problem: Problem) -> tuple[Array, Array]:
     )
     names = [name for name in problem.nominal_names if name != "zero"]
     severities = [f"{kind.name}.{kind.parameters()[0].name}" for kind in problem.effects]
+    for kind, key in zip(problem.effects, severities, strict=True):
+        if _is_share(problem, kind):  # regressed as a moment, whose bounds are not the share's
+            lower[key], upper[key] = -np.inf, np.inf
     keys = [*names, *severities]
     return np.array([lower[key] for key in keys]), np.array([upper[key] for key in keys])
+
+
+def _is_share(problem: Problem, kind: type[Effect]) -> bool:
+    """Whether an effect's severity is a share of a stiffness not yet known: it is regressed as a moment."""
+    return problem.data.normalised and kind.name in ("cubic_stiffness", "asymmetric_stiffness")
 
 
 def _smoothed(run: RunData, zero: float) -> tuple[Array, Array, Array]:
@@ -109,8 +118,7 @@ def _common(problem: Problem, solution: Array, zero: float) -> Array:
     values["zero"] = zero
     for kind, value in zip(problem.effects, solution[count:], strict=True):
         severity, *rest = kind.parameters()
-        # in normalised form a share of the stiffness was regressed as a moment
-        share = kind.name in ("cubic_stiffness", "asymmetric_stiffness") and problem.data.normalised
+        share = _is_share(problem, kind)
         values[f"{kind.name}.{severity.name}"] = (
             value / max(abs(values["stiffness"]), 1e-9) if share else value
         )
