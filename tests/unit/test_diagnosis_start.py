@@ -1,0 +1,209 @@
+"""Where fits start: the nominal model from the records, an effect's severity from its signature."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.data import prepare
+from diagnosis.equation_error import equation_error_start
+from diagnosis.least_squares import fit, fit_growing
+from diagnosis.problem import Point, Problem
+from diagnosis.spectra import residual_spectra, resonance, shedding_line
+from diagnosis.start import is_gross, leads, nominal_start, project_out
+from tests.reference import free_decays
+from tests.reference.free_decays import Setting, Truth
+from tests.unit.gap_campaigns import CN_BETA, INERTIA, campaign, nominal
+from tunnel_sim.effects import effect_class, effect_from
+
+NOISE = 4e-4
+SIX = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
+
+
+def prepared(settings=SIX, duration=6.0):
+    data = free_decays.campaign(
+        settings, noise=NOISE, rate=250.0, duration=duration, rng=np.random.default_rng(2)
+    )
+    return prepare(data, {run.id: NOISE**2 for run in data.runs})
+
+
+def test_the_nominal_start_is_within_a_fifth_of_a_radian_of_phase():
+    """Close enough for Gauss–Newton: half a percent of frequency is 0.2 rad after 6 s at 1 Hz."""
+    truth = Truth()
+    start = nominal_start(prepared())
+    inertia, damping, cn_beta, cn_r, zero = start.common
+    assert inertia == pytest.approx(truth.yaw_inertia, rel=5e-3)
+    assert cn_beta == pytest.approx(truth.cn_beta, abs=0.05)
+    assert (damping > 0.0, cn_r) == (True, 0.0)
+    assert zero == pytest.approx(0.004, abs=0.004)
+    np.testing.assert_allclose(start.release[:, 0], 0.35, atol=0.01)
+
+
+def test_the_nominal_start_of_runs_without_wind_or_stiffness():
+    still = nominal_start(prepared(SIX[:1] + SIX[3:4]))
+    assert still.common.size == 3
+    assert still.common[0] == pytest.approx(Truth().yaw_inertia, rel=5e-3)
+    normalised = nominal_start(prepared((Setting(None, 0.0), Setting(None, 0.0, 0.2))))
+    assert normalised.common[0] == pytest.approx(16.12 / Truth().yaw_inertia, rel=5e-3)
+
+
+def test_nothing_that_the_fit_can_absorb_is_left_of_a_change():
+    base = nominal(campaign())
+    rng = np.random.default_rng(3)
+    weights = rng.normal(size=len(base.point.common))
+    own = rng.normal(size=base.point.release.shape)
+    columns = [c @ weights + r @ o for (c, r), o in zip(base.jacobian, own, strict=True)]
+    size = np.sqrt(sum(float(c @ c) for c in columns))
+    assert np.sqrt(sum(float(c @ c) for c in project_out(base, columns))) < 1e-6 * size
+
+
+LINEAR = {
+    "quadratic_damping": {"coefficient": 4e-4},
+    "cubic_stiffness": {"coefficient": 0.01},
+    "asymmetric_stiffness": {"coefficient": 0.02},
+    "nonlinear_yaw_moment": {"coefficient": 0.15},
+    "flow_misalignment": {"angle": 0.005},
+    "sensor_drift": {"drift": 1e-3},
+    "wind_speed_offset": {"offset": 0.05},
+}
+
+
+@pytest.mark.parametrize("name", LINEAR)
+def test_the_promise_of_a_small_effect_is_the_drop_it_brings(name):
+    values = LINEAR[name]
+    base = nominal(campaign(effect_from(name, values)))
+    lead = leads(base, effect_class(name))[0]
+    found = fit(lead.problem, lead.point, base=base)
+    assert lead.promise == pytest.approx(base.total - found.total, rel=0.15)
+    key = f"{name}.{next(iter(values))}"
+    severity = lead.point.common[lead.problem.names.index(key)]
+    assert severity == pytest.approx(next(iter(values.values())), rel=0.25)
+    assert abs(found.value(key) - next(iter(values.values()))) < 4.0 * found.std(key)
+
+
+def test_what_these_runs_cannot_show_has_no_lead():
+    still = campaign()
+    still = replace(still, runs=tuple(run for run in still.runs if not run.wind_on))
+    base = nominal(still)
+    assert leads(base, effect_class("nonlinear_yaw_moment")) == []
+    assert leads(base, effect_class("vortex_shedding")) == []
+    assert leads(base, effect_class("coulomb_friction"))
+    one_spring = replace(still, runs=still.runs[:1])
+    assert leads(nominal(one_spring), effect_class("spring_miscalibration")) == []
+
+
+def test_leads_come_the_most_promising_first():
+    base = nominal(campaign(effect_from("rod_flexibility", {"compliance": 5e-5, "inertia_share": 0.2})))
+    promises = [lead.promise for lead in leads(base, effect_class("rod_flexibility"))]
+    assert promises == sorted(promises, reverse=True)
+    assert len(promises) == 3
+
+
+def test_a_wrong_spring_is_sought_among_the_springs_there_are():
+    base = nominal(
+        campaign(effect_from("spring_miscalibration", {"error": 0.002, "spring_stiffness": 44.84}))
+    )
+    held = {dict(lead.problem.fixed)["spring_miscalibration.spring_stiffness"] for lead in
+            leads(base, effect_class("spring_miscalibration"))}  # fmt: skip
+    assert held == {16.12, 44.84}
+
+
+def readings_of(data, effect, common, own, noise=0.0):
+    """The same runs with the readings of a model."""
+    values = [getattr(effect, info.name) for info in effect.parameters()]
+    point = Point(np.array([*common, *values]), np.array(own))
+    readings = Problem(data, (type(effect),)).predict([point])[0]
+    rng = np.random.default_rng(7)
+    runs = tuple(
+        replace(
+            run,
+            reading=y + rng.normal(0.0, noise, y.size) / np.sqrt(run.block),
+            noise_variance=NOISE**2 / run.block,
+        )
+        for run, y in zip(data.runs, readings, strict=True)
+    )
+    return replace(data, runs=runs)
+
+
+NOMINAL = (INERTIA, 0.008, CN_BETA, -0.25, 0.001)
+
+
+def test_a_shedding_line_gives_its_strouhal_number_amplitude_and_phase():
+    shed = effect_from("vortex_shedding", {"amplitude": 0.01, "strouhal_number": 0.16})
+    phases = np.linspace(0.3, 5.8, 6)
+    own = [[0.35, 0.0, phase] for phase in phases]
+    data = readings_of(replace(prepared(duration=10.0), width=0.225), shed, NOMINAL, own, NOISE)
+    base = fit(Problem(data), nominal_start(data))
+    line = shedding_line(base)
+    assert line is not None
+    assert line.parameter == pytest.approx(0.16, abs=0.002)
+    assert line.amplitude == pytest.approx(0.01, rel=0.15)
+    lead = leads(base, effect_class("vortex_shedding"))[0]
+    found = fit(lead.problem, lead.point, base=base)
+    assert abs(found.excess) < 5.0 * np.sqrt(2.0 / found.count)
+    windy = [i for i, run in enumerate(data.runs) if run.wind_on]
+    turn = found.point.release[windy, 2] - phases[windy]
+    np.testing.assert_allclose(np.angle(np.exp(1j * turn)), 0.0, atol=0.3)
+
+
+def test_a_sine_in_the_residuals_has_its_amplitude_in_their_spectrum():
+    base = nominal(campaign())
+    time = base.problem.data.runs[0].interval * np.arange(base.residuals[0].size)
+    sine = replace(base, residuals=[3.0 * np.sin(2.0 * np.pi * 7.3 * time + 0.4) for _ in base.residuals])
+    spectrum = residual_spectra(sine)[0]
+    assert abs(spectrum.at(7.3)) == pytest.approx(3.0, rel=0.01)
+    assert np.angle(spectrum.at(7.3)) + np.pi / 2 == pytest.approx(0.4, abs=0.02)
+    assert spectrum.power(7.3) == pytest.approx(np.sum(sine.residuals[0] ** 2), rel=0.02)
+
+
+def test_resonance_is_the_undamped_frequency_with_the_air():
+    base = nominal(campaign())
+    for i, run in enumerate(base.problem.data.runs):
+        pressure = 0.5 * run.air_density * run.wind_speed**2 * 0.036 * 0.625
+        expected = np.sqrt((run.spring_stiffness - pressure * CN_BETA) / INERTIA) / (2.0 * np.pi)
+        assert resonance(base, i) == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_gross_misfit_is_told_from_a_small_one():
+    assert not is_gross(nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))))
+    assert is_gross(nominal(campaign(effect_from("coulomb_friction", {"friction_moment": 0.3}))))
+
+
+BALANCED = {
+    "coulomb_friction": {"friction_moment": 0.1},
+    "quadratic_damping": {"coefficient": 0.05},
+    "cubic_stiffness": {"coefficient": 1.5},
+    "asymmetric_stiffness": {"coefficient": 0.5},
+    "gravity_stiffness": {"stiffness": 3.0},
+}
+
+
+@pytest.mark.parametrize("name", BALANCED)
+def test_the_balance_of_moments_starts_near_a_strong_effect(name):
+    """Near enough for growing horizons to arrive, which the nominal start's own phase would not allow."""
+    kind = effect_class(name)
+    effect = effect_from(name, BALANCED[name])
+    data = readings_of(prepared(duration=6.0), effect, NOMINAL, [[0.35, 0.0]] * 6, NOISE)
+    problem = Problem(data, (kind,), (("gravity_stiffness.rest_angle", 0.0),) * (name == "gravity_stiffness"))
+    start = equation_error_start(problem)
+    assert start is not None
+    found = fit_growing(problem, start)
+    assert abs(found.excess) < 5.0 * np.sqrt(2.0 / found.count)
+    key = problem.effect_names[0]
+    assert abs(found.value(key) - effect.severity) < 4.0 * found.std(key)
+
+
+def test_the_balance_of_moments_keeps_to_what_is_linear():
+    data = nominal(campaign()).problem.data
+    assert equation_error_start(Problem(data, (effect_class("rod_flexibility"),))) is None
+
+
+def test_the_balance_of_moments_without_stiffness_gives_a_share_of_it():
+    """Per unit inertia, and for a cubic spring per unit stiffness."""
+    data = prepared((Setting(None, 0.0), Setting(None, 0.0, 0.2)))
+    effect = effect_from("cubic_stiffness", {"coefficient": 0.8})
+    data = readings_of(data, effect, (160.0, 0.1, 0.002), [[0.5, 0.0], [0.3, 0.0]])
+    start = equation_error_start(Problem(data, (type(effect),)))
+    assert start is not None
+    assert start.common[0] == pytest.approx(160.0, rel=0.02)
+    assert start.common[3] == pytest.approx(0.8, rel=0.2)
