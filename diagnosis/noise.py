@@ -83,6 +83,7 @@ def campaign_noise(campaign: Campaign) -> Noise:
     stated = None
     if sensor.noise_std is not None:
         stated = sensor.noise_std**2 + (sensor.resolution or 0.0) ** 2 / 12.0
+        stated = stated if stated > 0.0 else None  # a noise of zero states nothing a record could have
     uniform = bool(np.all(np.abs(variances / pooled - 1.0) < _APART * relative))
     use = {run.id: pooled if uniform else estimates[run.id][0] for run in campaign.runs}
     if stated is None:
