@@ -1,0 +1,127 @@
+"""A random moment: its likelihood finds what drove the rig, and it is not called for anything else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from diagnosis.buffeting import weigh_buffeting, wind_off_excess
+from diagnosis.process_noise import fit_process_noise, whiteness
+from diagnosis.rank import Hypothesis
+from tests.unit.gap_campaigns import (
+    CN_BETA,
+    CN_R,
+    CONDITIONS,
+    DAMPING,
+    DURATION,
+    INERTIA,
+    INTERVAL,
+    campaign,
+    nominal,
+    with_blow,
+)
+from tunnel_sim.effects import effect_from
+from tunnel_sim.record import Record
+
+AREA, LENGTH = 0.036, 0.625
+
+
+def buffeted(data, intensity, bandwidth, seed=5):
+    """A first-order random moment on every wind-on run, sampled exactly: the nominal model is linear."""
+    rng = np.random.default_rng(seed)
+    runs = []
+    for run, (spring, speed) in zip(data.runs, CONDITIONS, strict=True):
+        if speed > 0.0:
+            response = random_response(rng, spring, speed, intensity, bandwidth)
+            run = replace(run, record=Record(run.record.time_s, run.record.yaw_rad + response))
+        runs.append(run)
+    return replace(data, runs=tuple(runs))
+
+
+def random_response(rng, spring, speed, intensity, bandwidth):
+    pressure = 0.5 * 1.2 * speed**2 * AREA * LENGTH
+    stiffness = spring - pressure * CN_BETA
+    damping = DAMPING - pressure * LENGTH / speed * CN_R
+    corner = 2.0 * np.pi * bandwidth
+    dynamics = np.array(
+        [[0, 1, 0], [-stiffness / INERTIA, -damping / INERTIA, pressure / INERTIA], [0, 0, -corner]], float
+    )
+    step = expm(dynamics * INTERVAL)
+    # the covariance over one step, by the matrix exponential's block form
+    drive = np.diag([0.0, 0.0, 2.0 * corner * intensity**2])
+    block = expm(np.block([[-dynamics, drive], [np.zeros((3, 3)), dynamics.T]]) * INTERVAL)
+    scatter = step @ block[:3, 3:]
+    root = np.linalg.cholesky(0.5 * (scatter + scatter.T) + 1e-24 * np.eye(3))
+    state = np.array([0.0, 0.0, intensity * rng.standard_normal()])
+    angles = np.empty(round(DURATION / INTERVAL))
+    for k in range(angles.size):
+        angles[k] = state[0]
+        state = step @ state + root @ rng.standard_normal(3)
+    return angles
+
+
+@pytest.fixture(scope="module")
+def windy():
+    return nominal(buffeted(campaign(), 0.01, 4.0))
+
+
+def test_intensity_and_bandwidth_are_recovered(windy):
+    found = fit_process_noise(windy)
+    assert found is not None
+    # at the rig only the level of the spectrum around resonance is seen well: intensity²/bandwidth
+    assert found.intensity**2 / found.bandwidth == pytest.approx(0.01**2 / 4.0, rel=0.5)
+    assert found.intensity == pytest.approx(0.01, rel=0.5)
+    assert found.drop > 1000.0
+    assert found.white_excess > 1.0
+    assert abs(found.excess) < 0.1
+
+
+def test_innovations_of_the_right_model_are_white_and_steady(windy):
+    found = fit_process_noise(windy)
+    assert found is not None
+    band, quarter, _ = whiteness(found)
+    assert band < 5.0
+    assert quarter < 5.0
+    assert len(found.run_ids) == sum(speed > 0.0 for _, speed in CONDITIONS)
+
+
+def test_without_a_random_moment_there_is_nothing_to_gain():
+    found = fit_process_noise(nominal(campaign()))
+    assert found is not None
+    assert found.drop < 20.0  # χ² of two parameters, fitted over a grid
+
+
+def test_buffeting_is_offered_where_it_blows(windy):
+    answer = weigh_buffeting(windy, [])
+    assert answer is not None
+    assert answer.effects == ("buffeting",)
+    assert answer.share < 0.1
+
+
+def test_one_gust_is_no_buffeting():
+    struck = with_blow(campaign(), 0.01, 5.5)
+    struck = replace(
+        struck,
+        runs=tuple(
+            b if b.wind_on else a for a, b in zip(campaign().runs, struck.runs, strict=True)
+        ),
+    )  # fmt: skip
+    assert weigh_buffeting(nominal(struck), []) is None
+
+
+def test_a_gap_in_still_air_is_no_buffeting():
+    fit = nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003})))
+    assert wind_off_excess(fit) > 0.1
+    assert weigh_buffeting(fit, []) is None
+
+
+def test_where_an_effect_closes_the_gap_no_random_moment_is_tried(windy):
+    closed = replace(windy, chi2=np.array([float(r.size) for r in windy.residuals]))
+    assert weigh_buffeting(windy, [Hypothesis(("free_play",), closed)]) is None
+
+
+def test_runs_without_wind_have_no_random_moment():
+    still = campaign()
+    still = replace(still, runs=tuple(run for run in still.runs if not run.wind_on))
+    assert fit_process_noise(nominal(still)) is None
