@@ -1,0 +1,280 @@
+"""The answer as data: every kind of answer is a document of the published schema."""
+
+import json
+from dataclasses import replace
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pytest
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from scipy.interpolate import CubicSpline
+
+from diagnosis.assemble import assemble, chosen_fit
+from diagnosis.decide import Weighed
+from diagnosis.diagnose import diagnose, vocabulary
+from diagnosis.localise import localise
+from diagnosis.rank import Hypothesis
+from diagnosis.study import study
+from tests.unit import gap_campaigns
+from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, with_blow
+from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.record import Record
+
+NAMES = [kind.name for kind in ALL_EFFECTS]
+FEW = vocabulary(
+    ["quadratic_damping", "coulomb_friction", "sensor_drift", "mains_hum", "sensor_quantisation"]
+)
+TIME = INTERVAL * np.arange(round(DURATION / INTERVAL))
+
+
+class Strict(BaseModel):
+    """The published fields with their types; others are welcome."""
+
+    model_config = ConfigDict(strict=True, extra="allow")
+
+
+class Value(Strict):
+    value: float
+    std: Annotated[float, Field(ge=0.0)]
+    unit: str
+
+
+class RunGap(Strict):
+    id: str
+    before: float
+    after: float
+
+
+class Gap(Strict):
+    detected: bool
+    excess_before: float
+    excess_after: float
+    closed: Annotated[float, Field(ge=0.0, le=1.0)]
+    runs: list[RunGap]
+
+
+Interval = Annotated[list[float], Field(min_length=2, max_length=2)] | None
+
+
+class Where(Strict):
+    channel: Literal["stiffness", "damping", "forcing", "sensor", "calibration"] | None
+    condition: Literal["always", "wind_on"] | None
+    runs: list[str]
+    time_s: Interval
+    amplitude_rad: Interval
+    frequency_hz: Interval
+
+
+class Candidate(Strict):
+    effect: str
+    probability: Annotated[float, Field(ge=0.0, le=1.0)]
+    excess_after: float
+    closed: Annotated[float, Field(ge=0.0, le=1.0)]
+    parameters: dict[str, Value]
+
+
+class Coefficients(Strict):
+    before: dict[str, Value]
+    after: dict[str, Value]
+
+
+class Document(Strict):
+    schema_version: Literal[1]
+    campaign: str
+    causes: list[str]
+    gap: Gap
+    where: Where
+    candidates: Annotated[list[Candidate], Field(min_length=2)]
+    ambiguous_with: list[str]
+    next_run: dict[str, Any] | None
+    coefficients: Coefficients
+
+    @model_validator(mode="after")
+    def consistent(self) -> "Document":
+        """What types do not say."""
+        assert self.causes == sorted(self.causes)
+        assert self.causes == ["unknown"] or set(self.causes) <= set(NAMES)
+        assert self.gap.detected == bool(self.causes)
+        assert set(self.ambiguous_with) <= set(NAMES) - set(self.causes)
+        names = [candidate.effect for candidate in self.candidates]
+        assert len(names) == len(set(names))
+        assert {"none", "unknown"} <= set(names)
+        assert all(set(name.split(" + ")) <= {*NAMES, "none", "unknown"} for name in names)
+        assert names[0] == (" + ".join(self.causes) or "none")
+        probabilities = [candidate.probability for candidate in self.candidates]
+        assert probabilities == sorted(probabilities, reverse=True)
+        assert abs(sum(probabilities) - 1.0) < 2e-3
+        return self
+
+
+def checked(answer):
+    """The document, through JSON and the schema."""
+    return Document.model_validate(json.loads(json.dumps(answer.to_json_dict(), allow_nan=False)))
+
+
+def answered(found):
+    """The document of a study."""
+    return checked(assemble(found, *localise(found.campaign, found.nominal, chosen_fit(found), found.causes)))
+
+
+def hum(amplitude):
+    return amplitude * np.sin(2.0 * np.pi * 50.0 * TIME + 0.4)
+
+
+def coarse(data, step):
+    """The same campaign read with a step coarser than stated."""
+    runs = tuple(
+        replace(run, record=Record(run.record.time_s, step * np.round(run.record.yaw_rad / step)))
+        for run in data.runs
+    )
+    return replace(data, runs=runs, sensor=replace(data.sensor, resolution=5.1e-4))
+
+
+def normalised(effect=None):
+    """Two runs of one rig in still air that state no stiffness."""
+    runs = tuple(
+        replace(campaign(effect, seed=seed).runs[0], id=f"n{seed}", spring_stiffness=None) for seed in (3, 4)
+    )
+    data = campaign(effect)
+    return replace(data, runs=runs, sensor=replace(data.sensor, noise_std=None))
+
+
+QUADRATIC = effect_from("quadratic_damping", {"coefficient": 0.004})
+CASES = {
+    "no gap": (campaign, []),
+    "named": (lambda: campaign(QUADRATIC), ["quadratic_damping"]),
+    "pair": (
+        lambda: campaign(QUADRATIC, added=3e-3 * np.linspace(0.0, 1.0, TIME.size)),
+        ["quadratic_damping", "sensor_drift"],
+    ),
+    "unknown": (lambda: with_blow(campaign(), 0.01, 4.0), ["unknown"]),
+    "hum only": (lambda: campaign(added=hum(1e-3)), ["mains_hum"]),
+    "coarse step only": (lambda: coarse(campaign(), 2e-3), ["sensor_quantisation"]),
+    "hum and an effect": (lambda: campaign(QUADRATIC, added=hum(1e-3)), ["mains_hum", "quadratic_damping"]),
+    "normalised, no gap": (normalised, []),
+    "normalised, named": (lambda: normalised(QUADRATIC), ["quadratic_damping"]),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_kind_of_answer_is_a_document_of_the_schema(name):
+    make, causes = CASES[name]
+    data = make()
+    document = checked(diagnose(data, kinds=FEW))
+    assert document.causes == causes
+    assert [run.id for run in document.gap.runs] == [run.id for run in data.runs]
+    expected = {"omega_n", "zeta"} if name.startswith("normalised") else {"cn_beta", "cn_r"}
+    assert set(document.coefficients.before) == set(document.coefficients.after) == expected
+    if causes and causes != ["unknown"]:
+        assert document.gap.closed > 0.9
+        assert document.gap.excess_after < 0.1 * document.gap.excess_before
+        assert document.where.channel is not None
+    else:
+        assert document.gap.closed == 0.0
+        assert document.gap.excess_after == document.gap.excess_before
+        assert [run.after for run in document.gap.runs] == [run.before for run in document.gap.runs]
+    if not causes:
+        assert abs(document.gap.excess_before) < 0.1
+
+
+def finely(data, noise, effect=QUADRATIC):
+    """The same motions read at 1 kHz, with noise of their own."""
+    rng = np.random.default_rng(5)
+    fine = np.arange(4 * TIME.size) * INTERVAL / 4.0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gap_campaigns, "NOISE", 1e-12)
+        quiet = campaign(effect)
+    runs = []
+    for run, clean in zip(data.runs, quiet.runs, strict=True):
+        smooth = CubicSpline(TIME, clean.record.yaw_rad)(fine)
+        runs.append(replace(run, record=Record(fine, smooth + rng.normal(0.0, noise, fine.size))))
+    sensor = replace(data.sensor, sample_rate=4.0 / INTERVAL, noise_std=None)
+    return replace(data, runs=tuple(runs), sensor=sensor)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return study(campaign(QUADRATIC), FEW)
+
+
+def test_the_excess_is_of_samples_whatever_the_blocks():
+    """Four samples to a block: its mean has four times the samples' excess."""
+    coarse = campaign(QUADRATIC)
+    one, other = (
+        checked(diagnose(data, kinds=FEW)).gap.excess_before for data in (coarse, finely(coarse, 4e-4))
+    )
+    assert other == pytest.approx(one, rel=0.1)
+
+
+def test_rivals_are_named_with_the_run_that_would_tell(found):
+    first = found.hypothesis(("quadratic_damping",))
+    second = found.hypothesis(("coulomb_friction",))
+    assert first is not None
+    assert second is not None
+    torn = replace(
+        found,
+        weighed=(
+            Weighed(("quadratic_damping",), 0.0, 0.6),
+            Weighed(("coulomb_friction",), 0.01, 0.3),
+            Weighed(("unknown",), 0.33, 0.1),
+        ),
+    )
+    document = answered(torn)
+    assert document.ambiguous_with == ["coulomb_friction"]
+    assert document.next_run is not None
+    assert document.next_run["separation"] > 0.0
+    sure = answered(found)
+    assert (sure.ambiguous_with, sure.next_run) == ([], None)
+    # not knowing which is paid for in the interval
+    assert document.coefficients.after["cn_r"].std > sure.coefficients.after["cn_r"].std
+
+
+def test_noise_that_misbehaves_is_unknown_once():
+    """Every effect is weighed, and none explains noise that swells with the rate."""
+    rng = np.random.default_rng(8)
+    data = finely(campaign(), 4e-4, None)
+
+    def louder(record):
+        level = 1e-3 * np.abs(np.gradient(record.yaw_rad, record.time_s))
+        return Record(record.time_s, record.yaw_rad + level * rng.normal(size=level.size))
+
+    data = replace(data, runs=tuple(replace(run, record=louder(run.record)) for run in data.runs))
+    document = checked(diagnose(data, kinds=FEW))
+    assert document.causes == ["unknown"]
+
+
+def test_the_chosen_fit_is_that_of_the_answer(found):
+    assert chosen_fit(found).problem.effects == (effect_class("quadratic_damping"),)
+    hypothesis = found.hypothesis(("quadratic_damping",))
+    assert isinstance(hypothesis, Hypothesis)
+    assert chosen_fit(found) is hypothesis.fit
+    lost = replace(found, weighed=(Weighed(("unknown",), 1.0, 1.0),))
+    assert chosen_fit(lost) is found.nominal
+    assert lost.causes == ("unknown",)
+
+
+def test_progress_is_told_and_steps_are_timed():
+    told = []
+    answer = diagnose(campaign(QUADRATIC), kinds=FEW, progress=told.append)
+    assert {"noise", "nominal fit", "single effects", "quadratic_damping"} <= set(told)
+    assert set(answer.seconds) >= {"noise", "nominal fit", "single effects"}
+    assert all(seconds >= 0.0 for seconds in answer.seconds.values())
+
+
+def test_effects_that_are_withheld_are_not_answered_with():
+    data = campaign(added=hum(1e-3))
+    answer = diagnose(data, kinds=vocabulary(["quadratic_damping", "coulomb_friction"]))
+    assert "mains_hum" not in answer.causes
+    assert {c.effect for c in answer.candidates} <= {
+        "quadratic_damping", "coulomb_friction", "coulomb_friction + quadratic_damping", "unknown", "none"
+    }  # fmt: skip
+
+
+def test_vocabularies():
+    assert [kind.name for kind in vocabulary()] == NAMES
+    assert [kind.name for kind in vocabulary(["free_play", "buffeting"], ["buffeting"])] == ["free_play"]
+    with pytest.raises(TunnelError, match="no effect is left"):
+        vocabulary(["free_play"], ["free_play"])
+    with pytest.raises(TunnelError, match="did you mean 'free_play'"):
+        vocabulary(["free_pley"])
