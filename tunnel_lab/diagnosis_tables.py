@@ -71,10 +71,16 @@ def parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
         parameters: value, std and unit by name; a std of zero means that the value was given, not fitted.
 
     Returns:
-        Lines such as ``friction_moment =`` and ``  0.003991 ± 0.000006 N m``.
+        Lines such as ``friction_moment =`` and ``  0.003991 ± 0.000006 N m``; of a pair, each effect's
+        below its name.
     """
-    lines = []
-    for name, given in parameters.items():
+    lines: list[str] = []
+    effect = ""
+    for full, given in parameters.items():
+        owner, _, name = full.rpartition(".")
+        if owner != effect:
+            effect = owner
+            lines.append(f"{owner}:")
         fixed = given["std"] == 0.0
         value = significant(given["value"]) if fixed else with_std(given["value"], given["std"])
         mark = "" if given["unit"] == "1" else " " + re.sub(r"(?<=[a-z])2\b", "²", given["unit"])

@@ -19,7 +19,7 @@ class Case:
         name: of the campaign.
         truth: its effects, sorted; ``("unknown",)`` outside the vocabulary, empty for none.
         withheld: whether one of its effects was excluded from the vocabulary, which makes the truth unknown.
-        severity: excess of the nominal model; None where the truth does not say.
+        severity: excess of the nominal model as a ratio to the noise power; None where the truth does not say.
         coefficients: true ``cn_beta`` and ``cn_r``, 1/rad.
         answer: the diagnosis' document.
     """

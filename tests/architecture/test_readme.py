@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -15,10 +16,14 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
 SESSIONS = {
-    text.splitlines()[0].removeprefix("$ "): text.splitlines()[1:]
+    text.splitlines()[0].removeprefix("$ "): [
+        (said.splitlines()[0], said.splitlines()[1:])
+        for said in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]
+    ]
     for kind, text in BLOCKS
     if kind == "console"
 }
+"""What is typed and shown, by the first command of each block."""
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
 LAST_DIGITS = 3
 """Another processor may round the last digits otherwise; what is shown is given to two digits of the std."""
@@ -34,7 +39,7 @@ def toml_block(key: str) -> str:
 
 
 def output_of(command: str, folder: Path) -> list[str]:
-    program, *arguments = command.split()
+    program, *arguments = shlex.split(command)
     assert program == "tunnel"
     done = subprocess.run(
         [sys.executable, "-m", "tunnel_lab.cli", *arguments],
@@ -72,11 +77,14 @@ def assert_same(shown: list[str], real: list[str]) -> None:
 
 @pytest.mark.parametrize("command", sorted(SESSIONS))
 def test_shown_output_is_real_output(command: str, tmp_path: Path) -> None:
-    assert_same(SESSIONS[command], output_of(command, tmp_path))
+    (tmp_path / "plan.toml").write_text(toml_block("wind_speeds"), encoding="utf-8")
+    for typed, shown in SESSIONS[command]:
+        assert_same(shown, output_of(typed, tmp_path))
 
 
-def test_demo_and_springs_are_shown() -> None:
-    assert set(SESSIONS) == {"tunnel demo", "tunnel springs"}
+def test_demo_springs_and_a_diagnosis_are_shown() -> None:
+    typed = [command.split()[1] for session in SESSIONS.values() for command, _ in session]
+    assert sorted(typed) == ["demo", "diagnose", "simulate", "springs"]
 
 
 def test_the_comparison_can_fail() -> None:
