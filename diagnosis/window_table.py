@@ -1,0 +1,261 @@
+"""A table of windows, as the paper's Table III, and the simulation of one.
+
+Such a table holds damping ratio and natural frequency of one wind-on run, three cycles at a time. The linear
+model leaves both columns constant; ``diagnosis.window_rivals`` weighs what makes them drift. The paper does
+not name the run behind its table: `RigState` is an inference, see `infer_springs` and `rig_state`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi, radians, sqrt
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from identification.damped_oscillation import Decay
+from identification.datasets import WindowRow, paper_derivatives, paper_springs, paper_windows
+from identification.decay_fit import Reading, fit_run
+from tunnel_sim.aero import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.effects import Effect
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.forward import forward_motion
+from tunnel_sim.record import Array
+from tunnel_sim.rig import Rig, load_rig
+from tunnel_sim.run_settings import RunSettings
+
+CYCLES = 3
+_POINTS = 100  # of a window, as the paper's first network takes them
+_RATE = 250.0  # Hz of the simulated reading
+_TREND = 2  # degree of the smooth trend whose residual is the table's scatter
+
+
+@dataclass(frozen=True)
+class RigState:
+    """The rig in the run behind a table: assumed, not stated by the paper.
+
+    Args:
+        spring_stiffness: Kr, N m/rad.
+        wind_speed: V, m/s; 0 is wind-off.
+        derivatives: Cnβ and Cnr, 1/rad.
+        release_angle: rad. It scales severities (a cubic one as its inverse square) and, but for effects
+            with an angle of their own, nothing else.
+        air_density: ρ, kg/m³.
+    """
+
+    spring_stiffness: float
+    wind_speed: float
+    derivatives: AeroDerivatives
+    release_angle: float = radians(20.0)
+    air_density: float = 1.204
+
+
+@dataclass(frozen=True)
+class SpringInference:
+    """What one spring of Table II would imply for the run behind Table III.
+
+    Args:
+        spring: number.
+        wind_speed: V at which the printed Cnβ brings the spring's wind-off frequency down to the table's
+            mean, m/s.
+        mechanical_damping: Cr left of the table's mean damping once the printed Cnr is taken off, N m s/rad;
+            negative is impossible.
+    """
+
+    spring: int
+    wind_speed: float
+    mechanical_damping: float
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Both columns of a table.
+
+    Args:
+        zeta: damping ratio, shape (windows,).
+        omega_n: natural frequency, shape (windows,), rad/s.
+    """
+
+    zeta: Array
+    omega_n: Array
+
+
+def infer_springs(table: Sequence[WindowRow] | None = None) -> tuple[SpringInference, ...]:
+    """Ask of every spring whether it can be the one behind the table: an inference, not the paper's word.
+
+    Each spring's own inertia is Kr/ω0², as in the paper's eqs 10 and 11; Cnβ and Cnr are Table IV's of the
+    neural network, which the paper took from the means of Table III.
+
+    Args:
+        table: None takes the paper's.
+
+    Returns:
+        One row per spring whose wind-off frequency lies above the table's mean, as a positive Cnβ demands.
+    """
+    rows = paper_windows() if table is None else table
+    omega = float(np.mean([row.omega_n_rad_per_s for row in rows]))
+    zeta = float(np.mean([row.zeta for row in rows]))
+    printed, body, density = paper_derivatives()[0], load_rig().body, load_rig().air.density
+    found = []
+    for spring in paper_springs():
+        stiffness, omega_0 = spring.stiffness_n_m_per_rad, 2.0 * pi * spring.frequency_hz
+        if omega_0 <= omega:
+            continue
+        inertia = stiffness / omega_0**2
+        per_square = 0.5 * density * body.frontal_area * body.length * printed.cn_beta_per_rad
+        speed = sqrt((stiffness - inertia * omega**2) / per_square)
+        air = 0.5 * density * speed * body.frontal_area * body.length**2 * printed.cn_r_per_rad
+        found.append(SpringInference(spring.number, speed, 2.0 * zeta * omega * inertia + air))
+    return tuple(found)
+
+
+def rig_state(spring: int = 5, wind_speed: float = 10.0, release_angle: float = radians(20.0)) -> RigState:
+    """The state assumed behind Table III; the defaults are what `infer_springs` leaves, and a guess at 20°.
+
+    Args:
+        spring: number in Table II.
+        wind_speed: m/s.
+        release_angle: rad.
+
+    Returns:
+        The state, with the derivatives of Table IV (neural network).
+    """
+    rig, printed = load_rig(), paper_derivatives()[0]
+    derivatives = AeroDerivatives(printed.cn_beta_per_rad, printed.cn_r_per_rad)
+    return RigState(rig.spring(spring), wind_speed, derivatives, release_angle, rig.air.density)
+
+
+def read_table(table: Sequence[WindowRow]) -> tuple[Columns, Columns]:
+    """A table's columns and their scatter.
+
+    Args:
+        table: rows in the order of time.
+
+    Returns:
+        Values and standard deviations. The scatter is what a quadratic in the window's number leaves, so it
+        is itself known to √(1/2ν) only, with ν = windows − 3.
+
+    Raises:
+        TunnelError: when there are fewer than six rows.
+    """
+    if len(table) < 6:
+        raise TunnelError(
+            f"a table of {len(table)} windows", remedy="give six or more, to estimate a scatter"
+        )
+    second = [row.omega_n_second_reading_rad_per_s for row in table]
+    pairs = [
+        (r.omega_n_rad_per_s, r.omega_n_rad_per_s if s is None else s)
+        for r, s in zip(table, second, strict=True)
+    ]
+    readings = np.array(pairs)
+    values = Columns(np.array([row.zeta for row in table]), readings.mean(axis=1))
+    spread = 0.5 * np.abs(readings[:, 1] - readings[:, 0])
+    std_omega = np.sqrt(_scatter(values.omega_n) ** 2 + spread**2)
+    return values, Columns(np.full(len(table), _scatter(values.zeta)), std_omega)
+
+
+def _scatter(column: Array) -> float:
+    place = np.arange(column.size)
+    residual = column - np.polyval(np.polyfit(place, column, _TREND), place)
+    return float(np.sqrt(residual @ residual / freedom(column.size)))
+
+
+def freedom(windows: int) -> int:
+    """Degrees of freedom behind a column's scatter: windows less the trend's coefficients."""
+    return windows - _TREND - 1
+
+
+def simulate_windows(
+    state: RigState,
+    effects: Sequence[Effect],
+    omega_n: float,
+    zeta: float,
+    count: int,
+    *,
+    base: RigState | None = None,
+) -> Columns | None:
+    """Simulate a release and window its reading as the paper did.
+
+    Args:
+        state: the rig.
+        effects: what acts beyond the linear model.
+        omega_n: base natural frequency in the state ``base``, rad/s.
+        zeta: base damping ratio there.
+        count: of consecutive windows of three cycles from the release on.
+        base: the state in which the base ωn and ζ hold; None is ``state`` itself.
+
+    Returns:
+        Both columns; None where the motion does not oscillate through all windows.
+    """
+    rig = load_rig()
+    inertia, mechanical = base_dynamics(state if base is None else base, omega_n, zeta, rig)
+    stated = RunSettings(
+        spring_stiffness=state.spring_stiffness,
+        derivatives=state.derivatives,
+        yaw_inertia=inertia,
+        mechanical_damping=mechanical,
+        wind_speed=state.wind_speed,
+        air_density=state.air_density,
+        release_angle=state.release_angle,
+        duration=round(1.1 * count * CYCLES * 2.0 * pi / omega_n * _RATE) / _RATE,
+        timestep=0.5 / _RATE,
+    )
+    return _windowed(*_read(rig, stated, effects), Decay.from_modal(omega_n, zeta), count)
+
+
+def base_dynamics(state: RigState, omega_n: float, zeta: float, rig: Rig) -> tuple[float, float]:
+    """Inertia and mechanical damping that give a base ωn and ζ with the air as printed.
+
+    Args:
+        state: the rig's state.
+        omega_n: rad/s, with the wind on.
+        zeta: damping ratio, with the wind on.
+        rig: gives A and l.
+
+    Returns:
+        Izz in kg m² and Cr in N m s/rad.
+    """
+    air = {
+        "air_density": state.air_density,
+        "wind_speed": state.wind_speed,
+        "frontal_area": rig.body.frontal_area,
+        "reference_length": rig.body.length,
+    }
+    inertia = (state.spring_stiffness - aerodynamic_stiffness(state.derivatives.cn_beta, **air)) / omega_n**2
+    return inertia, 2.0 * zeta * omega_n * inertia + aerodynamic_damping(state.derivatives.cn_r, **air)
+
+
+def _read(rig: Rig, stated: RunSettings, effects: Sequence[Effect]) -> tuple[Array, Array]:
+    rng = np.random.default_rng(0)  # nothing is drawn: random effects are not asked
+    run = stated
+    for effect in effects:
+        run = effect.on_run(run, stated, rng)
+    try:
+        motion = forward_motion(rig, run, _RATE)
+    except ValueError:  # grows without bound
+        return np.arange(2.0), np.zeros(2)
+    reading = motion.angle
+    for effect in effects:
+        reading = effect.on_angle(reading, motion.time_s, stated, rng)
+    for effect in effects:
+        reading = effect.on_reading(reading)
+    return motion.time_s, reading
+
+
+def _windowed(time: Array, reading: Array, decay: Decay, count: int) -> Columns | None:
+    curve, begin = CubicSpline(time, reading), 0.0
+    zeta, omega = np.empty(count), np.empty(count)
+    for i in range(count):
+        length = CYCLES * 2.0 * pi / decay.omega_d if decay.omega_d > 0.0 else np.inf
+        if begin + length > time[-1]:
+            return None
+        own = np.linspace(0.0, length, _POINTS)
+        with np.errstate(invalid="ignore"):  # a body at rest fits no decay, and the fit says so
+            fit = fit_run(Reading(own, np.asarray(curve(begin + own))), decay)
+        if not fit.runs or not fit.runs[0].decay.omega_d > 0.0:
+            return None
+        decay = fit.runs[0].decay
+        zeta[i], omega[i] = decay.zeta, decay.omega_n
+        begin += length
+    return Columns(zeta, omega)
