@@ -85,7 +85,12 @@ def _noise(noise: Noise) -> list[str]:
     ratio = std / noise.stated_variance**0.5
     if 1.0 / _CONTRADICTED < ratio < _CONTRADICTED:
         return []
+    said = f"The records' noise is {ratio:.3g} times what noise_std and resolution state"
+    if ratio < 1.0:
+        return [
+            f"{said}. The answer rests on the noise found in the records; correct noise_std or leave it out."
+        ]
     return [
-        f"The records' noise is {ratio:.3g} times what noise_std and resolution state. If that is how the sensor "
-        f"is, correct noise_std or leave it out: noise above the stated counts as a gap."
+        f"{said}, and noise above the stated counts as a gap. If that is how the sensor is, correct noise_std or "
+        f"leave it out."
     ]
