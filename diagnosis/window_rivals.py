@@ -100,27 +100,46 @@ class WindowDiagnosis:
         held = [e for e in self.explanations if {k.name for k in e.kinds} & set(names)]
         return sum(e.probability for e in held)
 
-    def separation(self, other: Explanation, state: RigState) -> float | None:
-        """How far a further run's table would set an explanation apart from the best.
+    def explanation(self, *names: str) -> Explanation:
+        """The hypothesis that holds just these effects.
+
+        Args:
+            *names: of its effects, in any order; none is the linear model.
+
+        Returns:
+            Its fit.
+
+        Raises:
+            TunnelError: when it was not weighed: one of its effects moves neither column.
+        """
+        for e in self.explanations:
+            if {kind.name for kind in e.kinds} == set(names):
+                return e
+        raise TunnelError(
+            f"{' + '.join(names)} was not weighed",
+            remedy="ask for one of " + ", ".join(e.name for e in self.explanations),
+        )
+
+    def separation(self, one: Explanation, other: Explanation, state: RigState) -> float | None:
+        """How far a further run's table would set two explanations apart.
 
         Both keep what was fitted here: severities, inertia and mechanical damping.
 
         Args:
-            other: the rival.
+            one: an explanation.
+            other: its rival.
             state: the further run.
 
         Returns:
-            Distance of the two predicted tables in standard deviations of this one's scatter, √Σ(Δ/std)²;
+            Distance of the two predicted tables in standard deviations of this table's scatter, √Σ(Δ/std)²;
             None where one of them would not oscillate through all windows.
         """
         count = self.measured.zeta.size
-        both = [
+        a, b = (
             simulate_windows(state, e.effects, e.omega_n, e.zeta, count, base=self.state)
-            for e in (self.explanations[0], other)
-        ]
-        if both[0] is None or both[1] is None:
-            return None
-        return float(np.linalg.norm(_residuals(both[0], both[1], self.std)))
+            for e in (one, other)
+        )
+        return None if a is None or b is None else float(np.linalg.norm(_residuals(a, b, self.std)))
 
 
 def diagnose_windows(

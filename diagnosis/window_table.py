@@ -201,7 +201,7 @@ def simulate_windows(
         duration=round(1.1 * count * CYCLES * 2.0 * pi / omega_n * _RATE) / _RATE,
         timestep=0.5 / _RATE,
     )
-    return _windowed(*_read(rig, stated, effects), Decay.from_modal(omega_n, zeta), count)
+    return _windowed(*_read(rig, stated, effects), zeta, count)
 
 
 def base_dynamics(state: RigState, omega_n: float, zeta: float, rig: Rig) -> tuple[float, float]:
@@ -243,19 +243,38 @@ def _read(rig: Rig, stated: RunSettings, effects: Sequence[Effect]) -> tuple[Arr
     return motion.time_s, reading
 
 
-def _windowed(time: Array, reading: Array, decay: Decay, count: int) -> Columns | None:
+def _windowed(time: Array, reading: Array, zeta: float, count: int) -> Columns | None:
     curve, begin = CubicSpline(time, reading), 0.0
-    zeta, omega = np.empty(count), np.empty(count)
-    for i in range(count):
-        length = CYCLES * 2.0 * pi / decay.omega_d if decay.omega_d > 0.0 else np.inf
-        if begin + length > time[-1]:
+    decay = _first_guess(time, reading, zeta)
+    rows: list[Decay] = []
+    for place in range(-1, count):  # the first window twice: its guess may be of another length
+        fitted = None if decay is None else _window(curve, begin, decay)
+        if fitted is None:
             return None
-        own = np.linspace(0.0, length, _POINTS)
-        with np.errstate(invalid="ignore"):  # a body at rest fits no decay, and the fit says so
-            fit = fit_run(Reading(own, np.asarray(curve(begin + own))), decay)
-        if not fit.runs or not fit.runs[0].decay.omega_d > 0.0:
-            return None
-        decay = fit.runs[0].decay
-        zeta[i], omega[i] = decay.zeta, decay.omega_n
-        begin += length
-    return Columns(zeta, omega)
+        decay = fitted
+        if place >= 0:
+            rows.append(decay)
+            begin += _length(decay)
+    return Columns(np.array([row.zeta for row in rows]), np.array([row.omega_n for row in rows]))
+
+
+def _length(decay: Decay) -> float:
+    return CYCLES * 2.0 * pi / decay.omega_d
+
+
+def _window(curve: CubicSpline, begin: float, decay: Decay) -> Decay | None:
+    own = np.linspace(0.0, _length(decay), _POINTS)
+    if begin + own[-1] > curve.x[-1]:
+        return None
+    with np.errstate(invalid="ignore"):  # a body at rest fits no decay, and the fit says so
+        fit = fit_run(Reading(own, np.asarray(curve(begin + own))), decay)
+    return fit.runs[0].decay if fit.runs and fit.runs[0].decay.omega_d > 0.0 else None
+
+
+def _first_guess(time: Array, reading: Array, zeta: float) -> Decay | None:
+    """A decay of the mean frequency of the upward crossings, which an offset does not shift."""
+    upward = np.flatnonzero(np.diff(np.signbit(reading - reading.mean()).astype(int)) < 0)
+    if upward.size < CYCLES:
+        return None
+    mean = 2.0 * pi * (upward.size - 1) / float(time[upward[-1]] - time[upward[0]])
+    return Decay.from_modal(mean, zeta)

@@ -1,0 +1,59 @@
+"""The tutorials' code runs, and what they show is what it prints."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from test_readme import assert_same
+
+ROOT = Path(__file__).parents[2]
+PAGES = ROOT / "docs" / "tutorials"
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+END = "-- end of a step --"
+
+
+def steps(page: Path) -> list[tuple[str, str]]:
+    """Every step's Python code with the text shown after it."""
+    found: list[tuple[str, str]] = []
+    for kind, text in BLOCK.findall(page.read_text(encoding="utf-8")):
+        if kind == "python":
+            found.append((text, ""))
+        elif kind == "text":
+            found[-1] = (found[-1][0], text)
+    return found
+
+
+def printed(codes: list[str], folder: Path) -> list[str]:
+    script = "".join(f"{code}\nprint({END!r})\n" for code in codes)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split(END + "\n")[:-1]
+
+
+@pytest.mark.slow
+def test_the_papers_own_gap(tmp_path: Path) -> None:
+    shown = steps(PAGES / "the-papers-own-gap.md")
+    real = printed([code for code, _ in shown], tmp_path)
+    assert len(shown) == len(real) == 6
+    for (_, text), output in zip(shown, real, strict=True):
+        assert_same(text.splitlines(), output.splitlines())
+    assert (tmp_path / "the-papers-own-gap.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=lambda page: page.stem)
+def test_the_links_lead_somewhere(page: Path) -> None:
+    links = [link for link in re.findall(r"\]\(([^)]+)\)", page.read_text()) if "://" not in link]
+    assert links
+    assert [link for link in links if not (page.parent / link.partition("#")[0]).exists()] == []
