@@ -2,10 +2,9 @@
 
 Real effects never have exactly a textbook form, and at rig signal-to-noise every misfit of form is significant.
 So hypotheses are weighed by the share of the gap they leave open, not by χ² itself: the weight of a hypothesis
-that leaves the share s is (s + δ)^−γ, δ standing for the misfit of form that is common among true causes. One
-name is preferred to two unless the second closes most of what the first leaves, and ``unknown`` weighs as much
-as a cause that leaves the share `UNKNOWN_SHARE`. The constants come from a tuning set made by another
-integrator with other forms (docs/blind-check.md); test sets are drawn with other seeds.
+that leaves the share s is (s + δ)^−γ; δ stands for the misfit of form that is common among true causes. One name is preferred to two unless the second closes most of what the first leaves,
+and ``unknown`` weighs as much as a cause that leaves the share `UNKNOWN_SHARE`. The constants come from a tuning
+set made by another integrator with other forms (docs/blind-check.md); test sets are drawn with other seeds.
 """
 
 from __future__ import annotations
@@ -73,12 +72,23 @@ def weigh(shares: Sequence[tuple[tuple[str, ...], float]], chance: float, excess
     for names, share in shares:
         key = tuple(sorted(names))
         answers[key] = min(max(share, 0.0), answers.get(key, np.inf))
-    weights = {names: (share + floor) ** -STEEPNESS * _prior(len(names)) for names, share in answers.items()}
-    weights[("unknown",)] = (UNKNOWN_SHARE + floor) ** -STEEPNESS
+    weights = {names: _evidence(share, floor) * _prior(len(names)) for names, share in answers.items()}
+    weights[("unknown",)] = _evidence(UNKNOWN_SHARE, floor)
     answers[("unknown",)] = UNKNOWN_SHARE
     total = sum(weights.values())
     found = [Weighed(names, answers[names], weight / total) for names, weight in weights.items()]
     return sorted(found, key=lambda w: -w.probability)
+
+
+def _evidence(share: float, floor: float) -> float:
+    """Weight of an answer that leaves a share of the gap.
+
+    Beyond `UNKNOWN_SHARE` it falls three times as steeply: many effects that close little must not together
+    outweigh the unknown one.
+    """
+    known = (share + floor) ** -STEEPNESS
+    beyond = (UNKNOWN_SHARE + floor) / (max(share, UNKNOWN_SHARE) + floor)
+    return float(known * beyond ** (2.0 * STEEPNESS))
 
 
 def _prior(count: int) -> float:

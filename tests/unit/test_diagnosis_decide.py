@@ -46,7 +46,7 @@ def test_closing_more_never_makes_an_answer_less_likely(answers, chance, excess,
     assert probability(better) >= probability(answers) * (1.0 - 1e-12)
 
 
-@given(SHARES, SHARES, CHANCE, EXCESS)
+@given(st.floats(0.0, UNKNOWN_SHARE), st.floats(0.0, UNKNOWN_SHARE), CHANCE, EXCESS)
 def test_two_names_must_leave_less_than_the_stated_part_of_what_one_leaves(single, pair, chance, excess):
     floor = form_floor(excess) + 2.0 * chance
     found = {w.effects: w.probability for w in weigh([(("a",), single), (("a", "b"), pair)], chance, excess)}
@@ -97,3 +97,9 @@ def test_the_share_forgiven_stops_growing_with_the_gap():
     assert 10.0 * FORM_MISFIT_UP_TO * form_floor(10.0 * FORM_MISFIT_UP_TO) == pytest.approx(
         FORM_MISFIT * FORM_MISFIT_UP_TO
     )
+
+
+def test_many_that_close_little_do_not_outweigh_unknown():
+    found = weigh([((f"effect {i}",), 0.95) for i in range(23)], 0.001, 20.0)
+    assert found[0].effects == ("unknown",)
+    assert found[0].probability > 0.95
