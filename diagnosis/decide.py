@@ -3,8 +3,9 @@
 Real effects never have exactly a textbook form, and at rig signal-to-noise every misfit of form is significant.
 So hypotheses are weighed by the share of the gap they leave open, not by χ² itself: the weight of a hypothesis
 that leaves the share s is (s + δ)^−γ; δ stands for the misfit of form that is common among true causes. One name
-is preferred to two unless the second closes most of what the first leaves, and ``unknown`` weighs as much as a cause that leaves the share `UNKNOWN_SHARE`. The constants come from a tuning
-set made by another integrator with other forms (docs/blind-check.md); test sets are drawn with other seeds.
+is preferred to two unless the second closes most of what the first leaves, and ``unknown`` weighs as much as a
+cause that leaves the share `UNKNOWN_SHARE`. The constants come from a tuning set made by another integrator with
+other forms (docs/blind-check.md); test sets are drawn with other seeds.
 """
 
 from __future__ import annotations
