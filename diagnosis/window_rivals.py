@@ -120,7 +120,7 @@ class WindowDiagnosis:
             remedy="ask for one of " + ", ".join(e.name for e in self.explanations),
         )
 
-    def separation(self, one: Explanation, other: Explanation, state: RigState) -> float | None:
+    def separation(self, one: Explanation, other: Explanation, state: RigState) -> float:
         """How far a further run's table would set two explanations apart.
 
         Both keep what was fitted here: severities, inertia and mechanical damping.
@@ -131,15 +131,19 @@ class WindowDiagnosis:
             state: the further run.
 
         Returns:
-            Distance of the two predicted tables in standard deviations of this table's scatter, √Σ(Δ/std)²;
-            None where one of them would not oscillate through all windows.
+            Distance of the two predicted tables in standard deviations of this table's scatter, √Σ(Δ/std)².
+
+        Raises:
+            TunnelError: when one of them would not oscillate through all windows.
         """
         count = self.measured.zeta.size
         a, b = (
             simulate_windows(state, e.effects, e.omega_n, e.zeta, count, base=self.state)
             for e in (one, other)
         )
-        return None if a is None or b is None else float(np.linalg.norm(_residuals(a, b, self.std)))
+        if a is None or b is None:
+            raise TunnelError("the run would not oscillate through all windows", remedy="choose another run")
+        return float(np.linalg.norm(_residuals(a, b, self.std)))
 
 
 def diagnose_windows(
