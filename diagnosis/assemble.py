@@ -30,6 +30,10 @@ from diagnosis.result import (
 from diagnosis.study import Study
 from diagnosis.verdict import blind_spots, cnr_note, verdict
 
+_LATE_START = (
+    "the nominal model misses the motion grossly, so every record is taken from its second passage through the middle "
+    "on: a start driven by hand is no free decay"
+)
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
 
@@ -101,8 +105,14 @@ def assemble(study: Study, where: Where, maps: Maps) -> Diagnosis:
         ),
         seconds=study.seconds,
         provenance={"versions": {name: version(name) for name in _PACKAGES}},
-        cautions=cautions(
-            study.campaign, study.noise, gap.runs, named=bool(study.causes) and study.causes != ("unknown",)
+        cautions=(
+            *cautions(
+                study.campaign,
+                study.noise,
+                gap.runs,
+                named=bool(study.causes) and study.causes != ("unknown",),
+            ),
+            *((_LATE_START,) if study.started_late else ()),
         ),
     )
 
