@@ -1,0 +1,280 @@
+"""Seconds and memory of a diagnosis, and the same candidates fitted with `mujoco.sysid`.
+
+Run as ``python benchmarks/diagnosis.py``; see README.md beside it. The campaigns come from the MuJoCo model. Each
+diagnosis runs in a process of its own, whose peak memory is the operating system's figure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import io
+import logging
+import multiprocessing
+import resource
+import time
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import rollout, sysid
+from rich.console import Console
+from rich.table import Table
+
+from diagnosis.data import prepare
+from diagnosis.diagnose import diagnose
+from diagnosis.least_squares import Fit, fit
+from diagnosis.noise import campaign_noise
+from diagnosis.problem import Problem, campaign_rig, held_end
+from diagnosis.rank import NOT_FITTED
+from diagnosis.start import Lead, leads, nominal_start
+from tunnel_sim.campaign import Campaign
+from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.model import Model, build_model
+from tunnel_sim.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
+from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.virtual_campaign import simulate_campaign
+
+CAUSES = {
+    "no effect": (),
+    "flexible rod": (EffectSetting("rod_flexibility", {"compliance": 3e-4, "inertia_share": 0.1}),),
+    "dry friction": (EffectSetting("coulomb_friction", {"friction_moment": 0.003}),),
+    "nonlinear yaw moment and sensor drift": (
+        EffectSetting("nonlinear_yaw_moment", {"coefficient": 0.3}),
+        EffectSetting("sensor_drift", {"drift": 0.002}),
+    ),
+}
+STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
+UNBOUNDED = 1e3  # bounds for sysid where a parameter has none
+STEP = 4e-3  # s, of both sides of the comparison
+
+
+def make_campaign(
+    effects: tuple[EffectSetting, ...], *, springs: tuple[float, ...], duration: float, rate: float
+) -> Campaign:
+    """Every spring at three speeds from 20°; with three springs also the first at the same speeds from 8°."""
+    cases = [(k, v, 0.35) for k in springs for v in (0.0, 15.0, 25.0)]
+    if len(springs) > 2:
+        cases += [(springs[0], v, 0.14) for v in (0.0, 15.0, 25.0)]
+    conditions = tuple(
+        Condition(f"r{i:02d}", k, v, 1.204, angle, duration) for i, (k, v, angle) in enumerate(cases)
+    )
+    truth, sensor = Truth(0.45, -0.15, 0.1014, 0.012), SensorModel(rate, 4e-4)
+    return simulate_campaign(CampaignPlan("benchmark", 1, truth, conditions, sensor, effects, ""))
+
+
+def measured(campaign: Campaign) -> tuple[tuple[str, ...], float, dict[str, float], float]:
+    """Causes, seconds, seconds by step and peak memory in MiB of one diagnosis, in a fresh process."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        return pool.apply(_diagnosed, (campaign,))
+
+
+def _diagnosed(campaign: Campaign) -> tuple[tuple[str, ...], float, dict[str, float], float]:
+    begin = time.perf_counter()
+    answer = diagnose(campaign)
+    seconds = time.perf_counter() - begin
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    return answer.causes, seconds, dict(answer.seconds), peak
+
+
+def full_size(console: Console) -> None:
+    """The campaign the time limit is stated for: 12 runs of 10 s at 1 kHz."""
+    table = Table(title="One diagnosis, 12 runs of 10 s at 1 kHz (targets: 30 s on two cores, 2 GiB)")
+    for head in ("campaign", "answer", "seconds", "peak MiB", "seconds by step"):
+        table.add_column(head, justify="right" if head in ("seconds", "peak MiB") else "left")
+    for name, effects in CAUSES.items():
+        data = make_campaign(effects, springs=(16.12, 35.02, 67.98), duration=10.0, rate=1000.0)
+        causes, seconds, steps, peak = measured(data)
+        by_step = ", ".join(f"{step} {value:.1f}" for step, value in steps.items())
+        rest = seconds - sum(steps.values())
+        table.add_row(
+            name, ", ".join(causes) or "none", f"{seconds:.1f}", f"{peak:.0f}", f"{by_step}, rest {rest:.1f}"
+        )
+    console.print(table)
+
+
+class SysidFit:
+    """One candidate as a problem of `mujoco.sysid`: its parameters, residual and optimiser, our MuJoCo model.
+
+    sysid takes releases as fixed and measures at a model's sensors. Here releases are parameters, written by a
+    custom rollout, and what the sensor adds (zero, effects on the reading) is a modified residual; both are
+    extension points of sysid. A model is made from one compiled model per run, which spares sysid compilations.
+    """
+
+    def __init__(self, lead: Lead) -> None:
+        self.lead, self.problem = lead, lead.problem
+        self.rig = campaign_rig(self.problem.data)
+        self.own = lead.point.release.shape[1]
+        self.params = sysid.ParameterDict()
+        lower, upper = self.problem.bounds
+        for name, value, low, high in zip(self.problem.names, lead.point.common, lower, upper, strict=True):
+            self.params.add(sysid.Parameter(name, value, max(low, -UNBOUNDED), min(high, UNBOUNDED)))
+        for run, own in zip(self.problem.data.runs, lead.point.release, strict=True):
+            self.params.add(sysid.Parameter(run.id, own, own * 0.0 - 50.0, own * 0.0 + 50.0))
+        self.models = [build_model(self.rig, self._settings(self.params, i)) for i in range(len(self._runs))]
+        self.sequences = [self._sequence(i, model) for i, model in enumerate(self.models)]
+
+    @property
+    def _runs(self) -> tuple[Any, ...]:
+        return self.problem.data.runs
+
+    def _values(self, params: Any, index: int) -> tuple[np.ndarray, np.ndarray]:
+        common = np.array([params[name].value[0] for name in self.problem.names])
+        return common, params[self._runs[index].id].value
+
+    def _settings(self, params: Any, index: int) -> RunSettings:
+        common, own = self._values(params, index)
+        stated = self.problem.stated(common, own, self._runs[index])
+        stated = dataclasses.replace(stated, timestep=STEP)
+        physics = stated
+        for effect, draw in zip(self.problem.effects_at(common), self.problem.draws(own), strict=True):
+            physics = effect.on_run(physics, stated, draw)
+        return held_end(physics)
+
+    def _model(self, params: Any, index: int) -> Model:
+        return self.models[index].with_settings(self._settings(params, index))
+
+    @staticmethod
+    def _state(model: Model) -> np.ndarray:
+        state = np.empty(mujoco.mj_stateSize(model.mj, STATE))
+        mujoco.mj_getState(model.mj, model.release_state(), state, STATE)
+        return state
+
+    def _sequence(self, index: int, model: Model) -> Any:
+        run = self._runs[index]
+        times = STEP * np.arange(run.reading.size)
+        mapping = sysid.TimeSeries.compute_all_sensor_mapping(model.mj)
+        reading = np.zeros((times.size, model.mj.nsensordata))
+        reading[:, 0] = run.reading
+        control = sysid.TimeSeries(times, np.zeros((times.size, 0)))
+        sensors = sysid.TimeSeries(times, reading, mapping)
+        return sysid.ModelSequences(run.id, model.spec, run.id, self._state(model), control, sensors)
+
+    def residual(self, x: np.ndarray, params: Any, **_: Any) -> tuple[list[np.ndarray], list[Any], list[Any]]:
+        """sysid's residual, run by run; every run has a model of its own."""
+        found = [
+            sysid.residual(
+                x, params, [sequence],
+                build_model=lambda p, _spec, i=i: self._model(p, i).mj,
+                custom_rollout=lambda i=i, **given: self._rollout(i, **given),
+                modify_residual=lambda p, predicted, measured, *_a, i=i, **_k: self._difference(
+                    i, p, predicted, measured
+                ),
+                n_threads=2, resample_true=False,
+            )
+            for i, sequence in enumerate(self.sequences)
+        ]  # fmt: skip
+        return [r for part in found for r in part[0]], [], []
+
+    def _rollout(self, index: int, *, models: Any, datas: Any, param_dicts: Any, **given: Any) -> list[Any]:
+        settings = [self._settings(params, index) for params in param_dicts]
+        states = [
+            self._state(dataclasses.replace(self.models[index], mj=model, settings=one))
+            for model, one in zip(models, settings, strict=True)
+        ]
+        count = self._runs[index].reading.size
+        moved, _ = rollout.rollout(models, datas, np.stack(states), nstep=count - 1)
+        angle_at = 1 + self.models[index].yaw_address  # the state begins with the time
+        found = []
+        for k, model in enumerate(models):
+            state = np.vstack([states[k], moved[k]])
+            # a step leaves its sensors as they were at its start; the state is that of its end
+            data = np.zeros((count, model.nsensordata))
+            data[:, 0] = state[:, angle_at]
+            times = STEP * np.arange(count)
+            found.append(
+                sysid.SystemTrajectory(
+                    model=model,
+                    control=given["control_signal"][0],
+                    sensordata=sysid.TimeSeries(times, data, given["rollout_signal_mapping"]),
+                    initial_state=states[k],
+                    state=sysid.TimeSeries(times, state, given["rollout_state_mapping"]),
+                )
+            )
+        return found
+
+    def _difference(
+        self, index: int, params: Any, predicted: Any, record: Any
+    ) -> tuple[np.ndarray, Any, Any]:
+        common, own = self._values(params, index)
+        run = self._runs[index]
+        stated = self.problem.stated(common, own, run)
+        angle = predicted.data[:, 0]
+        effects, draws = self.problem.effects_at(common), self.problem.draws(own)
+        for effect, draw in zip(effects, draws, strict=True):
+            angle = effect.on_angle(angle, predicted.times, stated, draw)
+        reading = angle + common[self.problem.names.index("zero")]
+        for effect in effects:
+            reading = effect.on_reading(reading)
+        left = (record.data[:, 0] - reading) / np.sqrt(run.noise_variance)
+        return left[:, None], predicted, record
+
+    def optimise(self) -> tuple[float, float]:
+        """Seconds and χ² reached, from the same start as the diagnosis's own fit."""
+        begin = time.perf_counter()
+        _, result = sysid.optimize(
+            self.params, self.residual, verbose=False, max_iters=30, x_scale="jac", xtol=1e-5,
+            output=io.StringIO(),
+        )  # fmt: skip
+        seconds = time.perf_counter() - begin
+        left = np.concatenate(self.residual(result.x, self.params)[0])
+        return seconds, float(left @ left)
+
+
+def against_sysid(console: Console, wanted: int) -> None:
+    """A smaller campaign: a whole diagnosis, and every candidate fitted with sysid from the same starts."""
+    data = make_campaign(CAUSES["dry friction"], springs=(16.12, 44.84), duration=4.0, rate=250.0)
+    causes, whole, _, _ = measured(data)
+    prepared = prepare(data, campaign_noise(data).variance)
+    begin = time.perf_counter()
+    nominal = fit(Problem(prepared), nominal_start(prepared))
+    own_total, other_total, candidates = time.perf_counter() - begin, 0.0, 0
+    table = Table(title="Nominal model and one effect, 6 runs of 4 s at 250 Hz")
+    for head in ("candidate", "own s", "sysid s", "ratio", "own χ²", "sysid χ²"):
+        table.add_column(head, justify="left" if head == "candidate" else "right")
+    for kind in ALL_EFFECTS:
+        starts = [] if kind.name in {*NOT_FITTED, "rod_flexibility"} else leads(nominal, kind)
+        if not starts or candidates >= wanted:
+            continue
+        own, chi2 = timed_fit(starts[0], nominal)
+        other, other_chi2 = SysidFit(starts[0]).optimise()
+        table.add_row(
+            kind.name, f"{own:.2f}", f"{other:.1f}", f"{other / own:.0f}", f"{chi2:.0f}", f"{other_chi2:.0f}"
+        )
+        own_total, other_total, candidates = own_total + own, other_total + other, candidates + 1
+    table.add_row("all", f"{own_total:.2f}", f"{other_total:.1f}", f"{other_total / own_total:.0f}", "", "")
+    console.print(table)
+    console.print(
+        f"A whole diagnosis of it (answer: {', '.join(causes)}), pairs, random moments and held-out runs included, "
+        f"takes {whole:.1f} s: {candidates} candidates with mujoco.sysid take {other_total / whole:.0f} times as "
+        f"long (aim: 20)."
+    )
+
+
+def timed_fit(lead: Lead, nominal: Fit) -> tuple[float, float]:
+    """Seconds and χ² of the diagnosis's own fit."""
+    begin = time.perf_counter()
+    found = fit(lead.problem, lead.point, base=nominal)
+    return time.perf_counter() - begin, found.total
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--candidates", type=int, default=len(ALL_EFFECTS), help="effects fitted with sysid")
+    parser.add_argument("--only", choices=("diagnosis", "sysid"), help="one of the two parts")
+    options = parser.parse_args()
+    if options.only != "diagnosis" and not hasattr(sysid, "ParameterDict"):
+        parser.error(
+            "mujoco.sysid misses its dependencies: pip install 'mujoco[sysid]', or give --only diagnosis"
+        )
+    logging.getLogger().setLevel(logging.ERROR)  # sysid's remarks on parameters that start at a bound
+    console = Console(width=140)
+    if options.only != "sysid":
+        full_size(console)
+    if options.only != "diagnosis":
+        against_sysid(console, options.candidates)
+
+
+if __name__ == "__main__":
+    main()
