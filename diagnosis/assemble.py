@@ -31,7 +31,7 @@ from diagnosis.study import Study
 from diagnosis.verdict import blind_spots, cnr_note, verdict
 
 _LATE_START = (
-    "the nominal model misses the motion grossly, so records are taken from their second passage through the middle "
+    "the nominal model misses the motion grossly, so records are read from their second passage through the middle "
     "on: a start driven by hand is no free decay"
 )
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")

@@ -103,7 +103,7 @@ def predict_held_out(whole: Fit) -> HeldOut:
 
 
 def _restricted(problem: Problem, ids: list[str]) -> Problem:
-    return Problem(problem.data.subset(tuple(ids)), problem.effects, problem.fixed)
+    return Problem(problem.data.subset(tuple(ids)), problem.effects, problem.fixed, problem.bent)
 
 
 def _sliced(whole: Fit, keep: list[int]) -> Fit:

@@ -130,7 +130,9 @@ def fit_growing(problem: Problem, start: Point) -> Fit:
             dataclasses.replace(run, reading=run.reading[: max(20, int(share * run.reading.size))])
             for run in problem.data.runs
         )
-        shorter = Problem(dataclasses.replace(problem.data, runs=runs), problem.effects, problem.fixed)
+        shorter = Problem(
+            dataclasses.replace(problem.data, runs=runs), problem.effects, problem.fixed, problem.bent
+        )
         point = fit(shorter, point, tolerance=1e-3, max_iterations=15).point
     return fit(problem, point)
 

@@ -76,7 +76,9 @@ def _designs(fit: Fit) -> list[tuple[RunData, float]]:
 def _difference(first: Fit, second: Fit, run: RunData, angle: float) -> float | None:
     predictions = []
     for fit in (first, second):
-        problem = Problem(fit.problem.data.with_runs((run,)), fit.problem.effects, fit.problem.fixed)
+        problem = Problem(
+            fit.problem.data.with_runs((run,)), fit.problem.effects, fit.problem.fixed, fit.problem.bent
+        )
         own = fit.point.release.shape[1]
         points = [Point(fit.point.common, np.array([[angle, 0.0, *[0.0] * (own - 2)]]))]
         for step in ((1e-4 * angle, 0.0), (0.0, 1e-3 * angle)):

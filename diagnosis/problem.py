@@ -51,11 +51,13 @@ class Problem:
         data: the runs.
         effects: effect classes whose parameters are free.
         fixed: value of effect parameters that are held, as ``effect.parameter``.
+        bent: names of effects whose form is free; the others keep the textbook's.
     """
 
     data: Data
     effects: tuple[type[Effect], ...] = ()
     fixed: tuple[tuple[str, float], ...] = ()
+    bent: tuple[str, ...] = ()
 
     @cached_property
     def nominal_names(self) -> tuple[str, ...]:
@@ -67,7 +69,12 @@ class Problem:
     @cached_property
     def effect_names(self) -> tuple[str, ...]:
         """Names of the free effect parameters, as ``effect.parameter``."""
-        names = [f"{kind.name}.{info.name}" for kind in self.effects for info in kind.parameters()]
+        names = [
+            f"{kind.name}.{info.name}"
+            for kind in self.effects
+            for info in kind.parameters()
+            if not info.form or kind.name in self.bent
+        ]
         held = dict(self.fixed)
         return tuple(name for name in names if name not in held)
 
@@ -102,7 +109,7 @@ class Problem:
         """
         values = dict(zip(self.names, common.tolist(), strict=True)) | dict(self.fixed)
         return tuple(
-            kind(**{info.name: values[f"{kind.name}.{info.name}"] for info in kind.parameters()})
+            kind(**{i.name: values.get(f"{kind.name}.{i.name}", i.default) for i in kind.parameters()})
             for kind in self.effects
         )
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.least_squares import Fit, FitError, fit, fit_growing
+from diagnosis.problem import Point, Problem
 from diagnosis.start import Lead, is_gross, leads
 from tunnel_sim.effects import Effect
 
@@ -17,6 +18,8 @@ _ALWAYS_FITTED = 7  # leads refitted whatever they promise: linear theory ranks 
 _PROMISING = 0.01  # share of χ² beyond which a lead is refitted too
 _BASES = 3  # single effects to which a second is added
 _SECONDS = 4  # second effects refitted for each
+_BENT = 3  # hypotheses whose forms are freed
+_BEND_FROM = 0.02  # share left open from which they are
 _STARTS = {"rod_flexibility": 3, "sensor_clipping": 2, "unsteady_aero_lag": 2, "spring_miscalibration": 2}
 
 Progress = Callable[[str], None]
@@ -60,7 +63,7 @@ def rank_singles(
         best = _best_fit(_tried(kind, starts, nominal), nominal)
         if best is not None:
             found.append(Hypothesis((kind.name,), best))
-    return sorted(found, key=lambda h: h.fit.total)
+    return _with_forms(found, nominal)
 
 
 def rank_pairs(
@@ -88,7 +91,37 @@ def rank_pairs(
             pair = Hypothesis((*single.effects, kind.name), best)
             if pair.names not in found or best.total < found[pair.names].fit.total:
                 found[pair.names] = pair
-    return sorted(found.values(), key=lambda h: h.fit.total)
+    return _with_forms(list(found.values()), singles[0].fit)
+
+
+def _with_forms(found: list[Hypothesis], base: Fit) -> list[Hypothesis]:
+    """Free the forms of the best hypotheses where the textbook's leave a good part open; best first."""
+    ranked = sorted(found, key=lambda h: h.fit.total)
+    bent = []
+    for hypothesis in ranked[:_BENT]:
+        fitted = hypothesis.fit
+        if fitted.excess > _BEND_FROM * max(base.excess, 0.0) and (freed := _bend(fitted)) is not None:
+            bent.append(Hypothesis(hypothesis.effects, freed))
+        else:
+            bent.append(hypothesis)
+    return sorted([*bent, *ranked[_BENT:]], key=lambda h: h.fit.total)
+
+
+def _bend(fitted: Fit) -> Fit | None:
+    """The same effects with the forms free; None where none has one, or nothing is gained."""
+    problem = fitted.problem
+    kinds = [kind for kind in problem.effects if any(info.form for info in kind.parameters())]
+    if not kinds:
+        return None
+    freed = Problem(problem.data, problem.effects, problem.fixed, tuple(kind.name for kind in kinds))
+    values = dict(zip(problem.names, fitted.point.common.tolist(), strict=True))
+    defaults = {f"{k.name}.{i.name}": i.default for k in kinds for i in k.parameters() if i.form}
+    start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
+    try:
+        found = fit(freed, start)
+    except (FitError, np.linalg.LinAlgError):
+        return None
+    return found if found.total < fitted.total else None
 
 
 def _promising(

@@ -127,7 +127,9 @@ def _balance_lead(base: Fit, kind: type[Effect]) -> Lead | None:
     fixed = dict(base.problem.fixed) | (
         {"gravity_stiffness.rest_angle": 0.0} if kind.name == "gravity_stiffness" else {}
     )
-    problem = Problem(base.problem.data, (*base.problem.effects, kind), tuple(fixed.items()))
+    problem = Problem(
+        base.problem.data, (*base.problem.effects, kind), tuple(fixed.items()), base.problem.bent
+    )
     point = equation_error_start(problem)
     if point is None:
         return None
@@ -137,7 +139,7 @@ def _balance_lead(base: Fit, kind: type[Effect]) -> Lead | None:
 
 
 def _line_lead(base: Fit, kind: type[Effect], line: Line) -> Lead:
-    problem = Problem(base.problem.data, (*base.problem.effects, kind), base.problem.fixed)
+    problem = Problem(base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.bent)
     severity, place = kind.parameters()
     lower, upper = severity.lower, severity.upper
     values = np.array(
@@ -179,8 +181,8 @@ def _clipping_trials(data: Data) -> list[dict[str, float]]:
 def _lead(base: Fit, kind: type[Effect], trial: dict[str, float]) -> Lead | None:
     held = {"spring_stiffness"} if kind.name == "spring_miscalibration" else set()
     fixed = (*base.problem.fixed, *((f"{kind.name}.{n}", v) for n, v in trial.items() if n in held))
-    problem = Problem(base.problem.data, (*base.problem.effects, kind), fixed)
-    infos = [info for info in kind.parameters() if info.name not in held]
+    problem = Problem(base.problem.data, (*base.problem.effects, kind), fixed, base.problem.bent)
+    infos = [info for info in kind.parameters() if info.name not in held and not info.form]
     values = np.array([trial.get(info.name, info.default) for info in infos])
     clipping = kind.name == "sensor_clipping"
     change = _moderate_change(base, problem, values, shrink=not clipping)

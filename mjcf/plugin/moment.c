@@ -18,6 +18,17 @@ double vwt_lag_time(const vwt_parameters* p, double wind_speed) {
   return wind_speed > 0 ? p->aero_lag * p->reference_length / wind_speed : 0;
 }
 
+// x^textbook for x >= 0, or another power of x that agrees with it at the reference; exponent 0: the textbook's.
+static double power(double x, double textbook, double exponent, double reference) {
+  if (exponent == 0 || exponent == textbook) {
+    return textbook == 2 ? x * x : x * x * x;
+  }
+  return pow(reference, textbook) * pow(x / reference, exponent);
+}
+
+static const double kAngleReference = 0.2;  // rad
+static const double kRateReference = 2.0;   // rad/s
+
 double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
   const double speed = s->wind_speed;
   if (!(speed > 0)) {
@@ -31,9 +42,14 @@ double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
   // A lag reads the state x; a lead (lag < 0) mirrors it about the angle, b + (b - x), because the lag's
   // own equation is unstable with a negative time constant.
   const double angle = lag > 0 ? s->lagged : lag < 0 ? 2 * s->angle - s->lagged : s->angle;
-  const double square = s->angle * s->angle;
-  double moment = stiffness * (angle * (1 + p->moment_cubic * square) + p->flow_angle);
-  moment += damping * (1 + p->damping_quadratic * square) * s->rate;
+  double steepening = 1, thickening = 1;
+  if (p->moment_cubic != 0) {
+    steepening += p->moment_cubic * power(fabs(s->angle), 2, p->moment_cubic_exponent, kAngleReference);
+  }
+  if (p->damping_quadratic != 0) {
+    thickening += p->damping_quadratic * power(fabs(s->angle), 2, p->damping_quadratic_exponent, kAngleReference);
+  }
+  double moment = stiffness * (angle * steepening + p->flow_angle) + damping * thickening * s->rate;
   if (p->shedding_amplitude != 0 && p->width > 0) {
     const double phase = kTwoPi * p->strouhal_number * speed / p->width * s->time + p->shedding_phase;
     moment += scale * p->shedding_amplitude * sin(phase);
@@ -45,13 +61,18 @@ double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate) 
   const double spring = p->spring_stiffness;
   double moment = 0;
   if (p->quadratic_damping != 0) {
-    moment -= p->quadratic_damping * fabs(rate) * rate;
+    const double square = power(fabs(rate), 2, p->quadratic_damping_exponent, kRateReference);
+    moment -= p->quadratic_damping * copysign(square, rate);
   }
   if (p->loss_factor != 0) {
     moment -= p->loss_factor * sqrt(spring * p->yaw_inertia) * rate;  // eta Kr/wn, wn of the rig at rest
   }
-  if (p->stiffness_cubic != 0 || p->stiffness_quadratic != 0) {
-    moment -= spring * angle * angle * (p->stiffness_cubic * angle + p->stiffness_quadratic);
+  if (p->stiffness_cubic != 0) {
+    const double cube = power(fabs(angle), 3, p->stiffness_cubic_exponent, kAngleReference);
+    moment -= spring * p->stiffness_cubic * copysign(cube, angle);
+  }
+  if (p->stiffness_quadratic != 0) {
+    moment -= spring * p->stiffness_quadratic * power(fabs(angle), 2, p->stiffness_quadratic_exponent, kAngleReference);
   }
   if (p->free_play > 0) {  // gives back what the linear spring takes inside the dead zone
     const double held = angle > p->free_play ? p->free_play : angle < -p->free_play ? -p->free_play : angle;

@@ -22,7 +22,9 @@ extern "C" {
   X(cn_beta, "1/rad", -VWT_ANY)                  \
   X(cn_r, "1/rad", -VWT_ANY)                     \
   X(moment_cubic, "1/rad2", -VWT_ANY)            \
+  X(moment_cubic_exponent, "1", 0)               \
   X(damping_quadratic, "1/rad2", -VWT_ANY)       \
+  X(damping_quadratic_exponent, "1", 0)          \
   X(aero_lag, "l/V", -VWT_ANY)                   \
   X(flow_angle, "rad", -VWT_ANY)                 \
   X(shedding_amplitude, "1", -VWT_ANY)           \
@@ -31,9 +33,12 @@ extern "C" {
   /* the mechanism */                            \
   X(friction_moment, "N m", 0)                   \
   X(quadratic_damping, "N m s2/rad2", -VWT_ANY)  \
+  X(quadratic_damping_exponent, "1", 0)          \
   X(loss_factor, "1", -VWT_ANY)                  \
   X(stiffness_cubic, "1/rad2", -VWT_ANY)         \
+  X(stiffness_cubic_exponent, "1", 0)            \
   X(stiffness_quadratic, "1/rad", -VWT_ANY)      \
+  X(stiffness_quadratic_exponent, "1", 0)        \
   X(free_play, "rad", 0)                         \
   X(gravity_stiffness, "N m/rad", -VWT_ANY)      \
   X(gravity_angle, "rad", -VWT_ANY)              \

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import pi, sin, sqrt
+from math import copysign, pi, sin, sqrt
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -46,22 +46,40 @@ class Oracle:
         ka, ca = pressure * self.cn_beta, 0.5 * self.density * speed * AREA * LENGTH**2 * self.cn_r
         lag = self.term("aero_lag")
         seen = angle if lag == 0.0 else lagged if lag > 0.0 else angle + (angle - lagged)
-        moment = ka * seen * (1.0 + self.term("moment_cubic") * angle**2) + ka * self.term("flow_angle")
-        moment += ca * (1.0 + self.term("damping_quadratic") * angle**2) * rate
+        moment = ka * seen * (
+            1.0 + self.term("moment_cubic") * self.bent(abs(angle), "moment_cubic", 2.0)
+        ) + ka * self.term("flow_angle")
+        moment += (
+            ca
+            * (1.0 + self.term("damping_quadratic") * self.bent(abs(angle), "damping_quadratic", 2.0))
+            * rate
+        )
         cycles = self.term("strouhal_number") * speed * t / WIDTH
         moment += (
             pressure * self.term("shedding_amplitude") * sin(2 * pi * cycles + self.term("shedding_phase"))
         )
         return moment + pressure * self.forcing(t)
 
+    def bent(self, size: float, term: str, textbook: float, reference: float = 0.2) -> float:
+        """The textbook's power of an angle or rate, or another that equals it at the reference."""
+        power = self.term(f"{term}_exponent") or textbook
+        return size**power * reference ** (textbook - power)
+
     def mechanism(self, angle: float, rate: float) -> float:
         play = self.term("free_play")
         stretched = max(angle - play, 0.0) + min(angle + play, 0.0) if play > 0.0 else angle
         moment = -self.stiffness * stretched - self.damping * rate
-        moment -= self.term("quadratic_damping") * abs(rate) * rate
+        moment -= (
+            self.term("quadratic_damping")
+            * self.bent(abs(rate), "quadratic_damping", 2.0, 2.0)
+            * copysign(1.0, rate)
+        )
         moment -= self.term("loss_factor") * self.stiffness / sqrt(self.stiffness / self.inertia) * rate
         moment -= self.stiffness * (
-            self.term("stiffness_cubic") * angle**3 + self.term("stiffness_quadratic") * angle**2
+            self.term("stiffness_cubic")
+            * self.bent(abs(angle), "stiffness_cubic", 3.0)
+            * copysign(1.0, angle)
+            + self.term("stiffness_quadratic") * self.bent(abs(angle), "stiffness_quadratic", 2.0)
         )
         return moment - self.term("gravity_stiffness") * sin(angle - self.term("gravity_angle"))
 

@@ -16,12 +16,13 @@ class AsymmetricStiffness(Effect):
 
     Args:
         coefficient: share of the stiffness per angle, 1/rad.
+        exponent: power of the angle in the moment, the same moment at 0.2 rad, dimensionless; 2 is the textbook's.
     """
 
     name = "asymmetric_stiffness"
     channel = "stiffness"
     condition = "always"
-    equation = "−κ Kr β²"
+    equation = "−κ Kr β²; bent: |β|^p for β²"
     signature = (
         "The centre of the oscillation shifts by −κ A²/2 and a second harmonic appears; the "
         "frequency changes only in second order."
@@ -32,7 +33,18 @@ class AsymmetricStiffness(Effect):
         "κ", "1/rad", "share of the stiffness per angle", scale=0.05, lower=-2.0, upper=2.0
     )
 
+    exponent: float = parameter(
+        "p",
+        "1",
+        "power of the angle in the moment, the same moment at 0.2 rad",
+        scale=1.0,
+        lower=0.25,
+        upper=9.0,
+        default=2.0,
+        form=True,
+    )
+
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Set the moment law's term."""
         del stated, rng
-        return with_law(run, stiffness_quadratic=self.coefficient)
+        return with_law(run, stiffness_quadratic=self.coefficient, stiffness_quadratic_exponent=self.exponent)

@@ -32,6 +32,7 @@ class ParameterInfo:
         lower: least value allowed, in the unit.
         upper: greatest value allowed, in the unit.
         default: value where none is given, in the unit; for the severity this is the null.
+        form: whether it bends the effect's textbook form, which its default is.
     """
 
     name: str
@@ -42,6 +43,7 @@ class ParameterInfo:
     lower: float
     upper: float
     default: float
+    form: bool = False
 
 
 def parameter(
@@ -53,6 +55,7 @@ def parameter(
     lower: float = -math.inf,
     upper: float = math.inf,
     default: float = 0.0,
+    form: bool = False,
 ) -> Any:
     """A dataclass field that is an effect's parameter; arguments as in `ParameterInfo`."""
     metadata = {
@@ -62,6 +65,7 @@ def parameter(
         "scale": scale,
         "lower": lower,
         "upper": upper,
+        "form": form,
     }
     return dataclasses.field(default=default, metadata=metadata)
 

@@ -16,12 +16,13 @@ class CubicStiffness(Effect):
 
     Args:
         coefficient: share of the stiffness per squared angle, positive: hardening, 1/rad2.
+        exponent: power of the angle in the moment, the same moment at 0.2 rad, dimensionless; 3 is the textbook's.
     """
 
     name = "cubic_stiffness"
     channel = "stiffness"
     condition = "always"
-    equation = "−κ Kr β³"
+    equation = "−κ Kr β³; bent: |β|^p sgn β for β³"
     signature = "The frequency departs from its small-amplitude value by the share (3/8) κ A²."
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
 
@@ -34,7 +35,18 @@ class CubicStiffness(Effect):
         upper=50.0,
     )
 
+    exponent: float = parameter(
+        "p",
+        "1",
+        "power of the angle in the moment, the same moment at 0.2 rad",
+        scale=1.0,
+        lower=0.25,
+        upper=9.0,
+        default=3.0,
+        form=True,
+    )
+
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Set the moment law's term."""
         del stated, rng
-        return with_law(run, stiffness_cubic=self.coefficient)
+        return with_law(run, stiffness_cubic=self.coefficient, stiffness_cubic_exponent=self.exponent)

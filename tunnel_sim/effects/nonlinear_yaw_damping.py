@@ -16,12 +16,13 @@ class NonlinearYawDamping(Effect):
 
     Args:
         coefficient: share of Ca per squared angle, 1/rad2.
+        exponent: power of the angle in the factor, the same factor at 0.2 rad, dimensionless; 2 is the textbook's.
     """
 
     name = "nonlinear_yaw_damping"
     channel = "damping"
     condition = "wind_on"
-    equation = "Ca (1 + μa β²) β̇ in place of Ca β̇"
+    equation = "Ca (1 + μa β²) β̇ in place of Ca β̇; bent: |β|^p for β²"
     signature = "The damping ratio of wind-on runs departs by the share μa A²/4 of the aerodynamic part."
     references = ("van der Pol, Phil. Mag. 2 (1926) 978, doi 10.1080/14786442608564127",)
 
@@ -29,7 +30,18 @@ class NonlinearYawDamping(Effect):
         "μa", "1/rad2", "share of Ca per squared angle", scale=5.0, lower=-500.0, upper=500.0
     )
 
+    exponent: float = parameter(
+        "p",
+        "1",
+        "power of the angle in the factor, the same factor at 0.2 rad",
+        scale=1.0,
+        lower=0.25,
+        upper=9.0,
+        default=2.0,
+        form=True,
+    )
+
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Set the moment law's term."""
         del stated, rng
-        return with_law(run, damping_quadratic=self.coefficient)
+        return with_law(run, damping_quadratic=self.coefficient, damping_quadratic_exponent=self.exponent)

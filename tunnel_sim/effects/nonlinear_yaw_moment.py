@@ -16,12 +16,13 @@ class NonlinearYawMoment(Effect):
 
     Args:
         coefficient: share of Ka per squared angle, 1/rad2.
+        exponent: power of the angle in the factor, the same factor at 0.2 rad, dimensionless; 2 is the textbook's.
     """
 
     name = "nonlinear_yaw_moment"
     channel = "stiffness"
     condition = "wind_on"
-    equation = "Ka (1 + κa β²) β in place of Ka β"
+    equation = "Ka (1 + κa β²) β in place of Ka β; bent: |β|^p for β²"
     signature = "As cubic stiffness, but in proportion to V² and absent with the wind off."
     references = ("Mansor & Passmore, J. Wind Eng. Ind. Aerodyn. 96 (2008) 1218",)
 
@@ -29,7 +30,18 @@ class NonlinearYawMoment(Effect):
         "κa", "1/rad2", "share of Ka per squared angle", scale=1.0, lower=-100.0, upper=100.0
     )
 
+    exponent: float = parameter(
+        "p",
+        "1",
+        "power of the angle in the factor, the same factor at 0.2 rad",
+        scale=1.0,
+        lower=0.25,
+        upper=9.0,
+        default=2.0,
+        form=True,
+    )
+
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Set the moment law's term."""
         del stated, rng
-        return with_law(run, moment_cubic=self.coefficient)
+        return with_law(run, moment_cubic=self.coefficient, moment_cubic_exponent=self.exponent)

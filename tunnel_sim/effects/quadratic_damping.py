@@ -16,12 +16,13 @@ class QuadraticDamping(Effect):
 
     Args:
         coefficient: coefficient of the squared rate, N m s2/rad2.
+        exponent: power of the rate in the moment, the same moment at 2 rad/s, dimensionless; 2 is the textbook's.
     """
 
     name = "quadratic_damping"
     channel = "damping"
     condition = "always"
-    equation = "−C2 |β̇| β̇"
+    equation = "−C2 |β̇| β̇; bent: |β̇|^n sgn β̇"
     signature = "The damping ratio falls in proportion to the amplitude."
     references = ("ITTC Recommended Procedure 7.5-02-07-04.5, roll damping of ships: B1 p + B2 |p| p",)
 
@@ -29,7 +30,18 @@ class QuadraticDamping(Effect):
         "C2", "N m s2/rad2", "coefficient of the squared rate", scale=0.002, lower=-1e4, upper=1e4
     )
 
+    exponent: float = parameter(
+        "n",
+        "1",
+        "power of the rate in the moment, the same moment at 2 rad/s",
+        scale=1.0,
+        lower=0.25,
+        upper=9.0,
+        default=2.0,
+        form=True,
+    )
+
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Set the moment law's term."""
         del stated, rng
-        return with_law(run, quadratic_damping=self.coefficient)
+        return with_law(run, quadratic_damping=self.coefficient, quadratic_damping_exponent=self.exponent)

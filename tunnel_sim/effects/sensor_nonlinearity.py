@@ -10,6 +10,8 @@ from tunnel_sim.effects.base import Effect, parameter
 from tunnel_sim.record import Array
 from tunnel_sim.run_settings import RunSettings
 
+_REFERENCE = 0.2  # rad: where forms of another power give the same error
+
 
 @dataclass(frozen=True)
 class SensorNonlinearity(Effect):
@@ -17,12 +19,13 @@ class SensorNonlinearity(Effect):
 
     Args:
         coefficient: cubic coefficient, 1/rad2.
+        exponent: power of the angle in the error, the same error at 0.2 rad, dimensionless; 3 is the textbook's.
     """
 
     name = "sensor_nonlinearity"
     channel = "sensor"
     condition = "always"
-    equation = "y = β + s β³"
+    equation = "y = β + s β³; bent: |β|^p sgn β for β³"
     signature = (
         "A third harmonic of s A³/4; the frequency is untouched, and the decay looks faster by the share "
         "(3/2) s A², whatever spring and wind."
@@ -31,7 +34,23 @@ class SensorNonlinearity(Effect):
 
     coefficient: float = parameter("s", "1/rad2", "cubic coefficient", scale=0.05, lower=-1.0, upper=1.0)
 
+    exponent: float = parameter(
+        "p",
+        "1",
+        "power of the angle in the error, the same error at 0.2 rad",
+        scale=1.0,
+        lower=0.25,
+        upper=9.0,
+        default=3.0,
+        form=True,
+    )
+
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, rng: np.random.Generator) -> Array:
         """Bend the characteristic."""
         del time_s, stated, rng
-        return angle + self.coefficient * angle**3 if self.coefficient else angle
+        if self.is_null:
+            return angle
+        if self.exponent == 3.0:
+            return angle + self.coefficient * angle**3
+        shape = _REFERENCE**3 * (np.abs(angle) / _REFERENCE) ** self.exponent
+        return angle + self.coefficient * np.sign(angle) * shape
