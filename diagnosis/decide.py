@@ -23,7 +23,7 @@ FORM_MISFIT = 0.01
 #: reason to overlook a second effect a thousand times the noise.
 FORM_MISFIT_UP_TO = 1000.0
 #: Share at which a cause is as likely as an unknown one.
-UNKNOWN_SHARE = 0.33
+UNKNOWN_SHARE = 0.25
 #: A second effect must leave less than this share of what the first leaves.
 PAIR_SHARE = 0.40
 #: Answers less likely than this are not called rivals.
