@@ -34,7 +34,11 @@ def campaign(effect: Effect | None = None, *, added: Array | None = None, seed: 
     problem = Problem(
         Data(runs, 0.036, 0.625, 0.225, False, INERTIA), () if effect is None else (type(effect),)
     )
-    values = [] if effect is None else [getattr(effect, info.name) for info in effect.parameters()]
+    values = (
+        []
+        if effect is None
+        else [getattr(effect, info.name) for info in effect.parameters() if not info.form]
+    )
     common = np.array([INERTIA, DAMPING, CN_BETA, CN_R, 0.001, *values])
     release = np.array([[0.35, 0.0]] * len(runs))
     rng = np.random.default_rng(seed)

@@ -110,7 +110,7 @@ def test_a_wrong_spring_is_sought_among_the_springs_there_are():
 
 def readings_of(data, effect, common, own, noise=0.0):
     """The same runs with the readings of a model."""
-    values = [getattr(effect, info.name) for info in effect.parameters()]
+    values = [getattr(effect, info.name) for info in effect.parameters() if not info.form]
     point = Point(np.array([*common, *values]), np.array(own))
     readings = Problem(data, (type(effect),)).predict([point])[0]
     rng = np.random.default_rng(7)
