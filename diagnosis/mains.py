@@ -14,7 +14,8 @@ from tunnel_sim.campaign import Campaign
 from tunnel_sim.record import Array, Record
 
 _HARMONICS = 5
-#: A run shows the line when taking it out lowers χ² by this much: by chance in one run of 2000.
+#: A run shows the line when taking it out lowers χ² by this much: at one given frequency,
+#: by chance in one run of 1800.
 _RUN_DROP = 15.0
 #: Share of the runs that must show it: the mains hum in every run.
 _RUN_SHARE = 0.75

@@ -11,7 +11,7 @@ extern "C" {
 #endif
 
 // Every parameter of the law: name, unit, least value allowed. A missing parameter is zero, and at zero its
-// term vanishes exactly. The names are those of the MJCF's <custom><numeric> elements.
+// term vanishes exactly; an exponent of zero is the textbook's power. The names are those of the MJCF's <custom><numeric> elements.
 #define VWT_PARAMETERS(X)                        \
   /* the flow and the model's reference sizes */ \
   X(air_density, "kg/m3", 0)                     \
