@@ -126,8 +126,23 @@ def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
         TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
     """
     path = Path(path)
-    document = read_plan(path)
-    rig = load_rig() if rig is None else rig
+    return plan_from(read_plan(path), load_rig() if rig is None else rig, shown(path))
+
+
+def plan_from(document: PlanDocument, rig: Rig, where: str) -> CampaignPlan:
+    """The plan that a validated campaign description stands for.
+
+    Args:
+        document: the description.
+        rig: as in `load_plan`.
+        where: the file, for messages.
+
+    Returns:
+        The plan.
+
+    Raises:
+        TunnelError: when the rig has no such spring.
+    """
     stated = document.truth.model_dump(exclude_none=True)
     inertia, damping = rig.dynamics.yaw_inertia, rig.dynamics.mechanical_damping
     return CampaignPlan(
@@ -135,7 +150,7 @@ def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
         description=document.description,
         seed=document.seed,
         truth=Truth(**({"yaw_inertia": inertia, "mechanical_damping": damping} | stated)),
-        conditions=_conditions(document, rig, path),
+        conditions=_conditions(document, rig, where),
         sensor=SensorModel(**document.sensor.model_dump(exclude_none=True)),
         effects=tuple(EffectSetting(effect.name, dict(effect.parameters)) for effect in document.effects),
     )
@@ -151,7 +166,7 @@ def paper_plan() -> CampaignPlan:
         return load_plan(path)
 
 
-def _conditions(document: PlanDocument, rig: Rig, path: Path) -> tuple[Condition, ...]:
+def _conditions(document: PlanDocument, rig: Rig, where: str) -> tuple[Condition, ...]:
     density = rig.air.density if document.air_density is None else document.air_density
     return tuple(
         Condition(
@@ -162,20 +177,20 @@ def _conditions(document: PlanDocument, rig: Rig, path: Path) -> tuple[Condition
             release_angle=radians(angle),
             duration=document.duration,
         )
-        for label, stiffness in _stiffnesses(document, rig.springs, path)
+        for label, stiffness in _stiffnesses(document, rig.springs, where)
         for speed in document.wind_speeds
         for angle in document.release_angles_deg
         for repeat in range(1, document.repeats + 1)
     )
 
 
-def _stiffnesses(document: PlanDocument, springs: Mapping[int, float], path: Path) -> list[tuple[str, float]]:
+def _stiffnesses(document: PlanDocument, springs: Mapping[int, float], where: str) -> list[tuple[str, float]]:
     """A label and a stiffness for every numbered spring and every stiffness stated outright."""
     for number in document.springs:
         if number not in springs:
             raise TunnelError(
                 f"there is no spring {number}",
-                where=shown(path),
+                where=where,
                 remedy=f"use one of {', '.join(map(str, springs))}, or give spring_stiffness in N m/rad",
             )
     numbered = [(f"s{number}", springs[number]) for number in document.springs]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Protocol
 
 from pydantic import AfterValidator, Field
 
@@ -86,7 +86,40 @@ def read_plan(path: Path) -> PlanDocument:
     """
     document = load_toml(path, missing="name a campaign description such as the packaged paper-campaign.toml")
     plan = validate(PlanDocument, document, path)
-    where = shown(path)
+    check_conditions(plan, shown(path))
+    return plan
+
+
+class ConditionKeys(Protocol):
+    """The keys whose product are a campaign's runs."""
+
+    @property
+    def springs(self) -> list[int]:
+        """Numbers of springs."""
+
+    @property
+    def spring_stiffness(self) -> list[float]:
+        """Kr, N m/rad."""
+
+    @property
+    def wind_speeds(self) -> list[float]:
+        """V, m/s."""
+
+    @property
+    def release_angles_deg(self) -> list[float]:
+        """Degrees."""
+
+
+def check_conditions(plan: ConditionKeys, where: str) -> None:
+    """Refuse conditions that give no run, or the same one twice.
+
+    Args:
+        plan: a campaign description, or a table with the same keys.
+        where: the file, for messages.
+
+    Raises:
+        TunnelError: when no spring is given, or a value stands twice.
+    """
     if not plan.springs and not plan.spring_stiffness:
         raise TunnelError(
             "no spring", where=where, remedy="give springs (numbers) or spring_stiffness (N m/rad)"
@@ -100,4 +133,3 @@ def read_plan(path: Path) -> PlanDocument:
                 where=where,
                 remedy="leave one out, and use repeats for more runs",
             )
-    return plan

@@ -179,20 +179,46 @@ def load_rig(path: Path | None = None) -> Rig:
     Raises:
         TunnelError: when the file cannot be read, or a key is missing, unknown or out of range.
     """
+    return parse_rig(rig_document(path), "rig.toml" if path is None else str(path))
+
+
+def rig_document(path: Path | None = None) -> dict[str, Any]:
+    """A rig description as it stands in its file, not yet checked.
+
+    Args:
+        path: as in `load_rig`.
+
+    Returns:
+        Its sections by name.
+
+    Raises:
+        TunnelError: when the file cannot be read or is no TOML.
+    """
     source = resources.files("tunnel_sim") / "data" / "rig.toml" if path is None else path
     where = "rig.toml" if path is None else str(path)
     try:
-        document = tomllib.loads(source.read_text(encoding="utf-8"))
+        return tomllib.loads(source.read_text(encoding="utf-8"))
     except OSError as error:
         raise TunnelError(
             "cannot be read", where=where, remedy="give the path of a rig description"
         ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise TunnelError(f"is not valid TOML ({error})", where=where, remedy="correct the file") from error
-    return _parse(document, where)
 
 
-def _parse(document: dict[str, Any], where: str) -> Rig:
+def parse_rig(document: Mapping[str, Any], where: str) -> Rig:
+    """A rig from its description.
+
+    Args:
+        document: sections by name, as in the packaged ``rig.toml``; SI units.
+        where: the file, for messages.
+
+    Returns:
+        The rig.
+
+    Raises:
+        TunnelError: when a key is missing, unknown or out of range.
+    """
     for key in document:
         if key not in (*_SECTIONS, "springs"):
             raise TunnelError(
@@ -202,7 +228,7 @@ def _parse(document: dict[str, Any], where: str) -> Rig:
     return Rig(**parts, springs=_springs(document, where))
 
 
-def _section(document: dict[str, Any], name: str, kind: type, where: str) -> Any:
+def _section(document: Mapping[str, Any], name: str, kind: type, where: str) -> Any:
     table = document.get(name)
     fields: dict[str, str] = kind.__annotations__
     if not isinstance(table, dict):
@@ -233,7 +259,7 @@ def _check_number(value: object, key: str, where: str, *, whole: bool = False) -
         )
 
 
-def _springs(document: dict[str, Any], where: str) -> Mapping[int, float]:
+def _springs(document: Mapping[str, Any], where: str) -> Mapping[int, float]:
     table = document.get("springs")
     if not isinstance(table, dict) or not table:
         raise TunnelError(

@@ -174,7 +174,8 @@ def _place(document: Mapping[str, Any], loc: Sequence[str | int]) -> str:
         name = entry.get("id") if isinstance(entry, Mapping) else None
         named = isinstance(name, str) and bool(name.strip())
         return f"run '{one_line(name)}'" if named else f"run number {loc[1] + 1}"
-    if len(loc) >= 2 and isinstance(loc[0], str) and isinstance(loc[1], int):
+    several = isinstance(document.get(str(loc[0])), list)
+    if len(loc) >= 2 and isinstance(loc[0], str) and isinstance(loc[1], int) and several:
         return f"[[{loc[0]}]] number {loc[1] + 1}"
     return f"[{loc[0]}]" if len(loc) >= 2 else ""
 

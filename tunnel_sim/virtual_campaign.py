@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import mujoco
@@ -12,10 +15,12 @@ from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_from
 from tunnel_sim.effects.spring_miscalibration import SpringMiscalibration
 from tunnel_sim.errors import TunnelError
+from tunnel_sim.motion import Motion
 from tunnel_sim.plan import CampaignPlan, Condition, EffectSetting, Truth
 from tunnel_sim.rig import Rig, load_rig
 from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.simulate import Progress, simulate_batch
+from tunnel_sim.sensor import read_motion
+from tunnel_sim.simulate import Progress, apply_effects, simulate_motions
 
 
 def simulate_campaign(
@@ -36,13 +41,66 @@ def simulate_campaign(
     Raises:
         TunnelError: when an effect is unknown or a run leaves the finite range.
     """
+    (campaign,) = simulate_campaigns([plan], rig, nthread=nthread, progress=progress)
+    return campaign
+
+
+def simulate_campaigns(
+    plans: Sequence[CampaignPlan],
+    rig: Rig | None = None,
+    *,
+    nthread: int = 0,
+    progress: Progress | None = None,
+) -> list[Campaign]:
+    """Make every run of several plans, their runs integrated together.
+
+    Args:
+        plans: of one sample rate.
+        rig: as in `simulate_campaign`.
+        nthread: likewise.
+        progress: called with (runs done, runs in all).
+
+    Returns:
+        One campaign per plan, to the bit those of `simulate_campaign`.
+
+    Raises:
+        TunnelError: when sample rates differ, an effect is unknown or a run leaves the finite range.
+    """
     rig = load_rig() if rig is None else rig
+    rates = {plan.sensor.sample_rate for plan in plans}
+    if len(rates) != 1:
+        raise TunnelError(f"plans of {len(rates)} sample rates", remedy="simulate those of one rate together")
+    casts = [_cast(plan) for plan in plans]
+    true = [run for cast in casts for run in cast.true]
+    motions = iter(simulate_motions(rig, true, *rates, nthread=nthread, progress=progress))
+    return [_campaign(cast, rig, list(islice(motions, len(cast.true)))) for cast in casts]
+
+
+@dataclass(frozen=True)
+class _Cast:
+    """A plan whose dice have been thrown: the stated and the true physics of its runs, in its order."""
+
+    plan: CampaignPlan
+    effects: tuple[Effect, ...]
+    stated: list[RunSettings]
+    true: list[RunSettings]
+    rngs: list[np.random.Generator]
+
+
+def _cast(plan: CampaignPlan) -> _Cast:
     effects = plan_effects(plan)
-    settings = [run_settings(plan.truth, condition) for condition in plan.conditions]
-    rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(plan.seed).spawn(len(settings))]
-    records = simulate_batch(
-        rig, settings, plan.sensor, rngs, effects=effects, nthread=nthread, progress=progress
-    )
+    stated = [run_settings(plan.truth, condition) for condition in plan.conditions]
+    rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(plan.seed).spawn(len(stated))]
+    true = [apply_effects(run, effects, rng) for run, rng in zip(stated, rngs, strict=True)]
+    return _Cast(plan, effects, stated, true, rngs)
+
+
+def _campaign(cast: _Cast, rig: Rig, motions: Sequence[Motion]) -> Campaign:
+    plan = cast.plan
+    records = [
+        read_motion(motion, run, plan.sensor, rng, cast.effects)
+        for motion, run, rng in zip(motions, cast.stated, cast.rngs, strict=True)
+    ]
     runs = tuple(
         Run(
             id=condition.id,
