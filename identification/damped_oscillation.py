@@ -75,16 +75,24 @@ def response_rows(time: Array, decay: Decay) -> Array:
         two functions of the derivatives.
     """
     delta = decay.stiffness - decay.rate**2
-    cosine, sine = _oscillating(time, decay.rate, delta) if delta >= 0.0 else _creeping(time, decay, delta)
-    slope = (time * cosine - sine) / (2.0 * delta) if delta != 0.0 else np.zeros_like(time)
-    small = np.abs(delta) * time**2 < _SERIES_LIMIT
-    if small.any():
-        near = time[small]
+    rows = np.empty((4, time.size))
+    unit, sine, slope, ramp = rows
+    cosine, sine[:] = _oscillating(time, decay.rate, delta) if delta >= 0.0 else _creeping(time, decay, delta)
+    if delta != 0.0:
+        np.multiply(time, cosine, out=slope)
+        slope -= sine
+        slope *= 0.5 / delta
+    small = np.flatnonzero(np.abs(time) < sqrt(_SERIES_LIMIT / abs(delta))) if delta != 0.0 else slice(None)
+    near = time[small]
+    if near.size:
         decaying = np.exp(-decay.rate * near)
         x = delta * near**2
         sine[small] = decaying * near * _polynomial(x, _SINE_SERIES)
         slope[small] = decaying * near**3 * _polynomial(x, _SLOPE_SERIES)
-    return np.stack((cosine + decay.rate * sine, sine, slope, time * sine))
+    np.multiply(sine, decay.rate, out=unit)
+    unit += cosine
+    np.multiply(time, sine, out=ramp)
+    return rows
 
 
 def free_decay(time: Array, decay: Decay, angle: float, rate: float) -> Array:

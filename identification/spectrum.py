@@ -24,7 +24,7 @@ class SpectralPeak:
     prominence: float
 
 
-def psd_peak(record: Record) -> SpectralPeak:
+def psd_peak(record: Record, *, padding: int = _PADDING) -> SpectralPeak:
     """The damped frequency, as the peak of the power spectral density.
 
     The mean is taken off, a Hann window keeps the offset and the negative frequencies from leaking into the
@@ -33,12 +33,14 @@ def psd_peak(record: Record) -> SpectralPeak:
 
     Args:
         record: the reading, n samples, rad against s.
+        padding: number of times its length the record is padded to at least; 1 is quicker, and good enough to
+            start a fit of many cycles from.
 
     Returns:
         The peak.
     """
     centred = record.yaw_rad - record.yaw_rad.mean()
-    size = 1 << int(np.ceil(np.log2(_PADDING * centred.size)))
+    size = 1 << int(np.ceil(np.log2(padding * centred.size)))
     power = np.abs(np.fft.rfft(centred * np.hanning(centred.size), size)) ** 2
     # Below one cycle per record the spectrum holds the offset's remainder, not the oscillation.
     lowest = max(1, int(size / centred.size))

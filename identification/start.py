@@ -10,6 +10,7 @@ from identification.spectrum import psd_peak
 from tunnel_sim.record import Array, Record
 
 _SAMPLES = 1024  # the start is judged on a thinned record; the fit itself sees every sample
+_LONG = 4096  # samples; a longer record is not padded for its spectrum
 _DAMPING_RATIOS = (0.0, 0.002, 0.006, 0.02, 0.06, 0.2, 0.5)
 
 
@@ -26,10 +27,10 @@ def starting_decay(record: Record) -> Decay | None:
     Returns:
         The start; None where the record is constant.
     """
-    frequency = psd_peak(record).frequency
+    frequency = psd_peak(record, padding=8 if record.time_s.size < _LONG else 1).frequency
     if frequency == 0.0 or np.ptp(record.yaw_rad) == 0.0:
         return None
-    thin = _thinned(record, frequency)
+    thin = thinned_reading(record, frequency)
     omega = 2.0 * np.pi * frequency
     candidates = [Decay.from_modal(omega / np.sqrt(1.0 - zeta**2), zeta) for zeta in _DAMPING_RATIOS]
     integrated = _integrated_equation(thin)
@@ -39,8 +40,16 @@ def starting_decay(record: Record) -> Decay | None:
     return candidates[int(np.argmin(costs))]
 
 
-def _thinned(record: Record, frequency: float) -> Reading:
-    # Block means, at least twenty to the cycle.
+def thinned_reading(record: Record, frequency: float) -> Reading:
+    """Block means of a record, at least twenty to the cycle; an exponential decay keeps its rate in them.
+
+    Args:
+        record: the reading of one run.
+        frequency: of its oscillation, Hz.
+
+    Returns:
+        The thinned reading, about a thousand samples of a long record; its clock starts at the first sample.
+    """
     factor = max(1, min(record.time_s.size // _SAMPLES, int(record.sample_rate / (20.0 * frequency))))
     usable = record.time_s.size // factor * factor
     time = (record.time_s[:usable] - record.time_s[0]).reshape(-1, factor).mean(axis=1)
