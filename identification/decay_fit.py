@@ -91,8 +91,33 @@ class DecayFit:
     iterations: int
 
 
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known of the shared parameters before the runs, as a normal distribution.
+
+    Args:
+        mean: of φ, shape (p,).
+        information: inverse covariance of φ times the noise variance of the readings, shape (p, p): the weight
+            of the prior against one squared residual.
+    """
+
+    mean: Array
+    information: Array
+
+    def cost(self, parameters: Array) -> float:
+        """What the prior adds to the sum of squares at φ, shape (p,): rad²."""
+        away = parameters - self.mean
+        return float(away @ self.information @ away)
+
+
 def fit_decays(
-    readings: Sequence[Reading], links: Sequence[Array], start: Array, *, zero: float | None = None
+    readings: Sequence[Reading],
+    links: Sequence[Array],
+    start: Array,
+    *,
+    zero: float | None = None,
+    prior: Prior | None = None,
+    tolerance: float = _TOLERANCE,
 ) -> DecayFit:
     """Fit runs whose decay rate and stiffness are linear in shared parameters.
 
@@ -101,26 +126,29 @@ def fit_decays(
         links: one (2, p) matrix Lᵢ per run: (aᵢ, kᵢ) = Lᵢ φ.
         start: φ to start from, shape (p,).
         zero: the sensor's zero where it is known, rad; estimated, common to the runs, where None.
+        prior: what is known of φ beforehand: the fit is then the maximum of the posterior, and ``normal`` has
+            the prior's information in it.
+        tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
 
     Returns:
         The fit; ``converged`` is False where the iteration stalled: the values are then the best met, and
         ``runs`` is empty where even the start was out of range.
     """
-    best = _project(readings, links, np.asarray(start, dtype=np.float64), zero)
+    best = _project(readings, links, np.asarray(start, dtype=np.float64), zero, prior)
     samples = sum(reading.time.size for reading in readings)
     damping, converged, iteration = 0.0, False, 0
     while best.runs and not converged and iteration < _MAX_ITERATIONS:
         iteration += 1
-        normal, gradient = _shared_system(best.runs, links, zero is None)
+        normal, gradient = _shared_system(best, links, zero is None, prior)
         try:
             step = scaled_solve(normal + damping * np.diag(np.diag(normal)), gradient)
         except np.linalg.LinAlgError:  # no motion in a run: nothing to identify there
             break
         size = _relative_size(step[: best.parameters.size], links, best.runs)
-        trial = _project(readings, links, best.parameters + step[: best.parameters.size], zero)
+        trial = _project(readings, links, best.parameters + step[: best.parameters.size], zero, prior)
         promised = float(step @ (2.0 * gradient - normal @ step))
         gain = (best.cost - trial.cost) / max(promised, 1e-300)
-        converged = size <= _TOLERANCE or (size <= _ROUNDING and trial.cost >= best.cost)
+        converged = size <= tolerance or (size <= _ROUNDING and trial.cost >= best.cost)
         if iteration == _MAX_ITERATIONS:
             converged = converged or promised <= _SETTLED * best.cost / samples
         damping = _next_damping(damping, gain)
@@ -128,22 +156,26 @@ def fit_decays(
             best = trial
     if not best.runs:
         return DecayFit(best.parameters, best.zero, (), np.zeros((0, 0)), False, iteration)
-    normal, _ = _shared_system(best.runs, links, zero is None)
+    normal, _ = _shared_system(best, links, zero is None, prior)
     return DecayFit(best.parameters, best.zero, best.runs, normal, converged, iteration)
 
 
-def fit_run(reading: Reading, start: Decay, *, zero: float | None = None) -> DecayFit:
+def fit_run(
+    reading: Reading, start: Decay, *, zero: float | None = None, tolerance: float = _TOLERANCE
+) -> DecayFit:
     """Fit one run by itself: φ = (a, k).
 
     Args:
         reading: the run or a window of it.
         start: decay to start from.
         zero: the sensor's zero where it is known, rad.
+        tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
 
     Returns:
         The fit of one run.
     """
-    return fit_decays([reading], [np.eye(2)], np.array([start.rate, start.stiffness]), zero=zero)
+    decay = np.array([start.rate, start.stiffness])
+    return fit_decays([reading], [np.eye(2)], decay, zero=zero, tolerance=tolerance)
 
 
 def projected_cost(reading: Reading, decay: Decay) -> float:
@@ -187,7 +219,11 @@ class _Point:
 
 
 def _project(
-    readings: Sequence[Reading], links: Sequence[Array], parameters: Array, zero: float | None
+    readings: Sequence[Reading],
+    links: Sequence[Array],
+    parameters: Array,
+    zero: float | None,
+    prior: Prior | None = None,
 ) -> _Point:
     decays = [Decay(*map(float, link @ parameters)) for link in links]
     with np.errstate(over="ignore", invalid="ignore"):  # a trial far off may overflow; it is then refused
@@ -204,7 +240,7 @@ def _project(
         ]
     except np.linalg.LinAlgError:
         return _Point(parameters, 0.0, ())
-    runs, cost = [], 0.0
+    runs, cost = [], 0.0 if prior is None else prior.cost(parameters)
     for reading, decay, block, gram, (angle, rate) in zip(readings, decays, rows, grams, states, strict=True):
         residual = reading.yaw - best_zero - angle * block[0] - rate * block[1]
         weights = _local_weights(decay, float(angle), float(rate))
@@ -236,11 +272,13 @@ def _common_zero(grams: Sequence[Array], moments: Sequence[Array]) -> float:
     return numerator / denominator
 
 
-def _shared_system(runs: Sequence[RunFit], links: Sequence[Array], with_zero: bool) -> tuple[Array, Array]:
+def _shared_system(
+    point: _Point, links: Sequence[Array], with_zero: bool, prior: Prior | None
+) -> tuple[Array, Array]:
     keep = 3 if with_zero else 2
     normal: Array | float = 0.0
     gradient: Array | float = 0.0
-    for run, link in zip(runs, links, strict=True):
+    for run, link in zip(point.runs, links, strict=True):
         order = (
             [RATE, STIFFNESS, ZERO, ANGLE, ANGULAR_RATE]
             if with_zero
@@ -250,7 +288,12 @@ def _shared_system(runs: Sequence[RunFit], links: Sequence[Array], with_zero: bo
         extended = embed(link, with_zero=with_zero)
         normal = normal + extended.T @ information @ extended
         gradient = gradient + extended.T @ score
-    return np.asarray(normal), np.asarray(gradient)
+    normal, gradient = np.asarray(normal), np.asarray(gradient)
+    if prior is not None:
+        size = point.parameters.size
+        normal[:size, :size] += prior.information
+        gradient[:size] += prior.information @ (prior.mean - point.parameters)
+    return normal, gradient
 
 
 def _next_damping(damping: float, gain: float) -> float:

@@ -31,6 +31,7 @@ from tunnel_sim.campaign import Run, SensorProperties
 _LEAST_ENERGY = 56.0
 _FEW_CYCLES = 3.0
 _UNKNOWNS = 5
+_NEAR = 1e-6  # how close, as a ratio, block means bring the start to their own optimum
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,7 @@ def _near(run: Run, start: Decay) -> Decay:
     thin = thinned_reading(run.record, start.omega_d / (2.0 * np.pi))
     if thin.time.size > run.record.time_s.size // 4:
         return start
-    fit = fit_run(thin, start)
+    fit = fit_run(thin, start, tolerance=_NEAR)
     return fit.runs[0].decay if fit.converged else start
 
 

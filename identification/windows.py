@@ -29,6 +29,7 @@ from tunnel_sim.record import Array, Record
 CYCLES = 3
 _LEAST_WINDOWS = 4
 _LEAST_SAMPLES = 16
+_TOLERANCE = 1e-5  # of a window's fit, as a ratio: Gauss–Newton's next step would be a thousand times smaller
 # A window is given while its oscillation stands out: an energy of 400 over the power of the noise, N(A/S)²/2,
 # is an amplitude known to 5 %.
 _LEAST_ENERGY = 400.0
@@ -109,7 +110,8 @@ def _fit_window(
             break
         count = round(length)
         part = slice(begin, begin + count)
-        fit = fit_run(Reading(reading.time[part] - reading.time[begin], reading.yaw[part]), decay, zero=zero)
+        window = Reading(reading.time[part] - reading.time[begin], reading.yaw[part])
+        fit = fit_run(window, decay, zero=zero, tolerance=_TOLERANCE)
         if not fit.runs:
             return None
         decay = fit.runs[0].decay
