@@ -147,7 +147,8 @@ static mjtNum friction(const mjModel* m, const mjData* d, const Instance* self, 
                        const mjtNum* state, const Motion* now) {
   const mjtNum inertia = self->twist_dof < 0 ? p->yaw_inertia : p->yaw_inertia - mass_diagonal(m, d, self->twist_dof);
   const Motion start = start_motion(state, now);
-  const mjtNum other = other_moment(m, self, p, air_moment(m, d, self, p, state, &start), &start);
+  const mjtNum applied = d->qfrc_applied[self->dof];  // by the user, on the spring's end
+  const mjtNum other = other_moment(m, self, p, air_moment(m, d, self, p, state, &start), &start) + applied;
   return vwt_friction_moment(p, inertia, start.rate, other, m->opt.timestep);
 }
 
