@@ -34,24 +34,47 @@ def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
         return None
     best: tuple[float, RunData, float] | None = None
     for run, angle in _designs(first):
-        difference = _difference(first, second, run, angle)
+        difference = separation(first, second, run, angle)
         if difference is not None and (best is None or difference > best[0]):
             best = (difference, run, angle)
     if best is None:
         return None
-    separation, run, angle = best
+    apart, run, angle = best
     return {
         "spring_stiffness": run.spring_stiffness,
         "wind_speed": run.wind_speed,
         "release_angle": angle,
         "duration": run.duration,
-        "separation": separation,
+        "separation": apart,
     }
+
+
+def planned_run(
+    fit: Fit, *, spring_stiffness: float, wind_speed: float, air_density: float, duration: float
+) -> RunData:
+    """A run that has not been made, with the sampling and the noise of those that have.
+
+    Args:
+        fit: to the runs made.
+        spring_stiffness: Kr, N m/rad.
+        wind_speed: V, m/s.
+        air_density: ρ, kg/m³; not used where the wind is off.
+        duration: s.
+    """
+    template = fit.problem.data.runs[0]
+    return dataclasses.replace(
+        template,
+        id="next",
+        reading=np.zeros(round(duration / template.interval)),
+        spring_stiffness=spring_stiffness,
+        wind_speed=wind_speed,
+        air_density=air_density if wind_speed > 0.0 else 0.0,
+        duration=duration,
+    )
 
 
 def _designs(fit: Fit) -> list[tuple[RunData, float]]:
     data = fit.problem.data
-    template = data.runs[0]
     density = max((run.air_density for run in data.runs), default=0.0) or 1.2
     springs = sorted({round(k * f, 2) for k in data.springs for f in _STIFFNESS_FACTORS} | set(data.springs))
     speeds = [v for v in _SPEEDS if v == 0.0 or data.wind_on]
@@ -59,21 +82,26 @@ def _designs(fit: Fit) -> list[tuple[RunData, float]]:
     for spring in springs[:: max(1, len(springs) // 4)]:
         for speed in speeds:
             for duration in _DURATIONS:
-                count = round(duration / template.interval)
-                run = dataclasses.replace(
-                    template,
-                    id="next",
-                    reading=np.zeros(count),
-                    spring_stiffness=spring,
-                    wind_speed=speed,
-                    air_density=density if speed > 0.0 else 0.0,
-                    duration=duration,
+                run = planned_run(
+                    fit, spring_stiffness=spring, wind_speed=speed, air_density=density, duration=duration
                 )
                 designs += [(run, angle) for angle in _ANGLES]
     return designs
 
 
-def _difference(first: Fit, second: Fit, run: RunData, angle: float) -> float | None:
+def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | None:
+    """How far apart two models predict one run's readings, once its release is refitted.
+
+    Args:
+        first: a fitted model.
+        second: its rival.
+        run: its conditions and length; the reading in it is not used.
+        angle: of the release, rad.
+
+    Returns:
+        Standard deviations of the noise; None where a model's motion grows without bound. Half its square is the
+        log-likelihood ratio, nats, that the run is expected to bring if one of the two is right.
+    """
     predictions = []
     for fit in (first, second):
         problem = Problem(

@@ -1,0 +1,290 @@
+"""``tunnel_sim/Campaign-v0``: an episode is a campaign, a step is a run; docs/reference/envs/campaign.md."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from identification.belief import information_gain
+from identification.estimate import PARAMETERS
+from tunnel_lab.envs.menu import Costs, make_menu
+from tunnel_lab.envs.presets import PRESETS, Preset, preset_sensor
+from tunnel_lab.envs.session import (
+    Conditions,
+    Knowledge,
+    Session,
+    answers,
+    diagnostic_information,
+    first_knowledge,
+    probabilities,
+)
+from tunnel_lab.envs.truth import draw_truth
+from tunnel_sim.campaign import Campaign
+from tunnel_sim.effects import effect_class
+from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim.record import Array
+from tunnel_sim.rig import load_rig
+
+Observation = dict[str, Array]
+_LARGE = 1e4  # bound of estimates and covariances in the observation space
+
+
+class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
+    """Choose the runs of a campaign; the reward is what they tell less what they cost.
+
+    Arguments that are None take the preset's value (`tunnel_lab.envs.presets`).
+
+    Args:
+        preset: ``identification`` or ``diagnosis``.
+        springs: numbers of the springs at hand, of the rig's table.
+        wind_speeds: m/s; 0 is wind-off.
+        release_angles_deg: degrees.
+        durations: s.
+        noise_std: of the sensor, rad.
+        sample_rate: of the sensor, Hz.
+        severities: the effects the diagnosis answers with, each with the range its severity is drawn from, in
+            its unit; the diagnosis preset only.
+        targets: relative standard deviations (fractions) of Cnβ and Cnr at which an identification ends.
+        probability: of one effect at which a diagnosis ends.
+        costs: rig time of a run.
+        seconds_per_nat: how much rig time a nat is worth, s.
+        max_runs: after so many the episode is truncated.
+        rig: path of a rig description; None takes the packaged rig.
+        reveal_truth: put the truth into ``info``; it is never in the observation.
+        render_mode: None, ``human`` (a line for each run in the terminal) or ``rgb_array`` (a figure).
+
+    Raises:
+        TunnelError: when an argument is out of range or names what does not exist.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 1}
+
+    def __init__(
+        self,
+        *,
+        preset: str = "identification",
+        springs: Sequence[int] | None = None,
+        wind_speeds: Sequence[float] | None = None,
+        release_angles_deg: Sequence[float] | None = None,
+        durations: Sequence[float] | None = None,
+        noise_std: float | None = None,
+        sample_rate: float | None = None,
+        severities: Mapping[str, tuple[float, float]] | None = None,
+        targets: tuple[float, float] = (0.01, 0.05),
+        probability: float = 0.95,
+        costs: Costs | None = None,
+        seconds_per_nat: float = 600.0,
+        max_runs: int | None = None,
+        rig: Path | str | None = None,
+        reveal_truth: bool = False,
+        render_mode: str | None = None,
+    ) -> None:
+        if preset not in PRESETS:
+            raise TunnelError(
+                f"unknown preset {preset!r}", where="Campaign-v0", remedy=did_you_mean(preset, PRESETS)
+            )
+        base = PRESETS[preset]
+        self.severities = _checked_severities(base, severities)
+        runs = base.max_runs if max_runs is None else max_runs
+        loaded = load_rig(None if rig is None else Path(rig))
+        goals = {"cn_beta target": targets[0], "cn_r target": targets[1], "max_runs": runs}
+        _check_positive(**goals, seconds_per_nat=seconds_per_nat)
+        _check_positive(probability=probability, most=1.0)
+        self.conditions = Conditions(
+            rig=loaded,
+            sensor=preset_sensor(base, noise_std, sample_rate),
+            menu=make_menu(
+                loaded,
+                base.springs if springs is None else springs,
+                base.wind_speeds if wind_speeds is None else wind_speeds,
+                base.release_angles_deg if release_angles_deg is None else release_angles_deg,
+                base.durations if durations is None else durations,
+            ),
+            costs=Costs() if costs is None else costs,
+            effects=tuple(self.severities),
+        )
+        self.targets = (float(targets[0]), float(targets[1]))
+        self.probability = float(probability)
+        self.seconds_per_nat = float(seconds_per_nat)
+        self.max_runs = int(runs)
+        self.reveal_truth = reveal_truth
+        self.render_mode = render_mode
+        self.action_space = spaces.MultiDiscrete(list(self.conditions.menu.shape))
+        self.observation_space = _observation_space(self.conditions, self.max_runs)
+        self.known: Knowledge = first_knowledge(self.conditions)
+        self._session: Session | None = None
+
+    @property
+    def campaign(self) -> Campaign:
+        """The runs of this episode so far, for `identify` and `diagnose`."""
+        return self.known.campaign
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin a campaign on a rig of unknown truth.
+
+        Args:
+            seed: of the truth and all noise; None goes on with the generator as it stands.
+            options: ``truth`` (coefficients by name, SI) and ``effects`` (parameters by effect) in place of
+                what is drawn.
+
+        Returns:
+            Observation and info.
+
+        Raises:
+            TunnelError: for an unknown option, coefficient or effect, or a number out of range.
+        """
+        super().reset(seed=seed)
+        truth = draw_truth(self.np_random, self.severities, options)
+        self._session = Session(self.conditions, truth, self.np_random.spawn(1)[0])
+        self.known = first_knowledge(self.conditions)
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), self._info(0.0)
+
+    def step(self, action: Iterable[int]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Make a run.
+
+        Args:
+            action: indices of spring, wind speed, release angle and duration in the menu.
+
+        Returns:
+            Observation, reward (information gained, nats, less rig time over ``seconds_per_nat``), whether the
+            goal is reached, whether the runs are used up, info.
+
+        Raises:
+            TunnelError: when the action is not in the menu, or there was no reset.
+        """
+        if self._session is None:
+            raise TunnelError("there is no episode", where="Campaign-v0", remedy="call reset() first")
+        before = self.known
+        self.known = self._session.perform(before, self.conditions.menu.choice(action))
+        gain = self._gain(before)
+        reward = gain - self.known.costs[-1] / self.seconds_per_nat
+        done = reached(self.known, self.targets, self.probability)
+        truncated = not done and len(self.known.choices) >= self.max_runs
+        if self.render_mode == "human":
+            self.render()
+        info = self._info(gain)
+        if done or truncated:
+            info["campaign"] = self.campaign
+        return self._observation(), float(reward), done, truncated, info
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """The last run and how far the campaign has come.
+
+        Returns:
+            For ``rgb_array`` an image of shape (480, 960, 3); None otherwise: ``human`` prints a line.
+        """
+        from tunnel_lab.envs.picture import line_of, picture
+
+        if self.render_mode == "human":
+            print(line_of(self.known), flush=True)
+        elif self.render_mode == "rgb_array":
+            return picture(self.known, self.targets, self.probability)
+        else:
+            gym.logger.warn(
+                "render() without a render_mode: give render_mode='rgb_array' or 'human' to make()"
+            )
+        return None
+
+    def _gain(self, before: Knowledge) -> float:
+        if self.conditions.effects:
+            return diagnostic_information(self.known) - diagnostic_information(before)
+        return information_gain(before.belief, self.known.belief)
+
+    def _observation(self) -> Observation:
+        known, last = self.known, self.known.last
+        run = (0.0,) * 4 if last is None else (
+            last.spring_stiffness, last.wind_speed, last.release_angle, last.duration
+        )  # fmt: skip
+        found = {
+            "estimate": np.clip(known.belief.values, -_LARGE, _LARGE),
+            "covariance": np.clip(known.belief.covariance, -_LARGE, _LARGE),
+            "last_run": np.array(run),
+            "progress": np.array([float(len(known.choices)), known.rig_time]),
+        }
+        if self.conditions.effects:
+            found["probabilities"] = probabilities(known)
+        return found
+
+    def _info(self, gain: float) -> dict[str, Any]:
+        known = self.known
+        info: dict[str, Any] = {
+            "status": known.status,
+            "runs": len(known.choices),
+            "rig_time_s": known.rig_time,
+            "information_gain_nats": float(gain),
+            "relative_std": {name: known.belief.relative_std(name) for name in PARAMETERS},
+        }
+        if self.conditions.effects:
+            named = zip(answers(self.conditions.effects), probabilities(known).tolist(), strict=True)
+            info["answers"] = dict(named)
+        if self.reveal_truth and self._session is not None:
+            info["truth"] = self._session.truth.to_json_dict()
+        return info
+
+
+def reached(known: Knowledge, targets: tuple[float, float], probability: float) -> bool:
+    """Whether a campaign has reached its goal.
+
+    Args:
+        known: what the runs have told.
+        targets: relative standard deviations of Cnβ and Cnr (fractions), where there is no vocabulary.
+        probability: of one effect alone, where there is one.
+    """
+    if not known.choices:
+        return False
+    if known.conditions.effects:
+        return bool(probabilities(known)[1:-2].max() >= probability)
+    belief = known.belief
+    return belief.relative_std("cn_beta") <= targets[0] and belief.relative_std("cn_r") <= targets[1]
+
+
+def _observation_space(conditions: Conditions, max_runs: int) -> spaces.Dict:
+    menu = conditions.menu
+    stiffest = max(stiffness for _, stiffness in menu.springs)
+    highest = [stiffest, max(menu.wind_speeds), max(menu.release_angles), max(menu.durations)]
+    longest = conditions.costs.setup + conditions.costs.spring_change + conditions.costs.speed_change
+    parts: dict[str, spaces.Space[Any]] = {
+        "estimate": spaces.Box(-_LARGE, _LARGE, (4,), np.float64),
+        "covariance": spaces.Box(-_LARGE, _LARGE, (4, 4), np.float64),
+        "last_run": spaces.Box(np.zeros(4), np.array(highest), dtype=np.float64),
+        "progress": spaces.Box(
+            np.zeros(2), np.array([max_runs, max_runs * (longest + highest[3])]), dtype=np.float64
+        ),
+    }
+    if conditions.effects:
+        parts["probabilities"] = spaces.Box(0.0, 1.0, (len(conditions.effects) + 3,), np.float64)
+    return spaces.Dict(parts)
+
+
+def _checked_severities(
+    preset: Preset, given: Mapping[str, tuple[float, float]] | None
+) -> dict[str, tuple[float, float]]:
+    where = "Campaign-v0"
+    if given is None:
+        return dict(preset.severities)
+    if not preset.severities or not given:
+        remedy = "give preset='diagnosis' and at least one effect with the range of its severity"
+        raise TunnelError("severities are the diagnosis preset's", where=where, remedy=remedy)
+    for name, (low, high) in given.items():
+        severity = effect_class(name).parameters()[0]
+        if not 0.0 < low <= high < np.inf:
+            remedy = f"give the range of {severity.name} in {severity.unit}"
+            raise TunnelError(f"{name}: ({low!r}, {high!r}) is no range above 0", where=where, remedy=remedy)
+    return {name: (float(low), float(high)) for name, (low, high) in given.items()}
+
+
+def _check_positive(*, most: float = np.inf, **values: float) -> None:
+    for name, value in values.items():
+        if isinstance(value, bool) or not 0.0 < value <= most:
+            bound = "above 0" if most == np.inf else f"above 0 and at most {most:g}"
+            raise TunnelError(f"{name} = {value!r} must be {bound}", where="Campaign-v0", remedy="correct it")

@@ -1,0 +1,180 @@
+"""What an operator may choose for a run, and what the run costs in rig time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import degrees, isfinite, radians
+
+import numpy as np
+
+from tunnel_sim.campaign import Run
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.record import Record
+from tunnel_sim.rig import Rig
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One run as it is ordered.
+
+    Args:
+        spring: number of the spring in the rig's table.
+        spring_stiffness: its Kr, N m/rad.
+        wind_speed: V, m/s; 0 is wind-off.
+        release_angle: rad.
+        duration: of the record, s.
+    """
+
+    spring: int
+    spring_stiffness: float
+    wind_speed: float
+    release_angle: float
+    duration: float
+
+    @property
+    def words(self) -> str:
+        """Such as ``spring 3, 10 m/s, 10°, 20 s``."""
+        wind = f"{self.wind_speed:g} m/s" if self.wind_speed > 0.0 else "wind off"
+        return f"spring {self.spring}, {wind}, {degrees(self.release_angle):.3g}°, {self.duration:g} s"
+
+
+@dataclass(frozen=True)
+class Menu:
+    """The choices; an action is one index into each.
+
+    Args:
+        springs: (number, Kr in N m/rad) of the springs at hand.
+        wind_speeds: m/s.
+        release_angles: rad.
+        durations: s.
+    """
+
+    springs: tuple[tuple[int, float], ...]
+    wind_speeds: tuple[float, ...]
+    release_angles: tuple[float, ...]
+    durations: tuple[float, ...]
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """How many springs, speeds, angles and durations there are."""
+        return len(self.springs), len(self.wind_speeds), len(self.release_angles), len(self.durations)
+
+    def choice(self, action: Iterable[int]) -> Choice:
+        """The run an action orders.
+
+        Args:
+            action: indices of spring, speed, angle and duration.
+
+        Raises:
+            TunnelError: when it is not four indices within the menu.
+        """
+        remedy = f"give four whole numbers from 0 to below {', '.join(map(str, self.shape))}"
+        numbers = np.asarray(action)
+        if numbers.shape != (4,) or not np.issubdtype(numbers.dtype, np.integer):
+            raise TunnelError(f"{action!r} is no action", where="Campaign-v0", remedy=remedy)
+        spring, speed, angle, duration = (int(i) for i in numbers)
+        if not all(0 <= i < n for i, n in zip((spring, speed, angle, duration), self.shape, strict=True)):
+            raise TunnelError(
+                f"action {numbers.tolist()} is outside the menu", where="Campaign-v0", remedy=remedy
+            )
+        number, stiffness = self.springs[spring]
+        return Choice(
+            number, stiffness, self.wind_speeds[speed], self.release_angles[angle], self.durations[duration]
+        )
+
+    def actions(self) -> Iterator[tuple[int, int, int, int]]:
+        """Every action, durations fastest, springs slowest."""
+        springs, speeds, angles, durations = (range(n) for n in self.shape)
+        return product(springs, speeds, angles, durations)
+
+
+def make_menu(
+    rig: Rig,
+    springs: Sequence[int],
+    wind_speeds: Sequence[float],
+    release_angles_deg: Sequence[float],
+    durations: Sequence[float],
+) -> Menu:
+    """Check and convert what an environment is given.
+
+    Args:
+        rig: whose spring table the numbers stand for.
+        springs: numbers of the rig's springs.
+        wind_speeds: m/s, 0 or more.
+        release_angles_deg: degrees, above 0.
+        durations: s, above 0.
+
+    Raises:
+        TunnelError: when a list is empty, repeats itself, or holds what the rig cannot do.
+    """
+    lists = {
+        "springs": springs,
+        "wind_speeds": wind_speeds,
+        "release_angles_deg": release_angles_deg,
+        "durations": durations,
+    }
+    for name, values in lists.items():
+        least = 0.0 if name == "wind_speeds" else np.nextafter(0.0, 1.0)
+        if len(values) == 0 or len(set(values)) != len(values):
+            raise TunnelError(f"{name} = {list(values)!r} needs values, each once", remedy="correct the list")
+        for value in values:
+            if isinstance(value, bool) or not (isfinite(value) and value >= least):
+                bound = "of 0 or more" if least == 0.0 else "above 0"
+                raise TunnelError(f"{name}: {value!r} is no number {bound}", remedy="correct the list")
+    return Menu(
+        tuple((int(number), rig.spring(number)) for number in springs),
+        tuple(map(float, wind_speeds)),
+        tuple(radians(angle) for angle in release_angles_deg),
+        tuple(map(float, durations)),
+    )
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Rig time of a run, s; what it is made of is assumed, not measured.
+
+    Args:
+        setup: to bring the model to rest, zero and release it, s.
+        spring_change: to open the section and change the spring, s.
+        speed_change: until the wind stands at another speed, s.
+    """
+
+    setup: float = 60.0
+    spring_change: float = 300.0
+    speed_change: float = 60.0
+
+    def of(self, choice: Choice, last: Choice | None) -> float:
+        """Rig time of a run.
+
+        Args:
+            choice: the run.
+            last: the run before it; None before the first, for which spring and wind are set up anew.
+
+        Returns:
+            s.
+        """
+        spring = last is None or choice.spring != last.spring
+        speed = last is None or choice.wind_speed != last.wind_speed
+        return self.setup + choice.duration + spring * self.spring_change + speed * self.speed_change
+
+
+def stated_run(choice: Choice, name: str, record: Record, air_density: float) -> Run:
+    """A run as a campaign states it.
+
+    Args:
+        choice: its conditions.
+        name: its id.
+        record: what the sensor read.
+        air_density: ρ, kg/m³.
+    """
+    wind_on = choice.wind_speed > 0.0
+    return Run(
+        id=name,
+        record=record,
+        wind_speed=choice.wind_speed,
+        spring_stiffness=choice.spring_stiffness,
+        air_density=air_density if wind_on else None,
+        release_angle=choice.release_angle,
+    )

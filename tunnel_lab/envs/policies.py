@@ -1,0 +1,175 @@
+"""Policies for ``Campaign-v0``: what a rig engineer would do, and what optimal design proposes.
+
+A policy is called with `Knowledge`, which holds all that the runs have told and nothing of the truth, and
+answers with an action. None of them draws random numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from diagnosis.decide import Weighed
+from diagnosis.least_squares import Fit
+from diagnosis.next_run import planned_run, separation
+from diagnosis.study import Study
+from identification.belief import expected_belief, information_gain
+from tunnel_lab.envs.menu import Choice
+from tunnel_lab.envs.session import Knowledge
+
+Action = tuple[int, int, int, int]
+Policy = Callable[[Knowledge], Action]
+
+
+def scripted(known: Knowledge) -> Action:
+    """What a rig engineer would do: springs in turn, on each the wind off and then the speeds in turn.
+
+    Every run has the largest release and the longest record. When the plan is through, it begins again.
+
+    Args:
+        known: how many runs there were.
+
+    Returns:
+        The action.
+    """
+    springs, speeds, _, _ = known.conditions.menu.shape
+    by_speed = np.argsort(known.conditions.menu.wind_speeds, kind="stable")
+    place = len(known.choices) % (springs * speeds)
+    return place // speeds, int(by_speed[place % speeds]), _largest_angle(known), _longest(known)
+
+
+def greedy(known: Knowledge) -> Action:
+    """The run that is expected to tell most about (Cnβ, Cnr) for its rig time.
+
+    Over the whole menu, the expected information gain (exact Fisher information at the present estimate; Izz, Cr,
+    the sensor's zero and every release unknown) over the run's cost. Runs that might not come back are left out.
+
+    Args:
+        known: the belief, and what stands on the rig now.
+
+    Returns:
+        The action; the scripted one where no run is expected to come back.
+    """
+    best, chosen = 0.0, None
+    for action in known.conditions.menu.actions():
+        choice = known.conditions.menu.choice(action)
+        value = expected_gain(known, choice) / known.cost(choice)
+        if value > best:
+            best, chosen = value, action
+    return scripted(known) if chosen is None else chosen
+
+
+def expected_gain(known: Knowledge, choice: Choice) -> float:
+    """Information that a run is expected to add about (Cnβ, Cnr).
+
+    Args:
+        known: the belief.
+        choice: the run.
+
+    Returns:
+        nats; 0 where the run might not come back.
+    """
+    conditions = known.conditions
+    after = expected_belief(
+        known.belief,
+        conditions.link(choice),
+        conditions.sample_times(choice.duration),
+        choice.release_angle,
+        conditions.noise_std,
+    )
+    return 0.0 if after is None else information_gain(known.belief, after)
+
+
+def separating(known: Knowledge) -> Action:
+    """The run that is expected to tell the two best answers of the diagnosis apart, for its rig time.
+
+    Over the whole menu, half the squared separation of the two fitted models (the expected log-likelihood ratio,
+    nats; see `diagnosis.next_run.separation`) over the run's cost. With one named answer only, its rival is the
+    nominal model.
+
+    Args:
+        known: the study, and what stands on the rig now.
+
+    Returns:
+        The action; while no gap shows, the next of the script.
+    """
+    rivals = None if known.study is None else best_rivals(known.study)
+    if rivals is None:
+        return scripted(known)
+    best, chosen = 0.0, None
+    for action in known.conditions.menu.actions():
+        choice = known.conditions.menu.choice(action)
+        apart = _apart(known, rivals, choice)
+        value = 0.5 * apart**2 / known.cost(choice)
+        if value > best:
+            best, chosen = value, action
+    return scripted(known) if chosen is None else chosen
+
+
+def best_rivals(study: Study) -> tuple[Fit, Fit] | None:
+    """The fits of the two most probable answers; the nominal one for the second where there is but one.
+
+    Args:
+        study: of the runs so far.
+
+    Returns:
+        None while no effect is fitted.
+    """
+    fits = [found for answer in study.weighed if (found := _fit_of(study, answer)) is not None]
+    if not fits:
+        return None
+    return (fits[0], fits[1]) if len(fits) > 1 else (fits[0], study.nominal)
+
+
+def _fit_of(study: Study, answer: Weighed) -> Fit | None:
+    hypothesis = study.hypothesis(answer.effects)
+    return None if hypothesis is None else hypothesis.fit
+
+
+def _apart(known: Knowledge, rivals: tuple[Fit, Fit], choice: Choice) -> float:
+    run = planned_run(
+        rivals[0],
+        spring_stiffness=choice.spring_stiffness,
+        wind_speed=choice.wind_speed,
+        air_density=known.conditions.rig.air.density,
+        duration=choice.duration,
+    )
+    found = separation(*rivals, run, choice.release_angle)
+    return 0.0 if found is None or not np.isfinite(found) else found
+
+
+def _largest_angle(known: Knowledge) -> int:
+    return int(np.argmax(known.conditions.menu.release_angles))
+
+
+def _longest(known: Knowledge) -> int:
+    return int(np.argmax(known.conditions.menu.durations))
+
+
+POLICIES: dict[str, Policy] = {"scripted": scripted, "greedy": greedy, "separating": separating}
+"""By name."""
+
+
+def run_campaign(
+    env: Any, policy: Policy, *, seed: int, options: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Play one episode.
+
+    Args:
+        env: a ``tunnel_sim/Campaign-v0``, wrapped or not.
+        policy: what chooses the runs.
+        seed: of truth and noise.
+        options: of the reset.
+
+    Returns:
+        The last ``info``, whose ``campaign`` goes to `identify` and `diagnose`.
+    """
+    _, info = env.reset(seed=seed, options=options)
+    over = False
+    while not over:
+        known: Knowledge = env.unwrapped.known
+        _, _, terminated, truncated, info = env.step(np.array(policy(known)))
+        over = terminated or truncated
+    return dict(info)

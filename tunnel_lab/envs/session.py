@@ -1,0 +1,273 @@
+"""A campaign in the making: the rig with its hidden truth, and what the runs so far have told.
+
+`Session` holds the truth and makes runs; `Knowledge` is all that the operator, a policy or an observation has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.gap import FALSE_ALARM_RATE
+from diagnosis.study import Study, study
+from identification.belief import Belief, prior_belief, run_link, update_belief
+from identification.decay_fit import Reading, RunFit
+from identification.noise import stated_noise
+from identification.run_fit import identify_run
+from identification.status import Status
+from tunnel_lab.envs.menu import Choice, Costs, Menu, stated_run
+from tunnel_lab.envs.truth import MEAN, STD, RigTruth
+from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.effects import effect_class
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.plan import Condition, SensorModel
+from tunnel_sim.record import Array, Record
+from tunnel_sim.rig import Rig
+from tunnel_sim.simulate import simulate
+from tunnel_sim.virtual_campaign import run_settings
+
+_EMPTY = Record(np.arange(2.0), np.zeros(2))  # of a run that is only planned
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What stays the same in all episodes of an environment.
+
+    Args:
+        rig: geometry, springs, air.
+        sensor: noise, rate and resolution; the zero in it is not used, each episode has its own.
+        menu: the choices.
+        costs: rig time of a run.
+        effects: the vocabulary of the diagnosis; empty where the campaign only identifies.
+    """
+
+    rig: Rig
+    sensor: SensorModel
+    menu: Menu
+    costs: Costs
+    effects: tuple[str, ...] = ()
+
+    @property
+    def rig_properties(self) -> RigProperties:
+        """What a campaign states of the rig; the inertia is the nominal one."""
+        body = self.rig.body
+        return RigProperties(self.rig.dynamics.yaw_inertia, body.frontal_area, body.length, body.width)
+
+    @property
+    def sensor_properties(self) -> SensorProperties:
+        """What a campaign states of the sensor."""
+        return SensorProperties(
+            self.sensor.sample_rate, self.sensor.resolution or None, self.sensor.noise_std
+        )
+
+    @property
+    def noise_std(self) -> float:
+        """Of the reading, quantisation included, rad."""
+        noise = stated_noise(self.sensor_properties)
+        assert noise is not None
+        return noise
+
+    def sample_times(self, duration: float) -> Array:
+        """Sample times of a run of a duration in s, shape (n,), s."""
+        rate = self.sensor.sample_rate
+        return np.arange(max(2, round(duration * rate))) / rate
+
+    def link(self, choice: Choice) -> Array:
+        """How the run's decay hangs on the shared parameters, shape (2, 4); see `identification.belief`."""
+        return run_link(stated_run(choice, "next", _EMPTY, self.rig.air.density), self.rig_properties)
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """All that is known at a point of an episode; the truth is not in it.
+
+    Args:
+        conditions: rig, sensor, menu and costs.
+        prior: the belief before the first run.
+        belief: now.
+        choices: the runs ordered so far, lost ones among them.
+        costs: rig time of each, s.
+        runs: the runs made.
+        fits: reading and own fit of the runs that count in the belief, with their links.
+        study: the last diagnosis; None before the first, or where there is no vocabulary.
+        status: of the last run, ``ok`` or what became of it.
+    """
+
+    conditions: Conditions
+    prior: Belief
+    belief: Belief
+    choices: tuple[Choice, ...] = ()
+    costs: tuple[float, ...] = ()
+    runs: tuple[Run, ...] = ()
+    fits: tuple[tuple[Array, Reading, RunFit], ...] = ()
+    study: Study | None = None
+    status: str = "ok"
+
+    @property
+    def last(self) -> Choice | None:
+        """The run before; None before the first."""
+        return self.choices[-1] if self.choices else None
+
+    @property
+    def rig_time(self) -> float:
+        """Spent so far, s."""
+        return float(sum(self.costs))
+
+    @property
+    def campaign(self) -> Campaign:
+        """The runs made, for `identify` and `diagnose`."""
+        conditions = self.conditions
+        return Campaign("campaign-v0", conditions.rig_properties, conditions.sensor_properties, self.runs)
+
+    def cost(self, choice: Choice) -> float:
+        """What a next run would cost, s."""
+        return self.conditions.costs.of(choice, self.last)
+
+
+def first_knowledge(conditions: Conditions) -> Knowledge:
+    """Before the first run: the prior is the distribution the truth is drawn from.
+
+    Args:
+        conditions: of the environment.
+    """
+    prior = prior_belief(MEAN, STD)
+    return Knowledge(conditions, prior, prior)
+
+
+class Session:
+    """The rig in one episode.
+
+    Args:
+        conditions: of the environment.
+        truth: hidden from the operator.
+        rng: every run takes a generator spawned of it, so that the noise of a run hangs on its number only.
+    """
+
+    def __init__(self, conditions: Conditions, truth: RigTruth, rng: np.random.Generator) -> None:
+        self._conditions = conditions
+        self.truth = truth
+        self._rng = rng
+
+    def perform(self, known: Knowledge, choice: Choice) -> Knowledge:
+        """Make a run and learn from it.
+
+        Args:
+            known: before the run.
+            choice: the run.
+
+        Returns:
+            After it. A run whose motion grows without bound is lost: it costs its time and tells nothing.
+        """
+        known = replace(
+            known,
+            choices=(*known.choices, choice),
+            costs=(*known.costs, known.cost(choice)),
+            status="ok",
+        )
+        rng = self._rng.spawn(1)[0]
+        try:
+            run = self._run(choice, f"r{len(known.choices):02d}", rng)
+        except TunnelError as error:
+            return replace(known, status=f"lost: {error.what}")
+        known = _identified(replace(known, runs=(*known.runs, run)), choice)
+        return _diagnosed(known) if self._conditions.effects else known
+
+    def _run(self, choice: Choice, name: str, rng: np.random.Generator) -> Run:
+        rig = self._conditions.rig
+        condition = Condition(
+            name,
+            choice.spring_stiffness,
+            choice.wind_speed,
+            rig.air.density,
+            choice.release_angle,
+            choice.duration,
+        )
+        record = simulate(
+            rig,
+            run_settings(self.truth.coefficients, condition),
+            replace(self._conditions.sensor, zero=self.truth.sensor_zero),
+            rng,
+            effects=self.truth.effects,
+        )
+        return stated_run(choice, name, record, rig.air.density)
+
+
+def _identified(known: Knowledge, choice: Choice) -> Knowledge:
+    """Take the last run into the belief."""
+    conditions = known.conditions
+    fitted = identify_run(known.runs[-1], conditions.sensor_properties)
+    if fitted.fit is None:
+        return replace(known, status=f"tells nothing: {_reason(fitted.estimate.status)}")
+    fits = (*known.fits, (conditions.link(choice), fitted.reading, fitted.fit))
+    links, pairs = [link for link, _, _ in fits], [(reading, fit) for _, reading, fit in fits]
+    try:
+        belief = update_belief(known.prior, links, pairs, conditions.noise_std)
+    except ValueError as error:
+        return replace(known, status=f"tells nothing: {error}")
+    return replace(known, fits=fits, belief=belief)
+
+
+def _diagnosed(known: Knowledge) -> Knowledge:
+    """Diagnose all runs so far."""
+    kinds = [effect_class(name) for name in known.conditions.effects]
+    try:
+        return replace(known, study=study(known.campaign, kinds))
+    except TunnelError as error:
+        return replace(known, status=f"not diagnosed: {error.what}")
+
+
+def _reason(status: Status) -> str:
+    return status.value.partition(":")[0]
+
+
+def answers(effects: Sequence[str]) -> tuple[str, ...]:
+    """What the probabilities of a diagnosis are of, in order.
+
+    Args:
+        effects: the vocabulary.
+
+    Returns:
+        ``none``, each effect alone, ``several`` (two at once), ``unknown``.
+    """
+    return ("none", *effects, "several", "unknown")
+
+
+def probabilities(known: Knowledge) -> Array:
+    """The diagnosis' probabilities of `answers`.
+
+    Args:
+        known: any.
+
+    Returns:
+        Shape (effects + 3,), summing to 1: equal before the first diagnosis; all on ``none`` but the
+        false-alarm rate while no gap is detected.
+    """
+    names = answers(known.conditions.effects)
+    found = np.zeros(len(names))
+    if known.study is None:
+        return np.full(len(names), 1.0 / len(names))
+    if not known.study.weighed:
+        found[0], found[-1] = 1.0 - FALSE_ALARM_RATE, FALSE_ALARM_RATE
+        return found
+    for answer in known.study.weighed:
+        name = answer.effects[0] if len(answer.effects) == 1 else "several"
+        found[names.index(name)] += answer.probability
+    return found / found.sum()
+
+
+def diagnostic_information(known: Knowledge) -> float:
+    """How far the diagnosis has come: ln(answers) less the entropy of the probabilities, nats.
+
+    Args:
+        known: any.
+
+    Returns:
+        0 while no gap is detected: that none shows yet tells nothing about which effect it is.
+    """
+    if known.study is None or not known.study.weighed:
+        return 0.0
+    found = probabilities(known)
+    positive = found[found > 0.0]
+    return float(np.log(found.size) + np.sum(positive * np.log(positive)))
