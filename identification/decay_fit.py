@@ -178,6 +178,20 @@ def fit_run(
     return fit_decays([reading], [np.eye(2)], decay, zero=zero, tolerance=tolerance)
 
 
+def project_run(reading: Reading, decay: Decay) -> tuple[RunFit, float] | None:
+    """The best initial state and zero of a run whose decay is given, by another method say.
+
+    Args:
+        reading: the run.
+        decay: decay rate and normalised stiffness.
+
+    Returns:
+        The run at that decay and its sensor zero in rad; None where the decay overflows.
+    """
+    point = _project([reading], [np.eye(2)], np.array([decay.rate, decay.stiffness]), None)
+    return (point.runs[0], point.zero) if point.runs else None
+
+
 def projected_cost(reading: Reading, decay: Decay) -> float:
     """What is left of a reading by the best initial state and zero for a given decay.
 

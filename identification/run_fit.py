@@ -14,17 +14,24 @@ from identification.decay_fit import (
     RATE,
     STIFFNESS,
     ZERO,
-    DecayFit,
     Reading,
     RunFit,
     fit_run,
 )
-from identification.estimate import NoiseLevel, Quantity, RunEstimate, Status, by_gravity
+from identification.estimate import (
+    NoiseLevel,
+    Quantity,
+    RunEstimate,
+    Status,
+    WindowEstimate,
+    by_gravity,
+)
 from identification.information import inverse
 from identification.noise import Residual, eighth_of_a_cycle, noise_level
 from identification.start import starting_decay, thinned_reading
 from identification.windows import fit_windows, modal_quantities
 from tunnel_sim.campaign import Run, SensorProperties
+from tunnel_sim.record import Array
 
 # The energy of the decay over the noise variance that noise alone reaches, at the best of all frequencies of
 # a record of 1e6 samples, less than once in 1e6 runs: 2 ln(1e12).
@@ -69,11 +76,17 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     fit = fit_run(reading, _near(run, start))
     if not fit.converged or fit.runs[0].decay.stiffness <= 0.0:
         return _failed(run, reading, Status.NOT_CONVERGED)
-    noise = noise_level(residuals_of([reading], fit.runs, fit.zero, _UNKNOWNS), sensor)
-    energy = float(np.sum((reading.yaw - fit.zero - fit.runs[0].residual) ** 2))
-    if energy < _LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
-        return _failed(run, reading, Status.NO_OSCILLATION)
-    return FittedRun(reading, fit.runs[0], noise, _run_estimate(run, reading, fit, noise, cycles_per_window))
+    fitted = fit.runs[0]
+    noise, failure = judge(reading, fitted, fit.zero, sensor)
+    if failure is not None:
+        return _failed(run, reading, failure)
+    variance = noise.std**2 * noise.slow_ratio
+    covariance = inverse(fitted.information)[np.ix_([RATE, STIFFNESS], [RATE, STIFFNESS])] * variance
+    windows = fit_windows(reading, fitted.decay, fit.zero, noise, cycles=cycles_per_window)
+    estimate = describe_run(
+        run, reading, fitted, fit.zero, covariance, variance, noise=noise, windows=windows
+    )
+    return FittedRun(reading, fitted, noise, estimate)
 
 
 def _near(run: Run, start: Decay) -> Decay:
@@ -114,33 +127,85 @@ def residuals_of(
     ]
 
 
-def _run_estimate(
-    run: Run, reading: Reading, fit: DecayFit, noise: NoiseLevel, cycles: int | None
+def judge(
+    reading: Reading, fitted: RunFit, zero: float, sensor: SensorProperties
+) -> tuple[NoiseLevel, Status | None]:
+    """What the residual of one run's fit says of the noise, and whether there is a decay above it at all.
+
+    Args:
+        reading: what was fitted.
+        fitted: the run at its decay.
+        zero: its sensor zero, rad.
+        sensor: what is stated of the noise.
+
+    Returns:
+        The noise level, and the status of the failure: None where there is none.
+    """
+    noise = noise_level(residuals_of([reading], [fitted], zero, _UNKNOWNS), sensor)
+    motion = reading.yaw - zero - fitted.residual
+    if float(motion @ motion) < _LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
+        return noise, Status.NO_OSCILLATION
+    return noise, None
+
+
+def describe_run(
+    run: Run,
+    reading: Reading,
+    fitted: RunFit,
+    zero: float,
+    covariance: Array,
+    noise_variance: float,
+    *,
+    noise: NoiseLevel | None = None,
+    windows: tuple[WindowEstimate, ...] = (),
 ) -> RunEstimate:
-    fitted = fit.runs[0]
-    covariance = inverse(fitted.information) * (noise.std**2 * noise.slow_ratio)
-    deviations = np.sqrt(np.diag(covariance))
-    omega_n, zeta = modal_quantities(fitted.decay, covariance[np.ix_([RATE, STIFFNESS], [RATE, STIFFNESS])])
+    """One run's result from its decay, whichever method found that.
+
+    The initial state and the zero are those that fit the decay best; their uncertainty is that of the reading
+    and that of the decay.
+
+    Args:
+        run: its conditions.
+        reading: the whole run.
+        fitted: the run at its decay.
+        zero: its sensor zero, rad.
+        covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
+        noise_variance: of one sample of the reading, rad².
+        noise: the level that the deviations rest on; None where the method does not use it.
+        windows: of the run.
+
+    Returns:
+        The estimate with the statuses that its noise, its length and its spring call for.
+    """
+    rest, decay = [ZERO, ANGLE, ANGULAR_RATE], [RATE, STIFFNESS]
+    own = inverse(fitted.information[np.ix_(rest, rest)])
+    move = own @ fitted.information[np.ix_(rest, decay)]
+    deviations = np.sqrt(np.diag(own * noise_variance + move @ covariance @ move.T))
+    omega_n, zeta = modal_quantities(fitted.decay, covariance)
+    return RunEstimate(
+        id=run.id,
+        statuses=by_gravity(_statuses(run, reading, fitted.decay, noise)),
+        omega_n=omega_n,
+        zeta=zeta,
+        initial_angle=Quantity(fitted.angle, float(deviations[1]), "rad"),
+        initial_rate=Quantity(fitted.rate, float(deviations[2]), "rad/s"),
+        sensor_zero=Quantity(zero, float(deviations[0]), "rad"),
+        noise=noise,
+        windows=windows,
+    )
+
+
+def _statuses(run: Run, reading: Reading, decay: Decay, noise: NoiseLevel | None) -> set[Status]:
     statuses = set()
-    if noise.departs:
+    if noise is not None and noise.departs:
         statuses.add(Status.MODEL_DEPARTS)
-    if noise.disagrees:
+    if noise is not None and noise.disagrees:
         statuses.add(Status.NOISE_DISAGREES)
-    if fitted.decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * _FEW_CYCLES:
+    if decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * _FEW_CYCLES:
         statuses.add(Status.FEW_CYCLES)
     if run.spring_stiffness is None:
         statuses.add(Status.NO_STIFFNESS)
-    return RunEstimate(
-        id=run.id,
-        statuses=by_gravity(statuses),
-        omega_n=omega_n,
-        zeta=zeta,
-        initial_angle=Quantity(fitted.angle, float(deviations[ANGLE]), "rad"),
-        initial_rate=Quantity(fitted.rate, float(deviations[ANGULAR_RATE]), "rad/s"),
-        sensor_zero=Quantity(fit.zero, float(deviations[ZERO]), "rad"),
-        noise=noise,
-        windows=fit_windows(reading, fitted.decay, fit.zero, noise, cycles=cycles),
-    )
+    return statuses
 
 
 def _failed(run: Run, reading: Reading, status: Status) -> FittedRun:

@@ -7,6 +7,7 @@ import numpy as np
 from identification.damped_oscillation import Decay
 from identification.decay_fit import Reading, projected_cost
 from identification.spectrum import psd_peak
+from identification.thinning import mean_of_blocks
 from tunnel_sim.record import Array, Record
 
 _SAMPLES = 1024  # the start is judged on a thinned record; the fit itself sees every sample
@@ -27,8 +28,8 @@ def starting_decay(record: Record) -> Decay | None:
     Returns:
         The start; None where the record is constant.
     """
-    frequency = psd_peak(record, padding=8 if record.time_s.size < _LONG else 1).frequency
-    if frequency == 0.0 or np.ptp(record.yaw_rad) == 0.0:
+    frequency = starting_frequency(record)
+    if frequency is None:
         return None
     thin = thinned_reading(record, frequency)
     omega = 2.0 * np.pi * frequency
@@ -38,6 +39,19 @@ def starting_decay(record: Record) -> Decay | None:
         candidates.append(integrated)
     costs = [projected_cost(thin, candidate) for candidate in candidates]
     return candidates[int(np.argmin(costs))]
+
+
+def starting_frequency(record: Record) -> float | None:
+    """The frequency of the strongest oscillation, good enough to start from.
+
+    Args:
+        record: the reading of one run.
+
+    Returns:
+        Hz; None where the record is constant.
+    """
+    frequency = psd_peak(record, padding=8 if record.time_s.size < _LONG else 1).frequency
+    return None if frequency == 0.0 or np.ptp(record.yaw_rad) == 0.0 else frequency
 
 
 def thinned_reading(record: Record, frequency: float) -> Reading:
@@ -51,9 +65,9 @@ def thinned_reading(record: Record, frequency: float) -> Reading:
         The thinned reading, about a thousand samples of a long record; its clock starts at the first sample.
     """
     factor = max(1, min(record.time_s.size // _SAMPLES, int(record.sample_rate / (20.0 * frequency))))
-    usable = record.time_s.size // factor * factor
-    time = (record.time_s[:usable] - record.time_s[0]).reshape(-1, factor).mean(axis=1)
-    return Reading(time, record.yaw_rad[:usable].reshape(-1, factor).mean(axis=1))
+    return Reading(
+        mean_of_blocks(record.time_s - record.time_s[0], factor), mean_of_blocks(record.yaw_rad, factor)
+    )
 
 
 def _integrated_equation(reading: Reading) -> Decay:

@@ -13,7 +13,11 @@ from tunnel_sim.errors import TunnelError
 
 NAMES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 # Relative error on a noise-free campaign of the nominal model. A new estimator states its own here.
-ACCURACY = {"output_error": 1e-6, "conventional": 0.02}
+ACCURACY = {
+    "output_error": 1e-6,
+    "conventional": 0.02,
+    "matrix_pencil": 1e-6,
+}
 
 each_estimator = pytest.mark.parametrize("name", ALL_ESTIMATORS)
 
@@ -63,6 +67,8 @@ def test_registry_is_explicit_and_consistent():
     assert set(ACCURACY) == set(ALL_ESTIMATORS)
     for name in ALL_ESTIMATORS:
         assert make_estimator(name).name == name
+    for entry in ENTRIES:
+        assert 20 < len(entry.summary) < 120
 
 
 @each_estimator

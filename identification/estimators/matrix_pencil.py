@@ -1,0 +1,87 @@
+"""Matrix pencil: poles by linear algebra alone, no start and no iteration on the parameters.
+
+Every run is thinned to block means, its two poles are read from the shift of their Hankel matrix, and the
+first-order perturbation of that gives their covariance; the campaign's coefficients are those that fit the
+runs' poles best. Sources: Hua & Sarkar, IEEE Trans. Acoust. Speech Signal Process. 38 (1990) 814–824,
+doi 10.1109/29.56027; see `identification.pencil`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.assembly import RunDecay, combined_estimate
+from identification.decay_fit import Reading, project_run
+from identification.derivatives import loads
+from identification.estimate import Estimate, RunEstimate, Status
+from identification.pencil import PencilDecay, pencil_decay
+from identification.run_fit import describe_run, judge
+from identification.start import starting_frequency
+from identification.thinning import block_means
+from tunnel_sim.campaign import Campaign, Run, SensorProperties
+
+_DECAY_TIMES = 8.0  # 1/σ: what comes later holds e^−16 of the energy, and noise
+
+
+@dataclass(frozen=True)
+class MatrixPencil:
+    """Poles from the shift of a Hankel matrix.
+
+    Args:
+        blocks_per_cycle: block means per period, at least. Fewer are quicker and see less of the signal: its
+            amplitude in them falls by (π/blocks)²/6.
+    """
+
+    name: ClassVar[str] = "matrix_pencil"
+    blocks_per_cycle: int = 16
+
+    def estimate(self, campaign: Campaign) -> Estimate:
+        """Identify every run, then the campaign from the runs.
+
+        Args:
+            campaign: at least one run.
+
+        Returns:
+            The estimate. A run that could not be identified is left out.
+
+        Raises:
+            TunnelError: when a wind-on run states no air density.
+        """
+        for run in campaign.runs:
+            loads(run, campaign.rig)
+        found = [self._run(run, campaign.sensor) for run in campaign.runs]
+        return combined_estimate(campaign, self.name, found)
+
+    def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
+        frequency = starting_frequency(run.record)
+        if frequency is None:
+            return RunDecay(RunEstimate(run.id, (Status.NO_OSCILLATION,)))
+        reading = Reading.from_record(run.record)
+        found = self._pencil(reading, frequency)
+        projected = None if found is None else project_run(reading, found[0].decay)
+        if found is None or projected is None or found[0].decay.stiffness <= 0.0:
+            return RunDecay(RunEstimate(run.id, (Status.NOT_CONVERGED,)))
+        fitted, zero = projected
+        noise, failure = judge(reading, fitted, zero, sensor)
+        if failure is not None:
+            return RunDecay(RunEstimate(run.id, (failure,)))
+        variance = noise.std**2 * noise.slow_ratio
+        covariance = found[0].weights @ found[0].weights.T * (variance / found[1])
+        estimate = describe_run(run, reading, fitted, zero, covariance, variance, noise=noise)
+        return RunDecay(estimate, fitted.decay, covariance)
+
+    def _pencil(self, reading: Reading, frequency: float) -> tuple[PencilDecay, int] | None:
+        # Over the whole record, and again over the part that holds the decay where that is much shorter.
+        thin, factor = block_means(reading, frequency, self.blocks_per_cycle)
+        interval = float(thin.time[-1] - thin.time[0]) / max(thin.time.size - 1, 1)
+        found = pencil_decay(thin.yaw, interval, 2.0 * np.pi * frequency)
+        if found is None:
+            return None
+        rate = found.decay.rate
+        if rate * float(thin.time[-1]) > 1.5 * _DECAY_TIMES:
+            count = int(_DECAY_TIMES / (rate * interval))
+            found = pencil_decay(thin.yaw[:count], interval, 2.0 * np.pi * frequency) or found
+        return found, factor
