@@ -1,0 +1,1 @@
+"""Estimators against records of known truth: over a grid, against a baseline, under unmodelled effects."""

@@ -1,0 +1,254 @@
+"""What estimators are scored on: a grid of conditions, one small TOML, and the cells it stands for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from tunnel_lab.effect_option import parse_effect
+from tunnel_sim.effects import effect_from
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.toml_input import OneLine, StrictModel, check_version, load_toml, shown, validate
+
+NO_EFFECT = "none"
+DECAY_QUANTITIES = ("zeta", "omega_n")
+CAMPAIGN_QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
+_MAX_CELLS = 10_000
+
+Positive = Annotated[float, Field(gt=0.0)]
+
+
+class DecaysTable(StrictModel):
+    """``[[decays]]``: single free decays with the wind off; every combination is a cell."""
+
+    zeta: list[Annotated[float, Field(gt=0.0, lt=1.0)]] = Field(
+        min_length=1, description="a list of damping ratios between 0 and 1, such as [0.002, 0.05]"
+    )
+    frequency: list[Positive] = Field(
+        min_length=1, description="a list of natural frequencies in Hz, such as [0.8, 4.0]"
+    )
+    noise: list[Positive] = Field(
+        min_length=1, description="a list of noise levels over the amplitude, such as [0.001, 0.01]"
+    )
+    duration: list[Positive] = Field(min_length=1, description="a list of record lengths in s, such as [20]")
+    amplitude: Positive = Field(default=0.35, description="the release angle, a positive number in rad")
+    sample_rate: Positive = Field(default=1000.0, description="a positive number in Hz")
+    resolution: Annotated[float, Field(ge=0.0)] = Field(
+        default=0.0, description="a number in rad, zero for none"
+    )
+
+
+class CampaignsTable(StrictModel):
+    """``[[campaigns]]``: every spring with the wind off and at one speed; speeds, noises, … make cells."""
+
+    springs: list[Positive] = Field(min_length=1, description="a list of stiffnesses in N m/rad")
+    wind_speeds: list[Positive] = Field(min_length=1, description="a list of speeds in m/s, such as [10, 25]")
+    noise: list[Positive] = Field(
+        min_length=1, description="a list of noise levels over the amplitude, such as [0.001, 0.01]"
+    )
+    duration: list[Positive] = Field(min_length=1, description="a list of record lengths in s, such as [20]")
+    effects: list[OneLine] = Field(
+        default=[NO_EFFECT],
+        min_length=1,
+        description='a list such as ["none", "coulomb_friction:friction_moment=0.004"]',
+    )
+    amplitude: Positive = Field(default=0.35, description="the release angle, a positive number in rad")
+    sample_rate: Positive = Field(default=1000.0, description="a positive number in Hz")
+    resolution: Annotated[float, Field(ge=0.0)] = Field(
+        default=0.0, description="a number in rad, zero for none"
+    )
+
+
+class GridDocument(StrictModel):
+    """The whole of a grid."""
+
+    schema_version: int = Field(description="1")
+    name: OneLine = Field(description="a short name in quotes")
+    seed: int = Field(ge=0, description="a whole number, zero or more")
+    trials: int = Field(ge=2, le=100_000, description="the records in each cell, a whole number from 2")
+    trials_of: dict[str, Annotated[int, Field(ge=2)]] = Field(
+        default={}, description="a table of estimators that see fewer records, such as { bayesian = 20 }"
+    )
+    decays: list[DecaysTable] = Field(default=[], description="[[decays]] tables")
+    campaigns: list[CampaignsTable] = Field(default=[], description="[[campaigns]] tables")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One point of the grid.
+
+    Args:
+        kind: ``decay`` (one wind-off run of stated ζ and frequency) or ``campaign``.
+        noise: standard deviation of the sensor's noise over the amplitude, a ratio.
+        duration: of every record, s.
+        amplitude: of the release, rad.
+        sample_rate: Hz.
+        resolution: of the sensor, rad; 0 for none.
+        zeta: damping ratio of a decay; 0 in a campaign.
+        frequency: natural frequency of a decay, Hz; 0 in a campaign.
+        wind_speed: of a campaign's wind-on runs, m/s; 0 in a decay.
+        springs: of a campaign, N m/rad; none in a decay.
+        effect: as ``tunnel simulate --effect`` takes it; ``none`` for the nominal model.
+    """
+
+    kind: Literal["decay", "campaign"]
+    noise: float
+    duration: float
+    amplitude: float
+    sample_rate: float
+    resolution: float
+    zeta: float = 0.0
+    frequency: float = 0.0
+    wind_speed: float = 0.0
+    springs: tuple[float, ...] = ()
+    effect: str = NO_EFFECT
+
+    @property
+    def label(self) -> str:
+        """The cell in a line; two cells that differ have different ones."""
+        tail = f"S/A {100 * self.noise:g} %, {self.duration:g} s"
+        if (self.amplitude, self.sample_rate, self.resolution) != (0.35, 1000.0, 0.0):
+            tail += f", A {self.amplitude:g} rad, {self.sample_rate:g} Hz"
+            tail += f", step {self.resolution:g} rad" if self.resolution else ""
+        if self.kind == "decay":
+            return f"ζ {self.zeta:g}, {self.frequency:g} Hz, {tail}"
+        springs = "/".join(f"{spring:g}" for spring in self.springs)
+        effect = "" if self.effect == NO_EFFECT else f", {self.effect}"
+        return f"Kr {springs} N m/rad, V {self.wind_speed:g} m/s, {tail}{effect}"
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """What is scored in it, by name in an estimate's JSON."""
+        return DECAY_QUANTITIES if self.kind == "decay" else CAMPAIGN_QUANTITIES
+
+    @property
+    def runs(self) -> int:
+        """Number of records in one trial."""
+        return 1 if self.kind == "decay" else 2 * len(self.springs)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What to score on.
+
+    Args:
+        name: of the grid.
+        seed: of every record.
+        trials: number of records, or campaigns, in each cell.
+        trials_of: the same for estimators that see fewer, by name.
+        cells: at least one, all different.
+    """
+
+    name: str
+    seed: int
+    trials: int
+    trials_of: tuple[tuple[str, int], ...]
+    cells: tuple[Cell, ...]
+
+    def trials_for(self, estimator: str) -> int:
+        """How many trials of each cell an estimator sees: always the first ones."""
+        return min(self.trials, dict(self.trials_of).get(estimator, self.trials))
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Everything that decides the records, in JSON's types."""
+        return {
+            "name": self.name,
+            "seed": self.seed,
+            "trials": self.trials,
+            "trials_of": dict(self.trials_of),
+            "cells": [dict(vars(cell)) | {"springs": list(cell.springs)} for cell in self.cells],
+        }
+
+    @classmethod
+    def from_json_dict(cls, data: dict[str, Any]) -> Grid:
+        """The inverse of `to_json_dict`."""
+        cells = tuple(Cell(**(cell | {"springs": tuple(cell["springs"])})) for cell in data["cells"])
+        return cls(data["name"], data["seed"], data["trials"], tuple(data["trials_of"].items()), cells)
+
+
+def load_grid(path: Path) -> Grid:
+    """Read a grid.
+
+    Args:
+        path: a TOML file like the packaged ``score-grid.toml``.
+
+    Returns:
+        The grid; cells in the order of the tables, the last list of a table running fastest.
+
+    Raises:
+        TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
+    """
+    raw = load_toml(path, missing="name a grid such as the packaged score-grid.toml, or leave it out")
+    check_version(raw, path)
+    document = validate(GridDocument, raw, path)
+    where = shown(path)
+    _check_effects(document, where)
+    cells = [cell for table in document.decays for cell in _decays(table)]
+    cells += [cell for table in document.campaigns for cell in _campaigns(table)]
+    if not cells:
+        raise TunnelError("no cells", where=where, remedy="add a [[decays]] or [[campaigns]] table")
+    if len(cells) > _MAX_CELLS:
+        raise TunnelError(
+            f"{len(cells)} cells are more than {_MAX_CELLS}", where=where, remedy="shorten a list"
+        )
+    twice = next((cell.label for cell in cells if cells.count(cell) > 1), None)
+    if twice is not None:
+        raise TunnelError(f"the cell {twice!r} is there twice", where=where, remedy="leave one out")
+    _check_names(document, where)
+    trials_of = tuple(document.trials_of.items())
+    return Grid(document.name, document.seed, document.trials, trials_of, tuple(cells))
+
+
+def packaged_grid() -> Grid:
+    """The grid that is scored on where none is named."""
+    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-grid.toml") as path:
+        return load_grid(path)
+
+
+def _check_names(document: GridDocument, where: str) -> None:
+    from identification.estimators import ALL_ESTIMATORS
+    from tunnel_sim.errors import did_you_mean
+
+    for name in document.trials_of:
+        if name not in ALL_ESTIMATORS:
+            remedy = did_you_mean(name, ALL_ESTIMATORS)
+            raise TunnelError(f"no estimator {name!r}", where=f"{where}, [trials_of]", remedy=remedy)
+
+
+def _check_effects(document: GridDocument, where: str) -> None:
+    for table in document.campaigns:
+        for text in table.effects:
+            if text != NO_EFFECT:
+                setting = parse_effect(text)
+                if effect_from(setting.name, setting.parameters).is_null:
+                    raise TunnelError(
+                        f"effect {text!r} does nothing",
+                        where=where,
+                        remedy=f'give its severity, or write "{NO_EFFECT}"',
+                    )
+
+
+def _decays(table: DecaysTable) -> list[Cell]:
+    common = (table.amplitude, table.sample_rate, table.resolution)
+    return [
+        Cell("decay", noise, duration, *common, zeta=zeta, frequency=frequency)
+        for zeta, frequency, noise, duration in product(
+            table.zeta, table.frequency, table.noise, table.duration
+        )
+    ]
+
+
+def _campaigns(table: CampaignsTable) -> list[Cell]:
+    common = (table.amplitude, table.sample_rate, table.resolution)
+    springs = tuple(table.springs)
+    return [
+        Cell("campaign", noise, duration, *common, wind_speed=speed, springs=springs, effect=effect)
+        for speed, noise, duration, effect in product(
+            table.wind_speeds, table.noise, table.duration, table.effects
+        )
+    ]

@@ -1,0 +1,196 @@
+"""Trials as a table, on disk as Parquet, and what they add up to.
+
+The table of trials is what a baseline is: it carries its grid, so that it can be repeated.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from identification.estimate import Quantity
+from identification.scoring import Outcome, Score, Trials, collect, score
+from tunnel_lab.files import write_whole
+from tunnel_lab.scoring.grid import NO_EFFECT, Cell, Grid
+from tunnel_lab.scoring.work import Row, describe
+from tunnel_sim.errors import TunnelError
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_COLUMNS = (
+    "cell", "trial", "estimator", "quantity", "unit", "truth", "value", "std", "bound", "status", "milliseconds"
+)  # fmt: skip
+
+Key = tuple[str, int, str]
+"""Estimator, index of the cell, quantity."""
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """A finished score.
+
+    Args:
+        grid: what was scored on.
+        estimators: names, in the order given.
+        rows: one per trial, estimator and quantity; see `tunnel_lab.scoring.work`.
+    """
+
+    grid: Grid
+    estimators: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+    def trials(self) -> dict[Key, Trials]:
+        """The trials of every estimator, cell and quantity."""
+        outcomes: dict[Key, list[Outcome]] = {}
+        for row in self.rows:
+            found = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
+            key = (row["estimator"], row["cell"], row["quantity"])
+            outcomes.setdefault(key, []).append(Outcome(row["truth"], found, row["bound"]))
+        return {key: collect(every) for key, every in outcomes.items()}
+
+    def milliseconds(self, estimator: str, cells: Sequence[int]) -> float:
+        """Median time an estimator took for one record, ms.
+
+        Args:
+            estimator: its name.
+            cells: indices of the cells that count.
+        """
+        from statistics import median
+
+        wanted = set(cells)
+        return median(
+            row["milliseconds"]
+            for row in self.rows
+            if row["estimator"] == estimator and row["cell"] in wanted
+        )
+
+    def raised(self) -> dict[str, list[str]]:
+        """What estimators raised, by estimator; none where all went well."""
+        found: dict[str, set[str]] = {}
+        for row in self.rows:
+            if row["status"].startswith("raised "):
+                found.setdefault(row["estimator"], set()).add(row["status"].removeprefix("raised "))
+        return {name: sorted(kinds) for name, kinds in found.items()}
+
+
+def groups_of(grid: Grid) -> dict[str, list[int]]:
+    """Cells that are added up together, by what they are: decays, campaigns, campaigns with an effect each."""
+    found: dict[str, list[int]] = {}
+    for index, cell in enumerate(grid.cells):
+        found.setdefault(_group(cell), []).append(index)
+    return found
+
+
+def _group(cell: Cell) -> str:
+    if cell.kind == "decay":
+        return "single decays"
+    return "campaigns" if cell.effect == NO_EFFECT else f"campaigns with {cell.effect}"
+
+
+def write_trials(path: Path, results: Results) -> Path:
+    """Write the trials with their grid as Parquet, whole or not at all.
+
+    Args:
+        path: the file; replaced when it exists.
+        results: what to write.
+
+    Returns:
+        The same path.
+    """
+    import polars as pl
+
+    frame = pl.DataFrame(
+        {name: [row[name] for row in results.rows] for name in _COLUMNS}, schema_overrides=_types()
+    )
+    told = json.dumps(results.grid.to_json_dict(), sort_keys=True)
+    return write_whole(path, parquet(frame.with_columns(pl.lit(told).alias("grid"))))
+
+
+def read_trials(path: Path) -> Results:
+    """Read what `write_trials` wrote.
+
+    Args:
+        path: the file.
+
+    Returns:
+        The results, estimators in the order of their first rows.
+
+    Raises:
+        TunnelError: when there is no such file, or it is no table of trials.
+    """
+    import polars as pl
+
+    if not path.is_file():
+        raise TunnelError(
+            "no such file", where=str(path), remedy="write one with tunnel score --write-baseline"
+        )
+    try:
+        frame = pl.read_parquet(path)
+        rows = tuple(frame.select(_COLUMNS).to_dicts())
+        grid = Grid.from_json_dict(json.loads(frame["grid"][0]))
+    except (pl.exceptions.PolarsError, ValueError, KeyError, TypeError, IndexError) as error:
+        raise TunnelError(
+            "is no table of trials", where=str(path), remedy="write one with tunnel score --write-baseline"
+        ) from error
+    return Results(grid, tuple(dict.fromkeys(row["estimator"] for row in rows)), rows)
+
+
+def scores_frame(results: Results) -> pl.DataFrame:
+    """A row for every estimator, cell and quantity: conditions, figures, standard errors and intervals.
+
+    Args:
+        results: at least one trial.
+
+    Returns:
+        Columns with the unit in their name, or in the column ``unit``.
+    """
+    import polars as pl
+
+    rows = []
+    for (estimator, index, quantity), trials in results.trials().items():
+        judged = score(trials)
+        rows.append(
+            {
+                "estimator": estimator,
+                **describe(results.grid.cells[index]),
+                "quantity": quantity,
+                "unit": trials.unit,
+                **_figures(judged),
+                "milliseconds_per_record": results.milliseconds(estimator, [index]),
+            }
+        )
+    return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def _figures(judged: Score) -> dict[str, Any]:
+    figures: dict[str, Any] = {"trials": judged.count, "failures": judged.failures.count}
+    for name in ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound"):
+        quantity: Quantity | None = getattr(judged, name)
+        label = "relative_bias_percent" if name == "relative_bias" else name
+        figures[label] = None if quantity is None else quantity.value
+        figures[f"{label}_std_error"] = None if quantity is None else quantity.std
+    shares = {"coverage": judged.coverage, "failure_share": judged.failures}
+    for name, share in shares.items():
+        figures[name] = None if share is None else share.value
+        figures[f"{name}_low"], figures[f"{name}_high"] = (None, None) if share is None else share.interval
+    return figures
+
+
+def parquet(frame: pl.DataFrame) -> bytes:
+    """A table as the bytes of a Parquet file."""
+    buffer = io.BytesIO()
+    frame.write_parquet(buffer, compression="zstd")
+    return buffer.getvalue()
+
+
+def _types() -> dict[str, Any]:
+    import polars as pl
+
+    text = dict.fromkeys(("estimator", "quantity", "unit", "status"), pl.Utf8)
+    numbers = dict.fromkeys(("truth", "value", "std", "bound", "milliseconds"), pl.Float64)
+    return {**text, **numbers, "cell": pl.Int64, "trial": pl.Int64}

@@ -1,0 +1,291 @@
+"""The work of a score: every estimator on every trial, in processes, and on where it was interrupted."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from tunnel_lab.files import output_folder, write_json
+from tunnel_lab.scoring.grid import Cell, Grid
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from identification.estimate import Estimate
+    from tunnel_sim.campaign import Campaign
+
+ItemT = TypeVar("ItemT")
+ResultT = TypeVar("ResultT")
+Row = dict[str, Any]
+Told = Callable[[int, int], None]
+UNIT_TRIALS = 5
+"""Trials done together: what an interruption costs at most, in each process."""
+
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Some trials of one cell.
+
+    Args:
+        cell: index of the cell in the grid.
+        first: number of the first trial.
+        stop: number after the last trial.
+    """
+
+    cell: int
+    first: int
+    stop: int
+
+    @property
+    def name(self) -> str:
+        """Of its file."""
+        return f"c{self.cell:04d}-t{self.first:05d}"
+
+
+def units_of(grid: Grid) -> tuple[Unit, ...]:
+    """The grid in pieces of a few trials, cells in turn so that the time left can be told early."""
+    return tuple(
+        Unit(cell, first, min(first + UNIT_TRIALS, grid.trials))
+        for first in range(0, grid.trials, UNIT_TRIALS)
+        for cell in range(len(grid.cells))
+    )
+
+
+def score_unit(grid: Grid, estimators: Sequence[str], unit: Unit) -> list[Row]:
+    """Every estimator on the unit's trials.
+
+    Args:
+        grid: the conditions.
+        estimators: names in the registry.
+        unit: which trials.
+
+    Returns:
+        A row for each trial, estimator and quantity, in this order.
+    """
+    from tunnel_lab.scoring.draw import draw_trial
+
+    cell = grid.cells[unit.cell]
+    rows: list[Row] = []
+    for number in range(unit.first, unit.stop):
+        wanted = [name for name in estimators if number < grid.trials_for(name)]
+        if not wanted:
+            continue
+        trial = draw_trial(cell, grid.seed, number)
+        for name in wanted:
+            rows += estimate_rows(
+                name, trial.campaign, trial.truth, trial.bound, {"cell": unit.cell, "trial": number}
+            )
+    return rows
+
+
+def estimate_rows(
+    estimator: str,
+    campaign: Campaign,
+    truth: Mapping[str, float],
+    bound: Mapping[str, float],
+    about: Mapping[str, Any],
+) -> list[Row]:
+    """One estimator on one campaign of known truth, a row for each quantity of the truth.
+
+    An estimator that raises has failed, and its status says what it raised: one bad record must not end the work.
+
+    Args:
+        estimator: its name in the registry.
+        campaign: what it sees.
+        truth: by quantity, SI; ζ and ωn are those of the first run.
+        bound: the Cramér–Rao bound by quantity, SI; quantities without one are left out.
+        about: put in front of every row.
+
+    Returns:
+        The rows; value and std are None where the estimator failed.
+    """
+    from identification import identify
+    from identification.estimate import UNITS
+
+    begun = time.perf_counter()
+    try:
+        found: Estimate | None = identify(campaign, estimator, throw=False)
+        status = "" if found is None else found.status.name.lower()
+    except Exception as error:  # whatever it is, it is this estimator's, and is counted and shown
+        found, status = None, f"raised {type(error).__name__}"
+    milliseconds = 1000.0 * (time.perf_counter() - begun) / len(campaign.runs)
+    rows = []
+    for quantity, value in truth.items():
+        source = None if found is None else found.runs[0] if quantity in ("zeta", "omega_n") else found
+        answer = getattr(source, quantity, None)
+        rows.append(
+            {
+                **about,
+                "estimator": estimator,
+                "quantity": quantity,
+                "unit": {"zeta": "1", "omega_n": "rad/s"}.get(quantity) or UNITS[quantity],
+                "truth": value,
+                "value": None if answer is None else answer.value,
+                "std": None if answer is None else answer.std,
+                "bound": bound.get(quantity),
+                "status": status,
+                "milliseconds": milliseconds,
+            }
+        )
+    return rows
+
+
+def score_grid(
+    grid: Grid,
+    estimators: Sequence[str],
+    *,
+    jobs: int = 2,
+    parts: Path | None = None,
+    progress: Told | None = None,
+) -> list[Row]:
+    """Every estimator on every trial of a grid.
+
+    Args:
+        grid: the conditions.
+        estimators: names in the registry.
+        jobs: processes; 0 works in this one. Apart from the milliseconds the rows are the same to the bit.
+        parts: folder for what is done; an interrupted score goes on from there where grid, estimators and code
+            are the same. None keeps nothing.
+        progress: told trials done and their number.
+
+    Returns:
+        The rows, in the order of cells, trials and estimators.
+    """
+    units = units_of(grid)
+    mark = fingerprint(grid.to_json_dict(), estimators)
+    done = {} if parts is None else {unit: rows for unit in units if (rows := _kept(parts, unit.name, mark))}
+    total = sum(unit.stop - unit.first for unit in units)
+
+    def tell() -> None:
+        if progress is not None:
+            progress(sum(unit.stop - unit.first for unit in done), total)
+
+    tell()
+    left = [unit for unit in units if unit not in done]
+    for unit, rows in in_processes(partial(score_unit, grid, tuple(estimators)), left, jobs):
+        if parts is not None:
+            write_json(output_folder(parts) / f"{unit.name}.json", {"fingerprint": mark, "rows": rows})
+        done[unit] = rows
+        tell()
+    order = sorted(units, key=lambda unit: (unit.cell, unit.first))
+    return [row for unit in order for row in done[unit]]
+
+
+def in_processes(
+    work: Callable[[ItemT], ResultT], items: Sequence[ItemT], jobs: int
+) -> Iterator[tuple[ItemT, ResultT]]:
+    """Do work in processes of one thread each.
+
+    Args:
+        work: what to do; a function of a module, and its result, have to go from process to process.
+        items: what to do it to.
+        jobs: number of processes; 0 works in this one.
+
+    Yields:
+        Items with their results, as they come.
+    """
+    if jobs == 0 or not items:
+        yield from ((item, work(item)) for item in items)
+        return
+    context = multiprocessing.get_context("spawn")
+    with (
+        _one_thread_each(),
+        ProcessPoolExecutor(min(jobs, len(items)), mp_context=context, initializer=_die_quietly) as pool,
+    ):
+        try:
+            waiting = {pool.submit(work, item): item for item in items}
+            for finished in as_completed(waiting):
+                yield waiting[finished], finished.result()
+        except BaseException:  # an interruption above all: nobody waits for what nobody will read
+            pool.shutdown(wait=False, cancel_futures=True)
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
+
+
+def fingerprint(document: Mapping[str, Any], estimators: Sequence[str]) -> str:
+    """What results hang on: the conditions, the estimators' names and the code of the packages below.
+
+    Args:
+        document: the conditions, in JSON's types.
+        estimators: names in the registry.
+
+    Returns:
+        SHA-256 in hexadecimal.
+    """
+    text = json.dumps([document, list(estimators), _code()], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@cache
+def _code() -> str:
+    """A digest of all files of identification and tunnel_sim, weights and libraries with them."""
+    import identification
+    import tunnel_sim
+
+    digest = hashlib.sha256()
+    for package in (identification, tunnel_sim):
+        root = Path(str(package.__file__)).parent
+        for path in sorted(root.rglob("*")):
+            if path.is_file() and "__pycache__" not in path.parts:
+                digest.update(path.relative_to(root).as_posix().encode())
+                digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _kept(parts: Path, name: str, mark: str) -> list[Row] | None:
+    """Rows of a unit done before; None where there are none, or other ones."""
+    try:
+        document = json.loads((parts / f"{name}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    matches = isinstance(document, dict) and document.get("fingerprint") == mark
+    return document["rows"] if matches else None
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Children inherit one thread for linear algebra: bits must not hang on the number of processors."""
+    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _die_quietly() -> None:
+    """On Ctrl-C a child just ends; the parent says what there is to say."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def describe(cell: Cell) -> Row:
+    """A cell's conditions as columns of a table, units in their names."""
+    return {
+        "cell": cell.label,
+        "kind": cell.kind,
+        "zeta": cell.zeta or None,
+        "frequency_hz": cell.frequency or None,
+        "wind_speed_m_per_s": cell.wind_speed or None,
+        "effect": cell.effect,
+        "noise_over_amplitude": cell.noise,
+        "duration_s": cell.duration,
+        "runs": cell.runs,
+    }
