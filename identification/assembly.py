@@ -5,7 +5,7 @@ A method that identifies run by run hands its runs to `combined_estimate`; a joi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from identification.damped_oscillation import Decay
-from identification.derivatives import Derivatives, Design, build_design, combine, derivatives
+from identification.derivatives import Derivatives, Design, build_design, combine, derivatives, loads
 from identification.estimate import (
     UNITS,
     Estimate,
@@ -25,7 +25,7 @@ from identification.estimate import (
 )
 from identification.information import inverse
 from identification.springs import wind_off_line
-from tunnel_sim.campaign import Campaign, Run
+from tunnel_sim.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.record import Array
 
 _FALSE_ALARM_RATE = 1e-3  # of saying that the runs contradict each other
@@ -44,6 +44,32 @@ class RunDecay:
     estimate: RunEstimate
     decay: Decay | None = None
     covariance: Array | None = None
+
+    @classmethod
+    def failed(cls, run: Run, status: Status) -> RunDecay:
+        """A run that gave nothing, and why."""
+        return cls(RunEstimate(run.id, (status,)))
+
+
+def estimate_by_runs(
+    campaign: Campaign, name: str, method: Callable[[Run, SensorProperties], RunDecay]
+) -> Estimate:
+    """Identify every run by itself, then the campaign from the runs.
+
+    Args:
+        campaign: at least one run.
+        name: of the estimator.
+        method: identifies one run.
+
+    Returns:
+        The estimate, as by `combined_estimate`.
+
+    Raises:
+        TunnelError: when a wind-on run states no air density; before any run is worked on.
+    """
+    for run in campaign.runs:
+        loads(run, campaign.rig)
+    return combined_estimate(campaign, name, [method(run, campaign.sensor) for run in campaign.runs])
 
 
 def combined_estimate(campaign: Campaign, name: str, found: Sequence[RunDecay]) -> Estimate:

@@ -104,6 +104,24 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
     )
 
 
+def white_noise(reading: Array, sensor: SensorProperties) -> float:
+    """The white part of a reading's noise, from its sixth differences, which hold next to none of the motion.
+
+    Args:
+        reading: of many samples per cycle, shape (n,), rad.
+        sensor: what the campaign states; used where the reading bears it out.
+
+    Returns:
+        Standard deviation of one sample, rad, quantisation included.
+    """
+    peak = 0.5 * float(np.ptp(reading))
+    floor = max(_FLOOR * peak, 1e-300)
+    fast, degrees = _fast_part([Residual(reading, 1, 0, peak)], floor)
+    fast = max(fast, floor, (sensor.resolution or 0.0) / np.sqrt(12.0))
+    stated = stated_noise(sensor)
+    return max(stated, floor) if stated is not None and _agree(fast, max(stated, floor), degrees) else fast
+
+
 def _fast_part(residuals: Sequence[Residual], fallback: float) -> tuple[float, float]:
     # Standard deviation of the white part, and the degrees of freedom it is known with.
     differences = [np.diff(r.values, _ORDER) for r in residuals if r.values.size > 4 * _ORDER]

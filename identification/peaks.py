@@ -8,7 +8,7 @@ import numpy as np
 
 from tunnel_sim.record import Array, Record
 
-_HALF_WIDTH = 1.0 / 12.0  # of a period, either side of a peak, that its parabola is fitted to
+PEAK_HALF_WIDTH = 1.0 / 12.0  # of a period, either side of a peak, that its parabola is fitted to
 _LEAST_SHARE = 0.1  # of the first peak; below it the noise bends the logarithm
 _LEAST_PEAKS = 4
 _MOVES = 8  # of half a window each
@@ -47,7 +47,7 @@ def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
     Returns:
         The decay; None where there are fewer than four peaks.
     """
-    times, heights = _peaks(record, frequency)
+    times, heights = follow_peaks(record, frequency)
     if times.size < _LEAST_PEAKS:
         return None
     centres = 0.25 * (heights[:-2] + 2.0 * heights[1:-1] + heights[2:])
@@ -68,8 +68,20 @@ def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
     )
 
 
-def _peaks(record: Record, frequency: float) -> tuple[Array, Array]:
-    # Peak follows peak half a period later; the first is looked for past the release itself.
+def follow_peaks(record: Record, frequency: float) -> tuple[Array, Array]:
+    """Peaks of both signs, each looked for half a period after the one before.
+
+    A peak is the vertex of a parabola through the samples within a twelfth of a period of it. The first is
+    looked for past the release itself.
+
+    Args:
+        record: the reading, rad against s.
+        frequency: of the oscillation, Hz.
+
+    Returns:
+        Instants since the first sample in s and heights in rad, shape (n,) each; they end where peaks no
+        longer go up and down in turn.
+    """
     time = record.time_s - record.time_s[0]
     half = 0.5 / frequency
     middle = 0.5 * (float(record.yaw_rad.max()) + float(record.yaw_rad.min()))
@@ -79,8 +91,8 @@ def _peaks(record: Record, frequency: float) -> tuple[Array, Array]:
     expected = (
         float(time[search[np.argmax(np.abs(record.yaw_rad[search] - middle))]]) if search.size else np.inf
     )
-    while expected + 2.0 * half * _HALF_WIDTH <= time[-1]:
-        vertex = _vertex(time, record.yaw_rad, expected, 2.0 * half * _HALF_WIDTH)
+    while expected + 2.0 * half * PEAK_HALF_WIDTH <= time[-1]:
+        vertex = _vertex(time, record.yaw_rad, expected, 2.0 * half * PEAK_HALF_WIDTH)
         if vertex is None:
             break
         if len(heights) >= 2 and (vertex[1] > heights[-1]) != (heights[-2] > heights[-1]):

@@ -70,6 +70,12 @@ ENTRIES: tuple[Entry, ...] = (
         "MatrixPencil",
         "poles by linear algebra, run by run: the quickest, and nearly as good",
     ),
+    Entry(
+        "log_decrement",
+        "identification.estimators.log_decrement",
+        "LogDecrement",
+        "weighted regression of the logarithms of all peaks, run by run: the hand method at its best",
+    ),
 )
 
 ALL_ESTIMATORS: tuple[str, ...] = tuple(entry.name for entry in ENTRIES)

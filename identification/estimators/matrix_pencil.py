@@ -13,10 +13,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.assembly import RunDecay, combined_estimate
+from identification.assembly import RunDecay, estimate_by_runs
 from identification.decay_fit import Reading, project_run
-from identification.derivatives import loads
-from identification.estimate import Estimate, RunEstimate, Status
+from identification.estimate import Estimate, Status
 from identification.pencil import PencilDecay, pencil_decay
 from identification.run_fit import describe_run, judge
 from identification.start import starting_frequency
@@ -50,24 +49,21 @@ class MatrixPencil:
         Raises:
             TunnelError: when a wind-on run states no air density.
         """
-        for run in campaign.runs:
-            loads(run, campaign.rig)
-        found = [self._run(run, campaign.sensor) for run in campaign.runs]
-        return combined_estimate(campaign, self.name, found)
+        return estimate_by_runs(campaign, self.name, self._run)
 
     def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
         frequency = starting_frequency(run.record)
         if frequency is None:
-            return RunDecay(RunEstimate(run.id, (Status.NO_OSCILLATION,)))
+            return RunDecay.failed(run, Status.NO_OSCILLATION)
         reading = Reading.from_record(run.record)
         found = self._pencil(reading, frequency)
         projected = None if found is None else project_run(reading, found[0].decay)
         if found is None or projected is None or found[0].decay.stiffness <= 0.0:
-            return RunDecay(RunEstimate(run.id, (Status.NOT_CONVERGED,)))
+            return RunDecay.failed(run, Status.NOT_CONVERGED)
         fitted, zero = projected
         noise, failure = judge(reading, fitted, zero, sensor)
         if failure is not None:
-            return RunDecay(RunEstimate(run.id, (failure,)))
+            return RunDecay.failed(run, failure)
         variance = noise.std**2 * noise.slow_ratio
         covariance = found[0].weights @ found[0].weights.T * (variance / found[1])
         estimate = describe_run(run, reading, fitted, zero, covariance, variance, noise=noise)

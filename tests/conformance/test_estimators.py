@@ -17,6 +17,7 @@ ACCURACY = {
     "output_error": 1e-6,
     "conventional": 0.02,
     "matrix_pencil": 1e-6,
+    "log_decrement": 1e-4,
 }
 
 each_estimator = pytest.mark.parametrize("name", ALL_ESTIMATORS)

@@ -1,0 +1,114 @@
+"""Logarithmic decrement as a regression: a weighted line through the logarithm of every peak.
+
+A peak is the vertex of a parabola, and white noise of S per sample moves its height by (3/2) S/√m and its
+instant by √(3/m) S/(w ωd² h), with m samples in its half width w and h its height; so the logarithms have the
+variance (9/4) S²/(m h²), and large peaks count for more. The line's gradient is the decay rate, the sensor's
+zero is fitted along with it (peaks of one side rise by what those of the other side fall), and a second line,
+through the instants, gives the damped frequency. Where peaks scatter about a line by more than the noise
+explains, its deviation is raised to that scatter. Peaks are used down to ten deviations.
+
+Sources: the decrement: Lord Rayleigh, The Theory of Sound, vol. 1 (1894), § 46; its regression over many peaks
+and the best number of them: Tweten, Ballard & Mann, J. Sound Vib. 333 (2014) 2804–2811,
+doi 10.1016/j.jsv.2014.01.024.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.assembly import RunDecay, estimate_by_runs
+from identification.damped_oscillation import Decay
+from identification.decay_fit import Reading, project_run
+from identification.estimate import Estimate, Status
+from identification.noise import white_noise
+from identification.peaks import PEAK_HALF_WIDTH, follow_peaks
+from identification.run_fit import describe_run, judge
+from identification.start import starting_frequency
+from identification.weighted_line import decay_covariance, weighted_fit
+from tunnel_sim.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.record import Array
+
+_LEAST_PEAKS = 5
+_LEAST_HEIGHT = 10.0  # in deviations of a peak: below, the logarithm bends the noise
+_SWEEPS = 4  # of weights and zero; each brings two digits more
+
+
+@dataclass(frozen=True)
+class LogDecrement:
+    """Weighted regression of the logarithms of all peaks; it has no settings."""
+
+    name: ClassVar[str] = "log_decrement"
+
+    def estimate(self, campaign: Campaign) -> Estimate:
+        """Identify every run from its peaks, then the campaign from the runs.
+
+        Args:
+            campaign: at least one run.
+
+        Returns:
+            The estimate. A run that could not be identified is left out.
+
+        Raises:
+            TunnelError: when a wind-on run states no air density.
+        """
+        return estimate_by_runs(campaign, self.name, _identify)
+
+
+def _identify(run: Run, sensor: SensorProperties) -> RunDecay:
+    frequency = starting_frequency(run.record)
+    if frequency is None:
+        return RunDecay.failed(run, Status.NO_OSCILLATION)
+    reading = Reading.from_record(run.record)
+    noise_std = white_noise(reading.yaw, sensor)
+    half_width = PEAK_HALF_WIDTH / frequency
+    share = noise_std / np.sqrt(2.0 * half_width * run.record.sample_rate)
+    times, heights = follow_peaks(run.record, frequency)
+    found = _decay_of_peaks(times, heights, share, half_width)
+    projected = None if found is None else project_run(reading, found[0])
+    if found is None or projected is None:
+        return RunDecay.failed(
+            run, Status.NO_OSCILLATION if times.size < _LEAST_PEAKS else Status.NOT_CONVERGED
+        )
+    fitted, zero = projected
+    _, failure = judge(reading, fitted, zero, sensor)
+    if failure is not None:
+        return RunDecay.failed(run, failure)
+    estimate = describe_run(run, reading, fitted, zero, found[1], noise_std**2)
+    return RunDecay(estimate, found[0], found[1])
+
+
+def _decay_of_peaks(
+    times: Array, heights: Array, share: float, half_width: float
+) -> tuple[Decay, Array] | None:
+    # The decay and the covariance of (a, k); share is S/√m.
+    if times.size < _LEAST_PEAKS:
+        return None
+    height_std = 1.5 * share
+    centres = 0.25 * (heights[:-2] + 2.0 * heights[1:-1] + heights[2:])
+    zero = float(centres[: max(1, centres.size // 2)].mean())
+    expected = np.abs(heights - zero)
+    count = times.size
+    for _ in range(_SWEEPS):
+        below = np.flatnonzero(expected < _LEAST_HEIGHT * height_std)
+        count = int(below[0]) if below.size else times.size
+        if count < _LEAST_PEAKS or not np.all(np.abs(heights[:count] - zero) > 0.0):
+            return None
+        above = heights[:count] - zero
+        side = -np.sign(above) / expected[:count]
+        columns = np.column_stack((np.ones(count), -times[:count], side))
+        variance = (height_std / expected[:count]) ** 2
+        line = weighted_fit(columns, np.log(np.abs(above)), variance)
+        zero += float(line.values[2])
+        expected = np.exp(np.clip(line.values[0] - line.values[1] * times, -700.0, 700.0))
+    steps = np.column_stack((np.ones(count), np.arange(count)))
+    omega = np.pi * (count - 1) / float(times[count - 1] - times[0])
+    instant_std = np.sqrt(3.0) * share / (half_width * omega**2 * expected[:count])
+    clock = weighted_fit(steps, times[:count], instant_std**2)
+    omega_d = np.pi / float(clock.values[1])
+    rate = float(line.values[1])
+    omega_variance = (omega_d**2 / np.pi) ** 2 * float(clock.covariance[1, 1])
+    covariance = decay_covariance(rate, omega_d, float(line.covariance[1, 1]), omega_variance)
+    return Decay(rate, omega_d**2 + rate**2), covariance
