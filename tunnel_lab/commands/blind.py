@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -66,6 +64,7 @@ def make(
     """
     from diagnosis.blind import make_blind
     from diagnosis.blind.files import SEAL, read_document
+    from tunnel_lab.progress import work_bar
     from tunnel_lab.tables import say
     from tunnel_sim.reference.draw import DEFAULT_SHARES, Mixture
     from tunnel_sim.reference.make import parse_shares
@@ -73,7 +72,7 @@ def make(
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
     if key is not None:
         refuse_unwritable(key)
-    with _bar("writing campaigns", count) as tell:
+    with work_bar("writing campaigns", count) as tell:
         where = make_blind(
             out, count=count, seed=seed, shares=shares, mixture=Mixture(textbook, rare), key=key,
             progress=lambda done, total: tell(done, total, ""), tell_steps=_terminal(),
@@ -97,10 +96,11 @@ def diagnose(
       0 all answered, 2 bad input, 130 interrupted (what is answered stays).
     """
     from diagnosis.blind import answer_set, answers_folder
+    from tunnel_lab.progress import work_bar
     from tunnel_lab.tables import say
 
     names = split_names(exclude)
-    with _bar("diagnosing", None) as tell:
+    with work_bar("diagnosing", None) as tell:
         sealed = answer_set(folder, excluded=names, jobs=jobs, progress=tell)
     say(f"Answers: {answers_folder(folder, names)}")
     say(f"Answers sha256 {sealed}")
@@ -158,37 +158,3 @@ def _terminal() -> bool:
     from tunnel_lab.tables import console
 
     return console(stderr=True).is_terminal
-
-
-@contextmanager
-def _bar(what: str, total: int | None) -> Iterator[Callable[[int, int, str], None]]:
-    """A progress bar with the time left, on standard error where that is a terminal.
-
-    Yields:
-        What to tell campaigns done, their number and the last one's name to.
-    """
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    from tunnel_lab.tables import console
-
-    terminal = console(stderr=True)
-    columns = (
-        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-        TextColumn("left"), TimeRemainingColumn(elapsed_when_finished=False),
-    )  # fmt: skip
-    with Progress(
-        *columns, console=terminal, disable=not terminal.is_terminal, speed_estimate_period=600
-    ) as bar:
-        task = bar.add_task(what, total=total)
-
-        def tell(done: int, count: int, name: str) -> None:
-            bar.update(task, completed=done, total=count, description=f"{what} {name}".rstrip())
-
-        yield tell

@@ -1,0 +1,186 @@
+"""``tunnel sweep``: many campaigns, simulated and estimated, and what people look at in them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from tunnel_lab.sweep.engine import Work
+    from tunnel_lab.sweep.product import Sweep
+
+NAME = "sweep"
+
+
+def run(
+    file: Annotated[Path | None, typer.Argument(help="The sweep file (TOML).", show_default=False)] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Where the results are and go.")
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", min=1, help="Processes on this machine. Default: one for each processor."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            metavar="ADDRESS",
+            help="Use the Dask cluster of this scheduler (tcp://host:8786), or start one here: local.",
+        ),
+    ] = None,
+    summary: Annotated[
+        Path | None,
+        typer.Option("--summary", metavar="FOLDER", help="Draw and tabulate what is finished in a folder."),
+    ] = None,
+) -> None:
+    r"""Simulate and estimate a product of campaigns; go on where it stopped.
+
+    Every case is a campaign: one rig, conditions, sensor, truth and effect of
+    those in the file. Its seed hangs on what it holds, so results are the same
+    to the bit with any number of workers, on one machine or a cluster. They go
+    to FOLDER/results, a Parquet dataset in the order of the cases. Interrupted
+    or killed, the same command does what is left.
+
+    [bold]A sweep file[/bold]
+      name = "noise-and-friction"
+      seed = 1
+      replicates = 10              # of every case, with other noise
+      estimators = ["output_error", "conventional"]
+      records = false              # true keeps the runs, too
+      [conditions]                 # [[conditions]] for several
+      springs = [5, 8]             # of the paper's Table II
+      wind_speeds = [0.0, 15.0]    # m/s; 0 is wind-off
+      release_angles_deg = [20.0]
+      duration = 10.0              # s
+      [truth]                      # a number or a list of them
+      cn_beta = [0.35, 0.495]      # 1/rad
+      cn_r = -0.114                # 1/rad
+      [sensor]
+      noise_std = [0.0002, 0.0005, 0.002]   # rad
+      \[[effects]]
+      name = "none"
+      \[[effects]]
+      name = "coulomb_friction"
+      parameters = { friction_moment = [0.002, 0.004] }   # N m
+
+    [bold]Examples[/bold]
+      tunnel sweep sweep.toml --out results
+      tunnel sweep sweep.toml --out results --scheduler tcp://host:8786
+      tunnel sweep --summary results
+
+    [bold]Exit status[/bold]
+      0 finished, 1 an estimator ended in an error of its own, 2 bad input,
+      130 interrupted (what is finished stays).
+    """
+    from tunnel_sim.errors import TunnelError
+
+    if summary is not None:
+        if file is not None or out is not None:
+            raise TunnelError(
+                "takes no FILE and no --out", where="--summary", remedy="name the folder of a sweep only"
+            )
+        show_summary(summary)
+        return
+    if file is None or out is None:
+        missing = "FILE" if file is None else "--out"
+        raise TunnelError(
+            f"{missing} is missing", where="sweep", remedy="give FILE --out FOLDER, or --summary FOLDER"
+        )
+    sweep_file(file, out, workers, scheduler)
+
+
+def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None) -> None:
+    """Do a sweep, or what is left of it.
+
+    Args:
+        file: the sweep file.
+        out: folder of its results.
+        workers: number of processes or, with a scheduler started here, of its workers.
+        scheduler: address, ``local``, or None for processes of this machine.
+
+    Raises:
+        TunnelError: for bad input.
+    """
+    from tunnel_lab.progress import work_bar
+    from tunnel_lab.sweep.engine import run_sweep
+    from tunnel_lab.sweep.reading import read_sweep
+    from tunnel_lab.tables import say
+    from tunnel_sim.errors import TunnelError
+
+    if workers is not None and scheduler not in (None, "local"):
+        raise TunnelError(
+            "its workers are started on their machines",
+            where=f"--scheduler {scheduler}",
+            remedy="leave out --workers",
+        )
+    sweep = read_sweep(file)
+    estimates = sweep.size * len(sweep.document.estimators)
+    say(f"Sweep {sweep.document.name}: {sweep.size} cases, {sweep.runs} runs, {estimates} estimates")
+    work = _work(workers, scheduler, sweep)
+    with work_bar("cases", sweep.size) as tell:
+        outcome = run_sweep(sweep, out, work, lambda done, total: tell(done, total, ""))
+    if outcome.found:
+        say(f"{outcome.found} of {sweep.shards} shards were finished before")
+    say(f"Written: {out} (tunnel sweep --summary {out} draws it)")
+    if outcome.crashes:
+        say(f"{outcome.crashes} estimates ended in an error: see status 'raised' in the results", stderr=True)
+        raise typer.Exit(1)
+
+
+def _work(workers: int | None, scheduler: str | None, sweep: Sweep) -> Work:
+    from tunnel_lab.sweep.cluster import on_cluster
+    from tunnel_lab.sweep.processes import available_processors, in_processes
+    from tunnel_lab.tables import say
+
+    count = min(workers or available_processors(), sweep.shards)
+
+    def tell(line: str) -> None:
+        say(f"tunnel: {line}", stderr=True)
+
+    return in_processes(count, tell) if scheduler is None else on_cluster(scheduler, count, tell)
+
+
+def show_summary(folder: Path) -> None:
+    """Tabulate and draw what is finished in a folder.
+
+    Args:
+        folder: of a sweep.
+
+    Raises:
+        TunnelError: when it holds no sweep, or nothing is finished.
+    """
+    import polars as pl
+
+    from tunnel_lab import plots
+    from tunnel_lab.files import output_folder, write_whole
+    from tunnel_lab.sweep import figures
+    from tunnel_lab.sweep.store import open_store
+    from tunnel_lab.sweep.summary import paces, summarise
+    from tunnel_lab.tables import say, show_tables
+
+    store = open_store(folder)
+    lines = summarise(store)
+    done, shards = len(store.finished()), store.sweep.shards
+    if done < shards:
+        say(f"Finished: {done} of {shards} shards; the same command goes on with the rest\n")
+    grouped = figures.groups(lines)
+    show_tables(
+        figures.overall_table(lines),
+        *map(figures.axis_table, grouped.values()),
+        figures.pace_table(paces(store)),
+    )
+    say(figures.BRACKETS)
+    target = output_folder(folder / "summary")
+    written = [
+        write_whole(
+            target / "summary.csv", pl.DataFrame([line.to_row() for line in lines]).write_csv().encode()
+        )
+    ]
+    for name, part in grouped.items():
+        drawn = figures.error_figure(part)
+        if drawn is not None:
+            written.append(plots.save(drawn, target / f"{name}.png"))
+    say(f"Written to {target}: {', '.join(path.name for path in written)}")

@@ -1,0 +1,44 @@
+"""A progress bar with the time left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from tunnel_lab.tables import console
+
+
+@contextmanager
+def bar(what: str, total: int | None = None) -> Iterator[Callable[[int, int, str], None]]:
+    """A progress bar on standard error, where that is a terminal; elsewhere nothing is printed.
+
+    Args:
+        what: is going on.
+        total: number of items, where it is known beforehand.
+
+    Yields:
+        What to tell the number done, the number in all and the last one's name to.
+    """
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    terminal = console(stderr=True)
+    columns = (
+        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        TextColumn("left"), TimeRemainingColumn(elapsed_when_finished=False),
+    )  # fmt: skip
+    with Progress(
+        *columns, console=terminal, disable=not terminal.is_terminal, speed_estimate_period=600
+    ) as progress:
+        task = progress.add_task(what, total=total)
+
+        def tell(done: int, count: int, name: str) -> None:
+            progress.update(task, completed=done, total=count, description=f"{what} {name}".rstrip())
+
+        yield tell

@@ -1,0 +1,168 @@
+"""Shards side by side on a Dask cluster: on other machines, or on workers that are started here.
+
+Dask does a lost worker's tasks again elsewhere. A shard is a pure function of sweep and number, and only this
+process writes: a shard that is done twice is kept once. Dask is imported inside the functions, never at import.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from tunnel_lab.sweep.processes import Said
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.toml_input import one_line
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+    from tunnel_lab.sweep.shard import Finished
+
+LOCAL = "local"
+ATTEMPTS = 3
+"""How often a shard is handed out again after Dask itself gave it up."""
+POLL_S = 5.0
+"""How long to wait for a shard before the workers are counted, s."""
+CONNECT_S = 10.0
+"""How long a scheduler may take to answer, s."""
+_FEWEST_IN_FLIGHT = 8
+
+
+def on_cluster(
+    address: str, workers: int, say: Said, *, poll_s: float = POLL_S
+) -> Callable[[str, Sequence[int]], Iterator[Finished]]:
+    """Work by a Dask cluster.
+
+    Args:
+        address: of a scheduler, such as ``tcp://host:8786``, or ``local`` for a cluster that is started here.
+        workers: number of workers of a local cluster.
+        say: told what the user should know, a line at a time.
+        poll_s: how long to wait for a shard before the workers are counted, s.
+
+    Returns:
+        What does shards: given the sweep as JSON and the shards' numbers, it yields them as they finish.
+    """
+    return partial(_work, address, workers, say, poll_s)
+
+
+def _work(
+    address: str, workers: int, say: Said, poll_s: float, sweep: str, shards: Sequence[int]
+) -> Iterator[Finished]:
+    with _client(address, workers) as client:
+        yield from _Crew(client, sweep, say, poll_s).work(shards)
+
+
+@contextmanager
+def _client(address: str, workers: int) -> Iterator[Client]:
+    from distributed import Client, LocalCluster
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line of our own
+    if address == LOCAL:
+        options: dict[str, Any] = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
+        with LocalCluster(n_workers=workers, threads_per_worker=1, **options) as here, Client(here) as client:
+            yield client
+        return
+    try:
+        client = Client(address, timeout=CONNECT_S)
+    except (OSError, ValueError, TimeoutError, ImportError) as error:
+        raise TunnelError(
+            f"no scheduler answers ({one_line(error, 80)})",
+            where=f"--scheduler {address}",
+            remedy="start one with: dask scheduler",
+        ) from None
+    with client:
+        yield client
+
+
+class _Crew:
+    """The workers of a cluster at one sweep."""
+
+    def __init__(self, client: Client, sweep: str, say: Said, poll_s: float) -> None:
+        self._client = client
+        self._sweep = sweep
+        self._say = say
+        self._poll_s = poll_s
+        self._attempts: dict[int, int] = {}
+        self._alone = False
+
+    def work(self, shards: Sequence[int]) -> Iterator[Finished]:
+        """Shards as they finish, few in flight at a time."""
+        from distributed import wait
+
+        waiting = iter(shards)
+        flying: dict[Future, int] = {}
+        self._workers()
+        while True:
+            for index in islice(waiting, max(0, self._room() - len(flying))):
+                flying[self._submit(index)] = index
+            if not flying:
+                return
+            try:
+                landed = wait(list(flying), timeout=self._poll_s, return_when="FIRST_COMPLETED").done
+            except TimeoutError:
+                self._workers()
+                continue
+            for future in landed:
+                index = flying.pop(future)
+                done = self._result(future, index)
+                if done is None:
+                    flying[self._submit(index)] = index
+                else:
+                    self._alone = False
+                    yield done
+
+    def _submit(self, index: int) -> Future:
+        from tunnel_lab.sweep.shard import run_shard
+
+        attempt = self._attempts.setdefault(index, 1)
+        return self._client.submit(
+            run_shard, self._sweep, index, key=f"shard-{index}-{attempt}-{id(self)}", pure=False
+        )
+
+    def _result(self, future: Future, index: int) -> Finished | None:
+        """A finished shard; None where its workers were lost and it is to be handed out again."""
+        from distributed import CancelledError, KilledWorker
+
+        try:
+            found: Finished = future.result()
+        except (KilledWorker, CancelledError) as error:
+            if self._client.status != "running":
+                raise self._gone(error) from None
+            self._attempts[index] += 1
+            if self._attempts[index] > ATTEMPTS:
+                raise TunnelError(
+                    f"shard {index} lost every worker it was given to",
+                    remedy="look for lack of memory on the workers; what is finished stays",
+                ) from None
+            return None
+        finally:
+            future.release()
+        return found
+
+    def _workers(self) -> None:
+        """Say it when there is nobody to do the work, once each time that happens."""
+        if self._client.status != "running":
+            raise self._gone(None)
+        address = self._client.scheduler.address if self._client.scheduler else ""
+        if self._client.nthreads():
+            if self._alone:
+                self._say("workers are there again")
+            self._alone = False
+        elif not self._alone:
+            self._alone = True
+            self._say(f"no worker is connected to {address}: start some with: dask worker {address}; waiting")
+
+    def _room(self) -> int:
+        """How many shards may be in flight: two for each thread."""
+        return max(_FEWEST_IN_FLIGHT, 2 * sum(self._client.nthreads().values()))
+
+    def _gone(self, error: BaseException | None) -> TunnelError:
+        said = f" ({one_line(error, 80)})" if error is not None and str(error) else ""
+        return TunnelError(
+            f"the scheduler is gone{said}",
+            remedy="what is finished stays: start it again, and then the same command",
+        )

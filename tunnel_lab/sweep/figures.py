@@ -1,0 +1,211 @@
+"""Figures and tables of a sweep's summary. matplotlib is imported inside the functions, never at import."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from tunnel_lab.formatting import concise, significant, unit
+from tunnel_lab.plots import COLOURS, MARKERS
+from tunnel_lab.sweep.summary import AXES, OVERALL, SEVERITY, Line, Pace
+from tunnel_lab.tables import SYMBOLS, table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from rich.table import Table
+
+    from identification.estimate import Quantity
+    from identification.scoring import Proportion
+
+DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "cn_r": "Cnr"}
+"""Quantities that have a panel; Izz, Cr and the sensor's zero stand in the first table and the CSV."""
+NAMES: Mapping[str, str] = {**DRAWN, **SYMBOLS, "sensor_zero": "zero"}
+BRACKETS = "In brackets: the standard error in the last digits, from the number of trials; of shares 95 %."
+_INTERVAL = 1.96
+_LOGARITHMIC = ("noise_std", "spring_stiffness")
+_WIDE = 10.0  # ratio of the largest to the least value from which an axis is drawn logarithmic
+
+
+def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
+    """Lines by what one figure shows.
+
+    Args:
+        lines: of a summary.
+
+    Returns:
+        Lines by file name without its suffix, such as ``error-by-noise-std`` or ``error-by-coulomb-friction``.
+    """
+    found: dict[str, list[Line]] = {}
+    for line in lines:
+        if line.axis != OVERALL:
+            what = line.effect.replace(" + ", "-and-") if line.axis == SEVERITY else line.axis
+            found.setdefault(f"error-by-{what.replace('_', '-')}", []).append(line)
+    return found
+
+
+def error_figure(lines: Sequence[Line]) -> Figure | None:
+    """RMSE and bias along one axis, a column of panels for each quantity, a colour for each estimator.
+
+    Args:
+        lines: of one axis, and of one effect where that is severity.
+
+    Returns:
+        The figure, with 95 % intervals from the number of trials; None where no quantity has a panel.
+    """
+    from matplotlib.figure import Figure
+
+    quantities = [name for name in DRAWN if any(line.quantity == name and line.score.rmse for line in lines)]
+    if not quantities:
+        return None
+    estimators = list(dict.fromkeys(line.estimator for line in lines))
+    figure = Figure(figsize=(max(6.4, 3.1 * len(quantities) + 0.6), 6.2), layout="constrained")
+    for column, name in enumerate(quantities, 1):
+        mine = [line for line in lines if line.quantity == name and line.score.rmse and line.score.bias]
+        top = figure.add_subplot(2, len(quantities), column)
+        bottom = figure.add_subplot(2, len(quantities), len(quantities) + column, sharex=top)
+        for place, estimator in enumerate(estimators):
+            shown = [line for line in mine if line.estimator == estimator]
+            _errorbars(top, shown, [line.score.rmse for line in shown], place, len(estimators))
+            _errorbars(bottom, shown, [line.score.bias for line in shown], place, len(estimators))
+        _dress(top, bottom, mine, name, first=column == 1)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)), fontsize=9)
+    return figure
+
+
+def _errorbars(
+    axes: Axes, lines: Sequence[Line], figures: Sequence[Quantity | None], place: int, count: int
+) -> None:
+    pairs = [
+        (line.at, figure)
+        for line, figure in zip(lines, figures, strict=True)
+        if figure and line.at is not None
+    ]
+    if not pairs:
+        return
+    at = [float(x) for x, _ in pairs]
+    aside = (place - (count - 1) / 2.0) * 0.012  # intervals of several estimators must not hide each other
+    if _is_logarithmic(lines):
+        at = [x * (1.0 + aside * 3.0) for x in at]
+    else:
+        at = [x + aside * (max(at) - min(at)) for x in at]
+    axes.errorbar(
+        at,
+        [figure.value for _, figure in pairs],
+        yerr=[_INTERVAL * figure.std for _, figure in pairs],
+        color=COLOURS[place % len(COLOURS)],
+        marker=MARKERS[place % len(MARKERS)],
+        markersize=4.5,
+        linewidth=1.0,
+        capsize=2.5,
+        label=lines[0].estimator,
+    )
+
+
+def _dress(top: Axes, bottom: Axes, lines: Sequence[Line], name: str, *, first: bool) -> None:
+    one = lines[0]
+    label = one.effect.replace("_", " ") if one.axis == SEVERITY else AXES[one.axis][0]
+    scale = one.score.rmse.unit if one.score.rmse else ""
+    per = "% of truth" if scale == "%" else scale
+    top.set_title(NAMES[name], fontsize=11)
+    top.set_yscale("log")
+    if _is_logarithmic(lines):
+        top.set_xscale("log")
+    bottom.axhline(0.0, color="black", linewidth=0.8)
+    bottom.set_xlabel(f"{label} [{one.at_unit}]")
+    top.tick_params(labelbottom=False)
+    if first or scale != "%":
+        top.set_ylabel(f"RMSE [{per}]")
+        bottom.set_ylabel(f"bias, estimate − truth [{per}]")
+    for axes in (top, bottom):
+        axes.grid(visible=True, color="0.88", linewidth=0.6)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+
+
+def _is_logarithmic(lines: Sequence[Line]) -> bool:
+    at = [line.at for line in lines if line.at is not None]
+    return lines[0].axis in _LOGARITHMIC and min(at) > 0.0 and max(at) / min(at) >= _WIDE
+
+
+def overall_table(lines: Iterable[Line]) -> Table:
+    """Bias, RMSE, coverage and failures of each estimator and quantity over all cases.
+
+    Args:
+        lines: of a summary.
+
+    Returns:
+        A table with a section for each estimator.
+    """
+    kept = [line for line in lines if line.axis == OVERALL]
+    said = "without effects" if all(line.effect == "none" for line in kept) else "effects pooled"
+    result = table(
+        f"All cases, {said}", "estimator", "quantity", "trials", "bias", "RMSE", "in 95 % interval", "failed",
+        right=("trials",),
+    )  # fmt: skip
+    last = ""
+    for line in kept:
+        if last not in ("", line.estimator):
+            result.add_section()
+        last = line.estimator
+        one = line.score
+        result.add_row(
+            line.estimator, NAMES[line.quantity], str(one.count), _figure(one.bias), _figure(one.rmse),
+            _percent(one.coverage), _percent(one.failures),
+        )  # fmt: skip
+    return result
+
+
+def axis_table(lines: Sequence[Line]) -> Table:
+    """RMSE along one axis, a column for each quantity that has a panel in the figures.
+
+    Args:
+        lines: of one axis, and of one effect where that is severity.
+
+    Returns:
+        A table with a section for each value on the axis.
+    """
+    one = lines[0]
+    label = one.effect.replace("_", " ") if one.axis == SEVERITY else AXES[one.axis][0]
+    quantities = [name for name in DRAWN if any(line.quantity == name for line in lines)]
+    heads = [f"RMSE {NAMES[name]}" for name in quantities]
+    result = table(f"Error against {label}", f"{label} {unit(one.at_unit)}", "estimator", *heads)
+    cells = {(line.at, line.estimator, line.quantity): line.score.rmse for line in lines}
+    for at in sorted({line.at for line in lines if line.at is not None}):
+        if result.row_count:
+            result.add_section()
+        for estimator in dict.fromkeys(line.estimator for line in lines):
+            figures = [_figure(cells.get((at, estimator, name))) for name in quantities]
+            result.add_row(significant(at), estimator, *figures)
+    return result
+
+
+def pace_table(found: Sequence[Pace]) -> Table:
+    """What the steps of the work took.
+
+    Args:
+        found: of a sweep.
+
+    Returns:
+        A table with a row for each step.
+    """
+    result = table("Time per run", "step", "median [ms]", "quartiles [ms]", right=("median [ms]",))
+    for one in found:
+        result.add_row(
+            one.step,
+            significant(one.milliseconds, 3),
+            f"{significant(one.low, 3)} to {significant(one.high, 3)}",
+        )
+    return result
+
+
+def _figure(found: Quantity | None) -> str:
+    return "–" if found is None else f"{concise(found.value, found.std)} {found.unit}"
+
+
+def _percent(share: Proportion | None) -> str:
+    if share is None:
+        return "–"
+    low, high = share.interval
+    return f"{100.0 * share.value:.1f} % ({100.0 * low:.1f} to {100.0 * high:.1f})"

@@ -1,0 +1,209 @@
+"""Which cases a sweep stands for: every case is a campaign description, whose seed hangs on what it holds."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from tunnel_lab.sweep.schema import SweepDocument
+from tunnel_sim.plan import CampaignPlan, plan_from
+from tunnel_sim.plan_schema import PlanDocument
+from tunnel_sim.rig import Rig, parse_rig
+
+STEPS_PER_SHARD = 500_000
+"""Integration steps of one shard: about two seconds of one core, and the most a killed sweep loses per worker."""
+STEPS_PER_SECOND = 1000.0
+NO_EFFECT = "none"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One campaign of a sweep.
+
+    Args:
+        index: in the order of the product, from 0.
+        replicate: which repetition with other noise, from 0.
+        rig_name: as the sweep file names it.
+        rig: the rig itself.
+        conditions: name of the conditions.
+        duration: of every run, s.
+        plan: the campaign, seed and all.
+        document: the same as a campaign description, ready to be written as TOML.
+    """
+
+    index: int
+    replicate: int
+    rig_name: str
+    rig: Rig
+    conditions: str
+    duration: float
+    plan: CampaignPlan
+    document: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep file whose rigs have been read: all that its results depend on.
+
+    Args:
+        document: the file.
+        rigs: sections of each rig's description, in the order of the file.
+    """
+
+    document: SweepDocument
+    rigs: tuple[Mapping[str, Any], ...]
+
+    def to_json(self) -> str:
+        """The sweep as one line of JSON, from which a worker anywhere makes it again."""
+        return json.dumps(
+            {"document": self.document.model_dump(), "rigs": list(self.rigs)}, sort_keys=True, allow_nan=False
+        )
+
+    @classmethod
+    def from_json(cls, text: str) -> Sweep:
+        """The inverse of `to_json`."""
+        found = json.loads(text)
+        return cls(SweepDocument.model_validate(found["document"]), tuple(found["rigs"]))
+
+    @cached_property
+    def axes(self) -> tuple[Sequence[Any], ...]:
+        """Values of rig, conditions, sensor, truth and effects; the last runs fastest."""
+        file = self.document
+        return (
+            range(len(self.rigs)),
+            [one for table in file.conditions for one in _conditions(table.model_dump())],
+            [one for table in file.sensor for one in _spread(table.model_dump(exclude_none=True))],
+            [one for table in file.truth for one in _spread(table.model_dump(exclude_none=True))],
+            [one for entry in file.effects for one in _effects(entry.model_dump())],
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of cases."""
+        return prod(map(len, self.axes)) * self.document.replicates
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return sum(_run_count(one) for one in self.axes[1]) * (self.size // len(self.axes[1]))
+
+    @property
+    def cases_per_shard(self) -> int:
+        """Cases done and kept together; it hangs on the file alone, never on the workers."""
+        longest = max(_run_count(one) * one["duration"] * STEPS_PER_SECOND for one in self.axes[1])
+        return self.document.cases_per_shard or max(1, int(STEPS_PER_SHARD // longest))
+
+    @property
+    def shards(self) -> int:
+        """Number of shards."""
+        return -(-self.size // self.cases_per_shard)
+
+    def shard(self, index: int) -> Iterator[Case]:
+        """The cases of a shard.
+
+        Args:
+            index: from 0.
+
+        Yields:
+            Its cases, in the order of the product.
+        """
+        start = index * self.cases_per_shard
+        for place in range(start, min(start + self.cases_per_shard, self.size)):
+            yield self.case(place)
+
+    def case(self, index: int) -> Case:
+        """A case.
+
+        Args:
+            index: in the order of the product, from 0.
+
+        Returns:
+            The case, the same in any sweep whose axes hold it under the same seed.
+        """
+        point, replicate = divmod(index, self.document.replicates)
+        places = np.unravel_index(point, tuple(map(len, self.axes)))
+        rig, conditions, sensor, truth, effects = (
+            axis[int(place)] for axis, place in zip(self.axes, places, strict=True)
+        )
+        physics = {
+            **{key: value for key, value in conditions.items() if key != "name"},
+            "sensor": sensor,
+            "truth": truth,
+            "effects": effects,
+        }
+        seed = case_seed(self.document.seed, {"rig": self.rigs[rig], **physics}, replicate)
+        document = {"name": f"{self.document.name}-{index}", "seed": seed, **physics}
+        plan = plan_from(PlanDocument.model_validate(document), self._parsed[rig], self.document.name)
+        return Case(
+            index=index,
+            replicate=replicate,
+            rig_name=self.document.rig[rig].name,
+            rig=self._parsed[rig],
+            conditions=conditions["name"],
+            duration=conditions["duration"],
+            plan=plan,
+            document=document,
+        )
+
+    @cached_property
+    def _parsed(self) -> tuple[Rig, ...]:
+        named = zip(self.document.rig, self.rigs, strict=True)
+        return tuple(parse_rig(_numbered(sections), f"rig '{table.name}'") for table, sections in named)
+
+
+def case_seed(seed: int, physics: Mapping[str, Any], replicate: int) -> int:
+    """The seed of a case: it hangs on what the case holds, not on where it stands in the product.
+
+    Args:
+        seed: of the sweep.
+        physics: all that the case's records depend on besides the noise, plain values.
+        replicate: which repetition, a count from 0.
+
+    Returns:
+        A number from 0 to 2⁶³ − 1, as a campaign description's ``seed``.
+    """
+    digest = hashlib.sha256(json.dumps(physics, sort_keys=True, allow_nan=False).encode()).digest()
+    words = tuple(np.frombuffer(digest, dtype="<u4").tolist())
+    sequence = np.random.SeedSequence(seed, spawn_key=(*words, replicate))
+    return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
+
+
+def _spread(table: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
+    """Every combination of lists, the last key fastest."""
+    return [dict(zip(table, values, strict=True)) for values in product(*table.values())]
+
+
+def _conditions(table: Mapping[str, Any]) -> list[dict[str, Any]]:
+    kept = {key: value for key, value in table.items() if value is not None}
+    named = {"name": kept.pop("name", "conditions"), **kept}
+    return [{**named, "duration": duration} for duration in table["duration"]]
+
+
+def _effects(entry: Mapping[str, Any]) -> list[list[dict[str, Any]]]:
+    if entry["name"] == NO_EFFECT:
+        return [[]]
+    others = [dict(other) for other in entry["together_with"]]
+    return [[{"name": entry["name"], "parameters": one}, *others] for one in _spread(entry["parameters"])]
+
+
+def _run_count(conditions: Mapping[str, Any]) -> int:
+    springs = len(conditions["springs"]) + len(conditions["spring_stiffness"])
+    return (
+        springs
+        * len(conditions["wind_speeds"])
+        * len(conditions["release_angles_deg"])
+        * int(conditions["repeats"])
+    )
+
+
+def _numbered(sections: Mapping[str, Any]) -> dict[str, Any]:
+    """A rig's sections with keys as TOML has them."""
+    return {name: dict(table) if isinstance(table, Mapping) else table for name, table in sections.items()}

@@ -1,0 +1,206 @@
+"""The folder of a sweep: what it is, and which of its shards are finished.
+
+``sweep.json`` says what the folder holds. Every shard is a file in ``results``, and one in ``records`` where they
+are kept, written under a temporary name and renamed, the results last: then the shard is finished. ``timings``
+stand apart, because no two runs of a shard take the same time.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tunnel_lab.files import output_folder, write_json, write_whole
+from tunnel_lab.sweep.product import Sweep
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.toml_input import shown
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from tunnel_lab.sweep.shard import Finished
+
+SCHEMA_VERSION = 1
+MANIFEST = "sweep.json"
+RESULTS, RECORDS, TIMINGS = "results", "records", "timings"
+_PARQUET = b"PAR1"  # a whole Parquet file begins and ends with it
+_ELSEWHERE = "name another --out"
+
+
+@dataclass(frozen=True)
+class Store:
+    """The folder of one sweep.
+
+    Args:
+        folder: it exists and holds the sweep's ``sweep.json``.
+        sweep: what it holds.
+        made_with: versions that its results are made with.
+    """
+
+    folder: Path
+    sweep: Sweep
+    made_with: Mapping[str, str]
+
+    def finished(self) -> list[int]:
+        """Shards whose results are there, whole, in ascending order."""
+        return [index for index in range(self.sweep.shards) if _is_whole(self._part(RESULTS, index))]
+
+    def keep(self, shard: Finished) -> None:
+        """Write a finished shard.
+
+        Args:
+            shard: of this sweep.
+
+        Raises:
+            TunnelError: when it was made with other versions, or cannot be written.
+        """
+        wanted = {**self.made_with, "threads": "1"}
+        odd = next((name for name, value in wanted.items() if shard.made_with.get(name) != value), None)
+        if odd is not None:
+            raise TunnelError(
+                f"a worker has {odd} {shard.made_with.get(odd)}, but this sweep is made with {wanted[odd]}",
+                where=shown(self.folder),
+                remedy="give every worker the same environment (threads: OMP_NUM_THREADS=1)",
+            )
+        if shard.records is not None:
+            write_whole(self._part(RECORDS, shard.index), shard.records)
+        write_whole(self._part(TIMINGS, shard.index), shard.timings)
+        write_whole(self._part(RESULTS, shard.index), shard.results)
+
+    def tidy(self) -> None:
+        """Remove what a killed run left half written."""
+        for name in (RESULTS, RECORDS, TIMINGS):
+            for path in (self.folder / name).glob(".*.part"):
+                path.unlink(missing_ok=True)
+
+    def scan(self, dataset: str = RESULTS) -> pl.LazyFrame:
+        """What the finished shards hold, in the order of the cases.
+
+        Args:
+            dataset: ``results``, ``records`` or ``timings``.
+
+        Returns:
+            The rows, not yet read.
+
+        Raises:
+            TunnelError: when there is none yet.
+        """
+        import polars as pl
+
+        parts = [self._part(dataset, index) for index in self.finished()]
+        if not parts or not all(path.exists() for path in parts):
+            raise TunnelError(
+                f"there are no {dataset}",
+                where=shown(self.folder),
+                remedy="run the sweep first" if not parts else "ask for them in the sweep file",
+            )
+        return pl.scan_parquet(parts)
+
+    def _part(self, dataset: str, index: int) -> Path:
+        width = max(5, len(str(self.sweep.shards - 1)))
+        return self.folder / dataset / f"part-{index:0{width}d}.parquet"
+
+
+def begin(sweep: Sweep, folder: Path) -> Store:
+    """The folder of a sweep, new or begun.
+
+    Args:
+        sweep: what it shall hold.
+        folder: made where it is missing.
+
+    Returns:
+        The store.
+
+    Raises:
+        TunnelError: when the folder holds another sweep or something else, or cannot be written.
+    """
+    from tunnel_lab.sweep.shard import made_with
+
+    if (folder / MANIFEST).is_file():
+        store = open_store(folder)
+        _check_same(store, sweep, made_with())
+        return store
+    if folder.is_dir() and any(not path.name.startswith(f".{MANIFEST}.") for path in folder.iterdir()):
+        raise TunnelError("the folder holds something else", where=shown(folder), remedy=_ELSEWHERE)
+    output_folder(folder)
+    for name in (RESULTS, TIMINGS, *([RECORDS] if sweep.document.records else [])):
+        (folder / name).mkdir(exist_ok=True)
+    write_json(
+        folder / MANIFEST,
+        {
+            "schema_version": SCHEMA_VERSION,
+            "name": sweep.document.name,
+            "cases": sweep.size,
+            "runs": sweep.runs,
+            "shards": sweep.shards,
+            "made_with": made_with(),
+            "sweep": json.loads(sweep.to_json()),
+        },
+    )
+    return Store(folder, sweep, made_with())
+
+
+def open_store(folder: Path) -> Store:
+    """A folder that holds a sweep, finished or not.
+
+    Args:
+        folder: as given to `begin`.
+
+    Returns:
+        The store.
+
+    Raises:
+        TunnelError: when it holds none, or one of another version of the format.
+    """
+    path = folder / MANIFEST
+    try:
+        document = json.loads(path.read_bytes())
+    except OSError:
+        raise TunnelError(
+            f"no {MANIFEST} here", where=shown(folder), remedy="name the folder of a sweep"
+        ) from None
+    except ValueError:
+        document = None
+    if not isinstance(document, dict) or document.get("schema_version") != SCHEMA_VERSION:
+        raise TunnelError(
+            f"this program reads version {SCHEMA_VERSION} only", where=shown(path), remedy=_ELSEWHERE
+        )
+    return Store(folder, Sweep.from_json(json.dumps(document["sweep"])), document["made_with"])
+
+
+def _check_same(store: Store, sweep: Sweep, versions: Mapping[str, str]) -> None:
+    where = shown(store.folder)
+    old, new = (json.loads(one.to_json()) for one in (store.sweep, sweep))
+    if old != new:
+        key = _first_difference(
+            {**old["document"], "rig": old["rigs"]}, {**new["document"], "rig": new["rigs"]}
+        )
+        raise TunnelError(
+            f"the folder holds sweep '{store.sweep.document.name}', whose {key} is not that of the file",
+            where=where,
+            remedy=f"{_ELSEWHERE}, or undo the change",
+        )
+    key = _first_difference(dict(store.made_with), dict(versions))
+    if key:
+        raise TunnelError(
+            f"the sweep was begun with {key} {store.made_with.get(key)}, and this is {versions.get(key)}",
+            where=where,
+            remedy=f"{_ELSEWHERE}, or go back to that version",
+        )
+
+
+def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    return next((key for key in {**old, **new} if old.get(key) != new.get(key)), "")
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a part is there and was written to its end."""
+    try:
+        with path.open("rb") as stream:
+            stream.seek(-len(_PARQUET), 2)
+            return stream.read() == _PARQUET
+    except OSError:
+        return False
