@@ -17,6 +17,7 @@ from diagnosis.held_out import HeldOut, predict_held_out
 from diagnosis.least_squares import Fit
 from diagnosis.localisation.maps import Maps
 from diagnosis.next_run import separating_run
+from diagnosis.random_moments import RandomAnswer
 from diagnosis.result import (
     Candidate,
     Coefficients,
@@ -120,8 +121,9 @@ def assemble(study: Study, where: Where, maps: Maps) -> Diagnosis:
 def chosen_fit(study: Study) -> Fit:
     """The fit of the answer; the nominal one where nothing fitted is part of it."""
     fitted = tuple(name for name in study.fitted if name != "unknown")
-    if "buffeting" in fitted and study.buffeting is not None:
-        return study.nominal if study.buffeting.beside is None else study.buffeting.beside.fit
+    random = study.random_answer(fitted)
+    if random is not None:
+        return study.nominal if random.beside is None else random.beside.fit
     hypothesis = study.hypothesis(fitted) if fitted else None
     return study.nominal if hypothesis is None else hypothesis.fit
 
@@ -151,6 +153,7 @@ def excess_base(study: Study) -> Base:
 def _gap(study: Study, base: Base, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> GapSummary:
     data = study.nominal.problem.data
     ratio = base.extra + 1.0  # of the estimated noise to the base
+    random = study.random_answer(study.fitted)
     explained = 0.0 if study.coarse and "sensor_quantisation" in study.causes else base.extra
     runs, sizes = [], []
     before_out, after_out = [], []
@@ -160,8 +163,8 @@ def _gap(study: Study, base: Base, chosen: Fit, nominal_out: HeldOut, chosen_out
         left = chosen_out.excess.get(run.id)
         open_ = float(np.mean(kept**2)) - 1.0 if left is None else left
         after = open_ / run.block * ratio + explained
-        if study.buffeting is not None and "buffeting" in study.causes and run.wind_on:
-            after = study.buffeting.process.excess / run.block * ratio + explained
+        if random is not None and run.wind_on:
+            after = random.process.excess / run.block * ratio + explained
         if left is not None and run.id in nominal_out.excess:
             before_out.append(nominal_out.excess[run.id] / run.block * ratio + base.hum + base.extra)
             after_out.append(after)
@@ -224,8 +227,8 @@ def _block(study: Study) -> int:
 
 
 def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
-    names = [name for name in answer.effects if name != "buffeting"]
-    hypothesis = study.hypothesis(names) if names else None
+    random = study.random_answer(answer.effects)
+    hypothesis = study.hypothesis(answer.effects) if random is None else random.beside
     found: dict[str, ParameterEstimate] = {}
     if hypothesis is not None:
         problem = hypothesis.fit.problem
@@ -238,14 +241,31 @@ def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
             found[name] = ParameterEstimate(fit.value(name), fit.std(name) * inflate, units[name])
         for name, value in problem.fixed:
             found[name] = ParameterEstimate(value, 0.0, units[name])
-    if "buffeting" in answer.effects and study.buffeting is not None:
-        process = study.buffeting.process
-        count = sum(i.size for i in process.innovations)
-        found["buffeting.intensity"] = ParameterEstimate(
-            process.intensity, process.intensity * float(np.sqrt(2.0 / max(count / 50.0, 1.0))), "1"
-        )
-        found["buffeting.bandwidth"] = ParameterEstimate(process.bandwidth, process.bandwidth, "Hz")
+    if random is not None:
+        found |= _random_parameters(random)
     return found
+
+
+def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
+    """Of a random moment; its size is known as well as the number of its correlation times allows."""
+    process, spectrum = answer.process, answer.process.spectrum
+    seconds = process.interval * sum(i.size for i in process.innovations)
+    independent = max(seconds * min(4.0 * spectrum.bandwidth, 1.0 / process.interval), 2.0)
+    relative = float(np.sqrt(0.5 / independent))
+    if spectrum.strouhal_number > 0.0:
+        amplitude = float(np.sqrt(2.0)) * spectrum.intensity
+        width = spectrum.bandwidth / max(spectrum.strouhal_number, 1e-9)
+        return {
+            "vortex_shedding.amplitude": ParameterEstimate(amplitude, amplitude * relative, "1"),
+            "vortex_shedding.strouhal_number": ParameterEstimate(
+                spectrum.strouhal_number, spectrum.strouhal_number * width * relative, "1"
+            ),
+        }
+    # a corner beyond the rig's own frequencies is seen as white: only the size over its root is known there
+    return {
+        "buffeting.intensity": ParameterEstimate(spectrum.intensity, spectrum.intensity * relative, "1"),
+        "buffeting.bandwidth": ParameterEstimate(spectrum.bandwidth, spectrum.bandwidth, "Hz"),
+    }
 
 
 def _read_parameters(study: Study) -> dict[str, ParameterEstimate]:

@@ -19,6 +19,9 @@ import numpy as np
 STEEPNESS = 3.0
 #: Misfit of form that counts as none, as a share of the gap.
 FORM_MISFIT = 0.01
+#: Effects that have no form to miss, a factor on a stated number, and the misfit that counts as none of them.
+EXACT = frozenset({"spring_miscalibration"})
+EXACT_MISFIT = 0.001
 #: Excess of block means beyond which that share no longer grows with the gap: a motion missed grossly is no
 #: reason to overlook a second effect a thousand times the noise.
 FORM_MISFIT_UP_TO = 1000.0
@@ -45,49 +48,60 @@ class Weighed:
     probability: float
 
 
-def form_floor(excess: float) -> float:
+def form_floor(excess: float, effects: Sequence[str] = ()) -> float:
     """Share of the gap that a misfit of form may leave.
 
     Args:
         excess: of the nominal model's block means.
+        effects: that were fitted.
 
     Returns:
         The share.
     """
-    return FORM_MISFIT * min(1.0, FORM_MISFIT_UP_TO / max(excess, 1e-9))
+    misfit = EXACT_MISFIT if effects and EXACT.issuperset(effects) else FORM_MISFIT
+    return misfit * min(1.0, FORM_MISFIT_UP_TO / max(excess, 1e-9))
 
 
-def weigh(shares: Sequence[tuple[tuple[str, ...], float]], chance: float, excess: float) -> list[Weighed]:
+def weigh(
+    shares: Sequence[tuple[tuple[str, ...], float]],
+    chance: float,
+    excess: float,
+    outside: float = UNKNOWN_SHARE,
+) -> list[Weighed]:
     """Probabilities of the answers.
 
     Args:
         shares: effect names and share of the gap they leave open, for singles and pairs.
         chance: standard deviation of a share by chance alone.
         excess: of the nominal model's block means.
+        outside: share that something outside the vocabulary leaves open; counts where it is below `UNKNOWN_SHARE`.
 
     Returns:
         All answers, ``unknown`` among them, most probable first.
     """
-    floor = form_floor(excess) + 2.0 * chance
+
+    def floor(names: Sequence[str]) -> float:
+        return form_floor(excess, names) + 2.0 * chance
+
     answers: dict[tuple[str, ...], float] = {}
     for names, share in shares:
         key = tuple(sorted(names))
         answers[key] = min(max(share, 0.0), answers.get(key, np.inf))
-    weights = {names: _evidence(share, floor) * _prior(len(names)) for names, share in answers.items()}
-    weights[("unknown",)] = _evidence(UNKNOWN_SHARE, floor)
-    answers[("unknown",)] = UNKNOWN_SHARE
+    weights = {names: _evidence(share, floor(names)) * _prior(len(names)) for names, share in answers.items()}
+    answers[("unknown",)] = min(UNKNOWN_SHARE, max(outside, 0.0))
+    weights[("unknown",)] = _evidence(answers[("unknown",)], floor(()))
     total = sum(weights.values())
     found = [Weighed(names, answers[names], weight / total) for names, weight in weights.items()]
     return sorted(found, key=lambda w: -w.probability)
 
 
 def _evidence(share: float, floor: float) -> float:
-    """Weight of an answer that leaves a share of the gap.
+    """Weight of an answer that leaves a share of the gap: the density of such a share under a true cause.
 
     Beyond `UNKNOWN_SHARE` it falls three times as steeply: many effects that close little must not together
     outweigh the unknown one.
     """
-    known = (share + floor) ** -STEEPNESS
+    known = floor ** (STEEPNESS - 1.0) * (share + floor) ** -STEEPNESS
     beyond = (UNKNOWN_SHARE + floor) / (max(share, UNKNOWN_SHARE) + floor)
     return float(known * beyond ** (2.0 * STEEPNESS))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize_scalar
+from scipy.stats import chi2
 
 from diagnosis.least_squares import Fit
 from diagnosis.spectra import mains_line, smooth_spectra
@@ -19,6 +20,9 @@ _HARMONICS = 5
 _RUN_DROP = 15.0
 #: Share of the runs that must show it: the mains hum in every run.
 _RUN_SHARE = 0.75
+#: Fastest swelling of its amplitude that is looked for, Hz, and how seldom one is found in a steady hum.
+_SWELL_UP_TO = 0.6
+_SWELL_RATE = 1e-6
 #: Drop of χ² at the line over the largest beside it, all runs together.
 _CONTRAST = 4.0
 
@@ -89,8 +93,9 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
         The campaign without it, and what was taken out.
     """
     cleaned, squares, powers = [], [], []
+    swells = _swells([run.record for run in campaign.runs], frequency, variance)
     for run in campaign.runs:
-        record, amplitude, power = _remove(run.record, frequency)
+        record, amplitude, power = _remove(run.record, frequency, swells)
         cleaned.append(dataclasses.replace(run, record=record))
         squares.append(amplitude**2)
         powers.append(power)
@@ -115,21 +120,58 @@ def _line_power(record: Record, frequency: float) -> float:
     return total
 
 
-def _remove(record: Record, frequency: float) -> tuple[Record, float, float]:
+def _remove(record: Record, frequency: float, swells: bool) -> tuple[Record, float, float]:
     """A record without the line and its harmonics, the fundamental's amplitude and the mean square removed."""
+    design = np.column_stack([_lines(record, frequency), *([_swell(record, frequency)] if swells else [])])
+    coefficients = _windowed_fit(record, design)
+    wave: Array = design @ coefficients
+    amplitude = float(np.hypot(coefficients[0], coefficients[1]))
+    return Record(record.time_s, record.yaw_rad - wave), amplitude, float(np.mean(wave**2))
+
+
+def _lines(record: Record, frequency: float) -> Array:
+    """Sine and cosine of the fundamental, then of its harmonics, shape (n, 2 harmonics)."""
     time = record.time_s - record.time_s[0]
     columns = []
     for k in range(1, _HARMONICS + 1):
         if k * frequency < 0.48 * record.sample_rate:
             phase = 2.0 * np.pi * k * frequency * time
             columns += [np.sin(phase), np.cos(phase)]
-    design = np.stack(columns, axis=1)
-    # the slow motion leaks little into a line 40 times its frequency, and less once windowed
-    window = np.hanning(time.size)[:, None]
-    coefficients = np.linalg.lstsq(design * window, _detrended(record.yaw_rad) * window[:, 0], rcond=None)[0]
-    wave: Array = design @ coefficients
-    amplitude = float(np.hypot(coefficients[0], coefficients[1]))
-    return Record(record.time_s, record.yaw_rad - wave), amplitude, float(np.mean(wave**2))
+    return np.stack(columns, axis=1)
+
+
+def _swell(record: Record, frequency: float) -> Array:
+    """The fundamental times slow cosines of time: a hum whose amplitude swells, shape (n, columns)."""
+    time = record.time_s - record.time_s[0]
+    orders = range(1, int(2.0 * _SWELL_UP_TO * time[-1]) + 1)
+    slow = [np.cos(np.pi * k * time / time[-1]) for k in orders]
+    phase = 2.0 * np.pi * frequency * time
+    return np.stack([wave * s for s in slow for wave in (np.sin(phase), np.cos(phase))], axis=1)
+
+
+def _swells(records: list[Record], frequency: float, variance: float) -> bool:
+    """Whether the hum's amplitude varies within the runs beyond chance (false-alarm rate `_SWELL_RATE`)."""
+    power, count = 0.0, 0
+    for record in records:
+        if int(2.0 * _SWELL_UP_TO * (record.time_s[-1] - record.time_s[0])) < 1:
+            continue
+        steady, swelling = _lines(record, frequency), _swell(record, frequency)
+        window = np.hanning(record.time_s.size)[:, None]
+        both = np.linalg.qr(np.column_stack([steady, swelling]) * window)[0][:, steady.shape[1] :]
+        # white noise seen through the window has the window's mean square
+        share = both.T @ (both * window**2)
+        found = both.T @ (_detrended(record.yaw_rad) * window[:, 0])
+        power += float(found @ np.linalg.solve(share, found)) / variance
+        count += swelling.shape[1]
+    return count > 0 and power > float(chi2.isf(_SWELL_RATE, count))
+
+
+def _windowed_fit(record: Record, design: Array) -> Array:
+    """Coefficients of the columns; windowed, the slow motion leaks little into a line 40 times its frequency."""
+    window = np.hanning(record.time_s.size)
+    return np.asarray(
+        np.linalg.lstsq(design * window[:, None], _detrended(record.yaw_rad) * window, rcond=None)[0]
+    )
 
 
 def _detrended(values: Array) -> Array:

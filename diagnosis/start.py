@@ -15,6 +15,7 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.record import Array
 
 _GROSS = 0.01  # share of the reading's power
+_FAR = 2.0  # rad: where a limit on one side only puts the other
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
@@ -101,7 +102,7 @@ def leads(base: Fit, kind: type[Effect]) -> list[Lead]:
     if kind.name in ("mains_hum", "vortex_shedding"):
         line = mains_line(base) if kind.name == "mains_hum" else shedding_line(base)
         return [] if line is None else [_line_lead(base, kind, line)]
-    found = [_lead(base, kind, trial) for trial in _trials(data, kind)]
+    found = [_lead(base, kind, trial) for trial in (*_trials(data, kind), *_bent_trials(data, kind))]
     if is_gross(base):
         found.append(_balance_lead(base, kind))
     return sorted((lead for lead in found if lead is not None), key=lambda lead: -lead.promise)
@@ -168,6 +169,23 @@ def _trials(data: Data, kind: type[Effect]) -> list[dict[str, float]]:
     return [{severity.name: scale, **other} for other in rest]
 
 
+def _bent_trials(data: Data, kind: type[Effect]) -> list[dict[str, float]]:
+    """Trials for forms that open a direction of their own: the last value given is the one that is scaled."""
+    if kind.name == "sensor_nonlinearity":
+        cubic, square = (
+            next(i.scale for i in kind.parameters() if i.name == name)
+            for name in ("coefficient", "quadratic")
+        )
+        return [{"coefficient": 0.01 * cubic, "quadratic": square}]
+    if kind.name == "sensor_clipping":
+        return [
+            {"limit": _FAR, "centre": side * (_FAR - trial["limit"])}
+            for trial in _clipping_trials(data)
+            for side in (-1.0, 1.0)
+        ]
+    return []
+
+
 def _moment_scale(data: Data) -> float:
     """Moments are per unit inertia in normalised form."""
     return 10.0 if data.normalised else 1.0
@@ -181,11 +199,15 @@ def _clipping_trials(data: Data) -> list[dict[str, float]]:
 def _lead(base: Fit, kind: type[Effect], trial: dict[str, float]) -> Lead | None:
     held = {"spring_stiffness"} if kind.name == "spring_miscalibration" else set()
     fixed = (*base.problem.fixed, *((f"{kind.name}.{n}", v) for n, v in trial.items() if n in held))
-    problem = Problem(base.problem.data, (*base.problem.effects, kind), fixed, base.problem.bent)
-    infos = [info for info in kind.parameters() if info.name not in held and not info.form]
+    bends = any(info.form and info.name in trial for info in kind.parameters())
+    bent = (*base.problem.bent, kind.name) if bends else base.problem.bent
+    problem = Problem(base.problem.data, (*base.problem.effects, kind), fixed, bent)
+    infos = [info for info in kind.parameters() if info.name not in held and (bends or not info.form)]
+    names = [info.name for info in infos]
+    scaled = names.index(list(trial)[-1]) if bends else 0
     values = np.array([trial.get(info.name, info.default) for info in infos])
     clipping = kind.name == "sensor_clipping"
-    change = _moderate_change(base, problem, values, shrink=not clipping)
+    change = _moderate_change(base, problem, values, scaled if not clipping else None)
     if change is None:
         return None
     left = project_out(base, change)
@@ -196,16 +218,17 @@ def _lead(base: Fit, kind: type[Effect], trial: dict[str, float]) -> Lead | None
     start = values.copy()
     promise = slope * slope * power
     if not clipping:
-        start[0] = np.clip(slope * values[0], infos[0].lower, infos[0].upper)
-        if start[0] == 0.0:
-            start[0], promise = 0.01 * values[0], 0.0
+        start[scaled] = np.clip(slope * values[scaled], infos[scaled].lower, infos[scaled].upper)
+        if start[scaled] == 0.0:
+            start[scaled], promise = 0.01 * values[scaled], 0.0
     return Lead(problem, Point(np.concatenate([base.point.common, start]), base.point.release), promise)
 
 
-def _moderate_change(base: Fit, problem: Problem, values: Array, *, shrink: bool) -> list[Array] | None:
-    """Change of the scaled prediction by an effect, its severity lowered until the change is no wild one.
+def _moderate_change(base: Fit, problem: Problem, values: Array, scaled: int | None) -> list[Array] | None:
+    """Change of the scaled prediction by an effect, one value lowered until the change is no wild one.
 
-    ``values`` holds the effect's parameters and is changed in place to those that were used.
+    ``values`` holds the effect's parameters and is changed in place to those that were used; ``scaled`` is the
+    place of the one that is lowered, None where none may be.
     """
     data = base.problem.data
     scale = [np.sqrt(run.noise_variance) for run in data.runs]
@@ -217,9 +240,11 @@ def _moderate_change(base: Fit, problem: Problem, values: Array, *, shrink: bool
             for m, run, r, s in zip(moved, data.runs, base.residuals, scale, strict=True)
         ]
         size = float(np.sqrt(sum(float(c @ c) for c in change)))
-        if np.isfinite(size) and (size <= limit or not shrink):
+        if np.isfinite(size) and (size <= limit or scaled is None):
             return change
-        values[0] *= 0.1 if not np.isfinite(size) else max(0.01, 0.5 * limit / size)
+        if scaled is None:
+            return None
+        values[scaled] *= 0.1 if not np.isfinite(size) else max(0.01, 0.5 * limit / size)
     return None
 
 

@@ -9,14 +9,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from diagnosis.buffeting import BuffetingAnswer, weigh_buffeting
 from diagnosis.data import Data, prepare, without_start
-from diagnosis.decide import Weighed, form_floor, weigh
+from diagnosis.decide import UNKNOWN_SHARE, Weighed, form_floor, weigh
 from diagnosis.gap import GapTest, test_gap
 from diagnosis.least_squares import Fit, FitError, fit
 from diagnosis.mains import Hum, find_hum, refine_frequency, remove_hum
 from diagnosis.noise import Noise, NoiseTrend, campaign_noise, noise_trend, reading_step
+from diagnosis.outsiders import Outsider, weigh_outsiders
 from diagnosis.problem import Problem
+from diagnosis.random_moments import RandomAnswer, weigh_random_moments
 from diagnosis.rank import NOT_FITTED, Hypothesis, rank_pairs, rank_singles
 from diagnosis.start import is_gross, nominal_start
 from tunnel_sim.campaign import Campaign
@@ -50,7 +51,8 @@ class Study:
         started_late: whether the runs' starts were left out, because the nominal model misses the motion grossly.
         hypotheses: fitted effects and pairs.
         weighed: answers with probabilities; empty where there is no gap.
-        buffeting: the random moment weighed, or None.
+        random: answers with a random moment that passed.
+        outsider: what outside the vocabulary closes most of the gap; None where there is no gap.
         seconds: wall time by step.
     """
 
@@ -66,7 +68,8 @@ class Study:
     started_late: bool = False
     hypotheses: tuple[Hypothesis, ...] = ()
     weighed: tuple[Weighed, ...] = ()
-    buffeting: BuffetingAnswer | None = None
+    random: tuple[RandomAnswer, ...] = ()
+    outsider: Outsider | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -91,6 +94,16 @@ class Study:
         """The fitted hypothesis of these effects, None where they were not fitted together."""
         key = tuple(sorted(names))
         return next((h for h in self.hypotheses if h.names == key), None)
+
+    def random_answer(self, names: Sequence[str]) -> RandomAnswer | None:
+        """The random moment of these effects, None where none passed or the same effects without it close more."""
+        key = tuple(sorted(names))
+        found = next((answer for answer in self.random if answer.effects == key), None)
+        steady = self.hypothesis(key)
+        if found is None or steady is None:
+            return found
+        share = max(steady.fit.excess, 0.0) / max(self.nominal.excess, 1e-9)
+        return found if found.share < share else None
 
 
 def study(
@@ -161,19 +174,17 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     with clock.step("single effects"):
         singles = rank_singles(nominal, fitted_kinds, clock.progress)
     pairs: list[Hypothesis] = []
-    if singles and _share(singles[0].fit, nominal) > form_floor(nominal.excess):
+    if singles and _share(singles[0].fit, nominal) > form_floor(nominal.excess, singles[0].effects):
         with clock.step("pairs"):
             pairs = rank_pairs(singles, fitted_kinds, clock.progress)
     hypotheses = [*singles, *pairs]
     shares = [(h.effects, _share(h.fit, nominal)) for h in hypotheses]
-    buffeting = None
-    if any(kind.name == "buffeting" for kind in kinds):
-        with clock.step("buffeting"):
-            buffeting = weigh_buffeting(nominal, singles, pairs)
-        if buffeting is not None:
-            shares.append((buffeting.effects, buffeting.share))
+    with clock.step("random moments"):
+        random = weigh_random_moments(nominal, singles, pairs, {kind.name for kind in kinds})
+    shares += [(answer.effects, answer.share) for answer in random]
     chance = float(np.sqrt(2.0 / nominal.count)) / max(nominal.excess, 1e-3)
-    weighed = weigh(shares, chance, nominal.excess)
+    outsider = weigh_outsiders(nominal)
+    weighed = weigh(shares, chance, nominal.excess, UNKNOWN_SHARE if outsider is None else outsider.share)
     if weighed[0].effects == ("unknown",) and _read_off_explains(found):
         weighed = []  # what is left belongs to the cause read off the records
     elif found.test.noisy and nominal.excess < _share_of_noise(found):
@@ -181,7 +192,8 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
         weighed = [Weighed(("unknown",), 1.0, 1.0), *named]
     return Study(
         found.campaign, found.cleaned, found.noise, found.trend, found.step, found.coarse, found.hum, nominal,
-        found.test, found.started_late, tuple(hypotheses), tuple(weighed), buffeting, clock.seconds,
+        found.test, found.started_late, tuple(hypotheses), tuple(weighed), tuple(random), outsider,
+        clock.seconds,
     )  # fmt: skip
 
 

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.signal import lfilter, lsim
 
-from diagnosis.buffeting import weigh_buffeting, wind_off_excess
-from diagnosis.process_noise import fit_process_noise, whiteness
+from diagnosis.process_noise import fit_turbulence, fit_wandering_shedding, whiteness
+from diagnosis.random_moments import weigh_random_moments, wind_off_excess
 from diagnosis.rank import Hypothesis
 from tests.unit.gap_campaigns import (
     CN_BETA,
@@ -25,6 +26,7 @@ from tunnel_sim.effects import effect_from
 from tunnel_sim.record import Record
 
 AREA, LENGTH = 0.036, 0.625
+BOTH = ("buffeting", "vortex_shedding")
 
 
 def buffeted(data, intensity, bandwidth, seed=5):
@@ -67,18 +69,19 @@ def windy():
 
 
 def test_intensity_and_bandwidth_are_recovered(windy):
-    found = fit_process_noise(windy)
+    found = fit_turbulence(windy)
     assert found is not None
     # at the rig only the level of the spectrum around resonance is seen well: intensity²/bandwidth
-    assert found.intensity**2 / found.bandwidth == pytest.approx(0.01**2 / 4.0, rel=0.5)
-    assert found.intensity == pytest.approx(0.01, rel=0.5)
+    spectrum = found.spectrum
+    assert spectrum.intensity**2 / spectrum.bandwidth == pytest.approx(0.01**2 / 4.0, rel=0.5)
+    assert spectrum.intensity == pytest.approx(0.01, rel=0.5)
     assert found.drop > 1000.0
     assert found.white_excess > 1.0
     assert abs(found.excess) < 0.1
 
 
 def test_innovations_of_the_right_model_are_white_and_steady(windy):
-    found = fit_process_noise(windy)
+    found = fit_turbulence(windy)
     assert found is not None
     band, quarter, _ = whiteness(found)
     assert band < 5.0
@@ -87,14 +90,13 @@ def test_innovations_of_the_right_model_are_white_and_steady(windy):
 
 
 def test_without_a_random_moment_there_is_nothing_to_gain():
-    found = fit_process_noise(nominal(campaign()))
+    found = fit_turbulence(nominal(campaign()))
     assert found is not None
     assert found.drop < 20.0  # χ² of two parameters, fitted over a grid
 
 
 def test_buffeting_is_offered_where_it_blows(windy):
-    answer = weigh_buffeting(windy, [])
-    assert answer is not None
+    (answer,) = weigh_random_moments(windy, [], [], BOTH)
     assert answer.effects == ("buffeting",)
     assert answer.share < 0.1
 
@@ -107,21 +109,72 @@ def test_one_gust_is_no_buffeting():
             b if b.wind_on else a for a, b in zip(campaign().runs, struck.runs, strict=True)
         ),
     )  # fmt: skip
-    assert weigh_buffeting(nominal(struck), []) is None
+    assert weigh_random_moments(nominal(struck), [], [], BOTH) == []
 
 
 def test_a_gap_in_still_air_is_no_buffeting():
     fit = nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003})))
     assert wind_off_excess(fit) > 0.1
-    assert weigh_buffeting(fit, []) is None
+    assert weigh_random_moments(fit, [], [], BOTH) == []
 
 
 def test_where_an_effect_closes_the_gap_no_random_moment_is_tried(windy):
     closed = replace(windy, chi2=np.array([float(r.size) for r in windy.residuals]))
-    assert weigh_buffeting(windy, [Hypothesis(("free_play",), closed)]) is None
+    assert weigh_random_moments(windy, [Hypothesis(("free_play",), closed)], [], BOTH) == []
 
 
 def test_runs_without_wind_have_no_random_moment():
     still = campaign()
     still = replace(still, runs=tuple(run for run in still.runs if not run.wind_on))
-    assert fit_process_noise(nominal(still)) is None
+    assert fit_turbulence(nominal(still)) is None
+
+
+def with_moment(data, moment):
+    """A moment coefficient added to every wind-on run: ``moment(time, speed)`` at 2 kHz, held over its samples."""
+    runs = []
+    for run, (spring, speed) in zip(data.runs, CONDITIONS, strict=True):
+        if speed > 0.0:
+            pressure = 0.5 * 1.2 * speed**2 * AREA * LENGTH
+            stiffness, damping = spring - pressure * CN_BETA, DAMPING - pressure * LENGTH / speed * CN_R
+            time = np.arange(2 * round(DURATION / INTERVAL)) * INTERVAL / 2
+            plant = ([pressure / INERTIA], [1.0, damping / INERTIA, stiffness / INERTIA])
+            response = lsim(plant, moment(time, speed), time)[1][::2]
+            run = replace(run, record=Record(run.record.time_s, run.record.yaw_rad + response))
+        runs.append(run)
+    return replace(data, runs=tuple(runs))
+
+
+def test_vortices_whose_phase_wanders_are_shedding_and_not_turbulence():
+    rng, strouhal, width = np.random.default_rng(8), 0.15, 0.225
+
+    def moment(time, speed):
+        walk = 0.5 * np.cumsum(rng.standard_normal(time.size)) * np.sqrt(time[1])
+        return 0.05 * np.sin(2.0 * np.pi * strouhal * speed / width * time + walk)
+
+    fit = nominal(with_moment(campaign(), moment))
+    found = fit_wandering_shedding(fit)
+    assert found is not None
+    assert found.spectrum.strouhal_number == pytest.approx(strouhal, rel=0.01)
+    assert np.sqrt(2.0) * found.spectrum.intensity == pytest.approx(0.05, rel=0.4)
+    (answer,) = weigh_random_moments(fit, [], [], BOTH)
+    assert answer.effects == ("vortex_shedding",)
+    assert answer.share < 0.1
+    assert weigh_random_moments(fit, [], [], ("buffeting",)) == []
+
+
+def test_turbulence_about_a_frequency_is_recovered():
+    rng = np.random.default_rng(9)
+
+    def moment(time, speed):
+        del speed
+        corner, turn = 2.0 * np.pi * 0.8, 2.0 * np.pi * 5.0
+        pole = np.exp((-corner + 1j * turn) * time[1])
+        drive = rng.standard_normal(time.size) + 1j * rng.standard_normal(time.size)
+        return 0.02 * np.real(lfilter([np.sqrt(1.0 - abs(pole) ** 2)], [1.0, -pole], drive))
+
+    fit = nominal(with_moment(campaign(), moment))
+    broad, centred = fit_turbulence(fit), fit_turbulence(fit, centred=True)
+    assert broad is not None
+    assert centred is not None
+    assert centred.spectrum.centre == pytest.approx(5.0, rel=0.1)
+    assert centred.cost < broad.cost - 100.0

@@ -20,7 +20,7 @@ STEPS = {
     "nominal fit": "fitting the nominal model",
     "single effects": "trying effects",
     "pairs": "trying pairs of effects",
-    "buffeting": "weighing buffeting",
+    "random moments": "weighing random moments",
     "where, and how far it closes": "locating the gap, holding runs out",
 }
 """Steps of the study in words; anything else it tells is the name of an effect or a pair."""

@@ -15,6 +15,9 @@ from tunnel_sim.plan import SensorModel
 from tunnel_sim.record import Array
 from tunnel_sim.run_settings import RunSettings
 
+LEAST_EXPONENT = 0.25
+"""Below it a term is nearly a jump, which the integration's steps do not resolve."""
+
 Channel = Literal["stiffness", "damping", "forcing", "sensor", "calibration"]
 Condition = Literal["always", "wind_on"]
 
@@ -68,6 +71,22 @@ def parameter(
         "form": form,
     }
     return dataclasses.field(default=default, metadata=metadata)
+
+
+def exponent(symbol: str, meaning: str, textbook: float) -> Any:
+    """A field that is the power of a term, whose textbook value it has by default.
+
+    Args:
+        symbol: as in the effect's equation.
+        meaning: one clause.
+        textbook: the power of the textbook's form.
+
+    Returns:
+        A form parameter.
+    """
+    return parameter(
+        symbol, "1", meaning, scale=1.0, lower=LEAST_EXPONENT, upper=9.0, default=textbook, form=True
+    )
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, parameter, with_law
+from tunnel_sim.effects.base import Effect, exponent, parameter, with_law
 from tunnel_sim.run_settings import RunSettings
 
 
@@ -30,16 +30,7 @@ class NonlinearYawDamping(Effect):
         "μa", "1/rad2", "share of Ca per squared angle", scale=5.0, lower=-500.0, upper=500.0
     )
 
-    exponent: float = parameter(
-        "p",
-        "1",
-        "power of the angle in the factor, the same factor at 0.2 rad",
-        scale=1.0,
-        lower=0.25,
-        upper=9.0,
-        default=2.0,
-        form=True,
-    )
+    exponent: float = exponent("p", "power of the angle in the factor, the same factor at 0.2 rad", 2.0)
 
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Set the moment law's term."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, parameter, with_law
+from tunnel_sim.effects.base import Effect, exponent, parameter, with_law
 from tunnel_sim.run_settings import RunSettings
 
 
@@ -30,16 +30,7 @@ class QuadraticDamping(Effect):
         "C2", "N m s2/rad2", "coefficient of the squared rate", scale=0.002, lower=-1e4, upper=1e4
     )
 
-    exponent: float = parameter(
-        "n",
-        "1",
-        "power of the rate in the moment, the same moment at 2 rad/s",
-        scale=1.0,
-        lower=0.25,
-        upper=9.0,
-        default=2.0,
-        form=True,
-    )
+    exponent: float = exponent("n", "power of the rate in the moment, the same moment at 2 rad/s", 2.0)
 
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Set the moment law's term."""

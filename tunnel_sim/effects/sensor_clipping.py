@@ -16,19 +16,42 @@ class SensorClipping(Effect):
 
     Args:
         limit: greatest reading; 0 stands for none, rad.
+        centre: middle of the readings that are possible, rad; 0 is the textbook's.
+        knee: share of the limit over which the reading bends over towards it, dimensionless; 0 is the textbook's.
     """
 
     name = "sensor_clipping"
     channel = "sensor"
     condition = "always"
-    equation = "|y| ≤ L"
+    equation = "|y| ≤ L; bent: |y − c| ≤ L, exponentially within k L of it"
     signature = "The tops of the largest swings are flat, and nothing else is touched."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
 
     limit: float = parameter(
         "L", "rad", "greatest reading; 0 stands for none", scale=0.3, lower=0.0, upper=10.0
     )
+    centre: float = parameter(
+        "c", "rad", "middle of the readings that are possible", scale=0.05, lower=-5.0, upper=5.0, form=True
+    )
+    knee: float = parameter(
+        "k",
+        "1",
+        "share of the limit over which the reading bends",
+        scale=0.05,
+        lower=0.0,
+        upper=0.9,
+        form=True,
+    )
 
     def on_reading(self, reading: Array) -> Array:
-        """Cut off beyond the limit."""
-        return np.clip(reading, -self.limit, self.limit) if self.limit else reading
+        """Cut off beyond the limit, or bend over towards it."""
+        if self.is_null:
+            return reading
+        if self.knee == 0.0:
+            return np.clip(reading, self.centre - self.limit, self.centre + self.limit)
+        room = self.knee * self.limit
+        size = np.abs(reading - self.centre)
+        straight = self.limit - room
+        over = np.maximum(size - straight, 0.0)
+        bent = np.minimum(size, straight) - room * np.expm1(-over / room)
+        return self.centre + np.copysign(bent, reading - self.centre)

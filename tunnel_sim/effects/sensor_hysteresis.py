@@ -18,22 +18,29 @@ class SensorHysteresis(Effect):
 
     Args:
         half_width: half width of the play, rad.
+        roundness: by which share a wider and a narrower play differ from it whose mean is read, dimensionless;
+            0 is the textbook's.
     """
 
     name = "sensor_hysteresis"
     channel = "sensor"
     condition = "always"
-    equation = "y follows β when pushed: play of half width w"
+    equation = "y follows β when pushed: play of half width w; bent: mean of plays (1 ± k) w"
     signature = "The reading rests for a moment at every turn of the motion, and lags by w between turns."
     references = (
         "Visintin, Differential Models of Hysteresis, Springer 1994, doi 10.1007/978-3-662-11557-2",
     )
 
     half_width: float = parameter("w", "rad", "half width of the play", scale=0.001, lower=0.0, upper=0.2)
+    roundness: float = parameter(
+        "k", "1", "share by which two plays differ from it", scale=0.3, lower=0.0, upper=1.0, form=True
+    )
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, rng: np.random.Generator) -> Array:
         """Follow when pushed; the release has just pushed it outward."""
         del time_s, stated, rng
         if self.is_null:
             return angle
-        return backlash(angle, self.half_width, float(angle[0] - np.sign(angle[0]) * self.half_width))
+        widths = {self.half_width * (1.0 + self.roundness), self.half_width * (1.0 - self.roundness)}
+        plays = [backlash(angle, w, float(angle[0] - np.sign(angle[0]) * w)) for w in sorted(widths)]
+        return np.asarray(sum(plays) / len(plays), dtype=np.float64)

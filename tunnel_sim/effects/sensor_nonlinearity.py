@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.base import Effect, exponent, parameter
 from tunnel_sim.record import Array
 from tunnel_sim.run_settings import RunSettings
 
@@ -20,12 +20,13 @@ class SensorNonlinearity(Effect):
     Args:
         coefficient: cubic coefficient, 1/rad2.
         exponent: power of the angle in the error, the same error at 0.2 rad, dimensionless; 3 is the textbook's.
+        quadratic: share of the angle's square in the error beside it, 1/rad; 0 is the textbook's.
     """
 
     name = "sensor_nonlinearity"
     channel = "sensor"
     condition = "always"
-    equation = "y = β + s β³; bent: |β|^p sgn β for β³"
+    equation = "y = β + s β³; bent: |β|^p sgn β for β³, and q β² beside it"
     signature = (
         "A third harmonic of s A³/4; the frequency is untouched, and the decay looks faster by the share "
         "(3/2) s A², whatever spring and wind."
@@ -34,15 +35,10 @@ class SensorNonlinearity(Effect):
 
     coefficient: float = parameter("s", "1/rad2", "cubic coefficient", scale=0.05, lower=-1.0, upper=1.0)
 
-    exponent: float = parameter(
-        "p",
-        "1",
-        "power of the angle in the error, the same error at 0.2 rad",
-        scale=1.0,
-        lower=0.25,
-        upper=9.0,
-        default=3.0,
-        form=True,
+    exponent: float = exponent("p", "power of the angle in the error, the same error at 0.2 rad", 3.0)
+
+    quadratic: float = parameter(
+        "q", "1/rad", "square of the angle beside it", scale=0.02, lower=-1.0, upper=1.0, form=True
     )
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, rng: np.random.Generator) -> Array:
@@ -51,6 +47,8 @@ class SensorNonlinearity(Effect):
         if self.is_null:
             return angle
         if self.exponent == 3.0:
-            return angle + self.coefficient * angle**3
-        shape = _REFERENCE**3 * (np.abs(angle) / _REFERENCE) ** self.exponent
-        return angle + self.coefficient * np.sign(angle) * shape
+            cubed = angle**3
+        else:
+            cubed = np.sign(angle) * _REFERENCE**3 * (np.abs(angle) / _REFERENCE) ** self.exponent
+        bent = angle + self.coefficient * cubed
+        return bent if self.quadratic == 0.0 else bent + self.quadratic * angle**2
