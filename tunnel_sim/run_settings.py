@@ -152,6 +152,15 @@ class RunSettings:
                     f"unknown parameter {name!r} of the moment law", remedy=did_you_mean(name, known)
                 )
 
+    def layout(self) -> tuple[object, ...]:
+        """What runs must have in common for one compiled model to serve them all.
+
+        Returns:
+            Timestep, names and lengths of the series, and whether the rod is rigid.
+        """
+        series = tuple((name, len(series.values)) for name, series in self.series.items())
+        return (self.timestep, series, self.rod_twist is None)
+
     def law(self, rig: Rig) -> dict[str, float]:
         """Every parameter of the moment law.
 

@@ -170,9 +170,7 @@ def _groups(settings: Sequence[RunSettings]) -> list[list[int]]:
     """Indices of runs that one compiled model can serve with expanded fields."""
     groups: dict[tuple[object, ...], list[int]] = {}
     for i, run in enumerate(settings):
-        layout = tuple((name, len(series.values)) for name, series in run.series.items())
-        key = (run.timestep, run.duration, layout, run.rod_twist is None)
-        groups.setdefault(key, []).append(i)
+        groups.setdefault((run.duration, *run.layout()), []).append(i)
     return list(groups.values())
 
 

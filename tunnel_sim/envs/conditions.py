@@ -1,0 +1,243 @@
+"""What one episode is: stated by the options of ``reset``, or drawn from a stated distribution."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import isfinite, radians
+from typing import Any
+
+import numpy as np
+
+from tunnel_sim.campaign import Run
+from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects.spring_miscalibration import SpringMiscalibration
+from tunnel_sim.envs.config import FreeDecayConfig, angle_limit
+from tunnel_sim.envs.errors import EnvError, as_env_error
+from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
+from tunnel_sim.record import Record
+from tunnel_sim.rig import Rig
+from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.virtual_campaign import plan_effects, run_settings
+
+OPTIONS = ("spring", "spring_stiffness", "wind_speed", "air_density", "release_angle", "truth", "effects")
+TRUTH = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping", "sensor_zero")
+
+# What is drawn uniformly where the options do not state it.
+WIND_SPEED = (10.0, 20.0)  # m/s
+RELEASE_ANGLE = (radians(5.0), radians(20.0))  # rad, to either side
+CN_BETA = (0.3, 0.6)  # 1/rad
+CN_R = (-0.2, -0.05)  # 1/rad
+INERTIA_SHARE = (0.95, 1.05)  # of the rig's Izz
+DAMPING_SHARE = (0.5, 1.5)  # of the rig's Cr
+SENSOR_ZERO = (-0.01, 0.01)  # rad
+SEVERITY_SHARE = (0.5, 2.0)  # of an effect's typical size
+STIFFNESS_MARGIN = 1.3  # a drawn spring exceeds the greatest Ka by this factor
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """One run before it is made: what is stated of it, and what is injected.
+
+    Args:
+        condition: spring, wind, release and length, as a campaign states them.
+        truth: coefficients.
+        sensor: the potentiometer with its true zero.
+        effects: what acts beyond the nominal model.
+    """
+
+    condition: Condition
+    truth: Truth
+    sensor: SensorModel
+    effects: tuple[Effect, ...] = ()
+
+    def stated(self) -> RunSettings:
+        """The run's physics without its effects, as ``tunnel_sim.simulate`` takes it."""
+        return run_settings(self.truth, self.condition)
+
+    def run(self, record: Record) -> Run:
+        """The run as a campaign lists it.
+
+        Args:
+            record: what the sensor read.
+
+        Returns:
+            The run; it knows nothing of the truth.
+        """
+        condition = self.condition
+        return Run(
+            id=condition.id,
+            record=record,
+            wind_speed=condition.wind_speed,
+            spring_stiffness=condition.spring_stiffness,
+            air_density=condition.air_density if condition.wind_speed > 0.0 else None,
+            release_angle=condition.release_angle,
+        )
+
+    def statement(self) -> dict[str, float]:
+        """What the operator is told at the start, SI units."""
+        condition = self.condition
+        return {
+            "spring_stiffness": condition.spring_stiffness,
+            "wind_speed": condition.wind_speed,
+            "air_density": condition.air_density,
+            "release_angle": condition.release_angle,
+        }
+
+
+def plan_run(
+    options: Mapping[str, Any] | None, config: FreeDecayConfig, rig: Rig, rng: np.random.Generator
+) -> RunPlan:
+    """The run of one episode.
+
+    Args:
+        options: of ``reset``; see docs/reference/envs/free-decay.md.
+        config: of the environment.
+        rig: whose springs, inertia and damping are meant.
+        rng: draws what the options leave open, in the order spring, wind speed, release angle, truth in the
+            order of `TRUTH`, effects. Nothing is drawn for what is stated.
+
+    Returns:
+        The plan.
+
+    Raises:
+        EnvError: for the first option that is unknown or out of range.
+    """
+    given = _checked(options or {}, OPTIONS, "reset options")
+    stiffness = _stiffness(given, rig, rng)
+    wind = _number(given, "wind_speed", WIND_SPEED, rng, least=0.0, most=config.wind_limit)
+    density = _number(given, "air_density", (rig.air.density, rig.air.density), None, least=0.0)
+    angle = _release_angle(given, rig, rng)
+    truth, zero = _truth(_checked(given.get("truth") or {}, TRUTH, "option truth"), rig, rng)
+    condition = Condition(
+        id=f"k{stiffness:g}-v{wind:g}-a{np.rad2deg(angle):.3g}",
+        spring_stiffness=stiffness,
+        wind_speed=wind,
+        air_density=density,
+        release_angle=angle,
+        duration=config.duration,
+    )
+    plan = RunPlan(condition, truth, config.sensor(zero))
+    settings = _effects(given, config, plan, rng)
+    try:
+        one_run = CampaignPlan("episode", 0, truth, (condition,), plan.sensor, tuple(settings))
+        return RunPlan(condition, truth, plan.sensor, plan_effects(one_run))
+    except TunnelError as error:
+        raise as_env_error(error, "option effects") from error
+
+
+def _checked(options: object, known: Iterable[str], where: str) -> Mapping[str, Any]:
+    if not isinstance(options, Mapping):
+        raise EnvError(f"{options!r} is no mapping", where=where, remedy="give names and values")
+    for name in options:
+        if name not in known:
+            raise EnvError(f"unknown option {name!r}", where=where, remedy=did_you_mean(str(name), known))
+    return options
+
+
+def _number(
+    given: Mapping[str, Any],
+    name: str,
+    bounds: tuple[float, float],
+    rng: np.random.Generator | None,
+    *,
+    least: float = -1e6,
+    most: float = 1e6,
+) -> float:
+    """A stated number within its range; where it is not stated, drawn, or the first bound without a generator."""
+    if given.get(name) is None:
+        return float(rng.uniform(*bounds)) if rng is not None else bounds[0]
+    value = given[name]
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not (number and isfinite(value) and least <= value <= most):
+        raise EnvError(
+            f"{value!r} is out of range",
+            where=f"option {name}",
+            remedy=f"give a number from {least:g} to {most:g} in SI units",
+        )
+    return float(value)
+
+
+def _stiffness(given: Mapping[str, Any], rig: Rig, rng: np.random.Generator) -> float:
+    if given.get("spring") is not None and given.get("spring_stiffness") is not None:
+        raise EnvError("spring and spring_stiffness are both given", remedy="give one of them")
+    if given.get("spring") is not None:
+        try:
+            return rig.spring(given["spring"])
+        except (TunnelError, TypeError) as error:
+            remedy = f"use one of {', '.join(map(str, rig.springs))}"
+            raise EnvError(
+                f"there is no spring {given['spring']!r}", where="option spring", remedy=remedy
+            ) from error
+    if given.get("spring_stiffness") is not None:
+        return _number(given, "spring_stiffness", (0.0, 0.0), None, least=1e-6)
+    springs = drawn_springs(rig)
+    return springs[int(rng.integers(len(springs)))]
+
+
+def drawn_springs(rig: Rig) -> list[float]:
+    """The stiffnesses an episode draws from: those that outweigh the air at any speed that is drawn.
+
+    Args:
+        rig: its springs, size and air.
+
+    Returns:
+        N m/rad; all springs where none is stiff enough.
+    """
+    body = rig.body
+    pressure = 0.5 * rig.air.density * WIND_SPEED[1] ** 2
+    needed = STIFFNESS_MARGIN * pressure * body.frontal_area * body.length * CN_BETA[1]
+    return [value for value in rig.springs.values() if value > needed] or list(rig.springs.values())
+
+
+def _release_angle(given: Mapping[str, Any], rig: Rig, rng: np.random.Generator) -> float:
+    limit = angle_limit(rig)
+    if given.get("release_angle") is not None:
+        return _number(given, "release_angle", (0.0, 0.0), None, least=-0.99 * limit, most=0.99 * limit)
+    return float(rng.choice((-1.0, 1.0)) * rng.uniform(*RELEASE_ANGLE))
+
+
+def _truth(given: Mapping[str, Any], rig: Rig, rng: np.random.Generator) -> tuple[Truth, float]:
+    nominal = rig.dynamics
+    inertia = tuple(share * nominal.yaw_inertia for share in INERTIA_SHARE)
+    damping = tuple(share * nominal.mechanical_damping for share in DAMPING_SHARE)
+    truth = Truth(
+        cn_beta=_number(given, "cn_beta", CN_BETA, rng),
+        cn_r=_number(given, "cn_r", CN_R, rng),
+        yaw_inertia=_number(given, "yaw_inertia", (inertia[0], inertia[1]), rng, least=1e-6),
+        mechanical_damping=_number(given, "mechanical_damping", (damping[0], damping[1]), rng),
+    )
+    return truth, _number(given, "sensor_zero", SENSOR_ZERO, rng, least=-1.0, most=1.0)
+
+
+def _effects(
+    given: Mapping[str, Any], config: FreeDecayConfig, plan: RunPlan, rng: np.random.Generator
+) -> list[EffectSetting]:
+    stated = given.get("effects")
+    if stated is None:
+        drawn = config.effect_probability > 0.0 and rng.random() < config.effect_probability
+        return [_drawn_effect(plan, rng)] if drawn else []
+    if isinstance(stated, Mapping):
+        pairs = [(name, _checked(values, values, f"effect {name}")) for name, values in stated.items()]
+        return [EffectSetting(str(name), dict(values)) for name, values in pairs]
+    if isinstance(stated, Iterable) and not isinstance(stated, str):
+        listed = list(stated)
+        if all(isinstance(effect, Effect) for effect in listed):
+            return [EffectSetting(effect.name, effect.to_json_dict()["parameters"]) for effect in listed]
+    raise EnvError(
+        f"{stated!r} names no effects",
+        where="option effects",
+        remedy="give {name: {parameter: value}}, or a list of tunnel_sim.effects",
+    )
+
+
+def _drawn_effect(plan: RunPlan, rng: np.random.Generator) -> EffectSetting:
+    """Any effect of the vocabulary, half to twice its typical size."""
+    kind = ALL_EFFECTS[int(rng.integers(len(ALL_EFFECTS)))]
+    severity = kind.parameters()[0]
+    value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))
+    values = {severity.name: value}
+    if kind is SpringMiscalibration:
+        values["spring_stiffness"] = plan.condition.spring_stiffness
+    return EffectSetting(kind.name, values)

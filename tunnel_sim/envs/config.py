@@ -1,0 +1,160 @@
+"""What an environment is made with, apart from how it is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from math import isfinite, radians
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs.information import Prior
+from tunnel_sim.errors import did_you_mean
+from tunnel_sim.plan import POTENTIOMETER_RESOLUTION, SensorModel
+from tunnel_sim.rig import Rig, load_rig
+
+PRESETS = ("plain", "operator")
+_MAY_BE_ZERO = frozenset({"noise_std", "resolution", "effect_probability"})
+
+
+@dataclass(frozen=True)
+class FreeDecayConfig:
+    """What every episode of an environment has in common.
+
+    Args:
+        preset: ``plain``: nothing can be done during a run; ``operator``: wind-speed set-point and applied
+            yaw moment.
+        duration: of a run, s; a whole number of control periods.
+        control_period: s; a whole number of sample intervals.
+        sample_rate: of the potentiometer, Hz.
+        noise_std: of its noise, rad.
+        resolution: step of its reading, rad; 0 does not quantise.
+        wind_limit: greatest wind speed, m/s.
+        wind_time_constant: of the tunnel's first-order answer to its set-point, s.
+        moment_limit: greatest moment the operator can apply, N m.
+        effect_probability: probability that an episode whose options name no effects draws one.
+        prior: changes to `Prior` by name, in its units.
+        expose_truth: whether ``info`` carries what was injected.
+        rig_file: a rig description; None takes the packaged one.
+    """
+
+    preset: Literal["plain", "operator"] = "plain"
+    duration: float = 10.0
+    control_period: float = 0.01
+    sample_rate: float = 1000.0
+    noise_std: float = 0.0005
+    resolution: float = POTENTIOMETER_RESOLUTION
+    wind_limit: float = 40.0
+    wind_time_constant: float = 2.0
+    moment_limit: float = 0.5
+    effect_probability: float = 0.0
+    prior: Mapping[str, float] = field(default_factory=dict)
+    expose_truth: bool = False
+    rig_file: str | None = None
+
+    def __post_init__(self) -> None:
+        """Check every argument.
+
+        Raises:
+            EnvError: when one is out of range, or does not divide as it should.
+        """
+        if self.preset not in PRESETS:
+            raise EnvError(f"unknown preset {self.preset!r}", remedy=did_you_mean(str(self.preset), PRESETS))
+        for item in fields(self):
+            if item.type == "float":
+                _check_number(item.name, getattr(self, item.name))
+        if self.effect_probability > 1.0:
+            raise EnvError("effect_probability is above 1", remedy="give a probability")
+        if self.noise_std == 0.0 and self.resolution == 0.0:
+            raise EnvError(
+                "noise_std and resolution are both 0",
+                remedy="give one of them: without noise any record holds infinite information",
+            )
+        _whole("control_period", self.control_period * self.sample_rate, "sample intervals")
+        _whole("duration", self.duration / self.control_period, "control periods")
+        if self.steps < 2:
+            raise EnvError("duration is one control period", remedy="give a longer run")
+        Prior.changed(self.prior)
+
+    @property
+    def samples_per_step(self) -> int:
+        """Potentiometer samples in one control period."""
+        return round(self.control_period * self.sample_rate)
+
+    @property
+    def steps(self) -> int:
+        """Control periods in one run."""
+        return round(self.duration / self.control_period)
+
+    @property
+    def sample_times(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Times of a whole run's samples, s, as `tunnel_sim.simulate` has them."""
+        return np.arange(self.steps * self.samples_per_step) / self.sample_rate
+
+    @property
+    def reading_variance(self) -> float:
+        """Variance of one reading, its quantisation included, rad²."""
+        return self.noise_std**2 + self.resolution**2 / 12.0
+
+    def sensor(self, zero: float) -> SensorModel:
+        """The potentiometer as stated.
+
+        Args:
+            zero: of the sensor, rad.
+
+        Returns:
+            The sensor.
+        """
+        return SensorModel(self.sample_rate, self.noise_std, self.resolution, zero)
+
+    def rig(self) -> Rig:
+        """The rig of the description, or the packaged one."""
+        return load_rig(Path(self.rig_file) if self.rig_file is not None else None)
+
+
+def angle_limit(rig: Rig) -> float:
+    """The angle at which a run is stopped: the end of the potentiometer's range.
+
+    Args:
+        rig: whose potentiometer it is.
+
+    Returns:
+        rad.
+    """
+    return radians(rig.potentiometer.half_range_deg)
+
+
+def free_decay_config(arguments: Mapping[str, Any]) -> FreeDecayConfig:
+    """The configuration of an environment from its keyword arguments.
+
+    Args:
+        arguments: as passed to ``gymnasium.make``.
+
+    Returns:
+        The configuration.
+
+    Raises:
+        EnvError: when a name is unknown or a value out of range.
+    """
+    known = [item.name for item in fields(FreeDecayConfig)]
+    for name in arguments:
+        if name not in known:
+            raise EnvError(
+                f"unknown argument {name!r}", where="FreeDecay-v0", remedy=did_you_mean(name, known)
+            )
+    return FreeDecayConfig(**arguments)
+
+
+def _check_number(name: str, value: object) -> None:
+    number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    if not number or value < 0.0 or (value == 0.0 and name not in _MAY_BE_ZERO):  # type: ignore[operator]
+        least = "0 or more" if name in _MAY_BE_ZERO else "above 0"
+        raise EnvError(f"{name} = {value!r} is out of range", remedy=f"give a finite number {least} (SI)")
+
+
+def _whole(name: str, count: float, of: str) -> None:
+    if round(count) < 1 or abs(count - round(count)) > 1e-9 * count:
+        raise EnvError(f"{name} is {count:g} {of}", remedy=f"make it a whole number of {of}")

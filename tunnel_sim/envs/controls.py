@@ -1,0 +1,143 @@
+"""What the operator does during a run: wind-speed set-point and applied yaw moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from tunnel_sim.envs.config import FreeDecayConfig
+from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.record import Array
+
+
+@dataclass(frozen=True, eq=False)
+class OperatorLog:
+    """What was done in a run, one entry per control period.
+
+    Args:
+        time_s: start of the period, shape (n,), s.
+        set_point: of the wind speed, shape (n,), m/s.
+        wind_speed: at the period's end, shape (n,), m/s.
+        moment: applied to the rod's upper end, shape (n,), N m.
+    """
+
+    time_s: Array
+    set_point: Array
+    wind_speed: Array
+    moment: Array
+
+
+def action_space(config: FreeDecayConfig) -> spaces.Space[Any]:
+    """The space of one environment's actions.
+
+    Args:
+        config: preset and limits.
+
+    Returns:
+        ``Discrete(1)`` where nothing can be done; else a box of two numbers from −1 to 1.
+    """
+    if config.preset == "plain":
+        return spaces.Discrete(1)
+    return spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+
+def operator_action(
+    config: FreeDecayConfig, *, wind_speed: float, moment: float = 0.0
+) -> np.ndarray[Any, Any]:
+    """The operator's action in SI units.
+
+    Args:
+        config: limits.
+        wind_speed: set-point, m/s, from 0 to the limit.
+        moment: applied yaw moment, N m, within the limit to either side.
+
+    Returns:
+        The action, shape (2,), from −1 to 1.
+
+    Raises:
+        EnvError: when one is beyond its limit.
+    """
+    action = np.array([2.0 * wind_speed / config.wind_limit - 1.0, moment / config.moment_limit], np.float32)
+    decode(config, action[None])
+    return action
+
+
+def decode(config: FreeDecayConfig, actions: np.ndarray[Any, Any]) -> tuple[Array, Array]:
+    """Set-points and moments of many operators.
+
+    Args:
+        config: limits.
+        actions: shape (runs, 2), from −1 to 1.
+
+    Returns:
+        Wind-speed set-points (m/s) and moments (N m), each of shape (runs,).
+
+    Raises:
+        EnvError: when the shape is wrong, or a number is not finite or outside the space.
+    """
+    values = np.asarray(actions, dtype=np.float64)
+    if values.ndim != 2 or values.shape[1] != 2:
+        raise EnvError(
+            f"an action has shape {values.shape[1:]}, not (2,)", where="action", remedy="see the page"
+        )
+    bad = ~(np.abs(values) <= 1.0)
+    if bad.any():
+        value = values[bad][0]
+        raise EnvError(
+            f"{value:g} is outside the space",
+            where="action",
+            remedy="give numbers from -1 to 1 (operator_action)",
+        )
+    return 0.5 * config.wind_limit * (values[:, 0] + 1.0), config.moment_limit * values[:, 1]
+
+
+def check_plain(actions: np.ndarray[Any, Any], count: int) -> None:
+    """Refuse anything but the plain preset's one action.
+
+    Args:
+        actions: as given to ``step``.
+        count: number of runs.
+
+    Raises:
+        EnvError: when an action is not 0, or there are too many or too few.
+    """
+    values = np.asarray(actions)
+    if values.size != count or values.dtype.kind not in "iu" or np.any(values != 0):
+        raise EnvError(
+            f"{actions!r} is no action of the plain preset",
+            where="action",
+            remedy="give 0, or make the environment with preset='operator'",
+        )
+
+
+@dataclass(frozen=True)
+class WindAnswer:
+    """The tunnel's first-order answer to its set-point over one control period.
+
+    Args:
+        period: s.
+        samples: intervals of the period.
+        time_constant: s.
+    """
+
+    period: float
+    samples: int
+    time_constant: float
+
+    def speeds(self, begin: Array, set_point: Array) -> tuple[Array, Array]:
+        """Exact solution of τ V̇ = Vs − V over the period.
+
+        Args:
+            begin: speed at its start, shape (runs,), m/s.
+            set_point: shape (runs,), m/s.
+
+        Returns:
+            Means over the sample intervals, shape (runs, samples), and speed at the end, shape (runs,), m/s.
+        """
+        left = np.exp(-np.arange(self.samples + 1) * (self.period / self.samples / self.time_constant))
+        mean = (left[:-1] - left[1:]) * (self.time_constant * self.samples / self.period)
+        departure = begin - set_point
+        return set_point[:, None] + departure[:, None] * mean, set_point + departure * left[-1]

@@ -1,0 +1,278 @@
+"""Moving the runs: one with ``mj_step``, many with ``mujoco.batch``; the bits are the same."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import batch as mujoco_batch
+
+from tunnel_sim.model import Model, build_model
+from tunnel_sim.motion import sampling
+from tunnel_sim.record import Array
+from tunnel_sim.rig import Rig
+from tunnel_sim.run_settings import RunSettings
+
+STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""What MuJoCo needs to go on to the bit: full physics with plugin state, inputs, and the solver's warm start."""
+
+_CONTROL = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED) | int(mujoco.mjtState.mjSTATE_USERDATA)
+_VARIED = ("jnt_stiffness", "dof_damping", "numeric_data", "body_inertia")
+
+
+@dataclass(frozen=True, eq=False)
+class Operation:
+    """What acts on the runs in one control period beside their own physics.
+
+    Args:
+        wind_departure: speed minus the stated one, mean over each sample interval, shape (runs, samples), m/s.
+        moment: on the rod's upper end, shape (runs,), N m.
+    """
+
+    wind_departure: Array
+    moment: Array
+
+
+class Models:
+    """Compiled models by layout, each compiled once.
+
+    Args:
+        rig: of all of them.
+        sample_rate: Hz.
+    """
+
+    def __init__(self, rig: Rig, sample_rate: float) -> None:
+        self._rig = rig
+        self._sample_rate = sample_rate
+        self._compiled: dict[tuple[object, ...], Model] = {}
+
+    def of(self, settings: RunSettings) -> tuple[tuple[object, ...], int, Model]:
+        """The model of a run, its layout, and its steps between two samples.
+
+        Args:
+            settings: the run's physics.
+
+        Returns:
+            Layout, number of steps, model.
+        """
+        _, steps = sampling(settings, self._sample_rate)
+        layout = settings.layout()
+        if layout not in self._compiled:
+            self._compiled[layout] = build_model(self._rig, settings)
+        return layout, steps, self._compiled[layout].with_settings(settings)
+
+
+class OneRun:
+    """One run on a model of its own.
+
+    Args:
+        models: compiled models.
+        samples: in one control period.
+    """
+
+    def __init__(self, models: Models, samples: int) -> None:
+        self._models = models
+        self._samples = samples
+        self._model: Model | None = None
+        self._data: Any = None
+        self._steps = 1
+
+    def start(self, row: int, settings: RunSettings) -> float:
+        """Begin a run at its release.
+
+        Args:
+            row: index of the run; 0 here.
+            settings: its physics.
+
+        Returns:
+            Angle of the spring's end, rad.
+        """
+        del row
+        _, self._steps, self._model = self._models.of(settings)
+        self._data = self._model.release_state()
+        return float(self._data.qpos[self._model.yaw_address])
+
+    def advance(self, operation: Operation | None) -> tuple[Array, Array]:
+        """Move by one control period.
+
+        Args:
+            operation: what acts; None: nothing.
+
+        Returns:
+            Angle (rad) and rate (rad/s) of the spring's end at the samples and at the period's end, each of
+            shape (1, samples + 1).
+        """
+        assert self._model is not None
+        model, data, at = self._model.mj, self._data, self._model.yaw_address
+        angle, rate = np.empty((1, self._samples + 1)), np.empty((1, self._samples + 1))
+        angle[0, 0], rate[0, 0] = data.qpos[at], data.qvel[at]
+        if operation is not None:
+            data.qfrc_applied[at] = operation.moment[0]
+        for j in range(self._samples):
+            if operation is not None:
+                data.userdata[0] = operation.wind_departure[0, j]
+            mujoco.mj_step(model, data, self._steps)
+            angle[0, j + 1], rate[0, j + 1] = data.qpos[at], data.qvel[at]
+        return angle, rate
+
+    def get_state(self, row: int) -> Array:
+        """MuJoCo's state of a run.
+
+        Args:
+            row: index of the run; 0 here.
+
+        Returns:
+            ``mj_getState`` of `STATE`.
+        """
+        del row
+        assert self._model is not None
+        state = np.empty(mujoco.mj_stateSize(self._model.mj, STATE))
+        mujoco.mj_getState(self._model.mj, self._data, state, STATE)
+        return state
+
+    def set_state(self, row: int, state: Array) -> None:
+        """Put a run into a state.
+
+        Args:
+            row: index of the run; 0 here.
+            state: from `get_state` of a run of the same layout, shape (n,).
+        """
+        del row
+        assert self._model is not None
+        mujoco.mj_setState(self._model.mj, self._data, np.asarray(state, dtype=np.float64), STATE)
+
+    def pose(self, row: int) -> tuple[float, float]:
+        """Angles of the spring's end and of the body against it, rad.
+
+        Args:
+            row: index of the run; 0 here.
+
+        Returns:
+            The two angles.
+        """
+        return _pose(self.get_qpos(row))
+
+    def get_qpos(self, row: int) -> Array:
+        """Positions of a run's joints, rad; arguments as in `pose`."""
+        del row
+        return np.array(self._data.qpos)
+
+
+class ManyRuns:
+    """Many runs on ``mujoco.batch``, one batch for each layout that is met.
+
+    Args:
+        models: compiled models.
+        samples: in one control period.
+        count: number of runs.
+        nthread: threads; 0 takes all processors. The result is the same to the bit whatever the number.
+    """
+
+    def __init__(self, models: Models, samples: int, count: int, nthread: int) -> None:
+        self._models, self._samples, self._count, self._nthread = models, samples, count, nthread
+        self._groups: dict[tuple[object, ...], _Group] = {}
+        self._layout: list[tuple[object, ...]] = [()] * count
+        self._members: dict[tuple[object, ...], np.ndarray[Any, Any] | None] = {}
+        self._last = np.zeros((2, count))  # angle and rate at the last period's end
+
+    def start(self, row: int, settings: RunSettings) -> float:
+        """Begin a run at its release; arguments and result as in `OneRun.start`."""
+        layout, steps, model = self._models.of(settings)
+        if layout not in self._groups:
+            batch = mujoco_batch.Batch(model.mj, nsim=self._count, nthread=self._nthread)
+            self._groups[layout] = _Group(batch, model.yaw_address, steps, self._samples)
+        group = self._groups[layout]
+        data = model.release_state()
+        for name in _VARIED:
+            group.fields[name][row] = getattr(model.mj, name)
+        mujoco.mj_getState(model.mj, data, group.batch.state[row], STATE)
+        group.changed.append(row)
+        if self._layout[row] != layout:
+            self._layout[row] = layout
+            self._members = {}
+        at = model.yaw_address
+        self._last[:, row] = data.qpos[at], data.qvel[at]
+        return float(data.qpos[at])
+
+    def advance(self, operation: Operation | None) -> tuple[Array, Array]:
+        """Move all runs by one control period; arguments and result as in `OneRun.advance`."""
+        if not self._members:
+            self._members = self._sorted()
+        if len(self._members) == 1:
+            (layout,) = self._members
+            angle, rate = self._groups[layout].advance(None, self._last, operation)
+        else:
+            angle, rate = (np.empty((self._count, self._samples + 1)) for _ in range(2))
+            for layout, rows in self._members.items():
+                angle[rows], rate[rows] = self._groups[layout].advance(rows, self._last, operation)
+        self._last = np.stack((angle[:, -1], rate[:, -1]))
+        return angle, rate
+
+    def _sorted(self) -> dict[tuple[object, ...], np.ndarray[Any, Any] | None]:
+        layouts = dict.fromkeys(self._layout)
+        return {one: np.flatnonzero([at == one for at in self._layout]) for one in layouts}
+
+    def get_state(self, row: int) -> Array:
+        """MuJoCo's state of a run; arguments and result as in `OneRun.get_state`."""
+        return np.array(self._groups[self._layout[row]].batch.state[row])
+
+    def set_state(self, row: int, state: Array) -> None:
+        """Put a run into a state; arguments as in `OneRun.set_state`."""
+        group = self._groups[self._layout[row]]
+        group.batch.state[row] = state
+        at = group.address
+        self._last[:, row] = group.states["qpos"][row, at], group.states["qvel"][row, at]
+
+    def pose(self, row: int) -> tuple[float, float]:
+        """Angles of the spring's end and of the body; arguments and result as in `OneRun.pose`."""
+        return _pose(self._groups[self._layout[row]].states["qpos"][row])
+
+
+class _Group:
+    """The batch of one layout; rows of other layouts lie idle in it."""
+
+    def __init__(self, batch: mujoco_batch.Batch, address: int, steps: int, samples: int) -> None:
+        self.batch, self.address, self._steps = batch, address, steps
+        self.fields = {name: batch.expand(name) for name in _VARIED}
+        self.states = {name: batch.bind(name) for name in ("qpos", "qvel")}
+        self.changed: list[int] = []
+        self._nstep = samples * steps
+        self._out: dict[str, Array] = {}
+
+    def advance(self, rows: Any, last: Array, operation: Operation | None) -> tuple[Array, Array]:
+        if self.changed:
+            self.batch.set_const(np.array(sorted(set(self.changed)), dtype=np.int32))
+            self.changed = []
+        chosen = slice(None) if rows is None else rows
+        control = self._control(chosen, operation) if operation is not None else None
+        recorded = self.batch.rollout(
+            self._nstep,
+            control,
+            _CONTROL,
+            ("qpos", "qvel"),
+            ids=rows,
+            out=self._out if rows is None else None,
+        )
+        if rows is None:
+            self._out = recorded  # the same buffers again
+        return tuple(
+            np.concatenate(
+                (last[i, chosen, None], recorded[name][:, self._steps - 1 :: self._steps, self.address]),
+                axis=1,
+            )
+            for i, name in enumerate(("qpos", "qvel"))
+        )  # type: ignore[return-value]
+
+    def _control(self, chosen: Any, operation: Operation) -> Array:
+        departure = np.repeat(operation.wind_departure[chosen], self._steps, axis=1)
+        joints = self.batch.model.nv
+        control = np.zeros((*departure.shape, joints + self.batch.model.nuserdata))
+        control[..., self.address] = operation.moment[chosen, None]
+        control[..., joints] = departure
+        return control
+
+
+def _pose(qpos: Array) -> tuple[float, float]:
+    return float(qpos[0]), float(qpos[1]) if len(qpos) > 1 else 0.0

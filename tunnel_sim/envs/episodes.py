@@ -1,0 +1,353 @@
+"""Many episodes side by side: reading, information, end. One environment has one, a vector environment many."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium import spaces
+
+from tunnel_sim.campaign import Run
+from tunnel_sim.envs.conditions import RunPlan, plan_run
+from tunnel_sim.envs.config import FreeDecayConfig, angle_limit
+from tunnel_sim.envs.controls import OperatorLog, WindAnswer, check_plain, decode
+from tunnel_sim.envs.engines import Operation
+from tunnel_sim.envs.errors import EnvError, as_env_error
+from tunnel_sim.envs.information import Information, Prior
+from tunnel_sim.envs.sensing import SensorChain
+from tunnel_sim.envs.sensitivity import NominalRun
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.record import Array, Record
+from tunnel_sim.rig import Rig
+from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.sensor import quantise
+from tunnel_sim.simulate import apply_effects
+
+READING_BOUND = 2.0 * np.pi
+"""Bound of a reading in the observation, rad; the record is not bounded."""
+
+
+class Engine(Protocol):
+    """What moves the runs; see `tunnel_sim.envs.engines`."""
+
+    def start(self, row: int, settings: RunSettings) -> float:
+        """Begin a run at its release; arguments and result as in `OneRun.start`."""
+
+    def advance(self, operation: Operation | None) -> tuple[Array, Array]:
+        """Move all runs by one control period; arguments and result as in `OneRun.advance`."""
+
+    def get_state(self, row: int) -> Array:
+        """MuJoCo's state of a run; arguments and result as in `OneRun.get_state`."""
+
+    def set_state(self, row: int, state: Array) -> None:
+        """Put a run into a state; arguments as in `OneRun.set_state`."""
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeState:
+    """All that an episode in progress is; an environment put back into it goes on with the same bits.
+
+    Args:
+        plan: of the run.
+        physics: what is integrated: the plan's run with its effects.
+        mujoco: ``mj_getState`` of ``mjSTATE_INTEGRATION``, plugin state included, shape (n,).
+        arrays: readings so far, sensitivities and information, by name.
+        sensor: what the effects do to the reading.
+        rng: source of the noise.
+    """
+
+    plan: RunPlan
+    physics: RunSettings
+    mujoco: Array
+    arrays: Mapping[str, Any]
+    sensor: SensorChain
+    rng: np.random.Generator
+
+
+def observation_space(config: FreeDecayConfig) -> spaces.Box:
+    """The space of one environment's observations.
+
+    Args:
+        config: of the environment.
+
+    Returns:
+        Readings (rad), then time (s) and wind speed (m/s).
+    """
+    low = np.array([-READING_BOUND] * config.samples_per_step + [0.0, 0.0])
+    high = np.array([READING_BOUND] * config.samples_per_step + [config.duration, config.wind_limit])
+    return spaces.Box(low, high, dtype=np.float64)
+
+
+class Episodes:
+    """Episodes of one configuration side by side.
+
+    Args:
+        config: of the environment.
+        rig: of all runs.
+        engine: what moves them.
+        count: how many there are.
+    """
+
+    def __init__(self, config: FreeDecayConfig, rig: Rig, engine: Engine, count: int) -> None:
+        self._config, self._rig, self._engine, self._count = config, rig, engine, count
+        samples = config.samples_per_step
+        self._prior = Prior.changed(config.prior)
+        self._information = Information(
+            count, samples, 1.0 / config.sample_rate, config.reading_variance, self._prior
+        )
+        self._wind = WindAnswer(config.control_period, samples, config.wind_time_constant)
+        self._limit = angle_limit(rig)
+        self._plans: list[RunPlan | None] = [None] * count
+        self._physics: list[RunSettings | None] = [None] * count
+        self._chains: list[SensorChain | None] = [None] * count
+        self._rngs: list[np.random.Generator] = [np.random.default_rng(0)] * count
+        self._bent: list[int] = []  # runs whose reading effects bend
+        self._sensor = np.zeros((3, count, 1))  # zero, noise, resolution
+        self._readings = np.zeros((count, config.steps * samples))
+        self._log = np.zeros((count, 3, config.steps))  # set-point, speed, moment
+        self._times = config.sample_times
+        self._stated_speed = np.zeros(count)
+        self._speed = np.zeros(count)
+        self.step_count = np.zeros(count, dtype=np.int64)
+        self.ended = np.ones(count, dtype=np.bool_)  # nothing is running before the first reset
+
+    def start(
+        self, row: int, options: Mapping[str, Any] | None, rng: np.random.Generator
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode.
+
+        Args:
+            row: index among the many.
+            options: of ``reset``.
+            rng: of this episode and those after it.
+
+        Returns:
+            First observation, and info.
+
+        Raises:
+            EnvError: when an option is refused.
+        """
+        plan = plan_run(options, self._config, self._rig, rng)
+        stated = plan.stated()
+        try:
+            physics = apply_effects(stated, plan.effects, rng)
+            end_angle = self._engine.start(row, physics)
+        except TunnelError as error:
+            raise as_env_error(error, "reset options") from error
+        chain = SensorChain(stated, plan.sensor, plan.effects, rng)
+        self._place(row, plan, physics, chain, rng)
+        self._information.start(row, self._nominal(plan))
+        self._stated_speed[row] = self._speed[row] = plan.condition.wind_speed
+        self.step_count[row], self.ended[row] = 0, False
+        observation = self._observation(row, self._held(chain, end_angle, rng))
+        info: dict[str, Any] = dict(plan.statement())
+        if self._config.expose_truth:
+            info["truth"] = plan
+        return observation, info
+
+    def _place(
+        self, row: int, plan: RunPlan, physics: RunSettings, chain: SensorChain, rng: np.random.Generator
+    ) -> None:
+        self._plans[row], self._physics[row], self._chains[row], self._rngs[row] = plan, physics, chain, rng
+        self._sensor[:, row, 0] = chain.sensor.zero, chain.sensor.noise_std, chain.sensor.resolution
+        self._bent = [i for i, one in enumerate(self._chains) if one is not None and not one.is_plain]
+
+    def _nominal(self, plan: RunPlan) -> NominalRun:
+        truth, condition, body = plan.truth, plan.condition, self._rig.body
+        return NominalRun(
+            spring_stiffness=condition.spring_stiffness,
+            yaw_inertia=truth.yaw_inertia,
+            mechanical_damping=truth.mechanical_damping,
+            cn_beta=truth.cn_beta,
+            cn_r=truth.cn_r,
+            air_density=condition.air_density,
+            frontal_area=body.frontal_area,
+            reference_length=body.length,
+        )
+
+    def _held(self, chain: SensorChain, angle: float, rng: np.random.Generator) -> Array:
+        """Readings of the control period before the release; their noise is no part of the run's."""
+        samples, sensor = self._config.samples_per_step, chain.sensor
+        time = (np.arange(samples) - samples) / self._config.sample_rate
+        noise = rng.spawn(1)[0].standard_normal(samples)
+        held = chain.held(np.full(samples, angle), time)
+        return quantise(chain.reading(held + sensor.zero + sensor.noise_std * noise), sensor.resolution)
+
+    def _observation(self, row: int, readings: Array) -> Array:
+        time = self.step_count[row] * self._config.control_period
+        shown = np.clip(readings, -READING_BOUND, READING_BOUND)
+        return np.concatenate((shown, (min(time, self._config.duration), self._speed[row])))
+
+    def advance(self, actions: Any) -> tuple[Array, Array, Array, Array]:
+        """Move every episode by one control period, those that have ended as well.
+
+        Args:
+            actions: shape (runs,) or (runs, 2), as the preset has it.
+
+        Returns:
+            Observations of shape (runs, samples + 2), rewards (nats), terminations and truncations of shape
+            (runs,).
+
+        Raises:
+            EnvError: when an action is refused.
+        """
+        speeds, moment = self._operate(actions)
+        operation = None
+        if self._config.preset == "operator":
+            operation = Operation(speeds - self._stated_speed[:, None], moment)
+        angle, rate = self._engine.advance(operation)
+        wild = ~(np.max(np.abs(angle), axis=1) <= self._limit)
+        if wild.any():
+            angle, rate = (np.nan_to_num(np.clip(values, -1e3, 1e3)) for values in (angle, rate))
+        readings = self._read(angle[:, :-1])
+        rewards = self._information.advance(angle, rate, speeds.mean(axis=1), moment)
+        self.step_count += 1
+        observations = np.empty((self._count, self._config.samples_per_step + 2))
+        np.clip(readings, -READING_BOUND, READING_BOUND, out=observations[:, :-2])
+        observations[:, -2] = np.minimum(self.step_count * self._config.control_period, self._config.duration)
+        observations[:, -1] = self._speed
+        truncated = ~wild & (self.step_count >= self._config.steps)
+        self.ended |= wild | truncated
+        return observations, rewards, wild, truncated
+
+    def _operate(self, actions: Any) -> tuple[Array, Array]:
+        """Speeds over the sample intervals and moments; keeps the log."""
+        if self._config.preset == "plain":
+            check_plain(actions, self._count)
+            still = np.broadcast_to(self._speed[:, None], (self._count, self._config.samples_per_step))
+            return still, np.zeros(self._count)
+        set_point, moment = decode(self._config, actions)
+        if len(moment) != self._count:
+            raise EnvError(f"{len(moment)} actions for {self._count} runs", remedy="give one per run")
+        speeds, self._speed = self._wind.speeds(self._speed, set_point)
+        at = np.minimum(self.step_count, self._config.steps - 1)
+        self._log[np.arange(self._count), :, at] = np.stack((set_point, self._speed, moment), axis=1)
+        return speeds, moment
+
+    def _read(self, angle: Array) -> Array:
+        """The next readings of all runs, as `read_motion` makes them."""
+        samples = self._config.samples_per_step
+        noise = np.zeros_like(angle)
+        for row in np.flatnonzero(~self.ended):  # a run that has ended leaves its generator as it is
+            self._rngs[row].standard_normal(out=noise[row])
+        first = np.minimum(self.step_count, self._config.steps - 1) * samples
+        if self._bent:
+            angle = angle.copy()
+        for row in self._bent:
+            times = self._times[first[row] : first[row] + samples]
+            angle[row] = self._chains[row].angle(angle[row], times)  # type: ignore[union-attr]
+        zero, noise_std, resolution = self._sensor
+        readings = angle + zero + noise_std * noise
+        for row in self._bent:
+            readings[row] = self._chains[row].reading(readings[row])  # type: ignore[union-attr]
+        step = np.where(resolution > 0.0, resolution, 1.0)
+        readings = np.where(resolution > 0.0, np.round(readings / step) * step, readings)
+        if (first == first[0]).all():
+            self._readings[:, first[0] : first[0] + samples] = readings
+        else:
+            columns = first[:, None] + np.arange(samples)
+            self._readings[np.arange(self._count)[:, None], columns] = readings
+        return readings
+
+    def outcome(self, row: int) -> dict[str, Any]:
+        """What ``info`` holds at the end of an episode.
+
+        Args:
+            row: index among the many.
+
+        Returns:
+            ``record``; ``run`` in the plain preset, ``operator_log`` in the other; ``truth`` where exposed.
+        """
+        plan, record = self._plan(row), self.record(row)
+        info: dict[str, Any] = {"record": record}
+        if self._config.preset == "plain":
+            info["run"] = self.run(row)
+        else:
+            steps = int(self.step_count[row])
+            time = np.arange(steps) * self._config.control_period
+            info["operator_log"] = OperatorLog(time, *(values[:steps].copy() for values in self._log[row]))
+        if self._config.expose_truth:
+            info["truth"] = plan
+        return info
+
+    def record(self, row: int) -> Record:
+        """The reading of a run so far.
+
+        Args:
+            row: index among the many.
+
+        Returns:
+            The record, whole where the run has ended.
+
+        Raises:
+            EnvError: before the first step.
+        """
+        count = int(self.step_count[row]) * self._config.samples_per_step
+        if count < 2:
+            raise EnvError("there is no reading yet", where="record", remedy="call step() first")
+        return Record(self._times[:count], self._readings[row, :count])
+
+    def run(self, row: int) -> Run:
+        """A run so far as a campaign lists it; arguments as in `record`."""
+        return self._plan(row).run(self.record(row))
+
+    def _plan(self, row: int) -> RunPlan:
+        plan = self._plans[row]
+        if plan is None:
+            raise EnvError("no episode has begun", remedy="call reset() first")
+        return plan
+
+    def matrix(self, row: int) -> Array:
+        """The Fisher information so far; arguments and result as in `Information.matrix`."""
+        return self._information.matrix(row)
+
+    def get_state(self, row: int) -> EpisodeState:
+        """All that an episode in progress is.
+
+        Args:
+            row: index among the many.
+
+        Returns:
+            The state; it shares nothing with the episode.
+        """
+        plan, physics = self._plan(row), self._physics[row]
+        assert physics is not None
+        own = {
+            "readings": self._readings[row],
+            "log": self._log[row],
+            "speed": self._speed[row],
+            "step_count": self.step_count[row],
+            "ended": self.ended[row],
+        }
+        arrays = {name: np.array(value) for name, value in own.items()} | self._information.snapshot(row)
+        chain, rng = copy.deepcopy((self._chains[row], self._rngs[row]))
+        assert chain is not None
+        return EpisodeState(plan, physics, self._engine.get_state(row), arrays, chain, rng)
+
+    def set_state(self, row: int, state: EpisodeState) -> np.random.Generator:
+        """Put an episode into a state taken from an environment of the same configuration.
+
+        Args:
+            row: index among the many.
+            state: from `get_state`.
+
+        Returns:
+            The episode's generator from now on.
+
+        Raises:
+            EnvError: when the state is of another configuration.
+        """
+        if np.shape(state.arrays["readings"]) != self._readings[row].shape:
+            raise EnvError("the state is of another configuration", remedy="make the environment alike")
+        self._engine.start(row, state.physics)
+        self._engine.set_state(row, state.mujoco)
+        chain, rng = copy.deepcopy((state.sensor, state.rng))
+        self._place(row, state.plan, state.physics, chain, rng)
+        self._information.restore(row, self._nominal(state.plan), state.arrays)
+        self._readings[row], self._log[row] = state.arrays["readings"], state.arrays["log"]
+        self._speed[row], self._stated_speed[row] = state.arrays["speed"], state.plan.condition.wind_speed
+        self.step_count[row], self.ended[row] = state.arrays["step_count"], state.arrays["ended"]
+        return rng

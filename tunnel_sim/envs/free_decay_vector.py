@@ -1,0 +1,223 @@
+"""Many runs of ``tunnel_sim/FreeDecay-v0`` at once on ``mujoco.batch``: the native vector environment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from tunnel_sim.envs.config import free_decay_config
+from tunnel_sim.envs.controls import action_space
+from tunnel_sim.envs.engines import ManyRuns, Models
+from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space
+from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs.free_decay import render_fps
+from tunnel_sim.envs.rendering import RigView
+from tunnel_sim.record import Array
+
+
+class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
+    """Runs side by side; each with the bits of `FreeDecayEnv` with its own seed.
+
+    A run that has ended begins anew in the next step (``AutoresetMode.NEXT_STEP``), with everything drawn.
+
+    Args:
+        num_envs: number of runs.
+        render_mode: ``rgb_array`` or None.
+        max_episode_steps: runs are truncated after so many steps; None: at their end only.
+        nthread: threads; 0 takes all processors. The result is the same to the bit whatever the number.
+        width: of a picture, pixels.
+        height: of a picture, pixels.
+        camera: name of a camera of ``mjcf/rig.xml``.
+        **arguments: fields of `FreeDecayConfig`.
+
+    Raises:
+        EnvError: when an argument is unknown or out of range.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": ["rgb_array"],
+        "render_fps": 100,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        render_mode: str | None = None,
+        max_episode_steps: int | None = None,
+        nthread: int = 0,
+        width: int = 480,
+        height: int = 480,
+        camera: str = "overview",
+        **arguments: Any,
+    ) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise EnvError(f"unknown mode {render_mode!r}", where="render_mode", remedy="use 'rgb_array'")
+        self.config = free_decay_config(arguments)
+        self.rig = self.config.rig()
+        self.metadata = {**self.metadata, "render_fps": render_fps(self.config.control_period)}  # type: ignore[misc]
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self._most_steps = max_episode_steps
+        self.single_observation_space = observation_space(self.config)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.single_action_space = action_space(self.config)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        models = Models(self.rig, self.config.sample_rate)
+        self._engine = ManyRuns(models, self.config.samples_per_step, num_envs, nthread)
+        self._episodes = Episodes(self.config, self.rig, self._engine, num_envs)
+        self._rngs: list[np.random.Generator | None] = [None] * num_envs
+        self._view = RigView(self.rig, render_mode, width, height, camera, self.config.control_period)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,  # type: ignore[override]
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin all runs, or those of a mask.
+
+        Args:
+            seed: one for each run, or the first of consecutive ones, or None, as in ``SyncVectorEnv``.
+            options: as in `FreeDecayEnv.reset`, for all runs; ``reset_mask``, a boolean array, begins only
+                some of them; ``runs``, a sequence, gives each run options of its own, over the common ones.
+
+        Returns:
+            Observations of all runs, those not begun anew as zeros with a mask; and infos.
+
+        Raises:
+            EnvError: when an option, mask or seed is refused.
+        """
+        common = dict(options or {})
+        mask = self._mask(common.pop("reset_mask", None))
+        each = self._each(common.pop("runs", None))
+        seeds = self._seeds(seed)
+        observations = np.zeros(self.observation_space.shape or ())
+        infos: dict[str, Any] = {}
+        for row in np.flatnonzero(mask):
+            if seeds[row] is not None or self._rngs[row] is None:
+                self._rngs[row], _ = seeding.np_random(seeds[row])
+            observations[row], infos = self._start(int(row), {**common, **each[row]}, infos)
+        return observations, infos
+
+    def _start(
+        self, row: int, options: Mapping[str, Any] | None, infos: dict[str, Any]
+    ) -> tuple[Array, dict[str, Any]]:
+        rng = self._rngs[row]
+        assert rng is not None
+        observation, info = self._episodes.start(row, options, rng)
+        return observation, self._add_info(infos, info, row)
+
+    def _mask(self, mask: Any) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        if mask is None:
+            return np.ones(self.num_envs, dtype=np.bool_)
+        values = np.asarray(mask)
+        if values.shape != (self.num_envs,) or values.dtype != np.bool_ or not values.any():
+            raise EnvError(
+                f"reset_mask is no boolean array of {self.num_envs} with a True in it",
+                where="option reset_mask",
+                remedy="give one boolean per run",
+            )
+        return values
+
+    def _each(self, runs: Any) -> Sequence[Mapping[str, Any]]:
+        if runs is None:
+            return [{}] * self.num_envs
+        if not isinstance(runs, Sequence) or len(runs) != self.num_envs:
+            raise EnvError(
+                f"runs is no sequence of {self.num_envs}",
+                where="option runs",
+                remedy="give one mapping per run",
+            )
+        return runs
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + row for row in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise EnvError(
+                f"{len(seed)} seeds for {self.num_envs} runs", where="seed", remedy="give one per run"
+            )
+        return seed
+
+    def step(self, actions: Any) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
+        """Go on for one control period; runs that ended in the step before begin anew instead.
+
+        Args:
+            actions: of ``action_space``; that of a run that begins anew is not used.
+
+        Returns:
+            Observations, information gained (nats), terminations, truncations and infos.
+
+        Raises:
+            EnvError: when an action is outside the space, or nothing was reset yet.
+        """
+        if any(rng is None for rng in self._rngs):
+            raise EnvError("no run is in progress", where="step", remedy="call reset() first")
+        renewed = np.flatnonzero(self._episodes.ended)
+        observations, rewards, terminated, truncated = self._episodes.advance(actions)
+        if self._most_steps is not None:
+            truncated |= self._episodes.step_count >= self._most_steps
+            self._episodes.ended |= truncated
+        infos: dict[str, Any] = {}
+        for row in renewed:
+            observations[row], infos = self._start(int(row), None, infos)
+            rewards[row], terminated[row], truncated[row] = 0.0, False, False
+        for row in np.flatnonzero(terminated | truncated):
+            infos = self._add_info(infos, self._episodes.outcome(int(row)), int(row))
+        return observations, rewards, terminated, truncated, infos
+
+    def get_state(self, index: int) -> EpisodeState:
+        """The state of one run, also for `FreeDecayEnv.set_state`.
+
+        Args:
+            index: of the run.
+
+        Returns:
+            The state.
+        """
+        return self._episodes.get_state(index)
+
+    def set_state(self, index: int, state: EpisodeState) -> None:
+        """Put one run into a state.
+
+        Args:
+            index: of the run.
+            state: from an environment of the same configuration.
+
+        Raises:
+            EnvError: when the state is of another configuration.
+        """
+        self._rngs[index] = self._episodes.set_state(index, state)
+
+    def information(self, index: int) -> Array:
+        """The Fisher information of one run so far.
+
+        Args:
+            index: of the run.
+
+        Returns:
+            Shape (7, 7), as `FreeDecayEnv.information`.
+        """
+        return self._episodes.matrix(index)
+
+    def render(self) -> tuple[Any, ...] | None:
+        """A picture of every run; arguments and result as in `FreeDecayEnv.render`."""
+        if self.render_mode is None:
+            return None
+        return tuple(self._view.draw(*self._engine.pose(row)) for row in range(self.num_envs))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the drawing's context.
+
+        Args:
+            **kwargs: not used.
+        """
+        del kwargs
+        self._view.close()
