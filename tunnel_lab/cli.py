@@ -13,7 +13,18 @@ from typing import Annotated, cast
 
 import typer
 
-from tunnel_lab.commands import blind, demo, diagnose, effects, identify, plot, simulate, springs, sweep
+from tunnel_lab.commands import (
+    blind,
+    demo,
+    diagnose,
+    effects,
+    identify,
+    plot,
+    score,
+    simulate,
+    springs,
+    sweep,
+)
 from tunnel_sim.errors import TunnelError
 
 BAD_INPUT = 2
@@ -63,6 +74,7 @@ def tunnel(
       tunnel plot c                      its figures
       tunnel effects                     what a plan may add to the model
       tunnel blind                       checks of the diagnosis, truth sealed
+      tunnel score                       how good each estimator is, and where not
       tunnel sweep sweep.toml --out s    many campaigns, resumable
 
     [bold]Units[/bold]
@@ -77,7 +89,7 @@ def tunnel(
         typer.echo(context.get_help())
 
 
-for _command in (demo, simulate, identify, diagnose, plot, springs, effects, sweep):
+for _command in (demo, simulate, identify, diagnose, plot, springs, effects, score, sweep):
     app.command(_command.NAME)(_command.run)
 app.add_typer(blind.app, name=blind.NAME)
 

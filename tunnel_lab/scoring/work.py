@@ -166,22 +166,61 @@ def score_grid(
     """
     units = units_of(grid)
     mark = fingerprint(grid.to_json_dict(), estimators)
-    done = {} if parts is None else {unit: rows for unit in units if (rows := _kept(parts, unit.name, mark))}
-    total = sum(unit.stop - unit.first for unit in units)
+    sizes = {unit.name: unit.stop - unit.first for unit in units}
 
-    def tell() -> None:
+    def tell(names: Sequence[str]) -> None:
         if progress is not None:
-            progress(sum(unit.stop - unit.first for unit in done), total)
+            progress(sum(sizes[name] for name in names), sum(sizes.values()))
 
-    tell()
-    left = [unit for unit in units if unit not in done]
-    for unit, rows in in_processes(partial(score_unit, grid, tuple(estimators)), left, jobs):
-        if parts is not None:
-            write_json(output_folder(parts) / f"{unit.name}.json", {"fingerprint": mark, "rows": rows})
-        done[unit] = rows
-        tell()
+    done = resumed(
+        partial(score_unit, grid, tuple(estimators)),
+        {unit.name: unit for unit in units},
+        mark,
+        jobs=jobs,
+        parts=parts,
+        tell=tell,
+    )
     order = sorted(units, key=lambda unit: (unit.cell, unit.first))
-    return [row for unit in order for row in done[unit]]
+    return [row for unit in order for row in done[unit.name]]
+
+
+def resumed(
+    work: Callable[[ItemT], list[Row]],
+    items: Mapping[str, ItemT],
+    mark: str,
+    *,
+    jobs: int,
+    parts: Path | None,
+    tell: Callable[[Sequence[str]], None],
+) -> dict[str, list[Row]]:
+    """Do work in processes, keeping what is done, and leave out what was done before.
+
+    Args:
+        work: what to do; a function of a module.
+        items: what to do it to, by the names of their files.
+        mark: what was kept under another mark is done again, see `fingerprint`.
+        jobs: number of processes; 0 works in this one.
+        parts: folder for what is done; None keeps nothing.
+        tell: told the names of all that is done, at the start and whenever there is more.
+
+    Returns:
+        The rows of every item, by name.
+    """
+    done: dict[str, list[Row]] = {}
+    for name in items if parts is not None else ():
+        rows = None if parts is None else _kept(parts, name, mark)
+        if rows is not None:
+            done[name] = rows
+    tell(tuple(done))
+    names = {id(item): name for name, item in items.items()}
+    left = [item for name, item in items.items() if name not in done]
+    for item, rows in in_processes(work, left, jobs):
+        name = names[id(item)]
+        if parts is not None:
+            write_json(output_folder(parts) / f"{name}.json", {"fingerprint": mark, "rows": rows})
+        done[name] = rows
+        tell(tuple(done))
+    return done
 
 
 def in_processes(
@@ -206,7 +245,7 @@ def in_processes(
         ProcessPoolExecutor(min(jobs, len(items)), mp_context=context, initializer=_die_quietly) as pool,
     ):
         try:
-            waiting = {pool.submit(work, item): item for item in items}
+            waiting = {pool.submit(work, item): item for item in items}  # items need not be hashable
             for finished in as_completed(waiting):
                 yield waiting[finished], finished.result()
         except BaseException:  # an interruption above all: nobody waits for what nobody will read

@@ -1,0 +1,261 @@
+"""``tunnel score``: estimators against records of known truth, and against their own past."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from tunnel_lab.scoring.grid import Grid
+    from tunnel_lab.scoring.results import Results
+
+NAME = "score"
+PACKAGED = "packaged"
+"""The word for the baseline that is installed."""
+
+
+def run(
+    grid: Annotated[
+        Path | None,
+        typer.Argument(help="Grid of conditions, TOML. Default: the packaged one, or the baseline's own."),
+    ] = None,
+    estimators: Annotated[
+        list[str] | None,
+        typer.Option("--estimator", "-e", metavar="NAME", help="Score only these. Default: all."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FOLDER", help="Keep trials and scores (Parquet) and a figure here."),
+    ] = None,
+    trials: Annotated[
+        int | None, typer.Option("--trials", min=2, help="Records in each cell, in place of the grid's.")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", min=0, help="Other records than the grid's seed draws.")
+    ] = None,
+    jobs: Annotated[
+        int, typer.Option("--jobs", min=0, help="Processes; 0 works in this one. It changes no figure.")
+    ] = 2,
+    cells: Annotated[bool, typer.Option("--cells", help="Show every cell, too.")] = False,
+    check: Annotated[
+        str | None,
+        typer.Option(
+            "--check", metavar="BASELINE", help="Exit with 1 when an estimator got worse; or 'packaged'."
+        ),
+    ] = None,
+    write_baseline: Annotated[
+        Path | None, typer.Option("--write-baseline", metavar="FILE", help="Write the trials as a baseline.")
+    ] = None,
+    breakdown: Annotated[
+        bool,
+        typer.Option("--breakdown", help="Map the bias under each of the 23 unmodelled effects instead."),
+    ] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a finished score in the folder.")
+    ] = False,
+) -> None:
+    """Score estimators: bias, RMSE over the Cramér–Rao bound, coverage, failures, time.
+
+    Every estimator sees the same simulated records: single decays over ζ,
+    frequency (Hz), noise and length (s), and campaigns over wind speed (m/s),
+    with effects on or off. With --out an interrupted score goes on where it
+    ended; the same seed gives the same figures, whatever the number of
+    processes (the milliseconds apart).
+
+    --check compares with a baseline in five aspects: bias, spread, outliers,
+    coverage and failures. All its tests together raise a false alarm once in a
+    hundred checks. Without a grid, the baseline's own records are scored, so
+    that unchanged code compares to the last bit.
+
+    --breakdown puts each of the 23 unmodelled effects into a campaign of twelve
+    runs of the reference simulator, 1 and 10 times as strong as the noise, and
+    shows the bias of Cnβ and Cnr in % and in reported standard deviations
+    (three realisations, or --trials). Allow some minutes.
+
+    [bold]Examples[/bold]
+      tunnel score
+      tunnel score grid.toml --out scores --trials 200
+      tunnel score --estimator output_error --write-baseline base.parquet
+      tunnel score --check base.parquet
+      tunnel score --check packaged --estimator conventional
+      tunnel score --breakdown --out map
+
+    [bold]Exit status[/bold]
+      0 scored (and no worse), 1 an estimator got worse, 2 bad input,
+      130 interrupted (what is done stays in --out).
+    """
+    from tunnel_lab.scoring import check as checking
+    from tunnel_lab.scoring import tables
+    from tunnel_lab.scoring.results import Results, write_trials
+    from tunnel_lab.tables import say, show_tables
+
+    names = chosen(estimators)
+    if breakdown:
+        _refuse_of_the_grid({"GRID": grid, "--check": check, "--write-baseline": write_baseline})
+        _refuse_occupied(out, overwrite)
+        _breakdown(names, out, jobs, 1 if seed is None else seed, trials)
+        return
+    baseline = None if check is None else _baseline(check, names, everything=not estimators)
+    wanted = _grid(grid, baseline, trials, seed)
+    _refuse_occupied(out, overwrite)
+    _refuse_unwritable(write_baseline)
+    results = Results(wanted, names, tuple(_rows(wanted, names, jobs, out)))
+    show_tables(*tables.summary_tables(results))
+    if cells:
+        show_tables(*tables.cell_tables(results))
+    say(tables.ABOUT)
+    for name, kinds in results.raised().items():
+        say(f"Note: {name} raised {', '.join(kinds)}; counted as failures")
+    if out is not None:
+        _keep(out, results)
+    if write_baseline is not None:
+        say(f"Written: {write_trials(write_baseline, results)}")
+    if baseline is not None:
+        verdict = checking.check(baseline, results)
+        say("")
+        show_tables(tables.worse_table(verdict))
+        for line in tables.verdict_lines(verdict):
+            say(line)
+        if not verdict.passed:
+            raise typer.Exit(1)
+
+
+def chosen(names: list[str] | None) -> tuple[str, ...]:
+    """The estimators to score.
+
+    Args:
+        names: as typed; several may stand in one word, with commas. None takes all.
+
+    Returns:
+        Names of the registry, each once.
+
+    Raises:
+        TunnelError: when one is unknown, with the closest name.
+    """
+    from identification.estimators import ALL_ESTIMATORS
+    from tunnel_lab.commands.identify import known_estimator
+
+    if not names:
+        return ALL_ESTIMATORS
+    given = [part.strip() for word in names for part in word.split(",")]
+    for name in given:
+        known_estimator(name)
+    return tuple(dict.fromkeys(given))
+
+
+def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results:
+    from importlib import resources
+
+    from tunnel_lab.scoring.results import read_trials
+    from tunnel_sim.errors import TunnelError
+
+    if text == PACKAGED:
+        with resources.as_file(resources.files("tunnel_lab") / "data" / "score-baseline.parquet") as path:
+            baseline = read_trials(path)
+    else:
+        baseline = read_trials(Path(text))
+    gone = [name for name in baseline.estimators if name not in names]
+    if everything and gone:
+        raise TunnelError(
+            f"the baseline knows {', '.join(gone)}, which the registry does not",
+            where="--check",
+            remedy="write a new baseline with --write-baseline, or name what to score with --estimator",
+        )
+    return baseline
+
+
+def _grid(path: Path | None, baseline: Results | None, trials: int | None, seed: int | None) -> Grid:
+    from tunnel_lab.scoring.grid import load_grid, packaged_grid
+
+    grid = baseline.grid if baseline is not None else packaged_grid()
+    if path is not None:
+        grid = load_grid(path)
+    if trials is not None:
+        grid = replace(grid, trials=trials)
+    return grid if seed is None else replace(grid, seed=seed)
+
+
+def _rows(grid: Grid, names: tuple[str, ...], jobs: int, out: Path | None) -> list[dict[str, object]]:
+    from tunnel_lab.progress import bar
+    from tunnel_lab.scoring.work import score_grid
+
+    parts = None if out is None else out / "parts"
+    with bar("scoring") as tell:
+        return score_grid(grid, names, jobs=jobs, parts=parts, progress=lambda n, all_: tell(n, all_, ""))
+
+
+def _keep(out: Path, results: Results) -> None:
+    import shutil
+
+    from tunnel_lab.files import write_whole
+    from tunnel_lab.plots import save
+    from tunnel_lab.scoring.figures import score_figure
+    from tunnel_lab.scoring.results import parquet, scores_frame, write_trials
+    from tunnel_lab.tables import say
+
+    written = (
+        write_trials(out / "trials.parquet", results),
+        write_whole(out / "scores.parquet", parquet(scores_frame(results))),
+        save(score_figure(results), out / "score.png"),
+    )
+    shutil.rmtree(out / "parts", ignore_errors=True)
+    for path in written:
+        say(f"Written: {path}")
+
+
+def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
+    """Only an interrupted score may be in the folder, or, with ``overwrite``, a finished one."""
+    from tunnel_sim.errors import TunnelError
+
+    if out is None or not out.exists():
+        return
+    if not out.is_dir():
+        raise TunnelError("is a file, not a folder", where=str(out), remedy="name another --out")
+    if any(path.name != "parts" for path in out.iterdir()) and not overwrite:
+        raise TunnelError("exists already", where=str(out), remedy="name another --out or add --overwrite")
+
+
+def _refuse_unwritable(path: Path | None) -> None:
+    from tunnel_lab.commands.diagnose import refuse_unwritable
+
+    if path is not None:
+        refuse_unwritable(path)
+
+
+def _refuse_of_the_grid(given: dict[str, object]) -> None:
+    """The breakdown map has conditions of its own."""
+    from tunnel_sim.errors import TunnelError
+
+    for name, value in given.items():
+        if value is not None:
+            raise TunnelError("does not go with --breakdown", where=name, remedy="leave one of them out")
+
+
+def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, trials: int | None) -> None:
+    import shutil
+
+    from tunnel_lab.files import write_whole
+    from tunnel_lab.plots import save
+    from tunnel_lab.progress import bar
+    from tunnel_lab.scoring import breakdown as work
+    from tunnel_lab.scoring import breakdown_view as view
+    from tunnel_lab.scoring.results import parquet
+    from tunnel_lab.tables import console, say, show_tables
+
+    terminal = console(stderr=True).is_terminal
+    cases = work.make_cases(seed, realisations=trials or work.REALISATIONS, tell_steps=terminal)
+    parts = None if out is None else out / "parts"
+    with bar("scoring") as tell:
+        rows = work.break_down(
+            cases, names, seed, jobs=jobs, parts=parts, progress=lambda n, all_: tell(n, all_, "")
+        )
+    found = work.biases(rows)
+    show_tables(*(view.breakdown_table(found, quantity) for quantity in view.SHOWN))
+    say(view.ABOUT)
+    if out is not None:
+        say(f"Written: {write_whole(out / 'breakdown.parquet', parquet(work.breakdown_frame(found)))}")
+        say(f"Written: {save(view.breakdown_figure(found), out / 'breakdown.png')}")
+        shutil.rmtree(out / "parts", ignore_errors=True)

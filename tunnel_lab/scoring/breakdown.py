@@ -1,0 +1,311 @@
+"""Where estimators break: the bias that each unmodelled effect causes.
+
+The truth is the reference simulator's, which shares no numerics with estimators or model: a campaign of twelve
+runs on three springs, the textbook's form of every effect sized so that it leaves 1 and 10 times the noise's power
+after the nominal refit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import radians
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification.estimate import Quantity
+from identification.scoring import Outcome, Score, collect, score
+from tunnel_lab.scoring.work import Row, Told, estimate_rows, fingerprint, resumed
+from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.reference.conditions import Conditions
+from tunnel_sim.reference.draw import CampaignDraw, EffectDraw
+from tunnel_sim.reference.forms import forms_of
+from tunnel_sim.reference.make import as_campaign
+from tunnel_sim.reference.severity import Simulated, read_and_fit, simulate_motions, size_effects
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from tunnel_sim.campaign import Campaign
+
+NO_EFFECT = "no effect"
+SEVERITIES = (1.0, 10.0)
+"""Mean squared residual of the nominal refit over the noise's power, less one."""
+QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
+EFFECTS: tuple[str, ...] = tuple(kind.name for kind in ALL_EFFECTS)
+REALISATIONS = 3
+TRUTH = {"cn_beta": 0.49, "cn_r": -0.11, "yaw_inertia": 0.1014, "mechanical_damping": 0.012}
+NOISE = 5e-4  # rad
+
+_SPRINGS, _SPEEDS = (16.12, 35.02, 51.88), (0.0, 15.0, 25.0)
+_DENSITY = 1.204
+_RUNS = (
+    *((spring, speed, 20.0) for spring in _SPRINGS for speed in _SPEEDS),
+    (16.12, 0.0, 8.0),
+    (16.12, 25.0, 8.0),
+    (35.02, 20.0, 14.0),
+)  # N m/rad, m/s, degrees
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A campaign under one effect, or none.
+
+    Args:
+        effect: its name, or ``no effect``.
+        severity: noise powers it was sized for; 0 for no effect.
+        reached: noise powers it leaves after the reference's own nominal refit (a ratio).
+        realisation: number of the realisation, from 0.
+        campaign: what estimators see.
+        bound: Cramér–Rao bound of the nominal model by quantity, SI.
+    """
+
+    effect: str
+    severity: float
+    reached: float
+    realisation: int
+    campaign: Campaign
+    bound: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        """Of its file."""
+        return f"{self.effect.replace(' ', '_')}-{self.severity:g}-{self.realisation}"
+
+
+def conditions_of(seed: int, *, duration: float = 10.0) -> Conditions:
+    """The campaign all effects act in.
+
+    Args:
+        seed: of the angles actually released from.
+        duration: of every run, s.
+    """
+    springs, speeds, degrees = (np.array(column) for column in zip(*_RUNS, strict=True))
+    release = np.round(np.radians(degrees), 4)
+    start = release * (1.0 + 0.03 * np.random.default_rng(seed).standard_normal(release.size))
+    return Conditions(
+        spring_stiffness=springs, wind_speed=speeds, release_angle=release, start_angle=start,
+        air_density=_DENSITY, duration=duration, noise_std=NOISE, zero=radians(0.2), **TRUTH,
+    )  # fmt: skip
+
+
+def make_cases(
+    seed: int,
+    *,
+    realisations: int = REALISATIONS,
+    effects: Sequence[str] = EFFECTS,
+    severities: Sequence[float] = SEVERITIES,
+    duration: float = 10.0,
+    tell_steps: bool = False,
+) -> list[Case]:
+    """Size the effects and simulate their campaigns.
+
+    Realisations differ in the noise, and in the forcing where it is random; the sign of an effect that has one is
+    positive.
+
+    Args:
+        seed: of everything random.
+        realisations: number of campaigns for each effect and severity.
+        effects: names.
+        severities: noise powers to leave after the nominal refit, as ratios.
+        duration: of every run, s.
+        tell_steps: say on standard error how sizing goes.
+
+    Returns:
+        The campaign without effect first, then effects in their order, severities and realisations.
+    """
+    conditions = conditions_of(seed, duration=duration)
+    nothing = CampaignDraw("none", conditions, (), 0)
+    sized = size_effects(
+        [_draw(conditions, name, severity, seed) for name in effects for severity in severities],
+        progress=tell_steps,
+    )
+    several = [_realise(draw, i, seed) for draw in (nothing, *sized) for i in range(realisations)]
+    # A motion that hangs on nothing random is integrated once.
+    moving = [draw for i, draw in enumerate(several) if i % realisations == 0 or _random(draw)]
+    motions = iter(simulate_motions(moving))
+    cases = []
+    motion = None
+    for i, draw in enumerate(several):
+        if motion is None or i % realisations == 0 or _random(draw):
+            motion = next(motions)
+        cases.append(_case(draw, read_and_fit(draw, motion), i % realisations))
+    return cases
+
+
+def _draw(conditions: Conditions, name: str, severity: float, seed: int) -> CampaignDraw:
+    form = forms_of(name)[0]
+    rng = np.random.default_rng([seed, EFFECTS.index(name)])
+    extra = {key: float(value) for key, value in form.draw(rng, conditions).items()}
+    effect = EffectDraw(form, extra, max(form.signs), severity, form.start)
+    return CampaignDraw("single", conditions, (effect,), seed)
+
+
+def _random(draw: CampaignDraw) -> bool:
+    return any("seed" in effect.extra for effect in draw.effects)
+
+
+def _realise(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
+    """Another noise, and another forcing where it is random."""
+    name = draw.effects[0].form.family if draw.effects else NO_EFFECT
+    key = EFFECTS.index(name) if draw.effects else len(EFFECTS)
+    rng = np.random.default_rng([seed, key, number, 1])
+    noise = int(rng.integers(2**62))
+    effects = draw.effects
+    if _random(draw) and number > 0:
+        other = {"seed": float(rng.integers(0, 2**31))}
+        effects = tuple(replace(effect, extra=effect.extra | other) for effect in effects)
+    return replace(draw, effects=effects, seed=noise)
+
+
+def _case(draw: CampaignDraw, simulated: Simulated, number: int) -> Case:
+    from identification.cramer_rao import campaign_bound
+
+    campaign = as_campaign(simulated, "breakdown")
+    starts = [(float(angle), 0.0) for angle in draw.conditions.start_angle]
+    noise = float(np.sqrt(draw.conditions.noise_power))
+    bound = campaign_bound(campaign, **TRUTH, noise_std=noise, initial_states=starts)
+    return Case(
+        effect=draw.effects[0].form.family if draw.effects else NO_EFFECT,
+        severity=draw.effects[0].target if draw.effects else 0.0,
+        reached=simulated.excess,
+        realisation=number,
+        campaign=campaign,
+        bound={name: bound.std(name) for name in QUANTITIES},
+    )
+
+
+def break_down(
+    cases: Sequence[Case],
+    estimators: Sequence[str],
+    seed: int,
+    *,
+    jobs: int = 2,
+    parts: Path | None = None,
+    progress: Told | None = None,
+) -> list[Row]:
+    """Every estimator on every case.
+
+    Args:
+        cases: of `make_cases`.
+        estimators: names in the registry.
+        seed: the cases were made with.
+        jobs: number of processes; 0 works in this one.
+        parts: folder for what is done, so that it can go on after an interruption; None keeps nothing.
+        progress: told cases done and their number.
+
+    Returns:
+        A row for each case, estimator and quantity, in this order.
+    """
+    named = {case.name: case for case in cases}
+    mark = fingerprint({"breakdown": sorted(named), "seed": seed}, estimators)
+    done = resumed(
+        partial(_estimate_case, tuple(estimators)),
+        named,
+        mark,
+        jobs=jobs,
+        parts=parts,
+        tell=lambda names: None if progress is None else progress(len(names), len(named)),
+    )
+    return [row for name in named for row in done[name]]
+
+
+def _estimate_case(estimators: Sequence[str], case: Case) -> list[Row]:
+    about = {
+        "effect": case.effect,
+        "severity": case.severity,
+        "reached": case.reached,
+        "realisation": case.realisation,
+    }
+    return [
+        row for name in estimators for row in estimate_rows(name, case.campaign, TRUTH, case.bound, about)
+    ]
+
+
+@dataclass(frozen=True)
+class Bias:
+    """What one effect does to one estimator's answer.
+
+    Args:
+        effect: its name, or ``no effect``.
+        severity: noise powers it was sized for; 0 for no effect.
+        reached: noise powers it leaves on the average of the realisations (a ratio).
+        estimator: its name.
+        quantity: by name.
+        score: over the realisations.
+        departs: share of the realisations in which the estimator said that the model departs.
+    """
+
+    effect: str
+    severity: float
+    reached: float
+    estimator: str
+    quantity: str
+    score: Score
+    departs: float
+
+
+def biases(rows: Sequence[Row]) -> list[Bias]:
+    """Rows added up over realisations.
+
+    Args:
+        rows: of `break_down`.
+
+    Returns:
+        In the order of the rows.
+    """
+    groups: dict[tuple[str, float, str, str], list[Row]] = {}
+    for row in rows:
+        key = (row["effect"], row["severity"], row["estimator"], row["quantity"])
+        groups.setdefault(key, []).append(row)
+    return [
+        Bias(
+            effect, severity, float(np.mean([row["reached"] for row in some])), estimator, quantity,
+            score(collect(_outcome(row) for row in some)),
+            float(np.mean([row["status"] == "model_departs" for row in some])),
+        )
+        for (effect, severity, estimator, quantity), some in groups.items()
+    ]  # fmt: skip
+
+
+def _outcome(row: Row) -> Outcome:
+    found = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
+    return Outcome(row["truth"], found, row["bound"])
+
+
+def breakdown_frame(found: Sequence[Bias]) -> pl.DataFrame:
+    """The map as a table.
+
+    Args:
+        found: of `biases`.
+
+    Returns:
+        A row for each effect, severity, estimator and quantity; units in the columns' names.
+    """
+    import polars as pl
+
+    return pl.DataFrame([_record(one) for one in found], infer_schema_length=None)
+
+
+def _record(one: Bias) -> dict[str, Any]:
+    judged = one.score
+    relative, in_stds = judged.relative_bias, judged.bias_in_stds
+    return {
+        "effect": one.effect,
+        "severity_noise_powers": one.severity,
+        "reached_noise_powers": one.reached,
+        "estimator": one.estimator,
+        "quantity": one.quantity,
+        "realisations": judged.count,
+        "failures": judged.failures.count,
+        "bias_percent": None if relative is None else relative.value,
+        "bias_percent_std_error": None if relative is None else relative.std,
+        "bias_in_stds": None if in_stds is None else in_stds.value,
+        "bias_in_stds_std_error": None if in_stds is None else in_stds.std,
+        "rmse_over_bound": None if judged.rmse_over_bound is None else judged.rmse_over_bound.value,
+        "covered": None if judged.coverage is None else judged.coverage.count,
+        "model_departs_share": one.departs,
+    }
