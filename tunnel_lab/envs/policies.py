@@ -93,10 +93,11 @@ def separating(known: Knowledge) -> Action:
         known: the study, and what stands on the rig now.
 
     Returns:
-        The action; while no gap shows, the next of the script.
+        The action; the next of the script while no gap shows, or the runs so far had no wind: what they do not
+        hold, their models cannot predict.
     """
     rivals = None if known.study is None else best_rivals(known.study)
-    if rivals is None:
+    if rivals is None or not rivals[0].problem.data.wind_on:
         return scripted(known)
     best, chosen = 0.0, None
     for action in known.conditions.menu.actions():

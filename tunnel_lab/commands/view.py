@@ -1,0 +1,80 @@
+"""``tunnel view``: the rig live, in a window or in a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tunnel_lab.commands.render import EFFECT_HELP, PLAN_HELP, RUN_HELP
+
+NAME = "view"
+
+
+def run(
+    plan: Annotated[Path | None, typer.Argument(help=PLAN_HELP)] = None,
+    run_id: Annotated[str | None, typer.Option("--run", metavar="ID", help=RUN_HELP)] = None,
+    spring: Annotated[int | None, typer.Option("--spring", help="Number of the spring in Table II.")] = None,
+    wind: Annotated[float | None, typer.Option("--wind", help="Wind speed, m/s.")] = None,
+    angle: Annotated[float | None, typer.Option("--angle", help="Release angle, degrees.")] = None,
+    duration: Annotated[float | None, typer.Option("--duration", help="Until the next release, s.")] = None,
+    effect: Annotated[
+        list[str] | None, typer.Option("--effect", metavar="NAME:PARAMETER=VALUE", help=EFFECT_HELP)
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed of what effects draw.")] = None,
+    speed: Annotated[
+        float, typer.Option("--speed", min=0.01, max=100.0, help="Factor on real time; the window only.")
+    ] = 1.0,
+    camera: Annotated[
+        str, typer.Option("--camera", help="overview, above or side; the window only.")
+    ] = "overview",
+    web: Annotated[bool, typer.Option("--web", help="Show it in a browser instead of a window.")] = False,
+    port: Annotated[
+        int, typer.Option("--port", min=0, max=65535, help="Of --web; 0 takes the first free from 8080 on.")
+    ] = 0,
+    browser: Annotated[bool, typer.Option("--browser", help="With --web: open a browser's tab.")] = False,
+) -> None:
+    """Watch the rig live: the model swings in real time and is released anew when the run is over.
+
+    In the window (MuJoCo's viewer) space pauses, R releases anew, the mouse turns
+    the view; a figure shows the angle. It needs a display.
+
+    --web serves the same to a browser (MuJoCo Studio's web viewer, WebGL 2), with
+    pause, speed and reset there. It needs no display, listens on all network
+    interfaces and asks for no password: use it in a network that you trust.
+
+    [bold]Examples[/bold]
+      tunnel view
+      tunnel view plan.toml --run s5-v10-a20 --speed 0.5
+      tunnel view --spring 8 --effect coulomb_friction:friction_moment=0.01
+      tunnel view --web --port 8080
+
+    [bold]Exit status[/bold]
+      0 closed, 2 bad input, no display or no free port, 130 interrupted.
+    """
+    from tunnel_lab.commands.render import checked_camera
+    from tunnel_lab.shown_run import Request, shown_run
+    from tunnel_lab.viewing import view_in_browser, view_in_window
+    from tunnel_sim.errors import TunnelError
+
+    request = Request(
+        plan=None if plan is None else str(plan),
+        run=run_id,
+        spring=spring,
+        wind_speed=wind,
+        release_angle_deg=angle,
+        duration=duration,
+        effects=tuple(effect or ()),
+        seed=seed,
+    )
+    if not web and (port or browser):
+        raise TunnelError(
+            "is for the browser only", where="--port" if port else "--browser", remedy="add --web"
+        )
+    name = checked_camera(camera)
+    shown = shown_run(request)
+    if web:
+        view_in_browser(shown, port=port, open_browser=browser)
+    else:
+        view_in_window(shown, camera=name, speed=speed)

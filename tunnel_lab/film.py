@@ -1,0 +1,236 @@
+"""A film of a run: the swinging body beside the trace of its angle.
+
+Frames are rendered off-screen, as `tunnel_lab.rendering` does it: in a process of their own, one OpenGL back
+end after another. The trace is drawn twice, faint and full; every frame shows the full one up to the present.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_lab.files import write_whole
+from tunnel_lab.rendering import REMEDY, backends
+from tunnel_lab.shown_run import Request, ShownRun, shown_run
+from tunnel_sim.errors import TunnelError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from tunnel_sim.model import Model
+
+Image = NDArray[np.uint8]
+CAMERAS = ("overview", "above", "side")
+BODY_SHARE = 0.52
+"""Share of the width that the body's picture takes."""
+FIRST_FRAME_S = 60.0
+"""A back end that has not drawn its first frame by now is taken to hang, s."""
+_SHADOW, _SAMPLES = (
+    2048,
+    4,
+)  # of a moving picture: a quarter of the still's time, no difference to see in motion
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a run is shown.
+
+    Args:
+        width: pixels, even.
+        height: pixels, even.
+        fps: frames per second of the film.
+        speed: of the film; 0.5 is half as fast as the run.
+        camera: of ``mjcf/rig.xml``.
+    """
+
+    width: int = 1280
+    height: int = 720
+    fps: int = 25
+    speed: float = 1.0
+    camera: str = "overview"
+
+    def frame_times(self, duration: float) -> NDArray[np.float64]:
+        """When the frames are, in the run's own time.
+
+        Args:
+            duration: of the run, s.
+
+        Returns:
+            s from the release, shape (frames,).
+        """
+        return np.arange(max(1, int(duration * self.fps / self.speed))) * self.speed / self.fps
+
+
+def write_film(
+    request: Request, look: Look, path: Path, progress: Callable[[int, int], None] | None = None
+) -> None:
+    """Write a run as MP4 (H.264), whole or not at all.
+
+    Args:
+        request: which run.
+        look: how.
+        path: the file; replaced when it exists.
+        progress: called with (frames done, frames in all).
+
+    Raises:
+        TunnelError: when the machine cannot render off-screen, or the file cannot be written.
+    """
+    _draw_elsewhere(request, look, path, None, progress)
+
+
+def write_still(request: Request, look: Look, path: Path, at: float) -> None:
+    """Write one frame of the film as PNG, whole or not at all.
+
+    Args:
+        request: which run.
+        look: how.
+        path: the file; replaced when it exists.
+        at: s from the release.
+
+    Raises:
+        TunnelError: likewise; also when the run is over by then.
+    """
+    duration = shown_run(request).settings.duration
+    if not 0.0 <= at <= duration:
+        raise TunnelError(f"{at:g} s is not in the run", where="--at", remedy=f"give 0 to {duration:g} s")
+    _draw_elsewhere(request, look, path, at, None)
+
+
+def _draw_elsewhere(
+    request: Request, look: Look, path: Path, at: float | None, progress: Callable[[int, int], None] | None
+) -> None:
+    """Have a process of its own draw into a temporary folder, then move what it drew to its place."""
+    order = {"request": request.to_json_dict(), "look": asdict(look), "at": at}
+    reasons = []
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / f"drawn{'.png' if at is not None else '.mp4'}"
+        for backend in backends():
+            reason = _one_backend(backend, {**order, "path": str(target)}, progress)
+            if not reason:
+                write_whole(path, target.read_bytes())
+                return
+            reasons.append(f"{backend or 'default'}: {reason}")
+    raise TunnelError(f"off-screen rendering does not work here ({'; '.join(reasons)})", remedy=REMEDY)
+
+
+def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, int], None] | None) -> str:
+    """Draw with one back end; returns empty when it drew, else why not."""
+    environment = {**os.environ, "MUJOCO_GL": backend} if backend else dict(os.environ)
+    with tempfile.TemporaryFile("w+") as errors:
+        child = subprocess.Popen(  # our own interpreter and module, no shell
+            [sys.executable, "-m", "tunnel_lab.film", json.dumps(order)],
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+        )
+        try:
+            silent = _follow(child, progress)
+        finally:  # also when interrupted: nothing is left behind
+            if child.poll() is None:
+                child.kill()
+            child.wait()
+        if silent:
+            return f"no answer in {FIRST_FRAME_S:.0f} s"
+        if child.returncode == 0:
+            return ""
+        errors.seek(0)
+        said = errors.read().strip().splitlines()
+    return (said or [f"ended with status {child.returncode}"])[-1][:80]
+
+
+def _follow(child: subprocess.Popen[str], progress: Callable[[int, int], None] | None) -> bool:
+    """Read the child's progress until it ends; whether it stayed silent too long."""
+    import threading
+
+    silent = threading.Event()
+
+    def give_up() -> None:
+        silent.set()
+        child.kill()
+
+    patience = threading.Timer(FIRST_FRAME_S, give_up)
+    patience.start()
+    try:
+        assert child.stdout is not None
+        for line in child.stdout:
+            patience.cancel()
+            done, _, total = line.partition("/")
+            if progress is not None and total.strip().isdigit():
+                progress(int(done), int(total))
+        child.wait()
+    finally:
+        patience.cancel()
+    return silent.is_set()
+
+
+def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Image]:
+    """Pictures of the run; needs OpenGL in this process.
+
+    Args:
+        run: what is shown.
+        look: how.
+        times: ascending, shape (frames,), s from the release.
+
+    Yields:
+        RGB, shape (height, width, 3).
+    """
+    import mujoco
+
+    from tunnel_lab.film_trace import draw_trace
+    from tunnel_sim.model import build_model
+
+    model = build_model(run.rig, run.settings)
+    left = 2 * round(BODY_SHARE * look.width / 2)
+    trace = draw_trace(run.record(), look.width - left, look.height, run.title)
+    _prepare(model, left, look.height)
+    data = model.release_state()
+    with mujoco.Renderer(model.mj, look.height, left) as renderer:
+        for time in times:
+            steps = round(time / run.settings.timestep) - round(data.time / run.settings.timestep)
+            if steps > 0:
+                mujoco.mj_step(model.mj, data, steps)
+            mujoco.mj_forward(model.mj, data)
+            renderer.update_scene(data, camera=look.camera)
+            yield np.concatenate((renderer.render(), trace.at(float(time))), axis=1)
+
+
+def _prepare(model: Model, width: int, height: int) -> None:
+    model.mj.vis.global_.offwidth = max(width, model.mj.vis.global_.offwidth)
+    model.mj.vis.global_.offheight = max(height, model.mj.vis.global_.offheight)
+    model.mj.vis.quality.shadowsize = _SHADOW
+    model.mj.vis.quality.offsamples = _SAMPLES
+
+
+def _draw(order: dict[str, Any]) -> None:
+    """Draw in this process; what goes wrong ends it."""
+    run = shown_run(Request.from_json_dict(order["request"]))
+    look, path = Look(**order["look"]), Path(order["path"])
+    if order["at"] is not None:
+        from matplotlib import image
+
+        (picture,) = frames(run, look, np.array([float(order["at"])]))
+        image.imsave(path, picture, format="png")
+        return
+    import imageio.v2 as imageio
+
+    times = look.frame_times(run.settings.duration)
+    with imageio.get_writer(
+        path, format="FFMPEG", mode="I", fps=look.fps, codec="libx264", quality=7, macro_block_size=2
+    ) as writer:
+        for number, frame in enumerate(frames(run, look, times), 1):
+            writer.append_data(frame)
+            print(f"{number}/{len(times)}", flush=True)
+
+
+if __name__ == "__main__":
+    _draw(json.loads(sys.argv[1]))

@@ -1,0 +1,134 @@
+"""The rig live: a run that goes on in real time and is released anew when it is over."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+from tunnel_lab.shown_run import ShownRun
+from tunnel_sim.model import build_model, build_spec
+from tunnel_sim.record import Array
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+class LiveRun:
+    """A run of the rig with its whole physics, plugin included.
+
+    Args:
+        run: what is shown.
+    """
+
+    def __init__(self, run: ShownRun) -> None:
+        self.run = run
+        self.model = build_model(run.rig, run.settings)
+        self.data = self.model.release_state()
+        self._released = self.model.release_state()
+        mujoco.mj_forward(self.model.mj, self.data)
+
+    def release(self) -> None:
+        """Hold the body at its angle and let go again."""
+        mujoco.mj_copyData(self.data, self.model.mj, self._released)
+        mujoco.mj_forward(self.model.mj, self.data)
+
+    def advance(self, seconds: float) -> None:
+        """Go on; a run that is over is released anew.
+
+        Args:
+            seconds: of the run, s.
+        """
+        self.advance_by(lambda: mujoco.mj_step(self.model.mj, self.data, self._steps(seconds)))
+
+    def advance_by(self, step: Callable[[], object]) -> None:
+        """Go on as somebody else's clock has it; a run that is over is released anew.
+
+        Args:
+            step: advances ``data``, or leaves it where it is.
+        """
+        if self.data.time >= self.run.settings.duration:
+            self.release()
+        step()
+
+    def _steps(self, seconds: float) -> int:
+        return max(0, round(seconds / self.model.mj.opt.timestep))
+
+    @property
+    def angle(self) -> float:
+        """Of the spring's and sensor's end now, rad."""
+        return float(self.data.qpos[self.model.yaw_address])
+
+
+class Puppet:
+    """The same bodies without the engine plugin, for viewers that do not have it (a browser).
+
+    Args:
+        live: whose pose it takes.
+    """
+
+    def __init__(self, live: LiveRun) -> None:
+        spec = build_spec(live.run.rig, live.run.settings)
+        for sensor in [sensor for sensor in spec.sensors if sensor.type == mujoco.mjtSensor.mjSENS_PLUGIN]:
+            spec.delete(sensor)
+        for plugin in list(spec.plugins):
+            spec.delete(plugin)
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.follow(live)
+
+    def follow(self, live: LiveRun) -> None:
+        """Take the pose of the run.
+
+        Args:
+            live: the run.
+        """
+        pose(self.data, live.data)
+        mujoco.mj_forward(self.model, self.data)
+
+
+def pose(target: mujoco.MjData, source: mujoco.MjData) -> None:
+    """Copy time, positions and rates; the two models have the same joints.
+
+    Args:
+        target: takes them.
+        source: gives them.
+    """
+    target.time = source.time
+    target.qpos[:] = source.qpos
+    target.qvel[:] = source.qvel
+
+
+class History:
+    """The last seconds of the angle, for a figure in the viewer.
+
+    Args:
+        span: s.
+        points: number of points kept.
+    """
+
+    def __init__(self, span: float = 10.0, points: int = 500) -> None:
+        self._interval = span / points
+        self._points = points
+        self._times: list[float] = []
+        self._angles: list[float] = []
+
+    def add(self, time: float, angle: float) -> None:
+        """Take a point in, unless the last one is too near; a time before the last begins anew.
+
+        Args:
+            time: s from the release.
+            angle: rad.
+        """
+        if self._times and time < self._times[-1]:
+            self._times, self._angles = [], []
+        if self._times and time - self._times[-1] < self._interval:
+            return
+        self._times = [*self._times[1 - self._points :], time]
+        self._angles = [*self._angles[1 - self._points :], angle]
+
+    @property
+    def points(self) -> Array:
+        """Time [s] and angle [rad], shape (n, 2)."""
+        return np.column_stack((self._times, self._angles))
