@@ -76,6 +76,12 @@ ENTRIES: tuple[Entry, ...] = (
         "LogDecrement",
         "weighted regression of the logarithms of all peaks, run by run: the hand method at its best",
     ),
+    Entry(
+        "hilbert",
+        "identification.estimators.hilbert",
+        "Hilbert",
+        "envelope and phase, run by run; its windows are damping and frequency against amplitude",
+    ),
 )
 
 ALL_ESTIMATORS: tuple[str, ...] = tuple(entry.name for entry in ENTRIES)

@@ -1,0 +1,148 @@
+"""Hilbert envelope: decay rate from the logarithm of the envelope, frequency from the phase.
+
+Both are weighted lines over half-cycle averages of the analytic signal, whose deviations follow from the
+noise: √2 S/(√m A) for the logarithm and the phase alike. The ends are handled by carrying the record on with
+the decay found so far (see `identification.envelope`). Short stretches of the same lines give
+ζ and ωn against the amplitude, the backbone of the rig, which stands in the run's windows; where a line does
+not fit a run, its deviations are raised to the scatter about it.
+
+Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018; backbone
+from free decays: J. M. Londoño, S. A. Neild & J. E. Cooper, J. Sound Vib. 348 (2015) 224–238,
+doi 10.1016/j.jsv.2015.03.025.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.assembly import RunDecay, estimate_by_runs
+from identification.damped_oscillation import Decay
+from identification.decay_fit import Reading, project_run
+from identification.envelope import Envelope, envelope
+from identification.estimate import Estimate, Quantity, Status, WindowEstimate
+from identification.noise import white_noise
+from identification.run_fit import describe_run, judge
+from identification.start import starting_decay
+from identification.weighted_line import WeightedFit, decay_covariance, weighted_fit
+from identification.windows import CYCLES, modal_quantities
+from tunnel_sim.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.record import Array
+
+_PASSES = 3  # each carries the record on with the decay of the one before
+_LEAST_POINTS = 5
+_LEAST_AMPLITUDE = 4.0  # in deviations of an average
+_LEAST_WINDOW_ENERGY = 400.0  # over the power of the noise, as in other windows
+
+
+@dataclass(frozen=True)
+class Hilbert:
+    """Regression of the envelope's logarithm and of the phase.
+
+    Args:
+        cycles_per_window: periods in each window of the backbone; 0 gives none.
+    """
+
+    name: ClassVar[str] = "hilbert"
+    cycles_per_window: int = CYCLES
+
+    def estimate(self, campaign: Campaign) -> Estimate:
+        """Identify every run from its envelope, then the campaign from the runs.
+
+        Args:
+            campaign: at least one run.
+
+        Returns:
+            The estimate. A run that could not be identified is left out; windows are the backbone.
+
+        Raises:
+            TunnelError: when a wind-on run states no air density.
+        """
+        return estimate_by_runs(campaign, self.name, self._run)
+
+    def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
+        start = starting_decay(run.record)
+        if start is None:
+            return RunDecay.failed(run, Status.NO_OSCILLATION)
+        reading = Reading.from_record(run.record)
+        noise_std = white_noise(reading.yaw, sensor)
+        decay, covariance, seen = start, None, None
+        for _ in range(_PASSES):
+            projected = project_run(reading, decay) if decay.omega_d > 0.0 else None
+            if projected is None:
+                return RunDecay.failed(run, Status.NOT_CONVERGED)
+            seen = envelope(reading, *projected)
+            lines = _lines(seen, decay, noise_std)
+            if lines is None:
+                break
+            decay, covariance = lines
+        projected = project_run(reading, decay) if decay.stiffness > 0.0 else None
+        if projected is None or seen is None:
+            return RunDecay.failed(run, Status.NOT_CONVERGED)
+        fitted, zero = projected
+        _, failure = judge(reading, fitted, zero, sensor)
+        if failure is not None or covariance is None:
+            return RunDecay.failed(run, failure or Status.NOT_CONVERGED)
+        windows = _backbone(seen, noise_std, self.cycles_per_window)
+        estimate = describe_run(run, reading, fitted, zero, covariance, noise_std**2, windows=windows)
+        return RunDecay(estimate, decay, covariance)
+
+
+def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array] | None:
+    # The decay and the covariance of (a, k). Weights follow the line, not the noisy envelope itself.
+    deviation = noise_std * np.sqrt(2.0 / seen.samples)
+    scale = float(np.exp(np.mean(np.log(seen.amplitude[:4]) + decay.rate * seen.time[:4])))
+    expected = scale * np.exp(-decay.rate * seen.time)
+    found = None
+    for _ in range(2):
+        below = np.flatnonzero(expected < _LEAST_AMPLITUDE * deviation)
+        count = int(below[0]) if below.size else expected.size
+        if count < _LEAST_POINTS:
+            return None
+        found = _two_lines(seen, slice(0, count), deviation / expected[:count])
+        expected = np.exp(found[0].values[0] - found[0].values[1] * seen.time)
+    return None if found is None else _decay(seen, *found)
+
+
+def _two_lines(seen: Envelope, part: slice, deviation: Array) -> tuple[WeightedFit, WeightedFit]:
+    columns = np.column_stack((np.ones(deviation.size), -seen.time[part]))
+    logarithm = weighted_fit(columns, np.log(seen.amplitude[part]), deviation**2)
+    return logarithm, weighted_fit(columns, seen.phase[part], deviation**2)
+
+
+def _decay(seen: Envelope, logarithm: WeightedFit, phase: WeightedFit) -> tuple[Decay, Array]:
+    rate, omega_d = float(logarithm.values[1]), seen.carrier - float(phase.values[1])
+    covariance = decay_covariance(
+        rate, omega_d, float(logarithm.covariance[1, 1]), float(phase.covariance[1, 1])
+    )
+    return Decay(rate, omega_d**2 + rate**2), covariance
+
+
+def _backbone(seen: Envelope, noise_std: float, cycles: int) -> tuple[WindowEstimate, ...]:
+    # Lines through consecutive stretches of the envelope; two averages to the cycle.
+    windows: list[WindowEstimate] = []
+    length = 2 * cycles
+    deviation = noise_std * np.sqrt(2.0 / seen.samples)
+    step = float(seen.time[1] - seen.time[0])
+    for begin in range(0, seen.time.size - length + 1, length or 1):
+        part = slice(begin, begin + length)
+        amplitude = float(np.exp(np.log(seen.amplitude[part]).mean())) if length else 0.0
+        if 0.5 * length * seen.samples * amplitude**2 < _LEAST_WINDOW_ENERGY * noise_std**2:
+            break
+        decay, covariance = _decay(seen, *_two_lines(seen, part, np.full(length, deviation / amplitude)))
+        if decay.stiffness <= 0.0:
+            break
+        omega_n, zeta = modal_quantities(decay, covariance)
+        windows.append(
+            WindowEstimate(
+                start_s=float(seen.time[begin] - 0.5 * step),
+                duration_s=length * step,
+                amplitude=Quantity(amplitude, float(deviation / np.sqrt(length)), "rad"),
+                omega_n=omega_n,
+                zeta=zeta,
+                cycles=cycles,
+            )
+        )
+    return tuple(windows)
