@@ -167,7 +167,7 @@ def expected_belief(
 
     Args:
         belief: what is known now.
-        link: of the run, see `run_link`.
+        link: of the run, see `run_link`, shape (2, 4).
         time: its sample times since the release, shape (n,), s.
         angle: of the release, rad.
         noise_std: of the reading, quantisation included, rad.

@@ -20,10 +20,12 @@ from tunnel_lab.commands import (
     effects,
     identify,
     plot,
+    render,
     score,
     simulate,
     springs,
     sweep,
+    view,
 )
 from tunnel_sim.errors import TunnelError
 
@@ -76,6 +78,8 @@ def tunnel(
       tunnel blind                       checks of the diagnosis, truth sealed
       tunnel score                       how good each estimator is, and where not
       tunnel sweep sweep.toml --out s    many campaigns, resumable
+      tunnel view                        the rig live, in a window or browser
+      tunnel render                      a film of a run, and a picture
 
     [bold]Units[/bold]
       SI and radians throughout.
@@ -89,7 +93,7 @@ def tunnel(
         typer.echo(context.get_help())
 
 
-for _command in (demo, simulate, identify, diagnose, plot, springs, effects, score, sweep):
+for _command in (demo, simulate, identify, diagnose, plot, springs, effects, score, sweep, view, render):
     app.command(_command.NAME)(_command.run)
 app.add_typer(blind.app, name=blind.NAME)
 

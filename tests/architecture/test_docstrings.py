@@ -20,7 +20,18 @@ PACKAGES = ("tunnel_sim", "identification", "tunnel_lab")
 # Typer turns the arguments of a command into its help; test_cli.py reads that.
 COMMANDS = {
     f"tunnel_lab.commands.{name}.run"
-    for name in ("demo", "simulate", "identify", "diagnose", "plot", "springs", "effects", "sweep")
+    for name in (
+        "demo",
+        "simulate",
+        "identify",
+        "diagnose",
+        "plot",
+        "springs",
+        "effects",
+        "sweep",
+        "view",
+        "render",
+    )
 } | {f"tunnel_lab.commands.blind.{name}" for name in ("make", "diagnose", "score")}
 EXEMPT = {"tunnel_lab.cli.tunnel", *COMMANDS}
 # The reference simulator is a test oracle with conventions of its own, not an interface.

@@ -53,8 +53,8 @@ def run(
     [bold]Exit status[/bold]
       0 written, 2 bad input or no way to render here; nothing is written then.
     """
-    from tunnel_lab.film import Look, write_still
-    from tunnel_lab.shown_run import Request, shown_run
+    from tunnel_lab.show.film import Look, write_still
+    from tunnel_lab.show.request import Request, shown_run
     from tunnel_lab.tables import say
 
     targets = _targets(out)
@@ -82,8 +82,8 @@ def _film(request: object, look: object, path: Path) -> None:
     """Write the film under a progress bar, where standard error is a terminal."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from tunnel_lab.film import Look, write_film
-    from tunnel_lab.shown_run import Request
+    from tunnel_lab.show.film import Look, write_film
+    from tunnel_lab.show.request import Request
     from tunnel_lab.tables import console
 
     assert isinstance(request, Request)
@@ -134,7 +134,7 @@ def checked_camera(name: str) -> str:
     Raises:
         TunnelError: when the rig has no such camera.
     """
-    from tunnel_lab.film import CAMERAS
+    from tunnel_lab.show.film import CAMERAS
     from tunnel_sim.errors import TunnelError, did_you_mean
 
     if name not in CAMERAS:

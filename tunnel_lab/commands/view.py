@@ -54,8 +54,7 @@ def run(
       0 closed, 2 bad input, no display or no free port, 130 interrupted.
     """
     from tunnel_lab.commands.render import checked_camera
-    from tunnel_lab.shown_run import Request, shown_run
-    from tunnel_lab.viewing import view_in_browser, view_in_window
+    from tunnel_lab.show.request import Request, shown_run
     from tunnel_sim.errors import TunnelError
 
     request = Request(
@@ -75,6 +74,10 @@ def run(
     name = checked_camera(camera)
     shown = shown_run(request)
     if web:
+        from tunnel_lab.show.web import view_in_browser
+
         view_in_browser(shown, port=port, open_browser=browser)
     else:
+        from tunnel_lab.show.window import view_in_window
+
         view_in_window(shown, camera=name, speed=speed)

@@ -51,7 +51,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         severities: the effects the diagnosis answers with, each with the range its severity is drawn from, in
             its unit; the diagnosis preset only.
         targets: relative standard deviations (fractions) of Cnβ and Cnr at which an identification ends.
-        probability: of one effect at which a diagnosis ends.
+        probability: of one effect (a probability) at which a diagnosis ends.
         costs: rig time of a run.
         seconds_per_nat: how much rig time a nat is worth, s.
         max_runs: after so many the episode is truncated.
@@ -238,7 +238,7 @@ def reached(known: Knowledge, targets: tuple[float, float], probability: float) 
     Args:
         known: what the runs have told.
         targets: relative standard deviations of Cnβ and Cnr (fractions), where there is no vocabulary.
-        probability: of one effect alone, where there is one.
+        probability: of one effect alone (a probability), where there is a vocabulary.
     """
     if not known.choices:
         return False

@@ -45,7 +45,7 @@ def picture(known: Knowledge, targets: tuple[float, float], probability: float) 
     Args:
         known: any.
         targets: relative standard deviations of Cnβ and Cnr, fractions.
-        probability: that ends a diagnosis.
+        probability: that ends a diagnosis (a probability).
 
     Returns:
         RGB, shape (480, 960, 3).

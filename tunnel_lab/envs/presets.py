@@ -62,7 +62,7 @@ PRESETS = {
         severities=MappingProxyType(
             {
                 "quadratic_damping": (0.003, 0.006),
-                "nonlinear_yaw_damping": (30.0, 60.0),
+                "nonlinear_yaw_damping": (60.0, 120.0),
                 "cubic_stiffness": (0.2, 0.4),
                 "nonlinear_yaw_moment": (4.0, 8.0),
             }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from tunnel_lab.shown_run import ShownRun
+from tunnel_lab.show.request import ShownRun
 from tunnel_sim.model import build_model, build_spec
 from tunnel_sim.record import Array
 

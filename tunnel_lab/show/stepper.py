@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 from mujoco.studio import messages, step_control
 
-from tunnel_lab.live import LiveRun, pose
+from tunnel_lab.show.live import LiveRun, pose
 
 _YIELD_S = 1e-3  # as Studio's own stepper: else the loop starves the viewer's threads
 

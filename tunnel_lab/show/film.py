@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from tunnel_lab.files import write_whole
 from tunnel_lab.rendering import REMEDY, backends
-from tunnel_lab.shown_run import Request, ShownRun, shown_run
+from tunnel_lab.show.request import Request, ShownRun, shown_run
 from tunnel_sim.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Look:
         width: pixels, even.
         height: pixels, even.
         fps: frames per second of the film.
-        speed: of the film; 0.5 is half as fast as the run.
+        speed: of the film as a ratio; 0.5 is half as fast as the run.
         camera: of ``mjcf/rig.xml``.
     """
 
@@ -127,7 +127,7 @@ def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, i
     environment = {**os.environ, "MUJOCO_GL": backend} if backend else dict(os.environ)
     with tempfile.TemporaryFile("w+") as errors:
         child = subprocess.Popen(  # our own interpreter and module, no shell
-            [sys.executable, "-m", "tunnel_lab.film", json.dumps(order)],
+            [sys.executable, "-m", "tunnel_lab.show.film", json.dumps(order)],
             env=environment,
             stdout=subprocess.PIPE,
             stderr=errors,
@@ -186,7 +186,7 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
     """
     import mujoco
 
-    from tunnel_lab.film_trace import draw_trace
+    from tunnel_lab.show.trace import draw_trace
     from tunnel_sim.model import build_model
 
     model = build_model(run.rig, run.settings)
