@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnosis.noise import Noise
-from diagnosis.result import RunGap
+from diagnosis.result import Confirmation, RunGap
 from tunnel_sim.campaign import Campaign
 
 _FEW = 3
@@ -15,19 +15,22 @@ _CONTRADICTED = 3.0
 _NUMERICS = 1e-5
 
 
-def cautions(campaign: Campaign, noise: Noise, runs: Sequence[RunGap], *, named: bool) -> tuple[str, ...]:
+def cautions(
+    campaign: Campaign, noise: Noise, runs: Sequence[RunGap], confirmation: Confirmation, *, named: bool
+) -> tuple[str, ...]:
     """Say what is missing for a firm answer.
 
     Args:
         campaign: the runs.
         noise: found in them, rad².
         runs: which of them could be held out.
+        confirmation: whether the fits' integrator agrees with the MuJoCo model.
         named: whether effects are named, so that there is something to hold runs out of.
 
     Returns:
         Sentences; none where nothing is missing.
     """
-    found = [*_stiffness(campaign), *_reference(campaign), *_noise(noise)]
+    found = [*_stiffness(campaign), *_reference(campaign), *_noise(noise), *_integrators(confirmation)]
     if len(campaign.runs) < _FEW:
         number = "one run" if len(campaign.runs) == 1 else f"{len(campaign.runs)} runs"
         found.append(
@@ -93,4 +96,20 @@ def _noise(noise: Noise) -> list[str]:
     return [
         f"{said}, and noise above the stated counts as a gap. If that is how the sensor is, correct noise_std or "
         f"leave it out."
+    ]
+
+
+def _integrators(confirmation: Confirmation) -> list[str]:
+    if confirmation.failure:
+        return [
+            f"The MuJoCo model could not follow the fitted motion ({confirmation.failure}), so the figures are "
+            f"those of the fits' own integrator alone. Do not rely on the parameters fitted."
+        ]
+    if confirmation.agrees:
+        return []
+    return [
+        f"The fits' own integrator departs from the MuJoCo model by {confirmation.rms_difference:.1e} rad (root "
+        f"mean square over {confirmation.run}), more than a tenth of the noise ({confirmation.tolerance:.1e} rad). "
+        f"The gap before and after is MuJoCo's; parameters and probabilities are the fits' and may be off by as "
+        f"much."
     ]

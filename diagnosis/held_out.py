@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.data import Data, RunData
-from diagnosis.least_squares import Fit, FitError, fit, fit_releases
+from diagnosis.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.problem import Point, Problem
 from tunnel_sim.record import Array
 
 _FOLDS = 3
+_RELEASE_STEPS = 4  # with the slopes of nearly the same parameters, two do
+_RELEASE_GAIN = 1e-6  # of a run's χ² that a step must save
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,14 +21,22 @@ class HeldOut:
     """Prediction of runs left out of the fit.
 
     Args:
-        excess: by run id: mean squared scaled residual minus one, only the run's release refitted.
+        residuals: by run id: reading minus prediction in noise standard deviations, only the run's own
+            parameters refitted.
+        points: by run id: the common parameters found without it, and its own.
         common: the common parameters found without each fold, shape (folds, common).
         names: of the common parameters.
     """
 
-    excess: dict[str, float]
+    residuals: dict[str, Array]
+    points: dict[str, tuple[Array, Array]]
     common: Array
     names: tuple[str, ...]
+
+    @property
+    def excess(self) -> dict[str, float]:
+        """By run id: mean squared scaled residual minus one."""
+        return {run: float(np.mean(residual**2)) - 1.0 for run, residual in self.residuals.items()}
 
 
 def folds(data: Data, count: int = _FOLDS) -> list[tuple[str, ...]]:
@@ -74,7 +84,8 @@ def predict_held_out(whole: Fit) -> HeldOut:
         The excess of every run that could be left out.
     """
     data = whole.problem.data
-    excess: dict[str, float] = {}
+    residuals: dict[str, Array] = {}
+    points: dict[str, tuple[Array, Array]] = {}
     found = []
     ids = [run.id for run in data.runs]
     for group in folds(data):
@@ -88,7 +99,7 @@ def predict_held_out(whole: Fit) -> HeldOut:
                 tolerance=1e-3,
                 max_iterations=6,
             )
-            left = fit_releases(
+            released, left = refit_releases(
                 _restricted(whole.problem, [ids[i] for i in out]),
                 Point(smaller.point.common, whole.point.release[out]),
                 [whole.jacobian[i][1] for i in out],
@@ -96,10 +107,37 @@ def predict_held_out(whole: Fit) -> HeldOut:
         except (FitError, np.linalg.LinAlgError):
             continue
         found.append(smaller.point.common)
-        for i, residual in zip(out, left, strict=True):
-            excess[ids[i]] = float(np.mean(residual**2)) - 1.0
+        for k, i in enumerate(out):
+            residuals[ids[i]] = left[k]
+            points[ids[i]] = (released.common, released.release[k])
     common = np.array(found) if found else np.zeros((0, len(whole.problem.names)))
-    return HeldOut(excess, common, whole.problem.names)
+    return HeldOut(residuals, points, common, whole.problem.names)
+
+
+def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple[Point, list[Array]]:
+    """Fit only what each run has of its own: release and phases.
+
+    Args:
+        problem: runs and effects.
+        start: common parameters, which stay, and releases to start from.
+        slopes: derivatives of the scaled prediction to each run's own parameters, shape (n, own), from a fit of
+            about the same parameters.
+
+    Returns:
+        The point found, each run at its own best, and the scaled residuals there by run.
+    """
+    best, residuals = start, scaled_residuals(problem, start)
+    for _ in range(_RELEASE_STEPS):
+        steps = [np.linalg.lstsq(s, r, rcond=1e-10)[0] for s, r in zip(slopes, residuals, strict=True)]
+        trial = Point(best.common, best.release + np.stack(steps))
+        moved = scaled_residuals(problem, trial)
+        gains = [float(r @ r - m @ m) for r, m in zip(residuals, moved, strict=True)]
+        better = [gain > _RELEASE_GAIN * float(r @ r) for gain, r in zip(gains, residuals, strict=True)]
+        if not any(better):
+            break
+        best = Point(best.common, np.where(np.array(better)[:, None], trial.release, best.release))
+        residuals = [m if keep else r for m, r, keep in zip(moved, residuals, better, strict=True)]
+    return best, residuals
 
 
 def _restricted(problem: Problem, ids: list[str]) -> Problem:

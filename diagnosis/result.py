@@ -128,6 +128,39 @@ class Coefficients:
 
 
 @dataclass(frozen=True)
+class Confirmation:
+    """How far the fits' integrator and the MuJoCo model agree on what is reported.
+
+    Args:
+        agrees: whether every run's difference is within the tolerance, and MuJoCo could predict them all.
+        largest_difference: of any block mean of any run, rad.
+        run: id of the run that is closest to its tolerance, or farthest beyond it.
+        rms_difference: root mean square of that run's differences, rad.
+        tolerance: of it, a tenth of a block mean's noise, rad.
+        failure: why MuJoCo could not predict the runs; empty where it did.
+    """
+
+    agrees: bool
+    largest_difference: float
+    run: str
+    rms_difference: float
+    tolerance: float
+    failure: str = ""
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The fields, with units in their names."""
+        return {
+            "model": "mujoco",
+            "agrees": self.agrees,
+            "largest_difference_rad": self.largest_difference,
+            "run": self.run,
+            "rms_difference_rad": self.rms_difference,
+            "tolerance_rad": self.tolerance,
+            "failure": self.failure,
+        }
+
+
+@dataclass(frozen=True)
 class NoiseSummary:
     """The noise the gap is measured against.
 
@@ -158,6 +191,7 @@ class Diagnosis:
         ambiguous_with: effects these runs cannot tell from the causes.
         next_run: the run expected to tell them apart; None where not needed.
         coefficients: before and after.
+        confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is.
         noise: what the gap is measured against.
         blind_spots: what these runs cannot show, in sentences.
         seconds: wall time by step, s.
@@ -175,6 +209,7 @@ class Diagnosis:
     ambiguous_with: tuple[str, ...]
     next_run: Mapping[str, Any] | None
     coefficients: Coefficients
+    confirmation: Confirmation
     noise: NoiseSummary
     blind_spots: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -228,6 +263,7 @@ class Diagnosis:
                 "after": _estimates(self.coefficients.after),
                 "note": self.coefficients.note,
             },
+            "confirmation": self.confirmation.to_json_dict(),
             "noise": {
                 "std": self.noise.std,
                 "stated_std": self.noise.stated_std,

@@ -206,7 +206,7 @@ def run_words(run: Mapping[str, float]) -> str:
 
 
 def closing_lines(document: Document) -> list[str]:
-    """Notes below the tables: the noise, the meaning of a coefficient, what these runs cannot show.
+    """Notes below the tables: the noise, the MuJoCo model's word, a coefficient's meaning, blind spots.
 
     Args:
         document: of a diagnosis.
@@ -216,6 +216,10 @@ def closing_lines(document: Document) -> list[str]:
     """
     noise, note = document["noise"], document["coefficients"]["note"]
     lines = [f"Noise: {noise['std']:.3g} rad, {noise['source']} ({noise['reason']})"]
+    checked = document["confirmation"]
+    if checked["agrees"]:
+        apart = f"{checked['largest_difference_rad']:.1e} rad"
+        lines.append(f"Excesses are the MuJoCo model's, which lies within {apart} of the fits")
     if note:
         lines.append(f"Note: {note}")
     lines += [f"Caution: {text}" for text in document["cautions"]]

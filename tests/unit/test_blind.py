@@ -17,6 +17,7 @@ from diagnosis.blind.statistics import Share, calibration
 from diagnosis.result import (
     Candidate,
     Coefficients,
+    Confirmation,
     Diagnosis,
     GapSummary,
     NoiseSummary,
@@ -63,7 +64,8 @@ def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12
         "c", tuple(causes), "words",
         GapSummary(bool(causes), 2.0, 0.1, closed, (), 0.001, 0.5),
         Where(None, None), (Candidate(name, probability, 0.1, closed),), tuple(rivals), None,
-        Coefficients(values, values), NoiseSummary(5e-4, None, "estimated", ""),
+        Coefficients(values, values), Confirmation(True, 0.0, "r01", 0.0, 1e-5),
+        NoiseSummary(5e-4, None, "estimated", ""),
     ).to_json_dict()  # fmt: skip
 
 

@@ -118,7 +118,7 @@ def test_coloured_residuals_give_the_jackknife_s_interval(data, base):
     column = base.problem.names.index("cn_r")
     common = np.tile(base.point.common, (3, 1))
     common[:, column] += [0.1, -0.2, 0.1]
-    out = HeldOut({}, common, base.problem.names)
+    out = HeldOut({}, {}, common, base.problem.names)
     assert base.excess > 0.03
     precise = replace(data, runs=tuple(replace(run, air_density=1.20000001) for run in data.runs))
     found = coefficients(base, out, precise)["cn_r"]

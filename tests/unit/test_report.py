@@ -11,6 +11,7 @@ from diagnosis.localise import localise
 from diagnosis.result import (
     Candidate,
     Coefficients,
+    Confirmation,
     Diagnosis,
     GapSummary,
     NoiseSummary,
@@ -63,8 +64,10 @@ def document(data):
         ambiguous_with=("coulomb_friction",),
         next_run={"spring_stiffness": 80.0, "wind_speed": 0.0, "release_angle": 0.35, "duration": 30.0},
         coefficients=Coefficients({"cn_r": ParameterEstimate(-0.31, 0.02, "1/rad")}, {"cn_r": after}, "A note."),
+        confirmation=Confirmation(True, 1.2e-5, "r2", 6e-6, 4e-5),
         noise=NoiseSummary(4e-4, 4e-4, "estimated", "from the records"),
         blind_spots=("an error of the clock",),
+        cautions=("There is one run only.",),
         seconds={"nominal fit": 0.5},
     )  # fmt: skip
     return json.loads(json.dumps(answer.to_json_dict() | {"maps": maps.to_json_dict()}, allow_nan=False))
@@ -150,6 +153,17 @@ def test_numbers_are_those_of_the_document(page, document):
     assert "an error of the clock" in text
     assert "Spring stiffness 80.0 N m/rad" in text
     assert effect_class(CAUSE).signature in text
+
+
+def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, document, data):
+    assert "There is one run only." in page
+    assert "the MuJoCo model" in page
+    assert "1.2e-05 rad at the most" in page
+    assert "within 4.0e-05 rad" in page
+    changed = {"maps": None, "cautions": [], "confirmation": document["confirmation"] | {"agrees": False}}
+    other = render_report(document | changed, data)
+    assert "beyond 4.0e-05 rad" in other
+    assert 'id="cautions"' not in other
 
 
 def test_the_same_document_gives_the_same_page(page, document, data):

@@ -95,7 +95,7 @@ def _context(document: Document, campaign: Campaign) -> dict[str, Any]:
         "coefficients": view.coefficient_rows(document),
         "tests": [(name, f"{value:.2g}") for name, value in document["gap"]["tests"].items()],
         "seconds": [(name, f"{value:.1f} s") for name, value in document["seconds"].items()],
-        "noise": _noise_rows(document),
+        "noise": _noise_rows(document) + _confirmation_rows(document),
         "provenance": _flat(document.get("provenance") or {}),
         "figures": figures,
         "significant": significant,
@@ -109,6 +109,22 @@ def _noise_rows(document: Document) -> list[tuple[str, str]]:
         ("Noise of one sample", f"{1e3 * noise['std']:.4g} × 10⁻³ rad ({noise['source']})"),
         ("Stated", "–" if stated is None else f"{1e3 * stated:.4g} × 10⁻³ rad"),
         ("Why this one", str(noise["reason"])),
+    ]
+
+
+def _confirmation_rows(document: Document) -> list[tuple[str, str]]:
+    """Which model the excesses are from, and how far the fits' integrator lies from it."""
+    found = document["confirmation"]
+    if found["failure"]:
+        return [("Excesses computed by", f"the fits' own integrator; MuJoCo: {found['failure']}")]
+    apart = f"{found['largest_difference_rad']:.1e} rad at the most"
+    rms = f"{found['rms_difference_rad']:.1e} rad root mean square in {found['run']}"
+    return [
+        ("Excesses computed by", "the MuJoCo model"),
+        (
+            "The fits' own integrator departs by",
+            f"{apart}; {rms}, {'within' if found['agrees'] else 'beyond'} {found['tolerance_rad']:.1e} rad",
+        ),
     ]
 
 

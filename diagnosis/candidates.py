@@ -1,0 +1,118 @@
+"""The answers weighed, with their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from diagnosis.decide import Weighed
+from diagnosis.gap import FALSE_ALARM_RATE
+from diagnosis.random_moments import RandomAnswer
+from diagnosis.reported import Base
+from diagnosis.result import Candidate, ParameterEstimate
+from diagnosis.study import Study
+
+
+def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
+    """The answers weighed, with what they leave in the fitted runs by the fits' own integrator.
+
+    Args:
+        study: what was found.
+        base: what an excess is measured against.
+
+    Returns:
+        Answers, ``none`` and ``unknown`` among them, most probable first; their probabilities sum to 1.
+    """
+    found = []
+    if not study.causes:
+        return (
+            Candidate("none", 1.0 - FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
+            Candidate("unknown", FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
+        )
+    before = max(study.nominal.excess, 1e-9)
+    for answer in study.weighed:
+        if answer.effects == ("unknown",):
+            found.append(Candidate("unknown", answer.probability, before / _block(study), 0.0))
+            continue
+        name = " + ".join(sorted({*study.read_off, *answer.effects}))
+        left = answer.share * before / _block(study)
+        parameters = {**_read_parameters(study), **_parameters(study, answer)}
+        found.append(
+            Candidate(name, answer.probability, left, max(0.0, 1.0 - answer.share), _short(parameters))
+        )
+    if not study.weighed:
+        name = " + ".join(study.read_off)
+        left = study.nominal.excess / _block(study)
+        closed = 1.0 - max(left, 0.0) / max(left + base.hum + base.extra, 1e-9)
+        found.append(
+            Candidate(name, 0.99, left, float(np.clip(closed, 0.0, 1.0)), _short(_read_parameters(study)))
+        )
+        found.append(Candidate("unknown", 0.01 - FALSE_ALARM_RATE, left + base.hum + base.extra, 0.0))
+    found.append(Candidate("none", min(study.test.p_value, FALSE_ALARM_RATE), before / _block(study), 0.0))
+    return tuple(sorted(found, key=lambda c: -c.probability))
+
+
+def _block(study: Study) -> int:
+    """Samples in a block mean: a structural excess of block means is as many times that of samples."""
+    return study.nominal.problem.data.runs[0].block
+
+
+def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
+    random = study.random_answer(answer.effects)
+    hypothesis = study.hypothesis(answer.effects) if random is None else random.beside
+    found: dict[str, ParameterEstimate] = {}
+    if hypothesis is not None:
+        problem = hypothesis.fit.problem
+        units = {
+            f"{kind.name}.{info.name}": info.unit for kind in problem.effects for info in kind.parameters()
+        }
+        inflate = float(np.sqrt(1.0 + max(hypothesis.fit.excess, 0.0)))
+        for name in problem.effect_names:
+            fit = hypothesis.fit
+            found[name] = ParameterEstimate(fit.value(name), fit.std(name) * inflate, units[name])
+        for name, value in problem.fixed:
+            found[name] = ParameterEstimate(value, 0.0, units[name])
+    if random is not None:
+        found |= _random_parameters(random)
+    return found
+
+
+def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
+    """Of a random moment; its size is known as well as the number of its correlation times allows."""
+    process, spectrum = answer.process, answer.process.spectrum
+    seconds = process.interval * sum(i.size for i in process.innovations)
+    independent = max(seconds * min(4.0 * spectrum.bandwidth, 1.0 / process.interval), 2.0)
+    relative = float(np.sqrt(0.5 / independent))
+    if spectrum.strouhal_number > 0.0:
+        amplitude = float(np.sqrt(2.0)) * spectrum.intensity
+        width = spectrum.bandwidth / max(spectrum.strouhal_number, 1e-9)
+        return {
+            "vortex_shedding.amplitude": ParameterEstimate(amplitude, amplitude * relative, "1"),
+            "vortex_shedding.strouhal_number": ParameterEstimate(
+                spectrum.strouhal_number, spectrum.strouhal_number * width * relative, "1"
+            ),
+        }
+    # a corner beyond the rig's own frequencies is seen as white: only the size over its root is known there
+    return {
+        "buffeting.intensity": ParameterEstimate(spectrum.intensity, spectrum.intensity * relative, "1"),
+        "buffeting.bandwidth": ParameterEstimate(spectrum.bandwidth, spectrum.bandwidth, "Hz"),
+    }
+
+
+def _read_parameters(study: Study) -> dict[str, ParameterEstimate]:
+    found: dict[str, ParameterEstimate] = {}
+    if study.hum is not None:
+        found["mains_hum.amplitude"] = ParameterEstimate(study.hum.amplitude, study.hum.std, "rad")
+        found["mains_hum.frequency"] = ParameterEstimate(study.hum.frequency, 1e-3, "Hz")
+    if study.coarse:
+        found["sensor_quantisation.step"] = ParameterEstimate(study.step, 1e-7, "rad")
+    return found
+
+
+def _short(parameters: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
+    """Parameter names without the effect's, where there is one effect only."""
+    effects = {name.split(".")[0] for name in parameters}
+    if len(effects) != 1:
+        return dict(parameters)
+    return {name.split(".")[1]: value for name, value in parameters.items()}
