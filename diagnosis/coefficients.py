@@ -13,11 +13,14 @@ from diagnosis.held_out import HeldOut
 from diagnosis.least_squares import Fit
 from diagnosis.rank import Hypothesis
 from diagnosis.result import ParameterEstimate
+from diagnosis.spectra import linear_coefficients
 from tunnel_sim.campaign import Campaign
 
 _UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1"}
 #: Excess of block means beyond which the residuals are no longer white, and runs must speak for the scatter.
 _COLOURED = 0.03
+#: Share of a lag's first order, a·Cnβ, by which its form leaves Cnr open.
+_LAG_FORM = 0.2
 
 
 def coefficients(
@@ -34,8 +37,8 @@ def coefficients(
     Returns:
         ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` in normalised form. The variance is that of the
         fit scaled by its excess, or of the delete-a-group jackknife (Kott, J. Off. Stat. 17 (2001) 521) where
-        the residuals are coloured and that is larger, plus the rounding of the air density, plus the spread
-        over rivals.
+        the residuals are coloured and that is larger, plus the rounding of the air density, plus what the form
+        of a cause leaves open that no free decay shows, plus the spread over rivals.
     """
     names = ("omega_n", "zeta") if fit.problem.data.normalised else ("cn_beta", "cn_r")
     result = {}
@@ -47,8 +50,49 @@ def coefficients(
             p * (other - value) ** 2 for f, p in rivals if (other := _value_only(f, name)) is not None
         )
         rounding = abs(value) * _density_rounding(campaign) if name.startswith("cn_") else 0.0
-        result[name] = ParameterEstimate(value, math.sqrt(std**2 + rounding**2 + spread), _UNITS[name])
+        unseen = _unseen_form(fit) if name == "cn_r" else 0.0
+        variance = std**2 + rounding**2 + unseen**2 + spread
+        result[name] = ParameterEstimate(value, math.sqrt(variance), _UNITS[name])
     return result
+
+
+def _unseen_form(fit: Fit) -> float:
+    """Standard deviation of Cnr, 1/rad, from what no free decay shows of a cause's form.
+
+    To first order a lag is a change a·Cnβ of Cnr, and only its second order is seen: two time constants, as in
+    Jones's approximation (NACA Report 681, 1940), have a mean up to a third below the one that fits, and a lead
+    mirrors them. A constant loss factor damps by η Kr/ω at the frequency ω of the motion, or by η Kr/ωn of the rig
+    in still air; the runs with wind do not tell which.
+    """
+    names = {kind.name for kind in fit.problem.effects}
+    variance = 0.0
+    if "unsteady_aero_lag" in names:
+        variance += (_LAG_FORM * fit.value("unsteady_aero_lag.lag") * fit.value("cn_beta")) ** 2
+    if "structural_damping" in names:
+        loss = fit.value("structural_damping.loss_factor")
+        shifts = [
+            loss * (stiffness / omega - stiffness / still) / load
+            for stiffness, omega, still, load in _wind_on_rates(fit)
+        ]
+        if shifts:
+            variance += (sum(shifts) / len(shifts)) ** 2 / 3.0  # anywhere between the two
+    return math.sqrt(variance)
+
+
+def _wind_on_rates(fit: Fit) -> list[tuple[float, float, float, float]]:
+    """Of every wind-on run Kr, ω, ωn of the rig in still air, and ½ρVAl² that multiplies Cnr."""
+    data = fit.problem.data
+    found = []
+    for i, run in enumerate(data.runs):
+        if not run.wind_on:
+            continue
+        inertia, _, stiffness = linear_coefficients(fit, i)
+        spring = fit.problem.stated(fit.point.common, fit.point.release[i], run).spring_stiffness
+        if stiffness <= 0.0 or spring <= 0.0:
+            continue
+        load = 0.5 * run.air_density * run.wind_speed * data.frontal_area * data.reference_length**2
+        found.append((spring, math.sqrt(stiffness / inertia), math.sqrt(spring / inertia), load))
+    return found
 
 
 def rival_fits(

@@ -101,8 +101,8 @@ def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
         bounds = ((1e-7, 1.0), (0.03, _LONGEST_BANDWIDTH))
         return _fit(fit, lambda x: Spectrum(x[0], x[1]), grid, bounds)
     about = [(s, b, f) for s in (1e-3, 3e-3, 1e-2) for b in (0.5, 2.0) for f in (1.5, 3.0, 4.5, 6.5, 9.0)]
-    bounds = ((1e-7, 1.0), (0.1, _LONGEST_BANDWIDTH), (0.3, 20.0))
-    return _fit(fit, lambda x: Spectrum(x[0], x[1], x[2]), about, bounds)
+    limits = ((1e-7, 1.0), (0.1, _LONGEST_BANDWIDTH), (0.3, 20.0))
+    return _fit(fit, lambda x: Spectrum(x[0], x[1], x[2]), about, limits)
 
 
 def fit_wandering_shedding(fit: Fit) -> ProcessNoise | None:

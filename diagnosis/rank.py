@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ _ALWAYS_FITTED = 7  # leads refitted whatever they promise: linear theory ranks 
 _PROMISING = 0.01  # share of χ² beyond which a lead is refitted too
 _BASES = 3  # single effects to which a second is added
 _SECONDS = 4  # second effects refitted for each
+_POLISH = 1e-7  # drop of χ², as a share of it, below which a polished fit is at its end
 _BENT = 3  # hypotheses whose forms are freed
 _BEND_FROM = 0.02  # share left open from which they are
 _STARTS = {"rod_flexibility": 3, "sensor_clipping": 2, "unsteady_aero_lag": 2, "spring_miscalibration": 2}
@@ -107,7 +109,25 @@ def _with_forms(found: list[Hypothesis], base: Fit) -> list[Hypothesis]:
     return sorted([*bent, *ranked[_BENT:]], key=lambda h: h.fit.total)
 
 
-def _bend(fitted: Fit) -> Fit | None:
+def polish(chosen: Hypothesis) -> Hypothesis:
+    """The hypothesis fitted to the end and with its forms free: what the form leaves open widens the spread.
+
+    Args:
+        chosen: a fitted hypothesis.
+
+    Returns:
+        The same effects, nowhere worse; as given where the fit cannot go on.
+    """
+    better = _bend(chosen.fit, tolerance=_POLISH)
+    if better is None:
+        with suppress(FitError, np.linalg.LinAlgError):
+            better = fit(chosen.fit.problem, chosen.fit.point, tolerance=_POLISH)
+    if better is None or better.total > chosen.fit.total:
+        return chosen
+    return Hypothesis(chosen.effects, better)
+
+
+def _bend(fitted: Fit, tolerance: float = 1e-4) -> Fit | None:
     """The same effects with the forms free; None where none has one, or nothing is gained."""
     problem = fitted.problem
     kinds = [kind for kind in problem.effects if any(info.form for info in kind.parameters())]
@@ -118,7 +138,7 @@ def _bend(fitted: Fit) -> Fit | None:
     defaults = {f"{k.name}.{i.name}": i.default for k in kinds for i in k.parameters() if i.form}
     start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
     try:
-        found = fit(freed, start)
+        found = fit(freed, start, tolerance=tolerance)
     except (FitError, np.linalg.LinAlgError):
         return None
     return found if found.total < fitted.total else None

@@ -18,7 +18,7 @@ from diagnosis.noise import Noise, NoiseTrend, campaign_noise, noise_trend, read
 from diagnosis.outsiders import Outsider, weigh_outsiders
 from diagnosis.problem import Problem
 from diagnosis.random_moments import RandomAnswer, weigh_random_moments
-from diagnosis.rank import NOT_FITTED, Hypothesis, rank_pairs, rank_singles
+from diagnosis.rank import NOT_FITTED, Hypothesis, polish, rank_pairs, rank_singles
 from diagnosis.start import is_gross, nominal_start
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.effects import ALL_EFFECTS, Effect
@@ -187,7 +187,10 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     weighed = weigh(shares, chance, nominal.excess, UNKNOWN_SHARE if outsider is None else outsider.share)
     if weighed[0].effects == ("unknown",) and _read_off_explains(found):
         weighed = []  # what is left belongs to the cause read off the records
-    elif found.test.noisy and nominal.excess < _share_of_noise(found):
+    elif weighed[0].effects != ("unknown",):
+        with clock.step("polishing"):
+            hypotheses = _polished(hypotheses, weighed[0], random)
+    if found.test.noisy and weighed and nominal.excess < _share_of_noise(found):
         named = [Weighed(w.effects, w.share, 0.0) for w in weighed if w.effects != ("unknown",)]
         weighed = [Weighed(("unknown",), 1.0, 1.0), *named]
     return Study(
@@ -195,6 +198,15 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
         found.test, found.started_late, tuple(hypotheses), tuple(weighed), tuple(random), outsider,
         clock.seconds,
     )  # fmt: skip
+
+
+def _polished(
+    hypotheses: Sequence[Hypothesis], answer: Weighed, random: Sequence[RandomAnswer]
+) -> list[Hypothesis]:
+    """The hypotheses with the answer's own fitted to the end, unless a random moment answers."""
+    if any(moment.effects == answer.effects for moment in random):
+        return list(hypotheses)
+    return [polish(h) if h.names == answer.effects else h for h in hypotheses]
 
 
 def _share(fitted: Fit, nominal: Fit) -> float:

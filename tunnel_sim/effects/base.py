@@ -15,6 +15,9 @@ from tunnel_sim.plan import SensorModel
 from tunnel_sim.record import Array
 from tunnel_sim.run_settings import RunSettings
 
+REFERENCE_SPEED = 20.0
+"""m/s: where forms that depend on the speed agree with the textbook's."""
+
 LEAST_EXPONENT = 0.25
 """Below it a term is nearly a jump, which the integration's steps do not resolve."""
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, parameter, with_law
+from tunnel_sim.effects.base import REFERENCE_SPEED, Effect, parameter, with_law
 from tunnel_sim.run_settings import RunSettings
 
 
@@ -15,21 +15,28 @@ class FlowMisalignment(Effect):
     """A flow that meets the rig at an angle: a steady yaw moment.
 
     Args:
-        angle: angle of the flow against the rig's zero, rad.
+        angle: angle of the flow against the rig's zero, at 20 m/s where it depends on the speed, rad.
+        exponent: power of the speed with which it grows, dimensionless; 0 is the textbook's.
     """
 
     name = "flow_misalignment"
     channel = "forcing"
     condition = "wind_on"
-    equation = "Ka βf added"
+    equation = "Ka βf added; bent: βf (V/20 m/s)^n"
     signature = "The centre of the oscillation shifts with wind speed squared over the stiffness."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
 
     angle: float = parameter(
         "βf", "rad", "angle of the flow against the rig's zero", scale=0.01, lower=-0.8, upper=0.8
     )
+    exponent: float = parameter(
+        "n", "1", "power of the speed with which it grows", scale=0.5, lower=-3.0, upper=3.0, form=True
+    )
 
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Set the moment law's term."""
-        del stated, rng
-        return with_law(run, flow_angle=self.angle)
+        del rng
+        if stated.wind_speed <= 0.0:
+            return with_law(run, flow_angle=self.angle)
+        grown = self.angle * (stated.wind_speed / REFERENCE_SPEED) ** self.exponent
+        return with_law(run, flow_angle=grown)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.base import REFERENCE_SPEED, Effect, parameter
 from tunnel_sim.run_settings import RunSettings, Series
 
 
@@ -16,26 +16,31 @@ class WindSpeedOffset(Effect):
     """A wind speed that is off by a constant.
 
     Args:
-        offset: true minus stated speed, m/s.
+        offset: true minus stated speed, at 20 m/s where it depends on the speed, m/s.
+        exponent: power of the stated speed with which it grows, dimensionless; 0 is the textbook's.
     """
 
     name = "wind_speed_offset"
     channel = "calibration"
     condition = "wind_on"
-    equation = "true speed = stated speed + ΔV"
+    equation = "true speed = stated speed + ΔV; bent: ΔV (V/20 m/s)^n"
     signature = "The aerodynamic stiffness does not grow as the stated speed squared."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
 
     offset: float = parameter("ΔV", "m/s", "true minus stated speed", scale=0.5, lower=-50.0, upper=50.0)
+    exponent: float = parameter(
+        "n", "1", "power of the stated speed with which it grows", scale=0.5, lower=-3.0, upper=3.0, form=True
+    )
 
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Blow at the true speed."""
         del rng
         if stated.wind_speed <= 0.0 or self.is_null:
             return run
+        grown = self.offset * (stated.wind_speed / REFERENCE_SPEED) ** self.exponent
         series = dict(run.series)
         if "wind_speed" in series:  # as another effect left it: a drift, say
             given = series["wind_speed"]
-            values = tuple(max(0.0, value + self.offset) for value in given.values)
+            values = tuple(max(0.0, value + grown) for value in given.values)
             series["wind_speed"] = Series(values, given.interval)
-        return dataclasses.replace(run, wind_speed=max(0.0, run.wind_speed + self.offset), series=series)
+        return dataclasses.replace(run, wind_speed=max(0.0, run.wind_speed + grown), series=series)

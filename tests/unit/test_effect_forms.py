@@ -1,0 +1,95 @@
+"""Forms beyond the textbook's: each against its equation, and equal to the textbook's at its default."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tests.reference.effect_cases import VALUES, settings
+from tests.reference.effect_oracle import Setting
+from tunnel_sim.effects import ALL_EFFECTS, effect_from
+
+TIME = np.linspace(0.0, 10.0, 1001)
+ANGLE = 0.3 * np.exp(-0.1 * TIME) * np.cos(9.0 * TIME)
+STATED = dataclasses.replace(settings(Setting(duration=10.0)), wind_speed=25.0)
+RNG = np.random.default_rng(0)
+FORMS = [(kind, info) for kind in ALL_EFFECTS for info in kind.parameters() if info.form]
+
+
+def read(name: str, **parameters: float) -> np.ndarray:
+    """What the sensor makes of the angle."""
+    effect = effect_from(name, parameters)
+    return effect.on_reading(effect.on_angle(ANGLE, TIME, STATED, RNG))
+
+
+@pytest.mark.parametrize(("kind", "info"), FORMS, ids=[f"{k.name}-{i.name}" for k, i in FORMS])
+def test_a_form_bends_the_effect_and_its_default_is_the_textbooks(kind, info) -> None:
+    values = VALUES[kind.name]
+    plain, stated = (
+        effect_from(kind.name, values),
+        effect_from(kind.name, {**values, info.name: info.default}),
+    )
+    bent = effect_from(kind.name, {**values, info.name: info.default + 0.3 * info.scale})
+    assert plain == stated
+
+    def act(effect):
+        run = effect.on_run(STATED, STATED, np.random.default_rng(1))
+        reading = effect.on_reading(effect.on_angle(ANGLE, TIME, STATED, np.random.default_rng(2)))
+        return dataclasses.replace(run, duration=1.0), reading
+
+    (run, reading), (bent_run, bent_reading) = act(plain), act(bent)
+    assert run != bent_run or not np.array_equal(reading, bent_reading)
+
+
+def test_a_drift_follows_a_power_of_time() -> None:
+    assert read("sensor_drift", drift=0.01, exponent=2.0) - ANGLE == pytest.approx(0.01 * (TIME / 10.0) ** 2)
+
+
+def test_a_drifting_wind_follows_a_power_of_time() -> None:
+    effect = effect_from("wind_speed_drift", {"drift": 0.1, "exponent": 0.5})
+    series = effect.on_run(STATED, STATED, RNG).series["wind_speed"]
+    place = np.arange(len(series.values)) * series.interval
+    assert np.array(series.values) == pytest.approx(
+        STATED.wind_speed * (1.0 + 0.1 * np.sqrt(place / 10.0)), rel=1e-12
+    )
+    assert place[-1] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize("speed", [10.0, 20.0, 30.0])
+def test_an_offset_and_a_misaligned_flow_follow_a_power_of_the_speed(speed: float) -> None:
+    stated = dataclasses.replace(STATED, wind_speed=speed)
+    offset = effect_from("wind_speed_offset", {"offset": 0.5, "exponent": -1.0})
+    assert offset.on_run(stated, stated, RNG).wind_speed == pytest.approx(speed + 0.5 * 20.0 / speed)
+    flow = effect_from("flow_misalignment", {"angle": 0.01, "exponent": 0.5})
+    assert flow.on_run(stated, stated, RNG).parameters["flow_angle"] == pytest.approx(
+        0.01 * np.sqrt(speed / 20.0)
+    )
+
+
+def test_a_sensor_may_have_a_square_beside_its_cube() -> None:
+    bent = read("sensor_nonlinearity", coefficient=0.1, quadratic=-0.05)
+    assert bent == pytest.approx(ANGLE + 0.1 * ANGLE**3 - 0.05 * ANGLE**2)
+
+
+def test_a_limit_may_lie_on_one_side() -> None:
+    assert read("sensor_clipping", limit=1.0, centre=-0.8) == pytest.approx(np.minimum(ANGLE, 0.2))
+    assert read("sensor_clipping", limit=1.0, centre=0.8) == pytest.approx(np.maximum(ANGLE, -0.2))
+
+
+def test_a_soft_limit_bends_over_without_a_kink() -> None:
+    limit, knee = 0.2, 0.25
+    bent = read("sensor_clipping", limit=limit, knee=knee)
+    straight = limit * (1.0 - knee)
+    inside = np.abs(ANGLE) <= straight
+    assert np.array_equal(bent[inside], ANGLE[inside])
+    room = limit * knee
+    expected = straight + room * (1.0 - np.exp(-(np.abs(ANGLE) - straight) / room))
+    assert np.abs(bent[~inside]) == pytest.approx(expected[~inside])
+    assert np.max(np.abs(bent)) < limit
+
+
+def test_rounded_backlash_is_the_mean_of_two_plays() -> None:
+    wide, narrow = (read("sensor_hysteresis", half_width=w) for w in (0.013, 0.007))
+    assert read("sensor_hysteresis", half_width=0.01, roundness=0.3) == pytest.approx(0.5 * (wide + narrow))
