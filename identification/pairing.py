@@ -4,9 +4,9 @@
     N̂r = −2 ln 2 (1/t½ − 1/t½₀)                            (eq. 8; printed with the first term squared)
 
 With ωn² = 4π²f² + ln²2/t½² and 2ζωn = 2 ln 2/t½ these are the differences of eqs 10 and 11, which the paper's
-networks are used with: one path serves both methods. With N̂β = +Ka/Izz and N̂r = +Ca/Izz (the text after eq. 6 has the
-signs reversed) eqs 17 and 18 give Cnβ and Cnr, averaged over the wind-on runs. Izz is the gradient of Kr against
-ωn² of the wind-off runs (eq. 1).
+networks are used with: one path serves both methods. With N̂β = +Ka/Izz and N̂r = +Ca/Izz (the text after eq. 6
+has the signs reversed) eqs 17 and 18 give Cnβ and Cnr, averaged over the wind-on runs. Izz is the gradient of Kr
+against ωn² of the wind-off runs (eq. 1).
 
 Standard deviations of f and σ are propagated numerically, one input at a time (Kragten, Analyst 119 (1994)
 2161–2165, doi 10.1039/AN9941902161). Where the scatter over the wind-on runs, or of the springs about their line,
