@@ -60,12 +60,14 @@ class Component:
         covariance: what it adds, shape (p, p), in the products of the quantities' units; a correlation may take
             away.
         note: why it is zero or could not be had; empty where there is nothing to say.
+        known: whether it could be had; where not, its covariance is zero and the total leaves it out.
     """
 
     name: str
     kind: Literal["A", "B"]
     covariance: Array
     note: str = ""
+    known: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +114,7 @@ class Budget:
                 {
                     "name": one.name,
                     "type": one.kind,
+                    "known": one.known,
                     "note": one.note,
                     "variance": dict(zip(self.names, np.diag(one.covariance).tolist(), strict=True)),
                 }
@@ -236,7 +239,7 @@ def _individual(
             total += np.outer(values - budget.values, values - budget.values)
         each = "spring" if name == "spring_stiffness" else "run"
         note = "" if groups else "no run states it"
-        found.append(Component(f"{name}, each {each}'s own", "B", total, note))
+        found.append(Component(f"{name}, each {each} its own", "B", total, note))
     return found
 
 
@@ -277,7 +280,7 @@ def _scatter(campaign: Campaign, budget: Budget, identify: Identify, known: Arra
     for label, places in sides.items():
         variance = _jackknife(campaign, budget, identify, places)
         if variance is None:
-            notes[label] = "not known: the campaign cannot spare a run"
+            notes[label] = "not known, since the campaign cannot spare a run"
         else:
             variances[label], degrees = variance, degrees + len(places) - 1
     total = sum(variances.values(), np.zeros(len(budget.names)))
@@ -287,7 +290,7 @@ def _scatter(campaign: Campaign, budget: Budget, identify: Identify, known: Arra
         own = variances.get(label, np.zeros(len(budget.names)))
         share = np.divide(own, total, out=np.zeros_like(own), where=total > 0.0)
         note = notes.get(label, "" if np.any(excess * share > 0.0) else "explained by what is above")
-        found.append(Component(label, "A", np.diag(excess * share), note))
+        found.append(Component(label, "A", np.diag(excess * share), note, known=label not in notes))
     return found
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from identification.budget import Budget
     from identification.estimate import Estimate
     from tunnel_sim.campaign import Campaign
 
@@ -33,6 +34,25 @@ def run(
             show_default=False,
         ),
     ] = None,
+    budget: Annotated[
+        bool, typer.Option("--budget", help="Carry scatter and choice of model too; show what dominates.")
+    ] = False,
+    uncertainties: Annotated[
+        Path | None,
+        typer.Option(
+            "--uncertainties",
+            metavar="FILE",
+            help="How well Kr, V, ρ, A and l are known, TOML; implies --budget.",
+        ),
+    ] = None,
+    models: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--model",
+            metavar="NAME",
+            help="Another estimator whose spread counts; with --budget. Repeatable.",
+        ),
+    ] = None,
 ) -> None:
     """Identify Cnβ, Cnr, Izz and Cr of a campaign, measured or simulated.
 
@@ -51,6 +71,13 @@ def run(
       tunnel identify my-campaign
       tunnel identify my-campaign --estimator conventional --json estimate.json
       tunnel identify my-campaign --json - | jq .cn_beta
+      tunnel identify my-campaign --uncertainties known.toml --model conventional
+
+    [bold]Uncertainty[/bold]
+      Without more, standard deviations are those of the reading's noise. With
+      --budget the scatter of the runs and the choice of model are added, with
+      --uncertainties those of the stated Kr, V, ρ, A and l; what is reported is
+      then the combined standard uncertainty, and a table says what dominates.
 
     [bold]Exit status[/bold]
       0 identified, 1 nothing could be identified, 2 bad input.
@@ -59,20 +86,86 @@ def run(
     from tunnel_lab.files import json_text, write_json
     from tunnel_lab.tables import say
     from tunnel_sim.campaign_io import read_campaign
+    from tunnel_sim.errors import TunnelError
 
-    known_estimator(estimator)
+    for name in (estimator, *(models or ())):
+        known_estimator(name)
+    if models and not budget and uncertainties is None:
+        raise TunnelError("goes with --budget only", where="--model", remedy="add --budget, or leave it out")
     data = read_campaign(campaign)
     estimate = identify(data, estimator, throw=False)
+    found = None
+    if (budget or uncertainties is not None) and not estimate.status.failed:
+        estimate, found = budgeted(data, estimate, uncertainties, models or [])
+    document = estimate.to_json_dict() | ({} if found is None else {"budget": found.to_json_dict()})
     if json is not None and str(json) == "-":
-        typer.echo(json_text(estimate.to_json_dict()), nl=False)
+        typer.echo(json_text(document), nl=False)
     else:
         if json is not None:
-            write_json(json, estimate.to_json_dict())
+            write_json(json, document)
         show(data, estimate, windows=len(data.runs) <= FEW_RUNS if windows is None else windows)
+        if found is not None:
+            show_budget(found)
         if json is not None:
             say(f"Written: {json}")
     if estimate.status.failed:
         raise typer.Exit(1)
+
+
+def budgeted(
+    campaign: Campaign, estimate: Estimate, uncertainties: Path | None, models: list[str]
+) -> tuple[Estimate, Budget]:
+    """The estimate with combined standard uncertainties, and their budget.
+
+    Args:
+        campaign: what was identified.
+        estimate: its estimate; the same estimator is asked again with changed campaigns.
+        uncertainties: file of the inputs' uncertainties; where None they are taken as exact.
+        models: further estimators whose spread counts.
+
+    Returns:
+        The widened estimate and the budget.
+
+    Raises:
+        TunnelError: when the file is wrong, or there is no coefficient to make a budget of.
+    """
+    from functools import partial
+
+    from identification import identify
+    from identification.budget import make_budget, with_budget
+    from identification.input_uncertainty import InputUncertainties, load_uncertainties
+    from tunnel_lab.tables import console
+
+    inputs = InputUncertainties() if uncertainties is None else load_uncertainties(uncertainties)
+    others = {
+        name: partial(identify, estimator=name, throw=False) for name in models if name != estimate.estimator
+    }
+    terminal = console(stderr=True)
+    with terminal.status("uncertainty budget") as status:
+        found = make_budget(
+            campaign,
+            estimate,
+            partial(identify, estimator=estimate.estimator, throw=False),
+            inputs,
+            others=others,
+            told=lambda what: status.update(f"uncertainty budget: {what}"),
+        )
+    return with_budget(estimate, found), found
+
+
+def show_budget(budget: Budget) -> None:
+    """Print a budget and what dominates.
+
+    Args:
+        budget: of the estimate that was shown.
+    """
+    from tunnel_lab import budget_table, tables
+
+    tables.say("")
+    tables.show_tables(budget_table.budget_table(budget))
+    for line in budget_table.budget_lines(budget):
+        tables.say(line)
+    tables.say("The standard deviations above are the combined ones.")
 
 
 def known_estimator(name: str) -> None:
