@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.candidates import candidates
 from diagnosis.cautions import cautions
 from diagnosis.coefficients import coefficients, rival_fits
-from diagnosis.decide import RIVAL_PROBABILITY, Weighed
+from diagnosis.decide import RIVAL_PROBABILITY, UNKNOWN_SHARE, Weighed
 from diagnosis.held_out import predict_held_out
 from diagnosis.least_squares import Fit
 from diagnosis.localisation.maps import Maps
@@ -99,8 +99,18 @@ def assemble(study: Study, where: Where, maps: Maps) -> Diagnosis:
                 named=bool(study.causes) and study.causes != ("unknown",),
             ),
             *((_LATE_START,) if study.started_late else ()),
+            *_outside(study),
         ),
     )
+
+
+def _outside(study: Study) -> tuple[str, ...]:
+    """What outside the vocabulary would explain a gap of unknown cause."""
+    outsider = study.outsider
+    if study.causes != ("unknown",) or outsider is None or outsider.share >= UNKNOWN_SHARE:
+        return ()
+    closed = 100.0 * (1.0 - outsider.share)
+    return (f"{outsider.words}, which the vocabulary does not hold, would close {closed:.0f} % of the gap",)
 
 
 def chosen_fit(study: Study) -> Fit:
