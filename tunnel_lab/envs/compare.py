@@ -1,0 +1,313 @@
+"""Policies compared over many seeds: ``python -m tunnel_lab.envs.compare docs`` writes docs/campaign-design.*.
+
+Both policies of a preset play the same seeds: the same truth, and in the i-th run the same noise. Medians have
+distribution-free 95 % intervals from order statistics (David & Nagaraja, Order Statistics, 3rd ed. (2003), ch. 7,
+doi 10.1002/0471722162); those of the difference rest on the differences seed by seed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import binom
+
+from identification.estimate import PARAMETERS
+from tunnel_lab.envs.campaign import CampaignEnv, reached
+from tunnel_lab.envs.picture import beliefs
+from tunnel_lab.envs.policies import POLICIES, run_campaign
+from tunnel_lab.envs.session import Knowledge, answers, probabilities
+from tunnel_lab.files import write_whole
+from tunnel_sim.record import Array
+
+CONTESTS = {"identification": ("scripted", "greedy"), "diagnosis": ("scripted", "separating")}
+SEEDS = {"identification": 100, "diagnosis": 50}
+_CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Row:
+    """One episode.
+
+    Args:
+        preset: of the environment.
+        policy: a name of `POLICIES`.
+        seed: of the episode.
+        runs: made until the goal, or until the episode was cut off; number of them.
+        rig_time_s: likewise, s.
+        reached: whether the goal was reached.
+        on_first: whether it was reached with the first run.
+        right: whether the answer is the effect that acts; of an identification, whether Cnβ and Cnr are both
+            within three standard deviations of the truth.
+        cn_beta_error: error of Cnβ over its standard deviation (1); of an identification.
+        cn_r_error: likewise of Cnr (1).
+    """
+
+    preset: str
+    policy: str
+    seed: int
+    runs: int
+    rig_time_s: float
+    reached: bool
+    on_first: bool
+    right: bool
+    cn_beta_error: float
+    cn_r_error: float
+
+
+def play(preset: str, policy: str, seed: int) -> Row:
+    """Play one episode.
+
+    Args:
+        preset: of the environment.
+        policy: a name of `POLICIES`.
+        seed: of the episode.
+    """
+    env = CampaignEnv(preset=preset, reveal_truth=True)
+    info = run_campaign(env, POLICIES[policy], seed=seed)
+    known, truth = env.known, info["truth"]
+    done = reached(known, env.targets, env.probability)
+    exact = np.array([truth[name] for name in PARAMETERS])
+    error = (known.belief.values - exact) / np.sqrt(np.diag(known.belief.covariance))
+    right = bool(np.all(np.abs(error[:2]) < 3.0))
+    if preset == "diagnosis":
+        right = done and _answer(known) == "".join(truth["effects"])
+        error = np.zeros(4)
+    return Row(
+        preset,
+        policy,
+        seed,
+        info["runs"],
+        info["rig_time_s"],
+        done,
+        done and info["runs"] == 1,
+        right,
+        round(float(error[PARAMETERS.index("cn_beta")]), 4),
+        round(float(error[PARAMETERS.index("cn_r")]), 4),
+    )
+
+
+def _answer(known: Knowledge) -> str:
+    return answers(known.conditions.effects)[int(np.argmax(probabilities(known)))]
+
+
+def to_csv(rows: Sequence[Row]) -> str:
+    """Rows as CSV with a header.
+
+    Args:
+        rows: any.
+    """
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, [field.name for field in fields(Row)], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(row) for row in rows)
+    return stream.getvalue()
+
+
+def from_csv(text: str) -> list[Row]:
+    """The inverse of `to_csv`.
+
+    Args:
+        text: of the file.
+    """
+    kinds = {"seed": int, "runs": int, "rig_time_s": float, "cn_beta_error": float, "cn_r_error": float}
+    flags = ("reached", "on_first", "right")
+    return [
+        Row(**{
+            name: value == "True" if name in flags else kinds.get(name, str)(value)
+            for name, value in line.items()
+        })
+        for line in csv.DictReader(io.StringIO(text))
+    ]  # fmt: skip
+
+
+def median_interval(values: Array) -> tuple[float, float, float]:
+    """The median with a distribution-free interval of at least 95 %.
+
+    Args:
+        values: shape (n,).
+
+    Returns:
+        Median, lower and upper end, in the unit of the values.
+    """
+    ordered = np.sort(values)
+    # Of n values, those of ranks k+1 and n−k enclose the median unless at most k lie on one side of it.
+    k = int(binom.ppf(0.5 * (1.0 - _CONFIDENCE), ordered.size, 0.5))
+    if binom.cdf(k, ordered.size, 0.5) > 0.5 * (1.0 - _CONFIDENCE):
+        k -= 1
+    k = max(k, -1) + 1
+    low, high = (ordered[k - 1], ordered[-k]) if k > 0 else (ordered[0], ordered[-1])
+    return float(np.median(ordered)), float(low), float(high)
+
+
+def share_interval(hits: int, count: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a share.
+
+    Args:
+        hits: number of them.
+        count: of all.
+
+    Returns:
+        Lower and upper end, as fractions. Source: Wilson (1927), doi 10.1080/01621459.1927.10502953.
+    """
+    z, p = 1.959964, hits / count
+    centre = (p + z**2 / (2 * count)) / (1 + z**2 / count)
+    half = z / (1 + z**2 / count) * float(np.sqrt(p * (1 - p) / count + z**2 / (4 * count**2)))
+    return max(0.0, centre - half), min(1.0, centre + half)
+
+
+def table(rows: Sequence[Row], preset: str) -> str:
+    """The comparison as a table in Markdown.
+
+    Args:
+        rows: of all presets.
+        preset: which to show.
+    """
+    first, second = CONTESTS[preset]
+    lines = [
+        "| policy | runs, median (95 %) | rig time, median (95 %) [min] | goal reached | with run one | right |",
+        "|---|---|---|---|---|---|",
+    ]
+    for policy in (first, second):
+        own = _of(rows, preset, policy)
+        lines.append(
+            f"| {policy} | {_shown(_values(own, 'runs'), 1.0, 0)} | "
+            f"{_shown(_values(own, 'rig_time_s'), 60.0, 1)} | "
+            f"{_share(own, 'reached')} | {_share(own, 'on_first')} | {_share(own, 'right')} |"
+        )
+    a, b = _of(rows, preset, first), _of(rows, preset, second)
+    runs = _values(b, "runs") - _values(a, "runs")
+    spent = _values(b, "rig_time_s") - _values(a, "rig_time_s")
+    lines.append(
+        f"| {second} less {first}, seed by seed | {_shown(runs, 1.0, 0)} | {_shown(spent, 60.0, 1)} | | | |"
+    )
+    return "\n".join(lines)
+
+
+def _of(rows: Sequence[Row], preset: str, policy: str) -> list[Row]:
+    found = [row for row in rows if row.preset == preset and row.policy == policy]
+    return sorted(found, key=lambda row: row.seed)
+
+
+def _values(rows: Sequence[Row], name: str) -> Array:
+    return np.array([float(getattr(row, name)) for row in rows])
+
+
+def _shown(values: Array, unit: float, digits: int) -> str:
+    middle, low, high = (value / unit for value in median_interval(values))
+    halves = digits if digits or middle == round(middle) else 1
+    return f"{middle:.{halves}f} ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def _share(rows: Sequence[Row], name: str) -> str:
+    hits = int(np.sum(_values(rows, name)))
+    low, high = share_interval(hits, len(rows))
+    return f"{hits} of {len(rows)} ({100 * low:.0f} to {100 * high:.0f} %)"
+
+
+def fill(page: str, rows: Sequence[Row]) -> str:
+    """A page with its tables replaced: what stands between ``<!-- NAME -->`` and ``<!-- end -->``.
+
+    Args:
+        page: Markdown.
+        rows: of all presets.
+    """
+    for preset in CONTESTS:
+        head, mark, rest = page.partition(f"<!-- {preset} -->\n")
+        _, end, tail = rest.partition("<!-- end -->")
+        page = f"{head}{mark}{table(rows, preset)}\n{end}{tail}"
+    return page
+
+
+def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
+    """How Cnr's standard deviation falls with the rig time in one campaign, by policy.
+
+    Args:
+        seed: of the episode.
+
+    Returns:
+        By policy: rig time [s] and relative standard deviation (1), each of shape (runs + 1,).
+    """
+    found = {}
+    for policy in CONTESTS["identification"]:
+        env = CampaignEnv()
+        run_campaign(env, POLICIES[policy], seed=seed)
+        spread = np.array([belief.relative_std("cn_r") for belief in beliefs(env.known)])
+        found[policy] = (np.concatenate(([0.0], np.cumsum(env.known.costs))), spread)
+    return found
+
+
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """The figure of the page.
+
+    Args:
+        rows: of all presets.
+        path: the PNG, written whole or not at all.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from tunnel_lab.plots import COLOURS, save
+
+    figure = Figure(figsize=(10.0, 3.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, 3)
+    for place, (policy, (spent, spread)) in enumerate(example().items()):
+        panels[0].semilogy(spent / 60.0, 100.0 * spread, "o-", color=COLOURS[place], label=policy)
+    panels[0].axhline(5.0, color="0.5", linestyle="--", linewidth=1)
+    panels[0].set_ylabel("standard deviation of Cnr [%]")
+    panels[0].set_title("identification, seed 0", fontsize=10)
+    for axes, (preset, policies) in zip(panels[1:], CONTESTS.items(), strict=True):
+        for place, policy in enumerate(policies):
+            own = _of(rows, preset, policy)
+            spent = np.sort([row.rig_time_s if row.reached else np.inf for row in own]) / 60.0
+            share = np.arange(1, len(own) + 1) / len(own)
+            axes.step(
+                np.append(0.0, spent), np.append(0.0, share), where="post", color=COLOURS[place], label=policy
+            )
+        axes.set_ylim(0.0, 1.02)
+        axes.set_ylabel("share of campaigns at the goal")
+        axes.set_title(f"{preset}, {len(own)} seeds", fontsize=10)
+    for axes in panels:
+        axes.set_xlabel("rig time [min]")
+        axes.legend(fontsize=8)
+        axes.grid(alpha=0.3)
+    save(figure, path)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Play all episodes and write the page's numbers, tables and figure.
+
+    Args:
+        arguments: those of the process when None.
+
+    Returns:
+        0.
+    """
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("docs", type=Path, help="the folder docs of the source tree")
+    docs: Path = parser.parse_args(arguments).docs
+    rows = []
+    for preset, policies in CONTESTS.items():
+        for policy in policies:
+            for seed in range(SEEDS[preset]):
+                rows.append(play(preset, policy, seed))
+                print(
+                    f"\r{preset} {policy} {seed + 1}/{SEEDS[preset]}  ", end="", file=sys.stderr, flush=True
+                )
+    write_whole(docs / "campaign-design.csv", to_csv(rows).encode())
+    page = docs / "campaign-design.md"
+    write_whole(page, fill(page.read_text(encoding="utf-8"), rows).encode())
+    draw(rows, docs / "images" / "campaign-design.png")
+    print(file=sys.stderr)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
