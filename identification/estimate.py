@@ -128,6 +128,7 @@ _RUN_QUANTITIES = (
     "sensor_zero",
     "aerodynamic_stiffness",
     "aerodynamic_damping",
+    "process_noise",
 )
 
 
@@ -145,6 +146,8 @@ class RunEstimate:
         sensor_zero: as this run alone shows it, rad.
         aerodynamic_stiffness: Ka, N m/rad, from the whole campaign; wind-on runs only.
         aerodynamic_damping: Ca, N m s/rad, likewise.
+        process_noise: spectral intensity of a random moment over the inertia, rad²/s³; None where the method
+            does not ask for it, or the run shows none.
         noise: what the standard deviations rest on; None where the method does not use it.
         windows: consecutive windows of three cycles.
     """
@@ -158,6 +161,7 @@ class RunEstimate:
     sensor_zero: Quantity | None = None
     aerodynamic_stiffness: Quantity | None = None
     aerodynamic_damping: Quantity | None = None
+    process_noise: Quantity | None = None
     noise: NoiseLevel | None = None
     windows: tuple[WindowEstimate, ...] = ()
 
@@ -284,4 +288,4 @@ def _quantities_json(owner: object, names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _quantities_from_json(data: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Quantity | None]:
-    return {name: None if data[name] is None else Quantity.from_json_dict(data[name]) for name in names}
+    return {name: None if data.get(name) is None else Quantity.from_json_dict(data[name]) for name in names}

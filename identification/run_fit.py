@@ -37,6 +37,8 @@ from tunnel_sim.record import Array
 # a record of 1e6 samples, less than once in 1e6 runs: 2 ln(1e12).
 _LEAST_ENERGY = 56.0
 _FEW_CYCLES = 3.0
+NO_WINDOWS = 10**6
+"""As periods in a window: longer than any record, so that a run has none."""
 _UNKNOWNS = 5
 _NEAR = 1e-6  # how close, as a ratio, block means bring the start to their own optimum
 
@@ -81,7 +83,7 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     if failure is not None:
         return _failed(run, reading, failure)
     variance = noise.std**2 * noise.slow_ratio
-    covariance = inverse(fitted.information)[np.ix_([RATE, STIFFNESS], [RATE, STIFFNESS])] * variance
+    covariance = decay_covariance_of(fitted) * variance
     windows = fit_windows(reading, fitted.decay, fit.zero, noise, cycles=cycles_per_window)
     estimate = describe_run(
         run, reading, fitted, fit.zero, covariance, variance, noise=noise, windows=windows
@@ -125,6 +127,18 @@ def residuals_of(
         )
         for reading, run in zip(readings, runs, strict=True)
     ]
+
+
+def decay_covariance_of(fitted: RunFit) -> Array:
+    """Covariance of (a, k) per noise variance, at the optimum of the least squares.
+
+    Args:
+        fitted: the run.
+
+    Returns:
+        Shape (2, 2); times the noise variance in rad² it is in 1/s and 1/s².
+    """
+    return inverse(fitted.information)[np.ix_([RATE, STIFFNESS], [RATE, STIFFNESS])]
 
 
 def judge(

@@ -82,6 +82,12 @@ ENTRIES: tuple[Entry, ...] = (
         "Hilbert",
         "envelope and phase, run by run; its windows are damping and frequency against amplitude",
     ),
+    Entry(
+        "filter_error",
+        "identification.estimators.filter_error",
+        "FilterError",
+        "maximum likelihood with a random moment on the rig: for buffeted runs",
+    ),
 )
 
 ALL_ESTIMATORS: tuple[str, ...] = tuple(entry.name for entry in ENTRIES)

@@ -1,0 +1,112 @@
+"""Filter error: maximum likelihood with a random moment on the rig as well as noise in the sensor.
+
+For runs in a turbulent stream: the motion wanders about the decay, so output error's residual is not white
+and its intervals are too narrow or, widened, too wide. Here a Kalman filter predicts every sample from those
+before, and decay rate, stiffness and the moment's intensity are those under which the prediction errors are
+likeliest; the initial state and the sensor's zero are marginal. Where a run shows no random moment, what is
+left is output error, and its result is given. Sources: Maine & Iliff, SIAM J. Appl. Math. 41 (1981) 558–579,
+doi 10.1137/0141046; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5,
+doi 10.2514/4.102790.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from identification.assembly import RunDecay, estimate_by_runs
+from identification.decay_fit import project_run
+from identification.estimate import Estimate, NoiseLevel, Quantity, Status
+from identification.filter_fit import DrivenFit, fit_driven
+from identification.noise import Residual, noise_level, white_noise
+from identification.run_fit import NO_WINDOWS, FittedRun, decay_covariance_of, describe_run, identify_run
+from identification.thinning import block_means
+from tunnel_sim.campaign import Campaign, Run, SensorProperties
+
+_DECIDED = 6  # what a run's data decide: decay, stiffness, intensity, initial state, zero
+_INNOVATIONS_BLOCK = 3  # of them in an eighth of a cycle
+INTENSITY_UNIT = "rad2/s3"
+
+
+@dataclass(frozen=True)
+class FilterError:
+    """Maximum likelihood with measurement and process noise.
+
+    Args:
+        blocks_per_cycle: block means per period that the filter sees, at least.
+    """
+
+    name: ClassVar[str] = "filter_error"
+    blocks_per_cycle: int = 24
+
+    def estimate(self, campaign: Campaign) -> Estimate:
+        """Identify every run, then the campaign from the runs.
+
+        Args:
+            campaign: at least one run.
+
+        Returns:
+            The estimate. A run that could not be identified is left out; ``process_noise`` of the others is
+            the random moment's spectral intensity q over the inertia, ⟨w(t)w(t′)⟩ = q δ(t − t′); where its
+            spectrum is not flat, that at the natural frequency.
+
+        Raises:
+            TunnelError: when a wind-on run states no air density.
+        """
+        return estimate_by_runs(campaign, self.name, self._run)
+
+    def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
+        bare = identify_run(run, sensor, cycles_per_window=NO_WINDOWS)
+        if bare.fit is None or bare.noise is None:
+            return RunDecay(bare.estimate)
+        driven = self._driven(bare, sensor)
+        if driven is not None:
+            return _with_moment(run, bare, bare.noise, *driven)
+        variance = bare.noise.std**2 * bare.noise.slow_ratio
+        return RunDecay(bare.estimate, bare.fit.decay, decay_covariance_of(bare.fit) * variance)
+
+    def _driven(self, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | None:
+        # The fit, and the sensor noise of one sample that it rests on.
+        fit, noise = bare.fit, bare.noise
+        if fit is None or noise is None or fit.decay.omega_d == 0.0:
+            return None
+        noise_std = white_noise(fit.residual, sensor) if noise.departs else noise.std
+        thin, factor = block_means(bare.reading, fit.decay.omega_d / (2.0 * np.pi), self.blocks_per_cycle)
+        if thin.time.size < 4 * _DECIDED:
+            return None
+        interval = float(thin.time[-1] - thin.time[0]) / (thin.time.size - 1)
+        deviations = np.sqrt(np.diag(decay_covariance_of(fit))) * noise_std
+        found = fit_driven(thin.yaw, interval, fit.decay, deviations, noise_std**2 / factor)
+        return None if found is None or found.model.decay.stiffness <= 0.0 else (found, noise_std)
+
+
+def _with_moment(
+    run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit, noise_std: float
+) -> RunDecay:
+    decay = found.model.decay
+    projected = project_run(bare.reading, decay)
+    if projected is None:
+        return RunDecay.failed(run, Status.NOT_CONVERGED)
+    fitted, zero = projected
+    noise = _judged(before, found, noise_std)
+    covariance = found.covariance * noise.slow_ratio
+    # The initial state is that of the least squares: the moment's own part in it is as the residual's power.
+    variance = max(noise_std, noise.residual_std) ** 2
+    estimate = describe_run(run, bare.reading, fitted, zero, covariance[:2, :2], variance, noise=noise)
+    q = found.model.intensity_at_resonance
+    process_noise = Quantity(q, q * float(np.sqrt(covariance[2, 2])), INTENSITY_UNIT)
+    return RunDecay(replace(estimate, process_noise=process_noise), decay, covariance[:2, :2])
+
+
+def _judged(before: NoiseLevel, found: DrivenFit, noise_std: float) -> NoiseLevel:
+    # The model is judged by the innovations, which are white if it is right; the residual never is.
+    values, variance = found.innovations.values, found.innovations.variance
+    level = noise_level(
+        [Residual(values, _INNOVATIONS_BLOCK, _DECIDED, float(np.abs(values).max()))],
+        SensorProperties(noise_std=float(np.sqrt(variance))),
+    )
+    departs = level.departs or level.disagrees
+    ratio = max(level.slow_ratio, float(values @ values) / values.size / variance) if departs else 1.0
+    return replace(before, std=noise_std, departs=departs, slow_ratio=ratio)
