@@ -28,6 +28,7 @@ COMMANDS = {
         "plot",
         "springs",
         "effects",
+        "score",
         "sweep",
         "view",
         "render",
