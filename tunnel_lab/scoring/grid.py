@@ -221,16 +221,18 @@ def _check_names(document: GridDocument, where: str) -> None:
 
 
 def _check_effects(document: GridDocument, where: str) -> None:
-    for table in document.campaigns:
-        for text in table.effects:
-            if text != NO_EFFECT:
-                setting = parse_effect(text)
-                if effect_from(setting.name, setting.parameters).is_null:
-                    raise TunnelError(
-                        f"effect {text!r} does nothing",
-                        where=where,
-                        remedy=f'give its severity, or write "{NO_EFFECT}"',
-                    )
+    texts = dict.fromkeys(text for table in document.campaigns for text in table.effects)
+    for text in texts:
+        if text == NO_EFFECT:
+            continue
+        try:
+            setting = parse_effect(text)
+            null = effect_from(setting.name, setting.parameters).is_null
+        except TunnelError as error:
+            raise TunnelError(error.what, where=f"{where}, effect {text!r}", remedy=error.remedy) from error
+        if null:
+            remedy = f'give its severity, or write "{NO_EFFECT}"'
+            raise TunnelError(f"effect {text!r} does nothing", where=where, remedy=remedy)
 
 
 def _decays(table: DecaysTable) -> list[Cell]:

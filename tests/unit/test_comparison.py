@@ -1,0 +1,91 @@
+"""The tests behind ``--check``: nothing where nothing changed, and every planted change."""
+
+import numpy as np
+import pytest
+
+from identification.comparison import ASPECTS, changes, holm
+from identification.scoring import Trials
+
+CELLS, COUNT = 6, 60
+
+
+def trials(rng, *, scale=1.0, shift=0.0, failures=0, std=1.0, outliers=0, bound=True, heavy=False):
+    error = (rng.standard_t(2, COUNT) if heavy else rng.standard_normal(COUNT)) * scale + shift
+    error[:outliers] *= 30.0
+    ones = np.ones(COUNT)
+    return Trials(error, std * ones, 2.0 * ones, ones if bound else None, failures)
+
+
+def several(seed, **options):
+    rng = np.random.default_rng(seed)
+    return [trials(rng, **options) for _ in range(CELLS)]
+
+
+def p_values(before, now):
+    cells = [change.p_value for old, new in zip(before, now, strict=True) for change in changes([old], [new])]
+    return cells + [change.p_value for change in changes(before, now)]
+
+
+def test_the_same_trials_are_no_change():
+    same = several(1)
+    for change in changes(same, same):
+        assert (change.before, change.p_value) == (change.now, 1.0)
+
+
+PLANTED = {
+    "bias": {"shift": 0.5},
+    "spread": {"scale": 1.5},
+    "outliers": {"outliers": 8},
+    "coverage": {"std": 0.6},
+    "failures": {"failures": 8},
+}
+
+
+@pytest.mark.parametrize("aspect", ASPECTS)
+def test_each_aspect_is_caught_by_its_own_test(aspect):
+    found = {change.aspect: change for change in changes(several(1), several(2, **PLANTED[aspect]))}
+    assert found[aspect].p_value < 1e-6
+    better = {change.aspect: change for change in changes(several(2, **PLANTED[aspect]), several(1))}
+    assert better[aspect].p_value == 1.0  # an improvement is never an alarm
+
+
+def test_intervals_that_became_too_wide_are_worse_too():
+    found = {change.aspect: change for change in changes(several(1), several(2, std=3.0))}
+    assert found["coverage"].p_value < 1e-3
+
+
+def test_bias_in_opposite_directions_does_not_cancel():
+    rng = np.random.default_rng(5)
+    biased = [trials(rng, shift=0.6 if i % 2 else -0.6) for i in range(CELLS)]
+    (bias, *_) = changes(several(1), biased)
+    assert bias.p_value < 1e-6
+
+
+@pytest.mark.parametrize("heavy", [False, True])
+def test_false_alarms_are_as_rare_as_stated(heavy):
+    """At 10 %, to see any: Holm is conservative, and errors without a variance change nothing."""
+    sets = 150
+    alarms = sum(
+        any(holm(p_values(several((1, i), heavy=heavy), several((2, i), heavy=heavy)), 0.10))
+        for i in range(sets)
+    )
+    assert alarms <= 28  # of 150, at 10 %: exceeded with probability 5e-4
+
+
+def test_holm_is_the_published_procedure():
+    assert holm([0.004, 0.03, 0.02, 0.5], 0.05) == (True, False, False, False)
+    assert holm([0.01, 0.013, 0.02, 0.04], 0.05) == (True, True, True, True)
+    assert holm([], 0.05) == ()
+
+
+def test_a_bound_on_one_side_only_is_refused():
+    rng = np.random.default_rng(1)
+    with pytest.raises(ValueError, match="one side"):
+        changes([trials(rng)], [trials(rng, bound=False)])
+
+
+def test_nothing_identified_is_a_matter_of_failures_only():
+    none = Trials(np.zeros(0), np.zeros(0), np.zeros(0), None, COUNT)
+    found = {change.aspect: change.p_value for change in changes(several(1)[:1], [none])}
+    assert found.pop("failures") < 1e-6
+    assert set(found.values()) == {1.0}

@@ -1,0 +1,153 @@
+"""Grids, trials and the work on them: what is refused, what is the same, what is kept."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.reference.free_decays import damped_cosine
+from tunnel_lab.scoring import work
+from tunnel_lab.scoring.draw import draw_trial
+from tunnel_lab.scoring.grid import Cell, Grid, load_grid, packaged_grid
+from tunnel_lab.scoring.results import Results, read_trials, scores_frame, write_trials
+from tunnel_sim.errors import TunnelError
+
+HEAD = 'schema_version = 1\nname = "g"\nseed = 1\ntrials = 4\n'
+DECAYS = "[[decays]]\nzeta = [0.01, 0.05]\nfrequency = [2.0]\nnoise = [0.01]\nduration = [4.0]\n"
+CAMPAIGNS = "[[campaigns]]\nsprings = [16.12]\nwind_speeds = [25.0]\nnoise = [0.0015]\nduration = [4.0]\n"
+DECAY = Cell("decay", 0.01, 4.0, 0.35, 500.0, 0.0, zeta=0.02, frequency=2.0)
+NAMES = ("conventional",)
+
+
+@pytest.fixture
+def small(tmp_path):
+    path = tmp_path / "grid.toml"
+    path.write_text(
+        HEAD + DECAYS + CAMPAIGNS + 'effects = ["none", "coulomb_friction:friction_moment=0.002"]\n'
+    )
+    return load_grid(path)
+
+
+def timeless(rows):
+    return [{name: value for name, value in row.items() if name != "milliseconds"} for row in rows]
+
+
+def test_every_combination_is_a_cell(small):
+    assert [cell.kind for cell in small.cells] == ["decay", "decay", "campaign", "campaign"]
+    assert len({cell.label for cell in small.cells}) == 4
+    assert Grid.from_json_dict(json.loads(json.dumps(small.to_json_dict()))) == small
+    assert len(packaged_grid().cells) > 10
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (HEAD, ["no cells", "[[decays]]"]),
+        (HEAD + DECAYS + DECAYS, ["twice"]),
+        (HEAD + DECAYS.replace("0.01, 0.05", "1.5"), ["zeta", "between 0 and 1"]),
+        (HEAD + DECAYS + "colour = 1\n", ["unknown key 'colour'"]),
+        (HEAD + "trials_of = { conventionl = 3 }\n" + DECAYS, ["conventionl", "did you mean 'conventional'"]),
+        (HEAD + CAMPAIGNS + 'effects = ["coulomb_frction:x=1"]\n', ["did you mean 'coulomb_friction'"]),
+        (HEAD + CAMPAIGNS + 'effects = ["coulomb_friction"]\n', ["does nothing", "severity"]),
+        (DECAYS, ["schema_version"]),
+    ],
+)  # fmt: skip
+def test_bad_grids_are_refused_in_a_line(tmp_path, text, parts):
+    path = tmp_path / "grid.toml"
+    path.write_text(text)
+    with pytest.raises(TunnelError) as error:
+        load_grid(path)
+    for part in (str(path), *parts):
+        assert part in str(error.value)
+
+
+def test_a_decay_is_the_textbooks_with_the_noise_that_is_said():
+    trial = draw_trial(DECAY, 1, 0)
+    run = trial.campaign.runs[0]
+    zeta, omega = trial.truth["zeta"], trial.truth["omega_n"]
+    textbook = damped_cosine(run.record.time_s, 2.0 * zeta * omega, omega**2, 0.35, 0.0)
+    left = run.record.yaw_rad - textbook
+    assert left.std() == pytest.approx(0.0035, rel=0.07)  # 2000 samples: 4.4σ
+    assert abs(left.mean()) < 0.02
+    assert (run.spring_stiffness, trial.campaign.sensor.noise_std) == (None, None)
+
+
+def test_a_trial_hangs_on_its_seed_cell_and_number_only():
+    first, same = draw_trial(DECAY, 1, 3), draw_trial(DECAY, 1, 3)
+    np.testing.assert_array_equal(first.campaign.runs[0].record.yaw_rad, same.campaign.runs[0].record.yaw_rad)
+    others = (draw_trial(DECAY, 2, 3), draw_trial(DECAY, 1, 4), draw_trial(replace(DECAY, zeta=0.03), 1, 3))
+    for other in others:
+        assert other.truth["omega_n"] != first.truth["omega_n"]
+
+
+def test_the_bound_is_that_of_the_start_actually_released():
+    from identification.cramer_rao import campaign_bound
+
+    cell = Cell("campaign", 0.0015, 4.0, 0.35, 500.0, 0.0, wind_speed=25.0, springs=(16.12, 44.84))
+    trial = draw_trial(cell, 1, 0)
+    nominal = campaign_bound(trial.campaign, **trial.truth, noise_std=0.0015 * 0.35)
+    for name, bound in trial.bound.items():
+        assert bound != nominal.std(name)
+        assert bound == pytest.approx(nominal.std(name), rel=0.12)  # releases scatter by 3 %
+
+
+def test_the_number_of_processes_changes_no_bit_and_an_interruption_costs_little(
+    small, tmp_path, monkeypatch
+):
+    here = work.score_grid(small, NAMES, jobs=0)
+    told = []
+    there = work.score_grid(
+        small, NAMES, jobs=2, parts=tmp_path / "parts", progress=lambda *now: told.append(now)
+    )
+    assert timeless(here) == timeless(there)
+    assert told[0] == (0, 16)
+    assert told[-1] == (16, 16)
+    # All is kept: going on estimates nothing again, unless the seed is another or a part was spoilt.
+    (tmp_path / "parts" / "c0001-t00000.json").write_text('{"fingerprint": ')
+    done = []
+    real = work.score_unit
+    monkeypatch.setattr(work, "score_unit", lambda *given: done.append(given[-1].name) or real(*given))
+    again = work.score_grid(small, NAMES, jobs=0, parts=tmp_path / "parts")
+    assert timeless(again) == timeless(here)
+    assert done == ["c0001-t00000"]
+    work.score_grid(replace(small, seed=2), NAMES, jobs=0, parts=tmp_path / "parts")
+    assert len(done) == 5
+
+
+def test_slow_methods_see_the_first_trials(small):
+    rows = work.score_grid(replace(small, trials_of=(("conventional", 2),)), NAMES, jobs=0)
+    assert {row["trial"] for row in rows} == {0, 1}
+
+
+def test_an_estimator_that_raises_is_a_failure_that_is_named(small, monkeypatch):
+    from identification.estimators.conventional import Conventional
+
+    def fall(*_):
+        raise np.linalg.LinAlgError("singular")
+
+    monkeypatch.setattr(Conventional, "estimate", fall)
+    results = Results(small, NAMES, tuple(work.score_grid(small, NAMES, jobs=0)))
+    assert results.raised() == {"conventional": ["LinAlgError"]}
+    assert {trials.failures for trials in results.trials().values()} == {4}
+    assert scores_frame(results)["failure_share"].to_list() == [1.0] * 12
+
+
+def test_trials_survive_the_disk(small, tmp_path):
+    results = Results(small, NAMES, tuple(work.score_grid(small, NAMES, jobs=0)))
+    again = read_trials(write_trials(tmp_path / "trials.parquet", results))
+    assert again.rows == results.rows
+    assert (again.grid, again.estimators) == (small, NAMES)
+    frame = scores_frame(results)
+    assert frame.height == 2 * 2 + 2 * 4
+    assert frame["coverage_low"].is_between(0.0, 1.0).all()
+
+
+@pytest.mark.parametrize("content", [b"", b"not parquet"])
+def test_a_file_that_is_no_baseline_is_refused(tmp_path, content):
+    path = tmp_path / "b.parquet"
+    path.write_bytes(content)
+    with pytest.raises(TunnelError, match="no table of trials"):
+        read_trials(path)
+    with pytest.raises(TunnelError, match="no such file"):
+        read_trials(tmp_path / "none.parquet")

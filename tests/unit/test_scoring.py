@@ -1,0 +1,85 @@
+"""Scores against sums done by hand and against the distributions they estimate."""
+
+import json
+
+import numpy as np
+import pytest
+
+from identification.estimate import Quantity
+from identification.scoring import Outcome, Proportion, collect, overall, score
+
+
+def outcomes(errors, *, std=1.0, truth=10.0, bound=1.0):
+    return [Outcome(truth, Quantity(truth + e, std, "kg m2"), bound) for e in errors]
+
+
+def test_figures_are_the_sums_done_by_hand():
+    found = score(collect([*outcomes([1.0, -2.0, 4.0]), Outcome(10.0, None, 1.0)]))
+    assert (found.count, found.failures.count) == (4, 1)
+    assert found.bias.value == pytest.approx(1.0)
+    assert found.bias.std == pytest.approx(3.0 / np.sqrt(3.0))  # s = 3 of 1, −2, 4
+    assert found.relative_bias.value == pytest.approx(10.0)
+    assert found.bias_in_stds.value == pytest.approx(1.0)
+    assert found.rmse.value == pytest.approx(np.sqrt(7.0))
+    # mean of 1, 4, 16 is 7, their s² = 63, so se(√7) = √(63/3)/(2√7)
+    assert found.rmse.std == pytest.approx(np.sqrt(21.0) / (2.0 * np.sqrt(7.0)))
+    assert found.rmse_over_bound == Quantity(pytest.approx(np.sqrt(7.0)), pytest.approx(found.rmse.std), "1")
+    assert (found.coverage.count, found.coverage.total) == (1, 3)
+    assert {found.bias.unit, found.rmse.unit} == {"kg m2"}
+
+
+def test_the_standard_errors_are_those_of_repeated_scores():
+    rng = np.random.default_rng(1)
+    many = [score(collect(outcomes(rng.normal(0.3, 2.0, 60)))) for _ in range(400)]
+    for name in ("bias", "rmse", "rmse_over_bound"):
+        figures = [getattr(one, name) for one in many]
+        scatter = np.std([figure.value for figure in figures], ddof=1)
+        claimed = np.sqrt(np.mean([figure.std**2 for figure in figures]))
+        assert claimed == pytest.approx(scatter, rel=0.15)  # 4σ of a scatter of 400
+
+
+def test_wilsons_interval_is_the_librarys():
+    from scipy.stats import binomtest
+
+    for count, total in ((0, 20), (7, 20), (20, 20), (950, 1000)):
+        library = binomtest(count, total).proportion_ci(method="wilson")
+        assert Proportion(count, total).interval == pytest.approx((library.low, library.high), abs=1e-12)
+
+
+def test_failures_and_single_trials_have_no_figures():
+    found = score(collect([Outcome(1.0, None)] * 3))
+    assert (found.failures.value, found.bias, found.rmse, found.coverage) == (1.0, None, None, None)
+    found = score(collect(outcomes([0.5])))
+    assert found.rmse is None
+    assert found.coverage.value == 1.0
+    json.dumps(found.to_json_dict(), allow_nan=False)
+    with pytest.raises(ValueError, match="no trial"):
+        score(collect([]))
+
+
+def test_a_missing_bound_or_a_truth_of_zero_leaves_the_ratio_out():
+    assert score(collect(outcomes([1.0, 2.0], bound=None))).rmse_over_bound is None
+    assert score(collect(outcomes([1.0, 2.0], truth=0.0))).relative_bias is None
+    assert score(collect(outcomes([1.0, 2.0], std=0.0))).bias_in_stds is None
+
+
+def test_tiny_errors_do_not_underflow():
+    found = score(collect(outcomes([3e-200, 4e-200], truth=0.0, bound=1e-200)))
+    assert found.rmse_over_bound.value == pytest.approx(np.sqrt(12.5))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_is_not_finite_is_refused(value):
+    with pytest.raises(ValueError, match="not finite"):
+        collect([Outcome(1.0, Quantity(value, 1.0, "1"))])
+
+
+def test_units_are_not_mixed():
+    with pytest.raises(ValueError, match="mixed"):
+        collect([Outcome(1.0, Quantity(1.0, 1.0, unit)) for unit in ("1", "rad")])
+
+
+def test_cells_are_added_in_squares():
+    one, other = score(collect(outcomes([3.0, -3.0]))), score(collect(outcomes([4.0, -4.0])))
+    assert overall([one, other]).value == pytest.approx(np.sqrt(12.5))
+    assert overall([score(collect([Outcome(1.0, None)]))]) is None
