@@ -28,6 +28,9 @@ from identification.springs import wind_off_line
 from tunnel_sim.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.record import Array
 
+Combination = Callable[[Design, list[int], Array, Array], tuple[Array, Array]]
+"""The design, the places of its runs, φ and its covariance to φ and its covariance."""
+
 _FALSE_ALARM_RATE = 1e-3  # of saying that the runs contradict each other
 
 
@@ -72,7 +75,9 @@ def estimate_by_runs(
     return combined_estimate(campaign, name, [method(run, campaign.sensor) for run in campaign.runs])
 
 
-def combined_estimate(campaign: Campaign, name: str, found: Sequence[RunDecay]) -> Estimate:
+def combined_estimate(
+    campaign: Campaign, name: str, found: Sequence[RunDecay], *, together: Combination | None = None
+) -> Estimate:
     """The campaign's coefficients from runs identified one by one: generalised least squares on their (a, k).
 
     Where the runs contradict each other beyond chance, the covariance is widened by their scatter, the ratio
@@ -82,6 +87,7 @@ def combined_estimate(campaign: Campaign, name: str, found: Sequence[RunDecay]) 
         campaign: the runs' conditions.
         name: of the estimator.
         found: one per run, in the campaign's order.
+        together: a method's own way to put runs together, from that of least squares on.
 
     Returns:
         The estimate. A run that could not be identified is left out; one without spring stiffness counts for
@@ -93,19 +99,22 @@ def combined_estimate(campaign: Campaign, name: str, found: Sequence[RunDecay]) 
     estimate = Estimate(campaign.name, name, tuple(item.estimate for item in found))
     statuses = statuses_of_runs(campaign, estimate.runs)
     pairs = [
-        (run, item.decay, item.covariance)
-        for run, item in zip(campaign.runs, found, strict=True)
+        (place, run, item.decay, item.covariance)
+        for place, (run, item) in enumerate(zip(campaign.runs, found, strict=True))
         if item.decay is not None and item.covariance is not None and run.spring_stiffness is not None
     ]
     statuses |= departures([run.noise for run in estimate.runs])
     if not pairs:
         return replace(estimate, statuses=by_gravity(statuses))
-    runs = [run for run, _, _ in pairs]
+    runs = [run for _, run, _, _ in pairs]
     design = build_design(runs, campaign.rig)
-    decays = np.array([[decay.rate, decay.stiffness] for _, decay, _ in pairs])
-    informations = [inverse(covariance) for _, _, covariance in pairs]
+    decays = np.array([[decay.rate, decay.stiffness] for _, _, decay, _ in pairs])
+    informations = [inverse(covariance) for _, _, _, covariance in pairs]
     parameters, covariance = combine(design, decays, informations)
-    covariance = covariance * _birge_ratio(design, parameters, decays, informations)
+    ratio = _birge_ratio(design, parameters, decays, informations)
+    if together is not None:
+        parameters, covariance = together(design, [place for place, *_ in pairs], parameters, covariance)
+    covariance = covariance * ratio
     return campaign_estimate(campaign, estimate, runs, design, parameters, covariance, statuses)
 
 

@@ -33,20 +33,26 @@ class Quantity:
         value: in the unit.
         std: its standard deviation, in the unit.
         unit: SI, e.g. ``rad/s``; ``1`` where there is none.
+        interval: lower and upper end of the 95 % interval, in the unit, where the method gives one of its own;
+            elsewhere value ± 1.96 std is it.
     """
 
     value: float
     std: float
     unit: str
+    interval: tuple[float, float] | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
-        """``{"value", "std", "unit"}``."""
-        return {"value": self.value, "std": self.std, "unit": self.unit}
+        """``{"value", "std", "unit"}``, and ``"interval"`` where there is one."""
+        data = {"value": self.value, "std": self.std, "unit": self.unit}
+        return data if self.interval is None else data | {"interval": list(self.interval)}
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> Quantity:
         """The inverse of `to_json_dict`."""
-        return cls(float(data["value"]), float(data["std"]), str(data["unit"]))
+        interval = data.get("interval")
+        ends = None if interval is None else (float(interval[0]), float(interval[1]))
+        return cls(float(data["value"]), float(data["std"]), str(data["unit"]), ends)
 
 
 @dataclass(frozen=True)

@@ -88,6 +88,12 @@ ENTRIES: tuple[Entry, ...] = (
         "FilterError",
         "maximum likelihood with a random moment on the rig: for buffeted runs",
     ),
+    Entry(
+        "bayesian",
+        "identification.estimators.bayesian",
+        "Bayesian",
+        "posterior means and 95 % intervals that hold in records of one to three cycles",
+    ),
 )
 
 ALL_ESTIMATORS: tuple[str, ...] = tuple(entry.name for entry in ENTRIES)

@@ -20,6 +20,7 @@ ACCURACY = {
     "log_decrement": 1e-4,
     "hilbert": 2e-5,
     "filter_error": 1e-6,
+    "bayesian": 1e-6,
 }
 
 each_estimator = pytest.mark.parametrize("name", ALL_ESTIMATORS)

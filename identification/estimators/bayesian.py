@@ -1,0 +1,111 @@
+"""Bayesian: the posterior of each run's decay, and of the campaign's coefficients under all of them.
+
+The initial state, the zero and the noise level are integrated out in closed form and damping and frequency
+are summed over a grid (see `identification.posterior`), so that nothing rests on the likelihood being a
+parabola: in records of one to three cycles, or of few samples, it is not. Values are posterior means, their
+deviations the posterior's, and ωn and ζ carry their 95 % intervals. The campaign's coefficients are drawn from
+the product of the runs' likelihoods. Sources: Bretthorst, Bayesian Spectrum Analysis and Parameter Estimation
+(1988), doi 10.1007/978-1-4684-9399-3; Jeffreys, Proc. R. Soc. A 186 (1946) 453–461,
+doi 10.1098/rspa.1946.0056.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from identification.assembly import RunDecay, combined_estimate
+from identification.damped_oscillation import Decay
+from identification.decay_fit import Reading, fit_run, project_run
+from identification.derivatives import Design, loads
+from identification.estimate import Estimate, NoiseLevel, Quantity, Status
+from identification.importance import shared_moments
+from identification.posterior import NoiseKnowledge, Posterior, posterior_of
+from identification.run_fit import decay_covariance_of, describe_run, judge
+from identification.start import starting_decay
+from identification.thinning import block_means
+from tunnel_sim.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.record import Array
+
+_LINEAR = 3  # initial angle and rate, zero
+
+
+@dataclass(frozen=True)
+class Bayesian:
+    """Posterior means, deviations and intervals.
+
+    Args:
+        blocks_per_cycle: block means per period that the posterior is computed from, at least.
+        seed: of the draws that put the runs together.
+    """
+
+    name: ClassVar[str] = "bayesian"
+    blocks_per_cycle: int = 20
+    seed: int = 0
+
+    def estimate(self, campaign: Campaign) -> Estimate:
+        """Identify every run, then the campaign under all of them.
+
+        Args:
+            campaign: at least one run.
+
+        Returns:
+            The estimate. A run that could not be identified is left out.
+
+        Raises:
+            TunnelError: when a wind-on run states no air density.
+        """
+        for run in campaign.runs:
+            loads(run, campaign.rig)
+        results = [self._run(run, campaign.sensor) for run in campaign.runs]
+
+        def together(
+            design: Design, places: list[int], centre: Array, covariance: Array
+        ) -> tuple[Array, Array]:
+            posteriors = [found for i in places if (found := results[i][1]) is not None]
+            rng = np.random.default_rng(self.seed)
+            return shared_moments(posteriors, design.links, centre, covariance, rng)
+
+        return combined_estimate(campaign, self.name, [found for found, _ in results], together=together)
+
+    def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunDecay, Posterior | None]:
+        start = starting_decay(run.record)
+        if start is None:
+            return RunDecay.failed(run, Status.NO_OSCILLATION), None
+        reading = Reading.from_record(run.record)
+        fit = fit_run(reading, start)
+        if not fit.runs or fit.runs[0].decay.stiffness <= 0.0:
+            return RunDecay.failed(run, Status.NOT_CONVERGED), None
+        noise, failure = judge(reading, fit.runs[0], fit.zero, sensor)
+        if failure is not None:
+            return RunDecay.failed(run, failure), None
+        variance = noise.std**2 * noise.slow_ratio
+        guess = decay_covariance_of(fit.runs[0]) * variance
+        found = self._posterior(reading, fit.runs[0].decay, fit.runs[0].residual, guess, noise)
+        if found is None:
+            return RunDecay.failed(run, Status.NOT_CONVERGED), None
+        mean, covariance = found.moments()
+        projected = project_run(reading, Decay(float(mean[0]), float(mean[1])))
+        if projected is None:
+            return RunDecay.failed(run, Status.NOT_CONVERGED), None
+        described = describe_run(run, reading, *projected, covariance, variance, noise=noise)
+        omega_n, zeta = found.modal()
+        estimate = replace(
+            described,
+            omega_n=Quantity(omega_n[0], omega_n[1], "rad/s", omega_n[2:]),
+            zeta=Quantity(zeta[0], zeta[1], "1", zeta[2:]),
+        )
+        return RunDecay(estimate, projected[0].decay, covariance), found
+
+    def _posterior(
+        self, reading: Reading, decay: Decay, residual: Array, guess: Array, noise: NoiseLevel
+    ) -> Posterior | None:
+        frequency = decay.omega_n / (2.0 * np.pi)
+        thin, factor = block_means(reading, frequency, self.blocks_per_cycle)
+        means, _ = block_means(Reading(reading.time, residual), frequency, self.blocks_per_cycle)
+        known = noise.std**2 * noise.slow_ratio if noise.source == "stated" or noise.departs else None
+        within = float(residual @ residual) - factor * float(means.yaw @ means.yaw)
+        knowledge = NoiseKnowledge(known, factor, max(within, 0.0), reading.time.size - _LINEAR)
+        return posterior_of(thin, decay, guess, knowledge)
