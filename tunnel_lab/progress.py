@@ -17,7 +17,8 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[[int, int, str
         total: number of items, where it is known beforehand.
 
     Yields:
-        What to tell the number done, the number in all and the last one's name to.
+        What to tell the number done, the number in all and the last one's name to. The first call says what was
+        done before, and does not count for the speed.
     """
     from rich.progress import (
         BarColumn,
@@ -37,8 +38,13 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[[int, int, str
         *columns, console=terminal, disable=not terminal.is_terminal, speed_estimate_period=600
     ) as progress:
         task = progress.add_task(what, total=total)
+        begun = False
 
         def tell(done: int, count: int, name: str) -> None:
+            nonlocal begun
+            if not begun:
+                progress.reset(task, completed=done, total=count)
+                begun = True
             progress.update(task, completed=done, total=count, description=f"{what} {name}".rstrip())
 
         yield tell

@@ -64,7 +64,7 @@ def make(
     """
     from diagnosis.blind import make_blind
     from diagnosis.blind.files import SEAL, read_document
-    from tunnel_lab.progress import work_bar
+    from tunnel_lab.progress import bar
     from tunnel_lab.tables import say
     from tunnel_sim.reference.draw import DEFAULT_SHARES, Mixture
     from tunnel_sim.reference.make import parse_shares
@@ -72,7 +72,7 @@ def make(
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
     if key is not None:
         refuse_unwritable(key)
-    with work_bar("writing campaigns", count) as tell:
+    with bar("writing campaigns", count) as tell:
         where = make_blind(
             out, count=count, seed=seed, shares=shares, mixture=Mixture(textbook, rare), key=key,
             progress=lambda done, total: tell(done, total, ""), tell_steps=_terminal(),
@@ -96,11 +96,11 @@ def diagnose(
       0 all answered, 2 bad input, 130 interrupted (what is answered stays).
     """
     from diagnosis.blind import answer_set, answers_folder
-    from tunnel_lab.progress import work_bar
+    from tunnel_lab.progress import bar
     from tunnel_lab.tables import say
 
     names = split_names(exclude)
-    with work_bar("diagnosing", None) as tell:
+    with bar("diagnosing", None) as tell:
         sealed = answer_set(folder, excluded=names, jobs=jobs, progress=tell)
     say(f"Answers: {answers_folder(folder, names)}")
     say(f"Answers sha256 {sealed}")

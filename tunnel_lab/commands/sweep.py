@@ -104,7 +104,7 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
     Raises:
         TunnelError: for bad input.
     """
-    from tunnel_lab.progress import work_bar
+    from tunnel_lab.progress import bar
     from tunnel_lab.sweep.engine import run_sweep
     from tunnel_lab.sweep.reading import read_sweep
     from tunnel_lab.tables import say
@@ -120,7 +120,7 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
     estimates = sweep.size * len(sweep.document.estimators)
     say(f"Sweep {sweep.document.name}: {sweep.size} cases, {sweep.runs} runs, {estimates} estimates")
     work = _work(workers, scheduler, sweep)
-    with work_bar("cases", sweep.size) as tell:
+    with bar("cases", sweep.size) as tell:
         outcome = run_sweep(sweep, out, work, lambda done, total: tell(done, total, ""))
     if outcome.found:
         say(f"{outcome.found} of {sweep.shards} shards were finished before")
