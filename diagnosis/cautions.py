@@ -11,8 +11,6 @@ from tunnel_sim.campaign import Campaign
 _FEW = 3
 #: Stated noise this many times too small or too large is said; its rounding to one digit reaches half of that.
 _CONTRADICTED = 3.0
-#: Ten times what the fits' step and block means leave on a record of the nominal model in closed form, rad.
-_NUMERICS = 1e-5
 
 
 def cautions(
@@ -76,12 +74,12 @@ def _reference(campaign: Campaign) -> list[str]:
 
 
 def _noise(noise: Noise) -> list[str]:
-    std = (sum(noise.variance.values()) / len(noise.variance)) ** 0.5
-    if std < _NUMERICS:
+    std = noise.estimated**0.5
+    if noise.source == "floor":
         return [
-            f"The records hold next to no noise ({std:.1g} rad): the fits are accurate to about "
-            f"{_NUMERICS / 10:.0g} rad, and what they miss by may be all of the gap. Add noise of the sensor's "
-            f"size to simulated records."
+            f"The records hold next to no noise ({std:.1g} rad): the fits' own accuracy, "
+            f"{noise.used**0.5:.1g} rad, stands in for it, and a gap smaller than that is not seen. Add noise of "
+            f"the sensor's size to simulated records."
         ]
     if noise.stated_variance is None:
         return []

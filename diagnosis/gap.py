@@ -56,14 +56,16 @@ def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
     Returns:
         The verdict at `FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
     """
-    tests = dict(zip(BANDS, band_p_values(fit), strict=True)) | {"offset": offset_p_value(fit)}
+    # stated noise that the records bear out may still lie a little below theirs
+    floor = (1.0 + _FLOOR_TOLERANCE) * max(noise.estimated / noise.used, 1.0)
+    tests = dict(zip(BANDS, band_p_values(fit, floor), strict=True)) | {"offset": offset_p_value(fit, floor)}
     noisy = {}
-    if not coarse_step:
+    if not coarse_step and noise.source != "floor":
         noisy["noise against amplitude"] = float(2.0 * norm.sf(abs(trend.amplitude_z)))
         noisy["noise against rate"] = float(2.0 * norm.sf(abs(trend.rate_z)))
         noisy["noise in bursts"] = 0.0 if trend.spread_z > _SPREAD_LIMIT else 1.0
         if noise.stated_variance is not None:
-            level = float(np.mean(list(noise.variance.values()))) / noise.stated_variance
+            level = noise.estimated / noise.stated_variance
             noisy["noise level"] = 0.0 if level > _ROUNDED_NOISE else 1.0
     everything = tests | noisy
     limit = FALSE_ALARM_RATE / len(everything)
@@ -76,25 +78,27 @@ def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
     )
 
 
-def offset_p_value(fit: Fit) -> float:
+def offset_p_value(fit: Fit, floor: float = 1.0) -> float:
     """Chance that white noise alone moves the runs' means from the common zero as far as they lie.
 
     Args:
         fit: its residuals, in noise standard deviations.
+        floor: power of white noise that counts as chance, in noise variances.
 
     Returns:
         The p-value, one degree of freedom given to the zero.
     """
     total = sum(float(np.sum(residual)) ** 2 / residual.size for residual in fit.residuals)
     runs = len(fit.residuals)
-    return float(chi2.sf(total / (1.0 + _FLOOR_TOLERANCE), runs - 1)) if runs > 1 else 1.0
+    return float(chi2.sf(total / floor, runs - 1)) if runs > 1 else 1.0
 
 
-def band_p_values(fit: Fit) -> tuple[float, ...]:
+def band_p_values(fit: Fit, floor: float = 1.0) -> tuple[float, ...]:
     """Chance that white noise alone gives as much power in each band, summed over the runs.
 
     Args:
         fit: its residuals, in noise standard deviations.
+        floor: power of white noise that counts as chance, in noise variances.
 
     Returns:
         One p-value per band of `BANDS`; the bands are multiples of each run's own frequency.
@@ -109,7 +113,6 @@ def band_p_values(fit: Fit) -> tuple[float, ...]:
         count += np.bincount(band, minlength=len(BANDS))
     # each ordinate is half a χ² of two degrees of freedom
     values = [
-        float(chi2.sf(2.0 * p / (1.0 + _FLOOR_TOLERANCE), 2.0 * n)) if n > 0 else 1.0
-        for p, n in zip(power, count, strict=True)
+        float(chi2.sf(2.0 * p / floor, 2.0 * n)) if n > 0 else 1.0 for p, n in zip(power, count, strict=True)
     ]
     return tuple(values)

@@ -167,7 +167,7 @@ class NoiseSummary:
     Args:
         std: of one sample, quantisation included, rad.
         stated_std: likewise as the campaign states it, rad; None where it does not.
-        source: ``stated`` or ``estimated``.
+        source: ``stated``, ``estimated`` or ``floor``: whose ``std`` is; the floor is the accuracy of the fits.
         reason: why, in words.
     """
 

@@ -230,6 +230,34 @@ def test_rivals_are_named_with_the_run_that_would_tell(found):
     assert document.coefficients.after["cn_r"].std > sure.coefficients.after["cn_r"].std
 
 
+def quiet(effect=None):
+    """A campaign without any noise."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gap_campaigns, "NOISE", 1e-15)
+        data = campaign(effect)
+    return replace(data, sensor=replace(data.sensor, noise_std=None))
+
+
+@pytest.mark.parametrize(("effect", "causes"), [(None, []), (QUADRATIC, ["quadratic_damping"])])
+def test_records_without_noise_are_answered_with_a_status(effect, causes):
+    answer = diagnose(quiet(effect), kinds=FEW)
+    document = checked(answer)
+    assert document.causes == causes
+    assert answer.noise.source == "floor"
+    assert any("stands in for it" in text for text in answer.cautions)
+    assert all(0.0 <= p <= 1.0 for p in answer.gap.tests.values())
+    if not causes:
+        assert answer.gap.p_value == 1.0
+
+
+def test_the_source_of_the_noise_is_said():
+    data = campaign()
+    assert diagnose(data, kinds=FEW).noise.source == "stated"
+    wrong = diagnose(replace(data, sensor=replace(data.sensor, noise_std=8e-4)), kinds=FEW).noise
+    assert wrong.source == "estimated"
+    assert "contradict the stated 0.0008 rad" in wrong.reason
+
+
 def test_noise_that_misbehaves_is_unknown_once():
     """Every effect is weighed, and none explains noise that swells with the rate."""
     rng = np.random.default_rng(8)
