@@ -207,7 +207,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         )  # fmt: skip
         found = {
             "estimate": np.clip(known.belief.values, -_LARGE, _LARGE),
-            "covariance": np.clip(known.belief.covariance, -_LARGE, _LARGE),
+            "covariance": np.clip(known.belief.covariance.ravel(), -_LARGE, _LARGE),
             "last_run": np.array(run),
             "progress": np.array([float(len(known.choices)), known.rig_time]),
         }
@@ -255,7 +255,7 @@ def _observation_space(conditions: Conditions, max_runs: int) -> spaces.Dict:
     longest = conditions.costs.setup + conditions.costs.spring_change + conditions.costs.speed_change
     parts: dict[str, spaces.Space[Any]] = {
         "estimate": spaces.Box(-_LARGE, _LARGE, (4,), np.float64),
-        "covariance": spaces.Box(-_LARGE, _LARGE, (4, 4), np.float64),
+        "covariance": spaces.Box(-_LARGE, _LARGE, (16,), np.float64),
         "last_run": spaces.Box(np.zeros(4), np.array(highest), dtype=np.float64),
         "progress": spaces.Box(
             np.zeros(2), np.array([max_runs, max_runs * (longest + highest[3])]), dtype=np.float64
