@@ -1,0 +1,39 @@
+"""A small sweep, and how to do it in this process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.unit.sweep.small_sweep import SMALL
+from tunnel_lab.sweep.product import Sweep
+from tunnel_lab.sweep.reading import read_sweep
+from tunnel_lab.sweep.shard import ONE_THREAD, run_shard
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    """The file of a sweep of 12 cases, a shard each."""
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def sweep(small: Path) -> Sweep:
+    """The same, read."""
+    return read_sweep(small)
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch):
+    """Shards done one after the other in this process, the last first."""
+    for name in ONE_THREAD:
+        monkeypatch.setenv(name, "1")
+
+    def work(text, shards):
+        for index in reversed(shards):
+            yield run_shard(text, index)
+
+    return work

@@ -1,0 +1,179 @@
+"""A sweep on disk: killed, interrupted, resumed, refused. The shards themselves are done in this process where that
+is not the point."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from tests.unit.sweep.small_sweep import SMALL, contents
+from tunnel_lab.sweep import shard as shard_module
+from tunnel_lab.sweep.engine import run_sweep
+from tunnel_lab.sweep.processes import in_processes
+from tunnel_lab.sweep.product import Sweep
+from tunnel_lab.sweep.reading import read_sweep
+from tunnel_lab.sweep.store import open_store
+from tunnel_sim.errors import TunnelError
+
+ROOT = Path(__file__).parents[3]
+PATIENCE_S = 120.0
+
+
+def started(file: Path, out: Path) -> subprocess.Popen[str]:
+    """``tunnel sweep`` on two processes, once its first shard is finished."""
+    words = [sys.executable, "-m", "tunnel_lab.cli", "sweep", str(file), "--out", str(out), "--workers", "2"]
+    process = subprocess.Popen(
+        words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, process_group=0
+    )
+    until = time.monotonic() + PATIENCE_S
+    while not list(out.glob("results/part-*")):
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    return process
+
+
+def running(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_killed_and_resumed_is_the_same_to_the_bit(small: Path, sweep: Sweep, here, tmp_path: Path) -> None:
+    """Against a sweep that nobody disturbed, in one process and in another order."""
+    run_sweep(sweep, tmp_path / "whole", here)
+    process = started(small, tmp_path / "killed")
+    process.kill()
+    process.communicate()
+    finished = {path: path.stat().st_mtime_ns for path in (tmp_path / "killed").glob("results/part-*")}
+    assert 0 < len(finished) < sweep.shards, "killed too late to say anything"
+    outcome = run_sweep(sweep, tmp_path / "killed", here)
+    assert outcome.found == len(finished)
+    assert {path: path.stat().st_mtime_ns for path in finished} == finished  # nothing was done twice
+    assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
+    cases = open_store(tmp_path / "killed").scan().select("case").collect()["case"]
+    assert cases.is_sorted()
+    assert cases.unique().to_list() == list(range(12))
+    until = time.monotonic() + PATIENCE_S
+    while running(process.pid) and time.monotonic() < until:
+        time.sleep(0.01)
+    assert not running(process.pid)  # its workers ended with it
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_what_is_finished(small: Path, tmp_path: Path) -> None:
+    process = started(small, tmp_path / "out")
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers, too
+    _, said = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 130
+    assert said.count("\n") == 1
+    assert "interrupted" in said
+    assert open_store(tmp_path / "out").finished()
+
+
+@pytest.mark.slow
+def test_a_lost_process_costs_nothing(sweep: Sweep, here, tmp_path: Path) -> None:
+    run_sweep(sweep, tmp_path / "whole", here)
+    said: list[str] = []
+    killed: list[int] = []
+
+    def kill_one(done: int, total: int) -> None:
+        del total
+        if done and not killed:
+            mine = [p.name for p in Path("/proc").iterdir() if p.name.isdecimal() and _is_worker(p)]
+            killed.append(int(mine[0]))
+            os.kill(killed[0], signal.SIGKILL)
+
+    run_sweep(sweep, tmp_path / "out", in_processes(2, said.append), kill_one)
+    assert said == ["a worker process was lost; its shards are done again"]
+    assert contents(tmp_path / "out") == contents(tmp_path / "whole")
+
+
+def _is_worker(process: Path) -> bool:
+    """Whether it is a worker that this process started."""
+    try:
+        parent = (process / "stat").read_text().rpartition(")")[2].split()[1]
+        return parent == str(os.getpid()) and b"spawn_main" in (process / "cmdline").read_bytes()
+    except OSError:
+        return False
+
+
+def test_half_a_part_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
+    store = run_sweep(sweep, tmp_path / "out", here).store
+    whole = contents(tmp_path / "out")
+    part = tmp_path / "out" / "results" / "part-00004.parquet"
+    part.write_bytes(part.read_bytes()[:-100])  # a disk that was full, or lost its power
+    (part.parent / ".part-00005.parquet.abc.part").write_bytes(b"PAR1")
+    assert 4 not in store.finished()
+    assert run_sweep(sweep, tmp_path / "out", here).found == 11
+    assert contents(tmp_path / "out") == whole
+
+
+def test_a_changed_file_is_refused_and_a_comment_is_no_change(sweep: Sweep, here, tmp_path: Path) -> None:
+    run_sweep(sweep, tmp_path / "out", here)
+    before = contents(tmp_path / "out")
+    for text, said in (
+        (SMALL.replace("seed = 1", "seed = 2"), "whose seed is not that of the file"),
+        (SMALL.replace("0.02]", "0.03]"), "whose effects is not that of the file"),
+    ):
+        (tmp_path / "changed.toml").write_text(text, encoding="utf-8")
+        with pytest.raises(TunnelError, match=said):
+            run_sweep(read_sweep(tmp_path / "changed.toml"), tmp_path / "out", here)
+    (tmp_path / "same.toml").write_text("# a comment\n" + SMALL.replace("0.0002", "2e-4"), encoding="utf-8")
+    assert run_sweep(read_sweep(tmp_path / "same.toml"), tmp_path / "out", here).found == 12
+    assert contents(tmp_path / "out") == before
+
+
+def test_other_versions_are_refused(
+    sweep: Sweep, here, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(shard_module, "made_with", lambda: {"numpy": "1.0"})
+        run_sweep(sweep, tmp_path / "old", lambda *_: iter(()))
+    with pytest.raises(TunnelError, match=r"begun with numpy 1\.0"):
+        run_sweep(sweep, tmp_path / "old", here)
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    with pytest.raises(TunnelError, match="a worker has threads 4, but this sweep is made with 1"):
+        run_sweep(sweep, tmp_path / "new", here)
+    assert open_store(tmp_path / "new").finished() == []
+
+
+def test_a_case_that_cannot_be_simulated_takes_no_other_with_it(tmp_path: Path, here) -> None:
+    """At 60 m/s the air's moment is stronger than this spring: the motion grows without bound."""
+    text = SMALL.replace("[0.0, 15.0]", "[0.0, 60.0]").replace("cn_beta = 0.495", "cn_beta = [0.1, 5.0]")
+    text = text.replace("cases_per_shard = 1", "cases_per_shard = 24").replace(
+        "duration = 2.0", "duration = 4.0"
+    )
+    (tmp_path / "wild.toml").write_text(text, encoding="utf-8")
+    rows = run_sweep(read_sweep(tmp_path / "wild.toml"), tmp_path / "out", here).store.scan().collect()
+    failed = rows.filter(pl.col("status") == "not_simulated")
+    assert set(failed["cn_beta"]) == {5.0}
+    assert failed["value"].null_count() == len(failed)
+    assert "grows without bound" in failed["message"][0]
+    assert rows.filter(cn_beta=0.1, quantity="omega_n")["value"].null_count() == 0
+
+
+def test_an_estimator_that_crashes_is_a_status(
+    sweep: Sweep, here, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Broken:
+        name = "conventional"
+
+        def estimate(self, _campaign):
+            raise ZeroDivisionError("planted")
+
+    monkeypatch.setattr(shard_module, "_estimator", lambda _: Broken())
+    outcome = run_sweep(sweep, tmp_path / "out", here)
+    assert outcome.crashes == 12
+    rows = outcome.store.scan().collect()
+    assert set(rows["status"]) == {"raised"}
+    assert set(rows["message"]) == {"ZeroDivisionError: planted"}
