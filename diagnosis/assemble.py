@@ -52,7 +52,7 @@ def assemble(study: Study, where: Where, maps: Maps) -> Diagnosis:
     shown = report_fits(study.nominal, chosen, nominal_out, chosen_out)
     study.seconds["confirmation"] = time.perf_counter() - begun
     gap = gap_summary(study, base, shown)
-    probability = study.weighed[0].probability if study.weighed else 1.0 - gap.false_alarm_rate
+    weighed = candidates(study, base)
     rivals = rival_fits(study.weighed, study.hypotheses, chosen)
     data = study.nominal.problem.data
     return Diagnosis(
@@ -63,13 +63,13 @@ def assemble(study: Study, where: Where, maps: Maps) -> Diagnosis:
             before=gap.excess_before,
             after=gap.excess_after,
             closed=gap.closed,
-            probability=probability,
+            probability=weighed[0].probability,
             held_out=any(run.held_out for run in gap.runs),
         ),
         gap=gap,
         where=where,
         maps=maps.to_json_dict(),
-        candidates=candidates(study, base),
+        candidates=weighed,
         ambiguous_with=_rival_names(study),
         next_run=_next_run(study, chosen),
         coefficients=Coefficients(

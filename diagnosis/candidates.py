@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -48,9 +49,17 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         found.append(
             Candidate(name, 0.99, left, float(np.clip(closed, 0.0, 1.0)), _short(_read_parameters(study)))
         )
-        found.append(Candidate("unknown", 0.01 - FALSE_ALARM_RATE, left + base.hum + base.extra, 0.0))
-    found.append(Candidate("none", min(study.test.p_value, FALSE_ALARM_RATE), before / _block(study), 0.0))
-    return tuple(sorted(found, key=lambda c: -c.probability))
+        found.append(Candidate("unknown", 0.01, left + base.hum + base.extra, 0.0))
+    none = 0.0 if study.read_off else min(study.test.p_value, FALSE_ALARM_RATE)
+    found.append(Candidate("none", none, before / _block(study), 0.0))
+    return _normalised(found)
+
+
+def _normalised(found: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Most probable first, their probabilities summing to 1."""
+    total = sum(candidate.probability for candidate in found)
+    shared = [replace(candidate, probability=candidate.probability / total) for candidate in found]
+    return tuple(sorted(shared, key=lambda c: -c.probability))
 
 
 def _block(study: Study) -> int:

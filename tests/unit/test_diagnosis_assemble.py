@@ -10,10 +10,12 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.interpolate import CubicSpline
 
 from diagnosis.assemble import assemble, chosen_fit
+from diagnosis.candidates import candidates
 from diagnosis.decide import Weighed
 from diagnosis.diagnose import diagnose, vocabulary
 from diagnosis.localise import localise
 from diagnosis.rank import Hypothesis
+from diagnosis.reported import excess_base
 from diagnosis.study import study
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, with_blow
@@ -104,7 +106,7 @@ class Document(Strict):
         assert names[0] == (" + ".join(self.causes) or "none")
         probabilities = [candidate.probability for candidate in self.candidates]
         assert probabilities == sorted(probabilities, reverse=True)
-        assert abs(sum(probabilities) - 1.0) < 2e-3
+        assert abs(sum(probabilities) - 1.0) < 1e-12
         return self
 
 
@@ -256,6 +258,17 @@ def test_the_source_of_the_noise_is_said():
     wrong = diagnose(replace(data, sensor=replace(data.sensor, noise_std=8e-4)), kinds=FEW).noise
     assert wrong.source == "estimated"
     assert "contradict the stated 0.0008 rad" in wrong.reason
+
+
+def test_the_probability_in_words_is_that_of_the_first_candidate(found):
+    answer = assemble(found, *localise(found.campaign, found.nominal, chosen_fit(found), found.causes))
+    assert f"(probability {answer.candidates[0].probability:.2f})" in answer.verdict
+    doubtful = replace(found, test=replace(found.test, p_value=9e-4))
+    (none,) = [c for c in candidates(doubtful, excess_base(doubtful)) if c.effect == "none"]
+    assert none.probability == pytest.approx(9e-4 / 1.0009)
+    read_off = replace(doubtful, coarse=True)
+    (none,) = [c for c in candidates(read_off, excess_base(read_off)) if c.effect == "none"]
+    assert none.probability == 0.0
 
 
 def test_noise_that_misbehaves_is_unknown_once():
