@@ -13,6 +13,13 @@ class Status(Enum):
     NO_OSCILLATION = (
         "no decaying motion above the noise: check the sensor, or let the record start at the release"
     )
+    TOO_FEW_CYCLES = (
+        "fewer than the three cycles the networks need after the first zero crossing: lengthen the record, or use "
+        "output_error"
+    )
+    OUTSIDE_TRAINING = (
+        "damping or frequency outside the range the networks were trained for: use output_error, or train others"
+    )
     RUN_LEFT_OUT = "a run could not be identified and was left out: see the status of the runs"
     MODEL_DEPARTS = "model departs from the data: run the diagnosis; the intervals are widened meanwhile"
     NOISE_DISAGREES = (
@@ -39,9 +46,16 @@ class Status(Enum):
     @property
     def failed(self) -> bool:
         """Whether there is no result at all."""
-        return self in (Status.NO_RUN_IDENTIFIED, Status.NOT_CONVERGED, Status.NO_OSCILLATION)
+        return self in _FAILED
 
 
+_FAILED = (
+    Status.NO_RUN_IDENTIFIED,
+    Status.NOT_CONVERGED,
+    Status.NO_OSCILLATION,
+    Status.TOO_FEW_CYCLES,
+    Status.OUTSIDE_TRAINING,
+)
 _GRAVITY = {status: rank for rank, status in enumerate(Status)}
 
 

@@ -65,6 +65,12 @@ ENTRIES: tuple[Entry, ...] = (
         "the paper's: spectrum, time to half amplitude, each wind-on run paired with a wind-off run of its spring",
     ),
     Entry(
+        "neural_network",
+        "identification.estimators.neural",
+        "NeuralNetwork",
+        "the paper's: one network for damping, one for frequency, three cycles at a time, paired likewise",
+    ),
+    Entry(
         "matrix_pencil",
         "identification.estimators.matrix_pencil",
         "MatrixPencil",

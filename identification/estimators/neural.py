@@ -1,0 +1,211 @@
+"""The paper's neural networks: three cycles at a time, ζ by 100-5-5-1 and ωn by 2-2-5-1.
+
+Each run is cut into consecutive windows of three cycles (the paper's Table III), found from zero crossings alone;
+the first network reads ζ off a window's shape, the second ωn off ζ and the window's length t3. The run's ζ and ωn
+are the averages over its windows, each with the weight its noise leaves it; eqs 10, 11, 17 and 18 then give Cnβ and
+Cnr from wind-on and wind-off runs of the same spring (`identification.pairing`).
+
+A standard deviation holds the reading's noise, carried through crossings, shape and networks by the delta method;
+the posterior of the networks' weights; and their largest error on responses they were not trained on. Where the
+windows scatter by more than that, it is widened by as much and the status says that the model departs.
+
+Torch is not needed: the shipped weights are used in NumPy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from scipy.stats import chi2
+
+from identification.derivatives import loads
+from identification.estimate import Estimate, Quantity, RunEstimate, Status, WindowEstimate, by_gravity
+from identification.neural.files import read_networks, shipped_networks
+from identification.neural.networks import Networks
+from identification.neural.shape import CYCLES, network_inputs, normalise, response_points
+from identification.neural.three_cycles import ThreeCycles, find_windows
+from identification.noise import FALSE_ALARM_RATE, white_noise
+from identification.pairing import PairedRun, paired_estimate
+from tunnel_sim.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.record import Array
+
+_UNLIKE = 0.1  # root mean square distance from a damped oscillation, of its amplitude, that is none
+_LEAST_FOR_SCATTER = 3
+_TOLERANCE = 1.2  # of χ²: the propagated deviations are good to a tenth
+
+
+@dataclass(frozen=True)
+class NeuralNetwork:
+    """The paper's networks.
+
+    Args:
+        weights: a safetensors file that ``tunnel train`` wrote; those that ship where None.
+    """
+
+    name: ClassVar[str] = "neural_network"
+    weights: Path | None = None
+
+    def estimate(self, campaign: Campaign) -> Estimate:
+        """Identify every run, then the campaign by pairs of wind-on and wind-off runs.
+
+        Args:
+            campaign: at least one run.
+
+        Returns:
+            The estimate. A run of fewer than three cycles, or outside the range of the training, is left out and
+            its status says so.
+
+        Raises:
+            TunnelError: when a wind-on run states no air density, or the weights cannot be read.
+        """
+        pairs = [loads(run, campaign.rig) for run in campaign.runs]
+        networks = shipped_networks() if self.weights is None else read_networks(self.weights)
+        seen = [_identified(run, campaign.sensor, networks) for run in campaign.runs]
+        estimate = Estimate(campaign.name, self.name, tuple(found for found, _ in seen))
+        known = [(one, load) for (_, one), load in zip(seen, pairs, strict=True) if one is not None]
+        if not known:
+            return replace(estimate, statuses=(Status.NO_RUN_IDENTIFIED,))
+        statuses = {Status.RUN_LEFT_OUT} if len(known) < len(seen) else set()
+        if any(Status.MODEL_DEPARTS in found.statuses for found, _ in seen):
+            statuses.add(Status.MODEL_DEPARTS)
+        return paired_estimate(campaign, estimate, known, statuses)
+
+
+@dataclass(frozen=True, eq=False)
+class WindowReading:
+    """What the networks read off one window.
+
+    Args:
+        window: where it lies.
+        zeta: damping ratio.
+        omega_n: natural frequency, rad/s.
+        noise: covariance of (ζ, ωn) from the reading's noise, shape (2, 2).
+    """
+
+    window: ThreeCycles
+    zeta: float
+    omega_n: float
+    noise: Array
+
+
+def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None:
+    """Put a window through both networks.
+
+    Args:
+        window: three cycles.
+        networks: trained.
+
+    Returns:
+        The reading; None where the window is nothing like a damped oscillation.
+    """
+    inputs = window.shape.inputs
+    zeta = float(networks.zeta(inputs[None])[0])
+    clean = network_inputs(np.clip([zeta], *networks.spec.zeta_range))[0]
+    if float(np.sqrt(np.mean((inputs - clean) ** 2))) > _UNLIKE:
+        return None
+    omega_n = float(networks.omega_n(np.array([zeta]), np.array([window.t3]))[0])
+    covariance = window.noise.covariance(window.shape, networks.damping.input_gradient(inputs))
+    slopes = np.array([[1.0, 0.0], networks.omega_slopes(zeta, window.t3)])
+    return WindowReading(window, zeta, omega_n, slopes @ covariance @ slopes.T)
+
+
+def read_windows(run: Run, sensor: SensorProperties, networks: Networks) -> tuple[list[WindowReading], float]:
+    """Put a run's windows through both networks, one after the other.
+
+    Args:
+        run: the run.
+        sensor: what is stated of the noise.
+        networks: trained.
+
+    Returns:
+        The readings, and how many cycles the record holds from its first crossing on; 0 where nothing oscillates.
+    """
+    windows, cycles = find_windows(run.record, white_noise(run.record.yaw_rad, sensor))
+    readings = []
+    for window in windows:
+        reading = read_window(window, networks)
+        if reading is None:
+            break
+        readings.append(reading)
+    return readings, cycles
+
+
+def _identified(
+    run: Run, sensor: SensorProperties, networks: Networks
+) -> tuple[RunEstimate, PairedRun | None]:
+    readings, cycles = read_windows(run, sensor, networks)
+    if not readings:
+        short = 0.0 < cycles < CYCLES
+        return RunEstimate(run.id, (Status.TOO_FEW_CYCLES if short else Status.NO_OSCILLATION,)), None
+    zeta, zeta_std, departs = _average([one.zeta for one in readings], [one.noise[0, 0] for one in readings])
+    omega, omega_std, drifts = _average(
+        [one.omega_n for one in readings], [one.noise[1, 1] for one in readings]
+    )
+    if not networks.trained_for(zeta, omega):
+        return RunEstimate(run.id, (Status.OUTSIDE_TRAINING,)), None
+    own_zeta, own_omega = networks.own_stds(zeta, readings[0].window.t3)
+    zeta_std, omega_std = float(np.hypot(zeta_std, own_zeta)), float(np.hypot(omega_std, own_omega * omega))
+    statuses = {Status.MODEL_DEPARTS} if departs or drifts else set()
+    if run.spring_stiffness is None:
+        statuses.add(Status.NO_STIFFNESS)
+    omega_n = Quantity(omega, omega_std, "rad/s")
+    estimate = RunEstimate(
+        id=run.id,
+        statuses=by_gravity(statuses),
+        omega_n=omega_n,
+        zeta=Quantity(zeta, zeta_std, "1"),
+        windows=tuple(
+            _shown(one, networks) for one in readings if networks.trained_for(one.zeta, one.omega_n)
+        ),
+    )
+    root = float(np.sqrt(1.0 - zeta**2))
+    damped_std = float(np.hypot(root * omega_std, zeta / root * omega * zeta_std))
+    paired = PairedRun(
+        run=run,
+        frequency=omega * root / (2.0 * np.pi),
+        frequency_std=damped_std / (2.0 * np.pi),
+        rate=zeta * omega,
+        rate_std=float(np.hypot(omega * zeta_std, zeta * omega_std)),
+        omega_n=omega_n,
+    )
+    return estimate, paired
+
+
+def _average(values: Sequence[float], variances: Sequence[float]) -> tuple[float, float, bool]:
+    # Weighted mean, its standard deviation, widened where the windows scatter beyond chance, and whether they do.
+    value, variance = np.array(values), np.array(variances)
+    weights = 1.0 / variance
+    mean = float(weights @ value / weights.sum())
+    std = float(1.0 / np.sqrt(weights.sum()))
+    if value.size < _LEAST_FOR_SCATTER:
+        return mean, std, False
+    scatter = float(np.sum((value - mean) ** 2 * weights))
+    chance = _TOLERANCE * float(chi2.isf(0.5 * FALSE_ALARM_RATE, value.size - 1))
+    departs = scatter > chance
+    return mean, std * float(np.sqrt(scatter / (value.size - 1))) if departs else std, departs
+
+
+def _shown(reading: WindowReading, networks: Networks) -> WindowEstimate:
+    window, zeta = reading.window, reading.zeta
+    own_zeta, own_omega = networks.own_stds(zeta, window.t3)
+    # The envelope at the first crossing, and from there to mid-window.
+    unit = normalise(response_points(np.array([zeta]))[0]).scale
+    middle = float(np.exp(-np.pi * CYCLES * zeta / np.sqrt(1.0 - zeta**2)))
+    amplitude = window.shape.scale / unit * middle
+    level = window.noise.std * float(np.linalg.norm(window.shape.peak_weights @ window.noise.points))
+    return WindowEstimate(
+        start_s=window.start_s,
+        duration_s=window.t3,
+        amplitude=Quantity(amplitude, level / unit * middle, "rad"),
+        omega_n=Quantity(
+            reading.omega_n,
+            float(np.hypot(np.sqrt(reading.noise[1, 1]), own_omega * reading.omega_n)),
+            "rad/s",
+        ),
+        zeta=Quantity(zeta, float(np.hypot(np.sqrt(reading.noise[0, 0]), own_zeta)), "1"),
+        cycles=CYCLES,
+    )

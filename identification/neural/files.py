@@ -1,0 +1,132 @@
+"""Weights as safetensors, with the training record beside them as JSON; no pickle anywhere.
+
+``paper.safetensors`` and ``paper.json`` in ``identification/neural/weights`` are those that ship.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from identification.neural.network import Network, Scaling, parameter_count
+from identification.neural.networks import Errors, Networks
+from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.record import Array
+
+SHIPPED = "paper"
+_FIELDS = ("weights", "directions", "precision", "prior_precision", "inputs", "output")
+
+
+def weights_bytes(damping: Network, frequency: Network) -> bytes:
+    """Both networks with their posteriors and scalings as safetensors.
+
+    Args:
+        damping: the first.
+        frequency: the second.
+    """
+    tensors: dict[str, Array] = {}
+    for name, network in ((DAMPING, damping), (FREQUENCY, frequency)):
+        values = {
+            "weights": network.weights,
+            "directions": network.directions,
+            "precision": network.precision,
+            "prior_precision": np.array([network.prior_precision]),
+            "inputs": np.array([network.inputs.mean, network.inputs.deviation]),
+            "output": np.array([network.output.mean, network.output.deviation]),
+        }
+        tensors |= {f"{name}.{field}": np.ascontiguousarray(values[field]) for field in _FIELDS}
+    return save(tensors)
+
+
+def read_networks(weights: Path) -> Networks:
+    """Networks that ``tunnel train`` has written.
+
+    Args:
+        weights: the safetensors file; its record is the ``.json`` of the same name beside it.
+
+    Returns:
+        The networks.
+
+    Raises:
+        TunnelError: when either file is missing, is not what it should be, or the two do not belong together.
+    """
+    record = weights.with_suffix(".json")
+    for path in (weights, record):
+        if not path.is_file():
+            remedy = "name the .safetensors file that tunnel train wrote, with its .json beside it"
+            raise TunnelError("no such file", where=str(path), remedy=remedy)
+    return networks_of(weights.read_bytes(), record.read_text(encoding="utf-8"), str(weights))
+
+
+@cache
+def shipped_networks() -> Networks:
+    """The networks that come with the package."""
+    folder = resources.files("identification") / "neural" / "weights"
+    weights = (folder / f"{SHIPPED}.safetensors").read_bytes()
+    return networks_of(weights, (folder / f"{SHIPPED}.json").read_text(encoding="utf-8"), SHIPPED)
+
+
+def shipped_record() -> dict[str, Any]:
+    """The training record of the networks that come with the package."""
+    folder = resources.files("identification") / "neural" / "weights"
+    found: dict[str, Any] = json.loads((folder / f"{SHIPPED}.json").read_text(encoding="utf-8"))
+    return found
+
+
+def networks_of(weights: bytes, record: str, where: str) -> Networks:
+    """Networks from the contents of their two files.
+
+    Args:
+        weights: safetensors.
+        record: JSON.
+        where: what to call them in an error.
+
+    Returns:
+        The networks.
+
+    Raises:
+        TunnelError: when they are not what they should be, or do not belong together.
+    """
+    remedy = "train them anew with tunnel train"
+    try:
+        document = json.loads(record)
+        if document["weights_sha256"] != hashlib.sha256(weights).hexdigest():
+            raise TunnelError(
+                "weights and training record do not belong together", where=where, remedy=remedy
+            )
+        spec, errors = DataSpec.from_json_dict(document["data"]), Errors.from_json_dict(document["errors"])
+        tensors = load(weights)
+        return Networks(_network(tensors, DAMPING), _network(tensors, FREQUENCY), spec, errors)
+    except (SafetensorError, ValueError, KeyError, TypeError) as error:
+        raise TunnelError("not weights with their training record", where=where, remedy=remedy) from error
+
+
+def _network(tensors: Mapping[str, Array], name: str) -> Network:
+    values = {field: np.asarray(tensors[f"{name}.{field}"], dtype=np.float64) for field in _FIELDS}
+    count = parameter_count(SIZES[name])
+    if values["weights"].shape != (count,) or values["directions"].shape != (values["precision"].size, count):
+        raise ValueError(name)
+    if not all(np.all(np.isfinite(value)) for value in values.values()):
+        raise ValueError(name)
+    scalings = [
+        Scaling(tuple(values[end][0].tolist()), tuple(values[end][1].tolist()))
+        for end in ("inputs", "output")
+    ]
+    return Network(
+        SIZES[name],
+        values["weights"],
+        *scalings,
+        values["directions"],
+        values["precision"],
+        float(values["prior_precision"][0]),
+    )

@@ -1,0 +1,239 @@
+"""Full-batch Levenberg–Marquardt with the evidence's regularisation, in torch float64.
+
+Each step solves (βJᵀJ + (α + μ)I) δ = −(βJᵀe + αw) by the singular values of J, so that γ stays right where β is
+large; a step that lowers F = βE_D + αE_W is taken and μ divided by ten, one that does not is tried again with ten
+times the μ. After every step α and β are re-estimated. Sources: Hagan and Menhaj, IEEE Trans. Neural Networks 5
+(1994) 989–993, doi 10.1109/72.329697, and those of `identification.neural.evidence`.
+
+One thread and one order of operations: the same start gives the same bits on the same machine and torch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identification.neural.evidence import Hyperparameters, log_evidence, updated
+from identification.neural.network import Network, Scaling, parameter_count, split
+from identification.neural.training_set import Pairs
+from tunnel_sim.record import Array
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+_FIRST = Hyperparameters(0.01, 1.0)
+_FIRST_DAMPING = 5e-3
+_LARGEST_DAMPING = 1e10  # of β: the steps are rounding then
+_SMALLEST_DAMPING = 1e-20  # of β
+_FACTOR = 10.0
+_STANDS_OUT = 1e-4  # a direction whose βλ is less of α than this is left to the prior
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """Where a training stands; enough to go on from.
+
+    Args:
+        weights: shape (n,).
+        held: α and β.
+        damping: μ; dimensionless.
+        iteration: number of steps taken.
+        finished: whether no step lowers F any more.
+    """
+
+    weights: Array
+    held: Hyperparameters = _FIRST
+    damping: float = _FIRST_DAMPING
+    iteration: int = 0
+    finished: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Scaled training pairs.
+
+    Args:
+        sizes: units per layer.
+        inputs: scaled, shape (N, inputs).
+        targets: scaled, shape (N,).
+        input_scaling: of the inputs.
+        output_scaling: of the targets.
+    """
+
+    sizes: tuple[int, ...]
+    inputs: Array
+    targets: Array
+    input_scaling: Scaling
+    output_scaling: Scaling
+
+    @classmethod
+    def of(cls, pairs: Pairs, sizes: tuple[int, ...], *, unit_deviation: bool) -> Problem:
+        """Scale pairs: zero mean, and unit deviation of the inputs where asked for; of the targets always."""
+        inputs, output = Scaling.of(pairs.inputs), Scaling.of(pairs.targets[:, None])
+        if not unit_deviation:
+            inputs = replace(inputs, deviation=(1.0,) * len(inputs.deviation))
+        targets = output.apply(pairs.targets[:, None])[:, 0]
+        return cls(sizes, inputs.apply(pairs.inputs), targets, inputs, output)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a training came to.
+
+    Args:
+        held: α and β.
+        effective_parameters: γ, a number of parameters.
+        rms_error: of the training pairs, scaled (1).
+        log_evidence: of α and β, (1).
+    """
+
+    held: Hyperparameters
+    effective_parameters: float
+    rms_error: float
+    log_evidence: float
+
+
+def first_weights(sizes: tuple[int, ...], rng: np.random.Generator) -> Array:
+    """Random weights of variance one over the number of a unit's inputs, and biases of deviation 0.3.
+
+    Args:
+        sizes: units per layer.
+        rng: draws them.
+    """
+    parts = []
+    for before, after in pairwise(sizes):
+        parts.append(rng.standard_normal(before * after) / np.sqrt(before))
+        parts.append(0.3 * rng.standard_normal(after))
+    return np.concatenate(parts)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let torch use one thread within, as many as before afterwards."""
+    import torch
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+def outputs_and_jacobian(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor) -> tuple[Tensor, Tensor]:
+    """The network's outputs and their derivatives by the weights, in closed form.
+
+    Args:
+        weights: shape (n,).
+        sizes: units per layer.
+        inputs: scaled, shape (N, inputs).
+
+    Returns:
+        Outputs, shape (N,), and Jacobian, shape (N, n).
+    """
+    import torch
+
+    layers = split(weights, sizes)  # type: ignore[arg-type,type-var]  # slices and shapes are torch's as well
+    activations = [inputs]
+    for matrix, bias in layers[:-1]:
+        activations.append(torch.tanh(activations[-1] @ matrix.T + bias))
+    matrix, bias = layers[-1]
+    outputs = (activations[-1] @ matrix.T + bias)[:, 0]
+    slope = torch.ones((inputs.shape[0], 1), dtype=inputs.dtype)
+    parts: list[Tensor] = []
+    for (matrix, _), before in zip(reversed(layers), reversed(activations), strict=True):
+        parts[:0] = [(slope[:, :, None] * before[:, None, :]).flatten(1), slope]
+        if before is not inputs:
+            slope = (slope @ matrix) * (1.0 - before**2)
+    return outputs, torch.cat(parts, dim=1)
+
+
+def outputs_only(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor) -> Tensor:
+    """The network's outputs, shape (N,); arguments as in `outputs_and_jacobian`."""
+    import torch
+
+    layers = split(weights, sizes)  # type: ignore[arg-type,type-var]
+    hidden = inputs
+    for matrix, bias in layers[:-1]:
+        hidden = torch.tanh(hidden @ matrix.T + bias)
+    matrix, bias = layers[-1]
+    return (hidden @ matrix.T + bias)[:, 0]
+
+
+def advance(progress: Progress, problem: Problem) -> Progress:
+    """One step of Levenberg–Marquardt, and α and β anew before it.
+
+    Args:
+        progress: where the training stands.
+        problem: what is trained on.
+
+    Returns:
+        Where it stands then; ``finished`` where no step lowers F.
+    """
+    import torch
+
+    inputs, targets = torch.from_numpy(problem.inputs), torch.from_numpy(problem.targets)
+    weights = torch.from_numpy(progress.weights)
+    outputs, jacobian = outputs_and_jacobian(weights, problem.sizes, inputs)
+    errors = outputs - targets
+    singular, right = torch.linalg.svd(jacobian, full_matrices=False)[1:]
+    eigenvalues = singular**2
+    squared_errors, squared_weights = float(errors @ errors), float(weights @ weights)
+    held = progress.held
+    if progress.iteration:
+        held = updated(held, eigenvalues.numpy(), squared_errors, squared_weights, problem.targets.size)
+    gradient = held.beta * (jacobian.T @ errors) + held.alpha * weights
+    along = right @ gradient
+    rest = gradient - right.T @ along
+    cost = held.beta * squared_errors + held.alpha * squared_weights
+    damping = max(progress.damping, _SMALLEST_DAMPING * held.beta)
+    while damping < _LARGEST_DAMPING * held.beta:
+        step = right.T @ (along / (held.beta * eigenvalues + held.alpha + damping))
+        moved = weights - step - rest / (held.alpha + damping)
+        left = outputs_only(moved, problem.sizes, inputs) - targets
+        if float(held.beta * (left @ left) + held.alpha * (moved @ moved)) < cost:
+            return Progress(moved.numpy(), held, damping / _FACTOR, progress.iteration + 1)
+        damping *= _FACTOR
+    return replace(progress, held=held, iteration=progress.iteration + 1, finished=True)
+
+
+def conclude(progress: Progress, problem: Problem) -> tuple[Network, Outcome]:
+    """The trained network with its posterior, and what the training came to.
+
+    Args:
+        progress: where the training ended.
+        problem: what was trained on.
+
+    Returns:
+        Both.
+    """
+    import torch
+
+    weights = torch.from_numpy(progress.weights)
+    outputs, jacobian = outputs_and_jacobian(weights, problem.sizes, torch.from_numpy(problem.inputs))
+    errors = outputs.numpy() - problem.targets
+    singular, right = torch.linalg.svd(jacobian, full_matrices=False)[1:]
+    eigenvalues, held = singular.numpy() ** 2, progress.held
+    kept = held.beta * eigenvalues > _STANDS_OUT * held.alpha
+    network = Network(
+        sizes=problem.sizes,
+        weights=progress.weights,
+        inputs=problem.input_scaling,
+        output=problem.output_scaling,
+        directions=np.ascontiguousarray(right.numpy()[kept]),
+        precision=2.0 * (held.beta * eigenvalues[kept] + held.alpha),
+        prior_precision=2.0 * held.alpha,
+    )
+    squares = float(errors @ errors), float(progress.weights @ progress.weights)
+    counts = problem.targets.size, parameter_count(problem.sizes)
+    return network, Outcome(
+        held,
+        held.effective_parameters(eigenvalues),
+        float(np.sqrt(squares[0] / errors.size)),
+        log_evidence(held, eigenvalues, *squares, counts),
+    )

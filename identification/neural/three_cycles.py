@@ -1,0 +1,298 @@
+"""Finds consecutive three-cycle windows in a record, from its zero crossings alone.
+
+A window begins at a zero crossing and lasts t3, the time of three damped cycles: six half cycles. The seven
+crossings are t_k = t0 + k t3/6, fitted by least squares with the weights their slopes give them, so that the late
+ones, which noise swallows where ζ is large, count little. The half cycles' means are z + m (−r)^k for any linear
+decay; their regression on one another gives the sensor's zero z and the decay per half cycle r, at any ζ.
+
+Every step is linear in the reading once the crossings are placed. So each result carries the weights by which the
+samples make it, and white noise is propagated through all of it by the delta method.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from identification.neural.shape import CYCLES, POINTS, Shape, normalise
+from identification.start import starting_decay
+from tunnel_sim.record import Array, Record
+
+HALVES = 2 * CYCLES
+_SAMPLES_PER_CYCLE = 134  # kept of a denser record; four to each of the 100 points
+_LEAST_PER_CYCLE = 8.0
+# Of a half cycle, either side of a crossing, that its quintic is fitted to; a cubic biases ζ by 0.1 %.
+_REACH = 0.25
+_TERMS = 6
+_ROUNDS = 8
+_SETTLED = 1e-10  # of a half cycle
+_CLEAR = 20.0  # amplitude over the noise of a crossing's level, at which linear propagation holds
+_BAND = 4.0  # a crossing counts when the smoothed reading goes this many standard deviations beyond
+_SHARE = 0.004  # or this share of the largest swing
+
+
+@dataclass(frozen=True, eq=False)
+class ThreeCycles:
+    """One window.
+
+    Args:
+        start_s: of the first crossing since the record's first sample, s.
+        t3: time of three damped cycles, s.
+        zero: of the sensor, rad.
+        decay: envelope's ratio over half a cycle, (1).
+        shape: the first network's inputs.
+        noise: how the samples' noise reaches the results.
+    """
+
+    start_s: float
+    t3: float
+    zero: float
+    decay: float
+    shape: Shape
+    noise: Propagation
+
+
+@dataclass(frozen=True, eq=False)
+class Propagation:
+    """How the samples' white noise reaches the points, the window's start and t3.
+
+    Args:
+        std: of one sample, rad.
+        points: weights of the samples in the 100 points, shape (100, n).
+        timing: weights of the samples in t0 and t3, s/rad, shape (2, n).
+        by_timing: how the points move with t0 and t3, rad/s, shape (100, 2).
+    """
+
+    std: float
+    points: Array
+    timing: Array
+    by_timing: Array
+
+    def covariance(self, shape: Shape, gradient: Array) -> Array:
+        """Covariance of (ζ, t3) from the noise.
+
+        Args:
+            shape: the window's.
+            gradient: of ζ by the network's inputs, shape (100,).
+
+        Returns:
+            Shape (2, 2), in 1, s and s².
+        """
+        pulled = shape.pull_back(gradient)
+        zeta = pulled @ self.points + (pulled @ self.by_timing) @ self.timing
+        rows = np.stack((zeta, self.timing[1]))
+        return np.asarray(rows @ rows.T * self.std**2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trace:
+    """A record thinned by block means, which keep a decay's rate and frequency, with its spline and noise."""
+
+    time: Array
+    yaw: Array
+    spline: CubicSpline
+    integral: CubicSpline
+    noise: float
+
+    @property
+    def step(self) -> float:
+        return float(self.time[-1] - self.time[0]) / (self.time.size - 1)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a window lies, and how it decays there."""
+
+    start: float
+    half: float
+    zero: float = 0.0
+    decay: float = 1.0
+    slope: float = 0.0
+
+
+def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, ...], float]:
+    """The windows of a record, one after the other, until it ends or the oscillation sinks into the noise.
+
+    Args:
+        record: the reading of one run.
+        noise_std: standard deviation of one sample, rad, above 0.
+
+    Returns:
+        The windows, and how many cycles of clear oscillation the record holds from its first crossing on; 0 where
+        nothing oscillates.
+    """
+    rough = starting_decay(record)
+    if rough is None or rough.omega_d == 0.0:
+        return (), 0.0
+    trace = _thinned(record, 2.0 * np.pi / rough.omega_d, noise_std)
+    crossings = _rough_crossings(trace, 2.0 * np.pi / rough.omega_d)
+    if crossings.size < 2:
+        return (), 0.0
+    first = _Place(float(crossings[0]), float(np.diff(crossings[:3]).mean()))
+    windows: list[ThreeCycles] = []
+    place = first
+    end = float(trace.time[-1])
+    while place.start + HALVES * place.half <= end + 0.5 * place.half:
+        found = _refined(trace, place)
+        if found is None or found.start + HALVES * found.half > end:
+            break
+        window = _window(trace, found)
+        if window is None:
+            break
+        windows.append(window)
+        place = _Place(found.start + HALVES * found.half, found.half)
+    return tuple(windows), (end - first.start) / (2.0 * first.half)
+
+
+def _thinned(record: Record, period: float, noise_std: float) -> _Trace:
+    block = max(1, int(period / record.sample_interval / _SAMPLES_PER_CYCLE))
+    kept = record.time_s.size // block * block
+    time = (record.time_s[:kept] - record.time_s[0]).reshape(-1, block).mean(axis=1)
+    yaw = record.yaw_rad[:kept].reshape(-1, block).mean(axis=1)
+    spline = CubicSpline(time, yaw)
+    return _Trace(time, yaw, spline, spline.antiderivative(), noise_std / np.sqrt(block))
+
+
+def _rough_crossings(trace: _Trace, period: float) -> Array:
+    # Of the smoothed reading through the level its later half oscillates about, with hysteresis.
+    width = max(1, round(period / trace.step / 10.0))
+    if trace.yaw.size < 2 * width or period / trace.step < _LEAST_PER_CYCLE:
+        return np.zeros(0)
+    smooth = np.convolve(trace.yaw, np.full(width, 1.0 / width), mode="valid")
+    time = trace.time[: smooth.size] + 0.5 * (width - 1) * trace.step
+    away = smooth - _level(trace, period)
+    largest = float(np.abs(away).max())
+    band = max(_BAND * trace.noise / np.sqrt(width), _SHARE * largest)
+    outside = np.flatnonzero(np.abs(away) > band)
+    change = np.flatnonzero(np.diff(np.sign(away[outside])) != 0.0)
+    before, after = outside[change], outside[change + 1]
+    # Straight from the last clear sample on one side to the first on the other.
+    share = away[before] / (away[before] - away[after])
+    return np.asarray(time[before] + share * (time[after] - time[before]))
+
+
+def _level(trace: _Trace, period: float) -> float:
+    # The mean over the last whole cycles: the zero to within a small share of what is left of the swing.
+    cycles = max(1, int(0.5 * trace.yaw.size * trace.step / period))
+    count = min(trace.yaw.size, round(cycles * period / trace.step))
+    return float(trace.yaw[-count:].mean())
+
+
+def _refined(trace: _Trace, place: _Place) -> _Place | None:
+    # Crossings, zero and decay by turns; None where the decay is lost in noise.
+    number = np.arange(HALVES + 1)
+    for _ in range(_ROUNDS):
+        instants = place.start + place.half * number
+        zero, decay = _zero_and_decay(trace, instants)
+        if not 0.0 < decay < 1.5:
+            return None
+        levels, slopes = _crossing_fits(trace, instants, place.half)
+        model = (-decay) ** number
+        slope = float(slopes @ model) / float(model @ model)
+        if slope == 0.0:
+            return None
+        moves = np.clip((zero - levels) / (slope * model), -0.25 * place.half, 0.25 * place.half)
+        line = _line_weights(decay) @ (instants + moves)
+        moved = abs(float(line[0]) - place.start)
+        place = _Place(float(line[0]), float(line[1]), zero, decay, slope)
+        if not place.half > 0.0 or place.start < 0.0:
+            return None
+        if moved < _SETTLED * place.half:
+            break
+    return place
+
+
+def _zero_and_decay(trace: _Trace, instants: Array) -> tuple[float, float]:
+    means = np.diff(trace.integral(np.clip(instants, trace.time[0], trace.time[-1]))) / np.diff(instants)
+    columns = np.column_stack((means[:-1], np.ones(means.size - 1)))
+    ratio, offset = np.linalg.lstsq(columns, means[1:], rcond=None)[0]
+    decay = -float(ratio)
+    return (float(offset) / (1.0 + decay) if decay > -1.0 else 0.0), decay
+
+
+def _line_weights(decay: float) -> Array:
+    # Start and half cycle from the crossings, each with the weight of its slope: shape (2, 7).
+    number = np.arange(HALVES + 1)
+    weights = np.asarray(decay, dtype=np.float64) ** number
+    columns = np.column_stack((np.ones(HALVES + 1), number)) * weights[:, None]
+    return np.asarray(np.linalg.pinv(columns) * weights)
+
+
+def _fit_rows(trace: _Trace, instant: float, half: float) -> tuple[slice, Array]:
+    # The samples about an instant, and their weights in level and slope of a quintic there: shape (2, m).
+    low, high = np.searchsorted(trace.time, (instant - _REACH * half, instant + _REACH * half))
+    low, high = max(0, min(int(low), trace.time.size - _TERMS - 1)), max(int(high), int(low) + _TERMS + 1)
+    part = slice(low, min(high, trace.time.size))
+    powers = np.vander((trace.time[part] - instant) / half, _TERMS, increasing=True)
+    rows = np.linalg.pinv(powers)[:2]
+    rows[1] /= half
+    return part, rows
+
+
+def _crossing_fits(trace: _Trace, instants: Array, half: float) -> tuple[Array, Array]:
+    # Level and slope at each instant.
+    found = [rows @ trace.yaw[part] for part, rows in (_fit_rows(trace, float(t), half) for t in instants)]
+    return np.array(found)[:, 0], np.array(found)[:, 1]
+
+
+def _level_weights(trace: _Trace, instants: Array, half: float, part: slice) -> Array:
+    # The samples' weights in the level at each instant, shape (7, samples of the part).
+    weights = np.zeros((instants.size, trace.time.size))
+    for place, instant in enumerate(instants):
+        where, rows = _fit_rows(trace, float(instant), half)
+        weights[place, where] = rows[0]
+    return weights[:, part]
+
+
+def _window(trace: _Trace, place: _Place) -> ThreeCycles | None:
+    instants = place.start + place.half * np.arange(HALVES + 1)
+    t3 = HALVES * place.half
+    edges = place.start + t3 * np.linspace(0.0, 1.0, POINTS + 1)
+    sign = 1.0 if place.slope > 0.0 else -1.0
+    points = sign * np.diff(trace.integral(edges)) * POINTS / t3
+    shape = normalise(points)
+    first, last = np.searchsorted(trace.time, (instants[0] - place.half, instants[-1] + place.half))
+    part = slice(int(first), int(last))
+    level_weights = _level_weights(trace, instants, place.half, part)
+    level_noise = trace.noise * float(np.linalg.norm(level_weights[0]))
+    if shape.scale < _CLEAR * level_noise:
+        return None
+    noise = Propagation(
+        trace.noise,
+        sign * _shares(trace, edges, part),
+        _timing_weights(trace, place, instants, level_weights, part),
+        sign * _by_timing(trace, edges, sign * points, t3),
+    )
+    return ThreeCycles(place.start, t3, place.zero, place.decay, shape, noise)
+
+
+def _shares(trace: _Trace, edges: Array, part: slice) -> Array:
+    # What each sample's cell contributes to the mean between two edges: shape (edges − 1, samples).
+    left = trace.time[part] - 0.5 * trace.step
+    covered = np.clip(edges[:, None] - left, 0.0, trace.step)
+    return np.asarray(np.diff(covered, axis=0) / np.diff(edges)[:, None])
+
+
+def _timing_weights(
+    trace: _Trace, place: _Place, instants: Array, level_weights: Array, part: slice
+) -> Array:
+    # A level dc above the zero moves its crossing by −dc/slope; the zero by the half cycles' means.
+    means = _shares(trace, instants, part)
+    pairs = (means[1:] + place.decay * means[:-1]) / (1.0 + place.decay)
+    slopes = place.slope * (-place.decay) ** np.arange(HALVES + 1)
+    crossings = (pairs.mean(axis=0) - level_weights) / slopes[:, None]
+    start, half = _line_weights(place.decay) @ crossings
+    return np.stack((start, HALVES * half))
+
+
+def _by_timing(trace: _Trace, edges: Array, points: Array, t3: float) -> Array:
+    # Moves of the points with t0 and with t3, from the curve's values at their edges; averaged against noise.
+    inner = 0.5 * (points[1:] + points[:-1])
+    ends = trace.spline(edges[[0, -1]])
+    values = np.concatenate(([float(ends[0])], inner, [float(ends[1])]))
+    share = np.linspace(0.0, 1.0, POINTS + 1)
+    by_start = np.diff(values) * POINTS / t3
+    by_length = np.diff(share * values) * POINTS / t3 - points / t3
+    return np.column_stack((by_start, by_length))

@@ -1,0 +1,207 @@
+"""Trains both networks from a seed: several starts each, the start of the largest evidence kept.
+
+The training can be stopped after any step and gone on with from its checkpoint, to the same bits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from identification.neural.checkpoint import Checkpoint
+from identification.neural.files import weights_bytes
+from identification.neural.levenberg import (
+    Outcome,
+    Problem,
+    Progress,
+    advance,
+    conclude,
+    first_weights,
+    one_thread,
+)
+from identification.neural.network import Network, parameter_count
+from identification.neural.networks import Errors, Networks, held_out_errors
+from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, training_pairs
+
+NETWORKS = (DAMPING, FREQUENCY)
+_START, _NOISE, _TEST = 0, 1, 2  # what a generator is for
+_DATA = DataSpec()
+_NO_ERRORS = Errors(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class TrainingSpec:
+    """Everything a training hangs on.
+
+    Args:
+        seed: of the first weights, the noise and the test set.
+        data: the responses.
+        starts: number of trainings of each network, from weights of their own.
+        damping_steps: number of Levenberg–Marquardt steps of the first network, at most.
+        frequency_steps: number of those of the second.
+    """
+
+    seed: int = 1
+    data: DataSpec = _DATA
+    starts: int = 3
+    damping_steps: int = 400
+    frequency_steps: int = 3000
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name."""
+        return {**asdict(self), "data": self.data.to_json_dict()}
+
+    def steps(self, which: str) -> int:
+        """Steps of a network's training, at most."""
+        return self.damping_steps if which == DAMPING else self.frequency_steps
+
+    def work(self, which: str) -> int:
+        """What a step costs, in steps of the second network."""
+        if which == FREQUENCY:
+            return 1
+        copies = self.data.noisy_copies if self.data.input_noise > 0.0 else 1
+        return max(1, self.data.zeta_count * copies * parameter_count(SIZES[DAMPING]) // 12_000)
+
+    @property
+    def total_work(self) -> int:
+        """That of all steps."""
+        return sum(self.starts * self.steps(which) * self.work(which) for which in NETWORKS)
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What a training gives.
+
+    Args:
+        networks: both networks with their errors.
+        weights: the safetensors file.
+        record: the training record.
+    """
+
+    networks: Networks
+    weights: bytes
+    record: dict[str, Any]
+
+
+def train(
+    spec: TrainingSpec,
+    *,
+    resume: Checkpoint | None = None,
+    tell: Callable[[int, str], None] = lambda _done, _text: None,
+    keep: Callable[[Checkpoint], None] = lambda _checkpoint: None,
+) -> Trained:
+    """Train both networks.
+
+    Args:
+        spec: what and how.
+        resume: where an interrupted training of the same spec stood.
+        tell: is told the work done and what is being done, after every step.
+        keep: is given a checkpoint after every step; what it raises ends the training.
+
+    Returns:
+        The networks with their file and record.
+    """
+    checkpoint = resume or Checkpoint()
+    with one_thread():
+        for number, which in enumerate(NETWORKS):
+            problem = problem_of(spec, which)
+            for start in range(spec.starts):
+                if len(checkpoint.ended) > number * spec.starts + start:
+                    continue
+                checkpoint = _one_start(spec, (number, start), problem, checkpoint, tell, keep)
+        return _collect(spec, checkpoint)
+
+
+def problem_of(spec: TrainingSpec, which: str) -> Problem:
+    """The scaled training pairs of a network.
+
+    Args:
+        spec: what and how.
+        which: ``damping`` or ``frequency``.
+    """
+    pairs = training_pairs(spec.data, which, np.random.default_rng([spec.seed, _NOISE]))
+    return Problem.of(pairs, SIZES[which], unit_deviation=which == FREQUENCY)
+
+
+def _one_start(
+    spec: TrainingSpec,
+    place: tuple[int, int],
+    problem: Problem,
+    checkpoint: Checkpoint,
+    tell: Callable[[int, str], None],
+    keep: Callable[[Checkpoint], None],
+) -> Checkpoint:
+    number, start = place
+    which = NETWORKS[number]
+    progress = checkpoint.running
+    if progress is None:
+        rng = np.random.default_rng([spec.seed, _START, number, start])
+        progress = Progress(first_weights(problem.sizes, rng))
+    before = _work_before(spec, number, start)
+    while progress.iteration < spec.steps(which) and not progress.finished:
+        progress = advance(progress, problem)
+        checkpoint = replace(checkpoint, running=progress)
+        keep(checkpoint)
+        tell(
+            before + progress.iteration * spec.work(which),
+            f"{which} network, start {start + 1} of {spec.starts}",
+        )
+    tell(
+        before + spec.steps(which) * spec.work(which), f"{which} network, start {start + 1} of {spec.starts}"
+    )
+    return Checkpoint((*checkpoint.ended, progress), None)
+
+
+def _work_before(spec: TrainingSpec, number: int, start: int) -> int:
+    whole = sum(spec.starts * spec.steps(which) * spec.work(which) for which in NETWORKS[:number])
+    return whole + start * spec.steps(NETWORKS[number]) * spec.work(NETWORKS[number])
+
+
+def _collect(spec: TrainingSpec, checkpoint: Checkpoint) -> Trained:
+    best: dict[str, Network] = {}
+    described: dict[str, Any] = {}
+    for number, which in enumerate(NETWORKS):
+        problem = problem_of(spec, which)
+        ended = checkpoint.ended[number * spec.starts : (number + 1) * spec.starts]
+        concluded = [conclude(progress, problem) for progress in ended]
+        chosen = int(np.argmax([outcome.log_evidence for _, outcome in concluded]))
+        best[which] = concluded[chosen][0]
+        described[which] = {
+            "sizes": list(SIZES[which]),
+            "parameters": parameter_count(SIZES[which]),
+            "training_pairs": int(problem.targets.size),
+            "chosen_start": chosen + 1,
+            "starts": [_described(*pair) for pair in zip(ended, (o for _, o in concluded), strict=True)],
+        }
+    untested = Networks(best[DAMPING], best[FREQUENCY], spec.data, _NO_ERRORS)
+    networks = replace(untested, errors=held_out_errors(untested, np.random.default_rng([spec.seed, _TEST])))
+    weights = weights_bytes(best[DAMPING], best[FREQUENCY])
+    record = {
+        **spec.to_json_dict(),
+        "networks": described,
+        "errors": networks.errors.to_json_dict(),
+        "versions": {
+            name: version(name) for name in ("virtual-wind-tunnel", "torch", "numpy", "safetensors")
+        },
+        "weights_sha256": hashlib.sha256(weights).hexdigest(),
+    }
+    return Trained(networks, weights, json.loads(json.dumps(record)))
+
+
+def _described(progress: Progress, outcome: Outcome) -> dict[str, Any]:
+    return {
+        "steps": progress.iteration,
+        "stopped_because": "no step lowers F" if progress.finished else "all steps taken",
+        "alpha": outcome.held.alpha,
+        "beta": outcome.held.beta,
+        "effective_parameters": outcome.effective_parameters,
+        "performance_ratio": outcome.held.performance_ratio(progress.weights.size),
+        "rms_error_scaled": outcome.rms_error,
+        "log_evidence": outcome.log_evidence,
+    }

@@ -1,0 +1,125 @@
+"""What the networks are trained on and tested against: impulse responses over the paper's range."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from identification.neural.shape import cycles_time, network_inputs
+from tunnel_sim.record import Array
+
+DAMPING, FREQUENCY = "damping", "frequency"
+SIZES = {DAMPING: (100, 5, 5, 1), FREQUENCY: (2, 2, 5, 1)}
+LOGARITHMIC, LINEAR = "logarithmic", "linear"
+
+
+@dataclass(frozen=True)
+class DataSpec:
+    """Which impulse responses.
+
+    Args:
+        zeta_range: damping ratios, the paper's 0.001 to 0.35 (1).
+        omega_range: natural frequencies, the paper's 0.4 to 26 rad/s.
+        zeta_count: number of damping ratios of the first network's set, evenly spaced.
+        grid: numbers of damping ratios and of natural frequencies of the second network's set.
+        frequency_scale: ``logarithmic`` or ``linear``: how t3 and ωn enter the second network before their mean is
+            taken off.
+        input_noise: standard deviation of white noise on the first network's 100 points, as a share of the
+            amplitude; 0 is the paper's.
+        noisy_copies: number of times each response is drawn with that noise.
+        test_count: number of responses of the test set, drawn at random over the range.
+    """
+
+    zeta_range: tuple[float, float] = (0.001, 0.35)
+    omega_range: tuple[float, float] = (0.4, 26.0)
+    zeta_count: int = 300
+    grid: tuple[int, int] = (12, 40)
+    frequency_scale: str = LOGARITHMIC
+    input_noise: float = 0.0
+    noisy_copies: int = 1
+    test_count: int = 4000
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name."""
+        return asdict(self)
+
+    @classmethod
+    def from_json_dict(cls, data: dict[str, Any]) -> DataSpec:
+        """The inverse of `to_json_dict`."""
+        pairs = {name: tuple(data[name]) for name in ("zeta_range", "omega_range", "grid")}
+        return cls(**{**data, **pairs})
+
+    def to_network(self, values: Array) -> Array:
+        """t3 [s] or ωn [rad/s] as the second network takes it, any shape."""
+        return np.log(values) if self.frequency_scale == LOGARITHMIC else np.asarray(values)
+
+    def from_network(self, values: Array) -> Array:
+        """ωn in rad/s from the second network's output, any shape."""
+        return np.exp(values) if self.frequency_scale == LOGARITHMIC else np.asarray(values)
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Inputs and targets of one network.
+
+    Args:
+        inputs: shape (N, inputs).
+        targets: shape (N,).
+    """
+
+    inputs: Array
+    targets: Array
+
+
+def training_pairs(spec: DataSpec, which: str, rng: np.random.Generator) -> Pairs:
+    """The training set of a network.
+
+    Args:
+        spec: its range and size.
+        which: ``damping`` or ``frequency``.
+        rng: draws the noise, where there is any.
+
+    Returns:
+        Inputs and targets before scaling.
+    """
+    if which == DAMPING:
+        zeta = np.linspace(*spec.zeta_range, spec.zeta_count)
+        inputs = network_inputs(zeta)
+        if spec.input_noise > 0.0:
+            zeta, inputs = np.repeat(zeta, spec.noisy_copies), np.repeat(inputs, spec.noisy_copies, axis=0)
+            noise = spec.input_noise * rng.standard_normal(inputs.shape)
+            inputs = inputs + noise - noise.mean(axis=1, keepdims=True)
+        return Pairs(inputs, zeta)
+    lowest, highest = spec.omega_range
+    space = np.geomspace if spec.frequency_scale == LOGARITHMIC else np.linspace
+    zeta, omega = (
+        axis.ravel()
+        for axis in np.meshgrid(
+            np.linspace(*spec.zeta_range, spec.grid[0]), space(lowest, highest, spec.grid[1])
+        )
+    )
+    return _frequency_pairs(spec, zeta, omega)
+
+
+def held_out_points(spec: DataSpec, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Damping ratios and frequencies [rad/s] that no training set holds, shapes (test_count,).
+
+    Half of them are even in the logarithm, so that the low ends of the range are tested too.
+
+    Args:
+        spec: the range.
+        rng: draws them.
+    """
+    found = []
+    for low, high in (spec.zeta_range, spec.omega_range):
+        even = rng.uniform(low, high, spec.test_count)
+        logarithmic = np.exp(rng.uniform(np.log(low), np.log(high), spec.test_count))
+        found.append(np.where(rng.random(spec.test_count) < 0.5, even, logarithmic))
+    return found[0], found[1]
+
+
+def _frequency_pairs(spec: DataSpec, zeta: Array, omega: Array) -> Pairs:
+    inputs = np.column_stack((zeta, spec.to_network(cycles_time(zeta, omega))))
+    return Pairs(inputs, spec.to_network(omega))
