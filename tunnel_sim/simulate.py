@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 import mujoco
 import numpy as np
@@ -191,7 +192,8 @@ def _integrate_chunk(rig: Rig, runs: list[RunSettings], sample_rate: float, nthr
     batch.set_const()
     samples, steps = sampling(runs[0], sample_rate)
     qpos, qvel = states["qpos"].copy(), states["qvel"].copy()
-    recorded = batch.rollout(nstep=(samples - 1) * steps, record=("qpos", "qvel"))
+    with _no_log():
+        recorded = batch.rollout(nstep=(samples - 1) * steps, record=("qpos", "qvel"))
     at = model.yaw_address
     time = np.arange(samples) / sample_rate
     motions = []
@@ -200,6 +202,17 @@ def _integrate_chunk(rig: Rig, runs: list[RunSettings], sample_rate: float, nthr
         rate = np.concatenate([qvel[i, at : at + 1], recorded["qvel"][i, steps - 1 :: steps, at]])
         motions.append(Motion(time, angle, rate))
     return motions
+
+
+@contextmanager
+def _no_log() -> Iterator[None]:
+    """Keep MuJoCo from printing and logging into the working folder what `_check_finite` says."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def _check_finite(angle: Array, where: str) -> None:
