@@ -17,6 +17,8 @@ from tunnel_sim.plan import POTENTIOMETER_RESOLUTION, SensorModel
 from tunnel_sim.rig import Rig, load_rig
 
 PRESETS = ("plain", "operator")
+LEAST_DEVIATION = 1e-6
+"""Of a reading, rad: below it the information's sums no longer hold what the prior knew."""
 _MAY_BE_ZERO = frozenset({"noise_std", "resolution", "effect_probability"})
 
 
@@ -68,10 +70,10 @@ class FreeDecayConfig:
                 _check_number(item.name, getattr(self, item.name))
         if self.effect_probability > 1.0:
             raise EnvError("effect_probability is above 1", remedy="give a probability")
-        if self.noise_std == 0.0 and self.resolution == 0.0:
+        if self.reading_variance < LEAST_DEVIATION**2:
             raise EnvError(
-                "noise_std and resolution are both 0",
-                remedy="give one of them: without noise any record holds infinite information",
+                f"noise_std and resolution together are below {LEAST_DEVIATION:g} rad",
+                remedy="give more of one: without noise any record holds infinite information",
             )
         _whole("control_period", self.control_period * self.sample_rate, "sample intervals")
         _whole("duration", self.duration / self.control_period, "control periods")

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
-from tunnel_sim.campaign import Run
 from tunnel_sim.envs.conditions import RunPlan, plan_run
 from tunnel_sim.envs.config import FreeDecayConfig, angle_limit
 from tunnel_sim.envs.controls import OperatorLog, WindAnswer, check_plain, decode
 from tunnel_sim.envs.engines import Operation
 from tunnel_sim.envs.errors import EnvError, as_env_error
 from tunnel_sim.envs.information import Information, Prior
+from tunnel_sim.envs.readings import Readings
 from tunnel_sim.envs.sensing import SensorChain
 from tunnel_sim.envs.sensitivity import NominalRun
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.record import Array, Record
 from tunnel_sim.rig import Rig
 from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.sensor import quantise
 from tunnel_sim.simulate import apply_effects
+
+Flags = NDArray[np.bool_]
 
 READING_BOUND = 2.0 * np.pi
 """Bound of a reading in the observation, rad; the record is not bounded."""
@@ -102,13 +103,8 @@ class Episodes:
         self._limit = angle_limit(rig)
         self._plans: list[RunPlan | None] = [None] * count
         self._physics: list[RunSettings | None] = [None] * count
-        self._chains: list[SensorChain | None] = [None] * count
-        self._rngs: list[np.random.Generator] = [np.random.default_rng(0)] * count
-        self._bent: list[int] = []  # runs whose reading effects bend
-        self._sensor = np.zeros((3, count, 1))  # zero, noise, resolution
-        self._readings = np.zeros((count, config.steps * samples))
+        self._readings = Readings(config, count)
         self._log = np.zeros((count, 3, config.steps))  # set-point, speed, moment
-        self._times = config.sample_times
         self._stated_speed = np.zeros(count)
         self._speed = np.zeros(count)
         self.step_count = np.zeros(count, dtype=np.int64)
@@ -138,22 +134,16 @@ class Episodes:
         except TunnelError as error:
             raise as_env_error(error, "reset options") from error
         chain = SensorChain(stated, plan.sensor, plan.effects, rng)
-        self._place(row, plan, physics, chain, rng)
+        self._plans[row], self._physics[row] = plan, physics
+        self._readings.start(row, chain, rng)
         self._information.start(row, self._nominal(plan))
         self._stated_speed[row] = self._speed[row] = plan.condition.wind_speed
         self.step_count[row], self.ended[row] = 0, False
-        observation = self._observation(row, self._held(chain, end_angle, rng))
+        observation = self._observation(row, self._readings.held(row, end_angle))
         info: dict[str, Any] = dict(plan.statement())
         if self._config.expose_truth:
             info["truth"] = plan
         return observation, info
-
-    def _place(
-        self, row: int, plan: RunPlan, physics: RunSettings, chain: SensorChain, rng: np.random.Generator
-    ) -> None:
-        self._plans[row], self._physics[row], self._chains[row], self._rngs[row] = plan, physics, chain, rng
-        self._sensor[:, row, 0] = chain.sensor.zero, chain.sensor.noise_std, chain.sensor.resolution
-        self._bent = [i for i, one in enumerate(self._chains) if one is not None and not one.is_plain]
 
     def _nominal(self, plan: RunPlan) -> NominalRun:
         truth, condition, body = plan.truth, plan.condition, self._rig.body
@@ -168,20 +158,12 @@ class Episodes:
             reference_length=body.length,
         )
 
-    def _held(self, chain: SensorChain, angle: float, rng: np.random.Generator) -> Array:
-        """Readings of the control period before the release; their noise is no part of the run's."""
-        samples, sensor = self._config.samples_per_step, chain.sensor
-        time = (np.arange(samples) - samples) / self._config.sample_rate
-        noise = rng.spawn(1)[0].standard_normal(samples)
-        held = chain.held(np.full(samples, angle), time)
-        return quantise(chain.reading(held + sensor.zero + sensor.noise_std * noise), sensor.resolution)
-
     def _observation(self, row: int, readings: Array) -> Array:
         time = self.step_count[row] * self._config.control_period
         shown = np.clip(readings, -READING_BOUND, READING_BOUND)
         return np.concatenate((shown, (min(time, self._config.duration), self._speed[row])))
 
-    def advance(self, actions: Any) -> tuple[Array, Array, Array, Array]:
+    def advance(self, actions: Any) -> tuple[Array, Array, Flags, Flags]:
         """Move every episode by one control period, those that have ended as well.
 
         Args:
@@ -202,7 +184,7 @@ class Episodes:
         wild = ~(np.max(np.abs(angle), axis=1) <= self._limit)
         if wild.any():
             angle, rate = (np.nan_to_num(np.clip(values, -1e3, 1e3)) for values in (angle, rate))
-        readings = self._read(angle[:, :-1])
+        readings = self._readings.take(angle[:, :-1], self.step_count, ~self.ended)
         rewards = self._information.advance(angle, rate, speeds.mean(axis=1), moment)
         self.step_count += 1
         observations = np.empty((self._count, self._config.samples_per_step + 2))
@@ -227,31 +209,6 @@ class Episodes:
         self._log[np.arange(self._count), :, at] = np.stack((set_point, self._speed, moment), axis=1)
         return speeds, moment
 
-    def _read(self, angle: Array) -> Array:
-        """The next readings of all runs, as `read_motion` makes them."""
-        samples = self._config.samples_per_step
-        noise = np.zeros_like(angle)
-        for row in np.flatnonzero(~self.ended):  # a run that has ended leaves its generator as it is
-            self._rngs[row].standard_normal(out=noise[row])
-        first = np.minimum(self.step_count, self._config.steps - 1) * samples
-        if self._bent:
-            angle = angle.copy()
-        for row in self._bent:
-            times = self._times[first[row] : first[row] + samples]
-            angle[row] = self._chains[row].angle(angle[row], times)  # type: ignore[union-attr]
-        zero, noise_std, resolution = self._sensor
-        readings = angle + zero + noise_std * noise
-        for row in self._bent:
-            readings[row] = self._chains[row].reading(readings[row])  # type: ignore[union-attr]
-        step = np.where(resolution > 0.0, resolution, 1.0)
-        readings = np.where(resolution > 0.0, np.round(readings / step) * step, readings)
-        if (first == first[0]).all():
-            self._readings[:, first[0] : first[0] + samples] = readings
-        else:
-            columns = first[:, None] + np.arange(samples)
-            self._readings[np.arange(self._count)[:, None], columns] = readings
-        return readings
-
     def outcome(self, row: int) -> dict[str, Any]:
         """What ``info`` holds at the end of an episode.
 
@@ -264,10 +221,10 @@ class Episodes:
         plan, record = self._plan(row), self.record(row)
         info: dict[str, Any] = {"record": record}
         if self._config.preset == "plain":
-            info["run"] = self.run(row)
+            info["run"] = plan.run(record)
         else:
             steps = int(self.step_count[row])
-            time = np.arange(steps) * self._config.control_period
+            time = np.arange(steps, dtype=np.float64) * self._config.control_period
             info["operator_log"] = OperatorLog(time, *(values[:steps].copy() for values in self._log[row]))
         if self._config.expose_truth:
             info["truth"] = plan
@@ -285,14 +242,7 @@ class Episodes:
         Raises:
             EnvError: before the first step.
         """
-        count = int(self.step_count[row]) * self._config.samples_per_step
-        if count < 2:
-            raise EnvError("there is no reading yet", where="record", remedy="call step() first")
-        return Record(self._times[:count], self._readings[row, :count])
-
-    def run(self, row: int) -> Run:
-        """A run so far as a campaign lists it; arguments as in `record`."""
-        return self._plan(row).run(self.record(row))
+        return self._readings.record(row, int(self.step_count[row]))
 
     def _plan(self, row: int) -> RunPlan:
         plan = self._plans[row]
@@ -315,16 +265,15 @@ class Episodes:
         """
         plan, physics = self._plan(row), self._physics[row]
         assert physics is not None
+        values, chain, rng = self._readings.snapshot(row)
         own = {
-            "readings": self._readings[row],
+            "readings": values,
             "log": self._log[row],
             "speed": self._speed[row],
             "step_count": self.step_count[row],
             "ended": self.ended[row],
         }
         arrays = {name: np.array(value) for name, value in own.items()} | self._information.snapshot(row)
-        chain, rng = copy.deepcopy((self._chains[row], self._rngs[row]))
-        assert chain is not None
         return EpisodeState(plan, physics, self._engine.get_state(row), arrays, chain, rng)
 
     def set_state(self, row: int, state: EpisodeState) -> np.random.Generator:
@@ -340,14 +289,12 @@ class Episodes:
         Raises:
             EnvError: when the state is of another configuration.
         """
-        if np.shape(state.arrays["readings"]) != self._readings[row].shape:
-            raise EnvError("the state is of another configuration", remedy="make the environment alike")
+        rng = self._readings.restore(row, state.arrays["readings"], state.sensor, state.rng)
         self._engine.start(row, state.physics)
         self._engine.set_state(row, state.mujoco)
-        chain, rng = copy.deepcopy((state.sensor, state.rng))
-        self._place(row, state.plan, state.physics, chain, rng)
+        self._plans[row], self._physics[row] = state.plan, state.physics
         self._information.restore(row, self._nominal(state.plan), state.arrays)
-        self._readings[row], self._log[row] = state.arrays["readings"], state.arrays["log"]
+        self._log[row] = state.arrays["log"]
         self._speed[row], self._stated_speed[row] = state.arrays["speed"], state.plan.condition.wind_speed
         self.step_count[row], self.ended[row] = state.arrays["step_count"], state.arrays["ended"]
         return rng

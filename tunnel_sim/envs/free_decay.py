@@ -16,7 +16,7 @@ from tunnel_sim.envs.rendering import RENDER_MODES, RigView
 from tunnel_sim.record import Array, Record
 
 
-class FreeDecayEnv(gymnasium.Env[Array, Any]):
+class FreeDecayEnv(gymnasium.Env[Any, Any]):
     """One run of the oscillating-model rig, from the release on; see docs/reference/envs/free-decay.md.
 
     Args:

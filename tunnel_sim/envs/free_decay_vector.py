@@ -76,7 +76,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
     def reset(
         self,
         *,
-        seed: int | Sequence[int | None] | None = None,  # type: ignore[override]
+        seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Array, dict[str, Any]]:
         """Begin all runs, or those of a mask.
@@ -98,10 +98,10 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         seeds = self._seeds(seed)
         observations = np.zeros(self.observation_space.shape or ())
         infos: dict[str, Any] = {}
-        for row in np.flatnonzero(mask):
+        for row in np.flatnonzero(mask).tolist():
             if seeds[row] is not None or self._rngs[row] is None:
                 self._rngs[row], _ = seeding.np_random(seeds[row])
-            observations[row], infos = self._start(int(row), {**common, **each[row]}, infos)
+            observations[row], infos = self._start(row, {**common, **each[row]}, infos)
         return observations, infos
 
     def _start(
@@ -166,11 +166,11 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
             truncated |= self._episodes.step_count >= self._most_steps
             self._episodes.ended |= truncated
         infos: dict[str, Any] = {}
-        for row in renewed:
-            observations[row], infos = self._start(int(row), None, infos)
+        for row in renewed.tolist():
+            observations[row], infos = self._start(row, None, infos)
             rewards[row], terminated[row], truncated[row] = 0.0, False, False
-        for row in np.flatnonzero(terminated | truncated):
-            infos = self._add_info(infos, self._episodes.outcome(int(row)), int(row))
+        for row in np.flatnonzero(terminated | truncated).tolist():
+            infos = self._add_info(infos, self._episodes.outcome(row), row)
         return observations, rewards, terminated, truncated, infos
 
     def get_state(self, index: int) -> EpisodeState:

@@ -48,8 +48,8 @@ class Prior:
         cn_r: 1/rad, above 0.
     """
 
-    yaw_inertia: float = 0.001
-    mechanical_damping: float = 0.02
+    yaw_inertia: float = 1e-4
+    mechanical_damping: float = 1e-3
     release_angle: float = 0.01
     release_rate: float = 0.02
     sensor_zero: float = 0.01

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -46,6 +47,16 @@ class SensorChain:
     def is_plain(self) -> bool:
         """Whether the reading is zero, noise and quantisation alone."""
         return not self._on_angle and not self._on_reading
+
+    def copied(self) -> SensorChain:
+        """The same chain at the same point of its run, sharing nothing that changes."""
+        other = copy.copy(self)
+        vars(other).update(
+            _on_angle=[(effect, copy.deepcopy(rng), state) for effect, rng, state in self._on_angle],
+            _past=[list(past) for past in self._past],
+            _times=list(self._times),
+        )
+        return other
 
     def angle(self, angle: Array, time_s: Array) -> Array:
         """What the sensor sees of the run's next samples before its zero and noise.

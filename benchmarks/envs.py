@@ -1,0 +1,115 @@
+"""Steps per second of FreeDecay-v0: the native vector environment against bare mujoco.batch and Gymnasium's async.
+
+Run as ``python benchmarks/envs.py``; see README.md beside it. Both sides of a ratio are measured by turns.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from statistics import median
+from typing import Any
+
+import gymnasium
+import numpy as np
+from mujoco import batch as mujoco_batch
+from rich.console import Console
+from rich.table import Table
+from throughput import interleaved, ratio
+
+import tunnel_sim.envs  # noqa: F401  registers the environments
+from tunnel_sim.envs.conditions import plan_run
+from tunnel_sim.envs.config import FreeDecayConfig
+from tunnel_sim.model import build_model
+from tunnel_sim.rig import load_rig
+
+NAME = "tunnel_sim/FreeDecay-v0"
+DURATION = 60.0  # s, so that no run ends while it is timed
+
+
+def bare(count: int, periods: int, substeps: int) -> Callable[[], float]:
+    """A repetition of ``mujoco.batch`` alone: elapsed time, s. Nothing is read, drawn or recorded."""
+    rig = load_rig()
+    plan = plan_run({}, FreeDecayConfig(), rig, np.random.default_rng(0))
+    batch = mujoco_batch.Batch(build_model(rig, plan.stated()).mj, nsim=count)
+    batch.bind("qpos")[:, 0] = np.linspace(0.1, 0.3, count)
+
+    def repetition() -> float:
+        begin = time.perf_counter()
+        for _ in range(periods):
+            batch.step(nstep=substeps)
+        return time.perf_counter() - begin
+
+    return repetition
+
+
+def stepping(envs: Any, periods: int) -> Callable[[], float]:
+    """A repetition of ``step`` with sampled actions: elapsed time, s."""
+    envs.action_space.seed(1)
+    actions = [envs.action_space.sample() for _ in range(periods)]
+
+    def repetition() -> float:
+        envs.reset(seed=1)
+        begin = time.perf_counter()
+        for action in actions:
+            envs.step(action)
+        return time.perf_counter() - begin
+
+    return repetition
+
+
+def vector(count: int, mode: str, preset: str) -> Any:
+    """A vector environment of one kind."""
+    arguments = {"preset": preset, "duration": DURATION}
+    if preset == "operator":
+        arguments["wind_limit"] = 20.0  # sampled set-points stay where the springs hold
+        arguments["moment_limit"] = 0.05
+    return gymnasium.make_vec(NAME, num_envs=count, vectorization_mode=mode, **arguments)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=256, help="runs side by side, against mujoco.batch")
+    parser.add_argument("--workers", type=int, default=16, help="runs side by side, against async")
+    parser.add_argument("--periods", type=int, default=40, help="control periods of a repetition")
+    parser.add_argument("--repetitions", type=int, default=9, help="repetitions of each side")
+    options = parser.parse_args()
+
+    table = Table(
+        title="FreeDecay-v0, control periods of 10 ms (ten RK4 steps) per second, all runs together"
+    )
+    for head in ("comparison", "runs", "baseline", "subject", "ratio (median)", "ratio (best)", "target"):
+        table.add_column(head, justify="left" if head == "comparison" else "right")
+
+    def line(name: str, count: int, one: Callable[[], float], other: Callable[[], float], aim: str) -> None:
+        times = interleaved(one, other, options.repetitions)
+        speeds = [f"{count * options.periods / median(side):,.0f}" for side in times]
+        middle, best = ratio(*times)
+        table.add_row(name, str(count), *speeds, f"{middle:.2f}", f"{best:.2f}", aim)
+
+    for preset in ("plain", "operator"):
+        envs = vector(options.count, "vector_entry_point", preset)
+        alone = bare(options.count, options.periods, 10)
+        aim = "≥ 0.7" if preset == "plain" else ""
+        line(
+            f"{preset}: native against mujoco.batch",
+            options.count,
+            alone,
+            stepping(envs, options.periods),
+            aim,
+        )
+        envs.close()
+    for preset in ("plain", "operator"):
+        native = vector(options.workers, "vector_entry_point", preset)
+        workers = vector(options.workers, "async", preset)
+        sides = (stepping(workers, options.periods), stepping(native, options.periods))
+        line(f"{preset}: native against async", options.workers, *sides, "≥ 5" if preset == "plain" else "")
+        workers.close()
+        native.close()
+    Console(width=118).print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,27 @@
+"""Whether pictures can be drawn here; MuJoCo's log out of the way."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs.rendering import RigView
+from tunnel_sim.rig import load_rig
+
+
+@pytest.fixture(autouse=True)
+def _log_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log into the working directory
+
+
+@pytest.fixture(scope="session")
+def drawing() -> None:
+    view = RigView(load_rig(), "rgb_array", 32, 32, "overview", 0.01)
+    try:
+        view.draw(0.0, 0.0)
+    except EnvError as error:
+        pytest.skip(str(error))
+    finally:
+        view.close()

@@ -1,0 +1,157 @@
+"""The readings of many runs in progress: zero, noise and quantisation at once, effects run by run."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_sim.envs.config import FreeDecayConfig
+from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs.sensing import SensorChain
+from tunnel_sim.record import Array, Record
+from tunnel_sim.sensor import quantise
+
+
+class Readings:
+    """What the potentiometers of many runs have read.
+
+    Args:
+        config: of the environment.
+        count: number of runs.
+    """
+
+    def __init__(self, config: FreeDecayConfig, count: int) -> None:
+        self._samples = config.samples_per_step
+        self._steps = config.steps
+        self._times = config.sample_times
+        self._interval = 1.0 / config.sample_rate
+        self._chains: list[SensorChain | None] = [None] * count
+        self._rngs: list[np.random.Generator] = [np.random.default_rng(0)] * count
+        self._bent: set[int] = set()  # runs whose reading effects bend
+        self._sensor = np.zeros((3, count, 1))  # zero, noise, resolution
+        self._values = np.zeros((count, config.steps * config.samples_per_step))
+
+    def start(self, row: int, chain: SensorChain, rng: np.random.Generator) -> None:
+        """Begin a run.
+
+        Args:
+            row: index among the many.
+            chain: what its effects do to the reading.
+            rng: source of its noise.
+        """
+        self._chains[row], self._rngs[row] = chain, rng
+        self._sensor[:, row, 0] = chain.sensor.zero, chain.sensor.noise_std, chain.sensor.resolution
+        (self._bent.discard if chain.is_plain else self._bent.add)(row)
+
+    def held(self, row: int, angle: float) -> Array:
+        """Readings of the control period before the release; their noise is no part of the run's.
+
+        Args:
+            row: index among the many.
+            angle: at which the rod's upper end is held, rad.
+
+        Returns:
+            Shape (samples,), rad.
+        """
+        chain = self._chain(row)
+        sensor = chain.sensor
+        time = np.arange(-self._samples, 0, dtype=np.float64) * self._interval
+        noise = self._rngs[row].spawn(1)[0].standard_normal(self._samples)
+        held = chain.held(np.full(self._samples, angle), time)
+        return quantise(chain.reading(held + sensor.zero + sensor.noise_std * noise), sensor.resolution)
+
+    def take(self, angle: Array, step: NDArray[np.int64], running: NDArray[np.bool_]) -> Array:
+        """The next readings of all runs, with the bits of `tunnel_sim.sensor.read_motion`.
+
+        Args:
+            angle: of the rod's upper end at the samples, shape (runs, samples), rad.
+            step: number of the control period, shape (runs,).
+            running: which runs are in progress, shape (runs,); the generators of others are left as they are.
+
+        Returns:
+            Shape (runs, samples), rad.
+        """
+        noise = np.zeros_like(angle)
+        for row in np.flatnonzero(running).tolist():
+            self._rngs[row].standard_normal(out=noise[row])
+        first = np.minimum(step, self._steps - 1) * self._samples
+        if self._bent:
+            angle = angle.copy()
+        for row in self._bent:
+            times = self._times[first[row] : first[row] + self._samples]
+            angle[row] = self._chain(row).angle(angle[row], times)
+        zero, noise_std, resolution = self._sensor
+        readings = angle + zero + noise_std * noise
+        for row in self._bent:
+            readings[row] = self._chain(row).reading(readings[row])
+        size = np.where(resolution > 0.0, resolution, 1.0)
+        readings = np.where(resolution > 0.0, np.round(readings / size) * size, readings)
+        self._keep(first, readings)
+        return readings
+
+    def _keep(self, first: NDArray[np.int64], readings: Array) -> None:
+        if (first == first[0]).all():
+            self._values[:, first[0] : first[0] + self._samples] = readings
+        else:
+            columns = first[:, None] + np.arange(self._samples)
+            self._values[np.arange(len(first))[:, None], columns] = readings
+
+    def record(self, row: int, steps: int) -> Record:
+        """The reading of a run so far.
+
+        Args:
+            row: index among the many.
+            steps: number of control periods so far.
+
+        Returns:
+            The record.
+
+        Raises:
+            EnvError: before the second reading.
+        """
+        count = steps * self._samples
+        if count < 2:
+            raise EnvError("there is no reading yet", where="record", remedy="call step() first")
+        return Record(self._times[:count], self._values[row, :count])
+
+    def snapshot(self, row: int) -> tuple[Array, SensorChain, np.random.Generator]:
+        """Copies of what a run carries.
+
+        Args:
+            row: index among the many.
+
+        Returns:
+            Readings, effects and source of noise.
+        """
+        return self._values[row].copy(), self._chain(row).copied(), copy.deepcopy(self._rngs[row])
+
+    def restore(
+        self, row: int, values: Array, chain: SensorChain, rng: np.random.Generator
+    ) -> np.random.Generator:
+        """Put a run back to where a snapshot was taken.
+
+        Args:
+            row: index among the many.
+            values: readings, shape (n,), rad.
+            chain: likewise from `snapshot`.
+            rng: likewise.
+
+        Returns:
+            The run's generator from now on, a copy.
+
+        Raises:
+            EnvError: when the readings are of another configuration.
+        """
+        if np.shape(values) != self._values[row].shape:
+            raise EnvError("the state is of another configuration", remedy="make the environment alike")
+        self.start(row, chain.copied(), copy.deepcopy(rng))
+        self._values[row] = values
+        return self._rngs[row]
+
+    def _chain(self, row: int) -> SensorChain:
+        chain = self._chains[row]
+        if chain is None:
+            raise EnvError("no episode has begun", remedy="call reset() first")
+        return chain
