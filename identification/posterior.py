@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
 from identification.damped_oscillation import Decay
@@ -25,9 +26,13 @@ from tunnel_sim.record import Array
 
 _FIRST = (5.6, 0.8)  # half width and step in deviations: to a normal distribution the sum is exact to 1e-7
 _FINER = (7.0, 0.35)
-_MOST_REFINEMENTS = 6
-_BORDER_MASS = 1e-6
+_WIDENING = 1.25  # of the half width in each refinement after the first: Student's tails are long
+_MOST_REFINEMENTS = 7
+_BORDER_MASS = 1e-4
 _SCALE_BAND = (0.7, 1.4)  # of the deviations found over those the grid was laid for
+_FLOOR = -60.0  # of the logarithm of the likelihood over its peak: what is below counts for nothing
+_STEEPEST = 50.0  # |a| times the record's length: beyond, the motion is not one of this record
+_RIDGE = 1e-13  # of a scaled Gram matrix, which a motion of a few samples only makes singular
 _FINE = 121  # points a side for the quantiles
 TAIL = 0.025
 
@@ -89,15 +94,15 @@ class Posterior:
         z = np.linalg.solve(self.scale, (decays - self.centre).T)
         edge = float(self.axis[-1])
         inside = np.clip(z, -edge, edge)
-        spline = RectBivariateSpline(self.axis, self.axis, self.log_likelihood)
+        spline = _spline(self.axis, self.log_likelihood)
         beyond = np.sum(z**2 - inside**2, axis=0)
         return np.asarray(spline.ev(inside[0], inside[1]) - 0.5 * beyond)
 
     def modal(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float, float]]:
         """ωn in rad/s and ζ: mean, standard deviation, lower and upper end of the 95 % interval of each."""
         fine = np.linspace(self.axis[0], self.axis[-1], _FINE)
-        spline = RectBivariateSpline(self.axis, self.axis, self.log_posterior)
-        weights = np.exp(spline(fine, fine) - self.log_posterior.max()).ravel()
+        spline = _spline(self.axis, self.log_posterior)
+        weights = np.exp(np.minimum(spline(fine, fine) - self.log_posterior.max(), 1.0)).ravel()
         decays = self.centre[:, None] + self.scale @ _points(fine)
         real = decays[1] > 0.0
         omega = np.sqrt(decays[1][real])
@@ -132,14 +137,22 @@ def posterior_of(
         decays = centre[:, None] + scale @ _points(axis)
         likelihood, prior = _log_terms(thin, decays, knowledge)
         shape = (axis.size, axis.size)
-        likelihood -= likelihood.max()
+        if not np.isfinite(likelihood.max()):
+            return None
+        likelihood = np.maximum(likelihood - likelihood.max(), _FLOOR)
         found = Posterior(centre, scale, axis, likelihood.reshape(shape), (likelihood + prior).reshape(shape))
         mean, spread = found.moments()
         if _holds(found, mean, spread):
             return found
         centre = mean
-        width, step = _FINER
+        width, step = _FINER if width == _FIRST[0] else (_WIDENING * width, _FINER[1])
     return None
+
+
+def _spline(axis: Array, values: Array) -> RectBivariateSpline:
+    # A smooth curve overshoots where the prior cuts the posterior off; straight pieces do not.
+    degree = 1 if np.any(np.abs(np.diff(values, axis=0)) > -_FLOOR / 4.0) else 3
+    return RectBivariateSpline(axis, axis, values, kx=degree, ky=degree)
 
 
 def _holds(found: Posterior, mean: Array, covariance: Array) -> bool:
@@ -162,26 +175,31 @@ def _log_terms(thin: Reading, decays: Array, knowledge: NoiseKnowledge) -> tuple
     for begin in range(0, count, slice_size):
         part = slice(begin, begin + slice_size)
         squares, prior[part] = _squares_and_prior(thin, decays[0, part], decays[1, part])
+        squares = np.where(_possible(thin, decays[:, part]) & np.isfinite(squares), squares, np.inf)
         total = knowledge.samples * squares + knowledge.within
         if knowledge.variance is None:
             likelihood[part] = -0.5 * knowledge.freedom * np.log(total)
         else:
             likelihood[part] = -0.5 * total / knowledge.variance
-    outside = decays[1] <= 0.0  # no spring
-    likelihood[outside] = -1e9
-    return likelihood, prior
+    return likelihood, np.where(np.isfinite(prior), prior, 0.0)
+
+
+def _possible(thin: Reading, decays: Array) -> NDArray[np.bool_]:
+    # With a spring, and neither dying nor growing within a sample.
+    return np.asarray((decays[1] > 0.0) & (np.abs(decays[0]) * float(thin.time[-1]) < _STEEPEST))
 
 
 def _squares_and_prior(thin: Reading, rate: Array, stiffness: Array) -> tuple[Array, Array]:
-    rows = _responses(thin.time, rate, stiffness)  # (points, 5, n): u, s, 1, w, t s
+    limit = _STEEPEST / float(thin.time[-1])
+    rows = _responses(
+        thin.time, np.clip(rate, -limit, limit), np.abs(stiffness)
+    )  # (points, 5, n): u, s, 1, w, t s
     linear = rows[:, :3]
     gram = linear @ linear.transpose(0, 2, 1)
     unit = np.sqrt(np.einsum("gii->gi", gram))
     moments = linear @ thin.yaw
-    solution = (
-        np.linalg.solve(gram / (unit[:, :, None] * unit[:, None, :]), (moments / unit)[:, :, None])[:, :, 0]
-        / unit
-    )
+    scaled = gram / (unit[:, :, None] * unit[:, None, :]) + _RIDGE * np.eye(3)
+    solution = np.linalg.solve(scaled, (moments / unit)[:, :, None])[:, :, 0] / unit
     residual = thin.yaw - np.einsum("gi,gin->gn", solution, linear)
     squares = np.einsum("gn,gn->g", residual, residual)
     angle, speed = solution[:, 0, None], solution[:, 1, None]
@@ -190,7 +208,8 @@ def _squares_and_prior(thin: Reading, rate: Array, stiffness: Array) -> tuple[Ar
     by_stiffness = (a * angle + speed) * rows[:, 3] - 0.5 * angle * rows[:, 4]
     full = np.concatenate((linear, by_rate[:, None], by_stiffness[:, None]), axis=1)
     information = full @ full.transpose(0, 2, 1)
-    return squares, 0.5 * (np.linalg.slogdet(information)[1] - np.linalg.slogdet(gram)[1])
+    with np.errstate(invalid="ignore"):  # a motion gone within a few samples has none to offer
+        return squares, 0.5 * (np.linalg.slogdet(information)[1] - np.linalg.slogdet(gram)[1])
 
 
 def _responses(time: Array, rate: Array, stiffness: Array) -> Array:
