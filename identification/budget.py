@@ -9,8 +9,8 @@ First order after JCGM 100:2008 (GUM), correlated inputs after its 5.2:
   (Cnβ, Cnr) ∝ Kr, V^(−2, −1), ρ^−1, A^−1, l^(−1, −2). An error of one spring's or one run's own is moved through
   the estimator itself, one input at a time by one standard uncertainty (Kragten, Analyst 119 (1994) 2161–2165,
   doi 10.1039/AN9941902161).
-- Scatter: delete-one jackknife over the wind-off and over the wind-on runs (Efron & Stein, Ann. Statist. 9 (1981)
-  586–596, doi 10.1214/aos/1176345462), as far as it is more than noise and individual inputs explain.
+- Scatter: how far the wind-off and the wind-on runs scatter about the coefficients they share, as far as it is more
+  than noise and the individual errors of the inputs explain (see `identification.scatter`).
 - Model: how far other methods, or the first half of every record, move the answer beyond chance; the largest move
   is the half-width of a rectangular distribution (GUM 4.3.7).
 
@@ -19,7 +19,7 @@ What this cannot see is what no repeat and no other method of the same model sho
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from math import sqrt
 from typing import Any, Literal
@@ -28,7 +28,8 @@ import numpy as np
 
 from identification.estimate import PARAMETERS, Estimate, Quantity
 from identification.input_uncertainty import InputUncertainties
-from tunnel_sim.campaign import Campaign, Run
+from identification.scatter import error_groups, scaled, side_scatter
+from tunnel_sim.campaign import Campaign
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.record import Array, Record
 
@@ -45,9 +46,7 @@ _POWERS: Mapping[str, tuple[float, float, float, float, float]] = {
     "yaw_inertia": (0.0, 0.0, 0.0, 0.0, 0.0),  # the nominal one decides nothing: Izz is identified
     "clock": (0.0, 1.0, 2.0, 1.0, 2.0),
 }
-_LEAST_RUNS = 3
-_CHANCE = 1.96  # of a move, in its standard deviations
-_SCATTER_CHANCE = 0.05
+_CHANCE = 2.58  # of a move, in its standard deviations: once in a hundred
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +160,7 @@ def make_budget(
     noise = Component("noise of the readings", "A", _noise(estimate, budget))
     common = _common(budget, inputs, any(run.wind_on for run in campaign.runs))
     individual = _individual(campaign, budget, identify, inputs, tell)
-    known = noise.covariance + sum((c.covariance for c in individual), np.zeros_like(noise.covariance))
-    tell("scatter of the runs")
-    scatter = _scatter(campaign, budget, identify, np.diag(known))
+    scatter = _scatter(campaign, estimate, budget, inputs)
     tell("choice of model")
     rivals: dict[str, Estimate] = {name: other(campaign) for name, other in (others or {}).items()}
     rivals["the first half of the records"] = identify(_first_half(campaign))
@@ -222,12 +219,12 @@ def _individual(
     for name, size in inputs.individual.items():
         if size <= 0.0:
             continue
-        groups = _groups(campaign, name)
+        groups = error_groups(campaign.runs, name)
         total = np.zeros((len(budget.names),) * 2)
         for number, group in enumerate(groups, 1):
             tell(f"{name}, {number} of {len(groups)}")
             runs = tuple(
-                _scaled(run, name, 1.0 + size) if i in group else run for i, run in enumerate(campaign.runs)
+                scaled(run, name, 1.0 + size) if i in group else run for i, run in enumerate(campaign.runs)
             )
             values = _values(identify(replace(campaign, runs=runs)), budget)
             if values is None:
@@ -243,26 +240,6 @@ def _individual(
     return found
 
 
-def _groups(campaign: Campaign, name: str) -> list[list[int]]:
-    """Runs that share one error: those of a spring, or a single wind-on run."""
-    if name != "spring_stiffness":
-        return [[i] for i, run in enumerate(campaign.runs) if run.wind_on]
-    springs: dict[float, list[int]] = {}
-    for i, run in enumerate(campaign.runs):
-        if run.spring_stiffness is not None:
-            springs.setdefault(run.spring_stiffness, []).append(i)
-    return list(springs.values())
-
-
-def _scaled(run: Run, name: str, factor: float) -> Run:
-    if name == "wind_speed":
-        return replace(run, wind_speed=run.wind_speed * factor)
-    if name == "air_density":
-        return replace(run, air_density=None if run.air_density is None else run.air_density * factor)
-    spring = run.spring_stiffness
-    return replace(run, spring_stiffness=None if spring is None else spring * factor)
-
-
 def _values(estimate: Estimate, budget: Budget) -> Array | None:
     """The budget's quantities of another estimate; None where one is missing."""
     found: list[Quantity | None] = [getattr(estimate, name) for name in budget.names]
@@ -270,50 +247,21 @@ def _values(estimate: Estimate, budget: Budget) -> Array | None:
     return np.array(given) if len(given) == len(found) else None
 
 
-def _scatter(campaign: Campaign, budget: Budget, identify: Identify, known: Array) -> list[Component]:
-    """Of the wind-off and of the wind-on runs, as far as ``known`` variances do not explain it."""
-    sides = {
-        "scatter of the wind-off runs": [i for i, run in enumerate(campaign.runs) if not run.wind_on],
-        "scatter of the wind-on runs": [i for i, run in enumerate(campaign.runs) if run.wind_on],
-    }
-    variances, degrees, notes = {}, 0, {}
-    for label, places in sides.items():
-        variance = _jackknife(campaign, budget, identify, places)
-        if variance is None:
-            notes[label] = "not known, since the campaign cannot spare a run"
-        else:
-            variances[label], degrees = variance, degrees + len(places) - 1
-    total = sum(variances.values(), np.zeros(len(budget.names)))
-    excess = np.where(total > _least_scatter(degrees) * known, total - known, 0.0)
+def _scatter(
+    campaign: Campaign, estimate: Estimate, budget: Budget, inputs: InputUncertainties
+) -> list[Component]:
+    """Of the wind-off and of the wind-on runs, as far as nothing above explains it."""
     found = []
-    for label in sides:
-        own = variances.get(label, np.zeros(len(budget.names)))
-        share = np.divide(own, total, out=np.zeros_like(own), where=total > 0.0)
-        note = notes.get(label, "" if np.any(excess * share > 0.0) else "explained by what is above")
-        found.append(Component(label, "A", np.diag(excess * share), note, known=label not in notes))
+    sides = side_scatter(campaign, estimate.runs, inputs.individual)
+    for side, label in zip(sides, ("wind-off", "wind-on"), strict=True):
+        covariance = np.zeros((len(budget.names),) * 2)
+        shared = [name for name in side.names if name in budget.names]
+        mine, theirs = [budget.names.index(n) for n in shared], [side.names.index(n) for n in shared]
+        covariance[np.ix_(mine, mine)] = side.covariance[np.ix_(theirs, theirs)]
+        note = "" if covariance.any() else "explained by what is above"
+        note = note if side.known else "not known, since the campaign has no run to spare"
+        found.append(Component(f"scatter of the {label} runs", "A", covariance, note, known=side.known))
     return found
-
-
-def _least_scatter(degrees: int) -> float:
-    """Scatter over what is known, as a ratio of variances, that chance exceeds once in twenty."""
-    from scipy.special import chdtri
-
-    return float(chdtri(degrees, _SCATTER_CHANCE)) / degrees if degrees else np.inf
-
-
-def _jackknife(campaign: Campaign, budget: Budget, identify: Identify, places: Sequence[int]) -> Array | None:
-    """Variance by leaving out one run of a side at a time; None where the side cannot spare one."""
-    if len(places) < _LEAST_RUNS:
-        return None
-    moved = []
-    for left_out in places:
-        runs = tuple(run for i, run in enumerate(campaign.runs) if i != left_out)
-        values = _values(identify(replace(campaign, runs=runs)), budget)
-        if values is None:
-            return None
-        moved.append(values)
-    spread = np.array(moved) - np.mean(moved, axis=0)
-    return np.asarray((len(places) - 1) / len(places) * np.sum(spread**2, axis=0))
 
 
 def _model(budget: Budget, own_std: Array, rivals: Mapping[str, Estimate]) -> Component:

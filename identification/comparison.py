@@ -22,6 +22,7 @@ from tunnel_sim.record import Array
 Aspect = Literal["bias", "spread", "outliers", "coverage", "failures"]
 ASPECTS: tuple[Aspect, ...] = ("bias", "spread", "outliers", "coverage", "failures")
 FALSE_ALARM_RATE = 0.01
+_MATERIAL = 0.02  # of the spread, where trials are on the same records
 _FAR_OUT = 6.0  # medians of the error's size: four standard deviations where errors are normal
 
 
@@ -63,9 +64,12 @@ def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ..
     """
     pairs = list(zip(before, now, strict=True))
     scaled = [_scaled(old, new) for old, new in pairs]
+    same = all(
+        np.array_equal(old.truth, new.truth) for old, new in pairs
+    )  # truths are drawn: so are the records
     return (
-        _bias(scaled),
-        _spread(scaled),
+        _bias(scaled, same),
+        _spread(scaled, same),
         _outliers(scaled),
         _coverage(pairs),
         _shares(
@@ -101,7 +105,7 @@ def _scaled(old: Trials, new: Trials) -> tuple[Array, Array]:
     return old.scaled, new.scaled
 
 
-def _bias(scaled: Sequence[tuple[Array, Array]]) -> Change:
+def _bias(scaled: Sequence[tuple[Array, Array]], same: bool) -> Change:
     # Each cell's direction is that of all its errors, old and new: moved further that way is worse.
     turned = []
     for old, new in scaled:
@@ -109,13 +113,15 @@ def _bias(scaled: Sequence[tuple[Array, Array]]) -> Change:
         direction = 1.0 if both.size == 0 or both.mean() >= 0.0 else -1.0
         turned.append((direction * old, direction * new))
     before, now = (_mean_size(scaled, side) for side in (0, 1))
-    return Change("bias", before, now, _rank_sum(turned) if now > before else 1.0)
+    least = before + (_MATERIAL * _root_mean_square(scaled, 0) if same else 0.0)
+    return Change("bias", before, now, _larger(turned, same) if now > least else 1.0)
 
 
-def _spread(scaled: Sequence[tuple[Array, Array]]) -> Change:
+def _spread(scaled: Sequence[tuple[Array, Array]], same: bool) -> Change:
     sizes = [(np.abs(old), np.abs(new)) for old, new in scaled]
     before, now = (_root_mean_square(scaled, side) for side in (0, 1))
-    return Change("spread", before, now, _rank_sum(sizes) if now > before else 1.0)
+    least = before * (1.0 + _MATERIAL if same else 1.0)
+    return Change("spread", before, now, _larger(sizes, same) if now > least else 1.0)
 
 
 def _outliers(scaled: Sequence[tuple[Array, Array]]) -> Change:
@@ -155,8 +161,28 @@ def _shares(aspect: Aspect, old: tuple[int, int], new: tuple[int, int]) -> Chang
     return Change(aspect, before, now, float(fisher_exact(table, alternative="greater").pvalue))
 
 
+def _larger(cells: Sequence[tuple[Array, Array]], same: bool) -> float:
+    """One-sided p-value of the new values being the larger ones."""
+    return _signed_rank(cells) if same else _rank_sum(cells)
+
+
+def _signed_rank(cells: Sequence[tuple[Array, Array]]) -> float:
+    """By pairs, ranked within each cell; pairs without a difference say nothing."""
+    from scipy.special import ndtr
+    from scipy.stats import rankdata
+
+    excess = variance = 0.0
+    for old, new in cells:
+        difference = (new - old)[new != old]
+        if difference.size:
+            ranks = rankdata(np.abs(difference)) / difference.size
+            excess += float(np.sign(difference) @ ranks)
+            variance += float(ranks @ ranks)
+    return float(ndtr(-excess / np.sqrt(variance))) if variance > 0.0 else 1.0
+
+
 def _rank_sum(cells: Sequence[tuple[Array, Array]]) -> float:
-    """One-sided p-value of the new values being the larger ones, ranked within each cell."""
+    """Of independent values, ranked within each cell."""
     from scipy.special import ndtr
     from scipy.stats import rankdata
 

@@ -1,5 +1,7 @@
 """The tests behind ``--check``: nothing where nothing changed, and every planted change."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,11 +11,15 @@ from identification.scoring import Trials
 CELLS, COUNT = 6, 60
 
 
-def trials(rng, *, scale=1.0, shift=0.0, failures=0, std=1.0, outliers=0, bound=True, heavy=False):
+def trials(
+    rng, *, truth=None, scale=1.0, shift=0.0, failures=0, std=1.0, outliers=0, bound=True, heavy=False
+):
     error = (rng.standard_t(2, COUNT) if heavy else rng.standard_normal(COUNT)) * scale + shift
     error[:outliers] *= 30.0
     ones = np.ones(COUNT)
-    return Trials(error, std * ones, 2.0 * ones, ones if bound else None, failures)
+    return Trials(
+        error, std * ones, rng.random(COUNT) if truth is None else truth, ones if bound else None, failures
+    )
 
 
 def several(seed, **options):
@@ -70,6 +76,34 @@ def test_false_alarms_are_as_rare_as_stated(heavy):
         for i in range(sets)
     )
     assert alarms <= 28  # of 150, at 10 %: exceeded with probability 5e-4
+
+
+def on_the_same_records(before, change):
+    return [replace(one, error=change(one.error)) for one in before]
+
+
+def test_on_the_same_records_smaller_changes_show_and_immaterial_ones_do_not():
+    before, rng = several(1), np.random.default_rng(2)
+    noisier = on_the_same_records(before, lambda error: error + 0.6 * rng.standard_normal(error.size))
+    spread = {change.aspect: change for change in changes(before, noisier)}["spread"]
+    assert spread.p_value < 1e-4
+    apart = [replace(one, truth=one.truth + 1.0) for one in noisier]  # as if the records were others
+    assert {change.aspect: change for change in changes(before, apart)}["spread"].p_value > spread.p_value
+    rounded = on_the_same_records(before, lambda error: error * (1.0 + 1e-6) + 1e-9)
+    assert {change.p_value for change in changes(before, rounded)} == {1.0}
+
+
+def test_false_alarms_on_the_same_records_are_as_rare_as_stated():
+    """Another method, as good: each of its errors is old half and fresh half, so that pairs are exchangeable."""
+    alarms = 0
+    for i in range(150):
+        rng = np.random.default_rng((3, i))
+        before = several((4, i))
+        now = on_the_same_records(
+            before, lambda error, rng=rng: np.sqrt(0.5) * (error + rng.standard_normal(error.size))
+        )
+        alarms += any(holm(p_values(before, now), 0.10))
+    assert alarms <= 28
 
 
 def test_holm_is_the_published_procedure():

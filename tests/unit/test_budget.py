@@ -1,0 +1,148 @@
+"""The budget's arithmetic against the estimators themselves and against closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification import identify
+from identification.budget import make_budget, with_budget
+from identification.input_uncertainty import InputUncertainties
+from tests.reference.free_decays import TWELVE, Setting, campaign, with_records
+from tunnel_sim.record import Record
+
+EIGHT = (
+    *(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0)),
+    Setting(16.12, 0.0, 0.2),
+    Setting(44.84, 0.0, 0.2),
+)
+SHAPE = {"duration": 5.0, "rate": 200.0}
+
+
+def by(name):
+    return lambda data: identify(data, name, throw=False)
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    # A seed in which chance raises no flag of scatter; how often it does is tested below.
+    return campaign(EIGHT, noise=5e-4, rng=np.random.default_rng(4), **SHAPE)
+
+
+def budget_of(data, inputs, name="matrix_pencil", **options):
+    return make_budget(data, by(name)(data), by(name), inputs, **options)
+
+
+def component(budget, start):
+    (found,) = [one for one in budget.components if one.name.startswith(start)]
+    return found
+
+
+def stated(data, name, factor):
+    """The campaign with one input stated otherwise in all runs."""
+    if name == "clock":
+        runs = tuple(
+            replace(run, record=Record(run.record.time_s * factor, run.record.yaw_rad)) for run in data.runs
+        )
+        return replace(data, runs=runs)
+    if hasattr(data.rig, name):
+        return replace(data, rig=replace(data.rig, **{name: (getattr(data.rig, name) or 0.1) * factor}))
+    return replace(data, runs=tuple(replace(run, **{name: getattr(run, name) * factor}) for run in data.runs))
+
+
+INPUTS = (
+    "spring_stiffness", "wind_speed", "air_density", "frontal_area", "reference_length", "yaw_inertia", "clock"
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("estimator", ["matrix_pencil", "conventional"])
+@pytest.mark.parametrize("name", INPUTS)
+def test_common_errors_move_the_estimators_as_the_closed_form_says(noisy, estimator, name):
+    step = 1e-4
+    budget = budget_of(noisy, InputUncertainties({name: step}), estimator)
+    moves = np.sqrt(np.diag(component(budget, name).covariance))
+    there, back = (by(estimator)(stated(noisy, name, 1.0 + s * step)) for s in (1, -1))
+    for quantity, move in zip(budget.names, moves, strict=True):
+        change = 0.5 * abs(getattr(there, quantity).value - getattr(back, quantity).value)
+        scale = abs(getattr(there, quantity).value) * step
+        assert move == pytest.approx(change, abs=0.02 * scale)
+
+
+def test_one_wind_speed_for_all_runs_ties_the_coefficients_together(noisy):
+    budget = budget_of(noisy, InputUncertainties({"wind_speed": 0.02}))
+    block = component(budget, "wind_speed").covariance[:2, :2]
+    # Cnβ > 0 falls and Cnr < 0 rises where the speed is larger: one error, correlation −1.
+    assert block[0, 1] / np.sqrt(block[0, 0] * block[1, 1]) == pytest.approx(-1.0)
+    widened = with_budget(by("matrix_pencil")(noisy), budget)
+    assert widened.cn_beta.std == pytest.approx(budget.std("cn_beta"))
+    assert widened.covariance_matrix[0, 1] == pytest.approx(budget.covariance[0, 1])
+
+
+def test_independent_errors_of_runs_average_out_and_common_ones_do_not(noisy):
+    common = budget_of(noisy, InputUncertainties({"wind_speed": 0.01}))
+    own = budget_of(noisy, InputUncertainties({}, {"wind_speed": 0.01}))
+    ratio = component(own, "wind_speed").covariance[0, 0] / component(common, "wind_speed").covariance[0, 0]
+    assert 0.2 < ratio < 0.95  # four wind-on runs: 1/4 if they counted alike
+
+
+def test_correlated_inputs_add_or_cancel(noisy):
+    inputs = {"wind_speed": 0.01, "air_density": 0.02}
+    for coefficient, percent in ((1.0, 4.0), (-1.0, 0.0), (0.0, np.sqrt(8.0))):
+        given = InputUncertainties(inputs, {}, (("wind_speed", "air_density", coefficient),))
+        budget = budget_of(noisy, given)
+        # Cnβ ∝ 1/(ρV²): 2 % from each of them.
+        extra = budget.covariance[0, 0] - budget.components[0].covariance[0, 0]
+        assert np.sqrt(max(extra, 0.0)) / budget.values[0] == pytest.approx(0.01 * percent, abs=1e-6)
+
+
+def test_scatter_is_none_where_noise_explains_it_and_found_where_it_does_not(noisy):
+    quiet = budget_of(noisy, InputUncertainties())
+    for one in quiet.components:
+        if one.name.startswith("scatter"):
+            assert one.known
+            assert not one.covariance.any()
+    # Every run's speed is off by 3 % of its own, and nobody says so.
+    rng = np.random.default_rng(8)
+    runs = tuple(replace(run, wind_speed=run.wind_speed * rng.normal(1.0, 0.03)) for run in noisy.runs)
+    loud = budget_of(replace(noisy, runs=runs), InputUncertainties())
+    assert loud.share(component(loud, "scatter of the wind-on"), "cn_beta") > 0.9
+    # Said, it is not counted twice.
+    said = budget_of(replace(noisy, runs=runs), InputUncertainties({}, {"wind_speed": 0.03}))
+    assert said.share(component(said, "scatter of the wind-on"), "cn_beta") < 0.6
+
+
+def test_the_choice_of_model_shows_where_the_model_is_wrong(noisy):
+    calm = budget_of(noisy, InputUncertainties(), others={"conventional": by("conventional")})
+    assert not component(calm, "choice").covariance.any()
+    # A spring that stiffens with the angle: the first half of a decay is quicker than the whole.
+    bent = with_records(noisy, lambda time, yaw: yaw + 0.02 * np.sin(0.4 * time) * yaw)
+    budget = budget_of(bent, InputUncertainties())
+    assert component(budget, "choice").covariance[1, 1] > 0.0
+    assert "first half" in component(budget, "choice").note
+
+
+def test_a_budget_adds_up_and_goes_to_json(noisy):
+    budget = budget_of(noisy, InputUncertainties({"wind_speed": 0.01}, {"spring_stiffness": 0.002}))
+    for name in budget.names:
+        assert sum(budget.share(one, name) for one in budget.components) == pytest.approx(1.0)
+    document = budget.to_json_dict()
+    total = sum(one["variance"]["cn_r"] for one in document["components"])
+    assert np.sqrt(total) == pytest.approx(document["combined_std"]["cn_r"])
+
+
+def test_scatter_is_unknown_where_no_run_can_be_spared():
+    data = campaign(TWELVE[:2], noise=5e-4, rng=np.random.default_rng(1), **SHAPE)
+    budget = budget_of(data, InputUncertainties())
+    assert [one.known for one in budget.components if one.name.startswith("scatter")] == [False, False]
+
+
+def test_scatter_beyond_noise_is_flagged_as_rarely_as_stated():
+    """Four sums of squares at 1 % each; a ratio that ignored how far a run bends the fit to itself would not."""
+    from identification.scatter import side_scatter
+
+    flagged = 0
+    for seed in range(60):
+        data = campaign(EIGHT, noise=5e-4, rng=np.random.default_rng(seed), duration=4.0, rate=100.0)
+        found = side_scatter(data, by("matrix_pencil")(data).runs, {})
+        flagged += any(side.covariance.any() for side in found)
+    assert flagged <= 8  # of 60 at 4 %: more with probability 1e-3
