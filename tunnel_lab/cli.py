@@ -25,6 +25,7 @@ from tunnel_lab.commands import (
     simulate,
     springs,
     sweep,
+    train,
     view,
 )
 from tunnel_sim.errors import TunnelError
@@ -80,6 +81,7 @@ def tunnel(
       tunnel sweep sweep.toml --out s    many campaigns, resumable
       tunnel view                        the rig live, in a window or browser
       tunnel render                      a film of a run, and a picture
+      tunnel train w.safetensors         the paper's networks anew, from a seed
 
     [bold]Units[/bold]
       SI and radians throughout.
@@ -93,8 +95,21 @@ def tunnel(
         typer.echo(context.get_help())
 
 
-for _command in (demo, simulate, identify, diagnose, plot, springs, effects, score, sweep, view, render):
-    app.command(_command.NAME)(_command.run)
+for _command in (
+    demo,
+    simulate,
+    identify,
+    diagnose,
+    plot,
+    springs,
+    effects,
+    score,
+    sweep,
+    view,
+    render,
+    train,
+):
+    app.command(_command.NAME, cls=getattr(_command, "COMMAND", None))(_command.run)
 app.add_typer(blind.app, name=blind.NAME)
 
 

@@ -7,12 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tunnel_lab.estimator_help import CommandWithEstimators
+
 if TYPE_CHECKING:
     from identification.budget import Budget
     from identification.estimate import Estimate
+    from identification.estimators import Estimator
     from tunnel_sim.campaign import Campaign
 
 NAME = "identify"
+COMMAND = CommandWithEstimators
 FEW_RUNS = 3
 """Up to this many runs, the windows are shown without being asked for."""
 
@@ -20,11 +24,17 @@ FEW_RUNS = 3
 def run(
     campaign: Annotated[Path, typer.Argument(help="Folder of the campaign: campaign.toml and its runs.")],
     estimator: Annotated[
-        str, typer.Option("--estimator", "-e", metavar="NAME", help="output_error or conventional.")
+        str, typer.Option("--estimator", "-e", metavar="NAME", help="One of those listed above.")
     ] = "output_error",
     json: Annotated[
         Path | None,
         typer.Option("--json", metavar="FILE", help="Write the estimate as JSON; - for standard output."),
+    ] = None,
+    weights: Annotated[
+        Path | None,
+        typer.Option(
+            "--weights", metavar="FILE", help="Networks that tunnel train wrote; with neural_network."
+        ),
     ] = None,
     windows: Annotated[
         bool | None,
@@ -63,9 +73,7 @@ def run(
     deviation, and every note with what to do about it.
 
     [bold]Estimators[/bold]
-      output_error  maximum likelihood over all runs at once (default)
-      conventional  the paper's: spectrum, time to half amplitude, each wind-on
-                    run paired with a wind-off run of its spring
+      {estimators}
 
     [bold]Examples[/bold]
       tunnel identify my-campaign
@@ -93,10 +101,11 @@ def run(
     if models and not budget and uncertainties is None:
         raise TunnelError("goes with --budget only", where="--model", remedy="add --budget, or leave it out")
     data = read_campaign(campaign)
-    estimate = identify(data, estimator, throw=False)
+    chosen = with_weights(estimator, weights)
+    estimate = identify(data, chosen, throw=False)
     found = None
     if (budget or uncertainties is not None) and not estimate.status.failed:
-        estimate, found = budgeted(data, estimate, uncertainties, models or [])
+        estimate, found = budgeted(data, estimate, chosen, uncertainties, models or [])
     document = estimate.to_json_dict() | ({} if found is None else {"budget": found.to_json_dict()})
     if json is not None and str(json) == "-":
         typer.echo(json_text(document), nl=False)
@@ -113,13 +122,18 @@ def run(
 
 
 def budgeted(
-    campaign: Campaign, estimate: Estimate, uncertainties: Path | None, models: list[str]
+    campaign: Campaign,
+    estimate: Estimate,
+    chosen: str | Estimator,
+    uncertainties: Path | None,
+    models: list[str],
 ) -> tuple[Estimate, Budget]:
     """The estimate with combined standard uncertainties, and their budget.
 
     Args:
         campaign: what was identified.
-        estimate: its estimate; the same estimator is asked again with changed campaigns.
+        estimate: its estimate.
+        chosen: the estimator it is by, which is asked again with changed campaigns.
         uncertainties: file of the inputs' uncertainties; where None they are taken as exact.
         models: further estimators whose spread counts.
 
@@ -145,7 +159,7 @@ def budgeted(
         found = make_budget(
             campaign,
             estimate,
-            partial(identify, estimator=estimate.estimator, throw=False),
+            partial(identify, estimator=chosen, throw=False),
             inputs,
             others=others,
             told=lambda what: status.update(f"uncertainty budget: {what}"),
@@ -184,6 +198,28 @@ def known_estimator(name: str) -> None:
         raise TunnelError(
             f"there is no estimator {name!r}", where="--estimator", remedy=did_you_mean(name, ALL_ESTIMATORS)
         )
+
+
+def with_weights(name: str, weights: Path | None) -> str | Estimator:
+    """The estimator by its name, or the networks with weights of their own.
+
+    Args:
+        name: of a known estimator.
+        weights: a file of ``tunnel train``; None for what ships.
+
+    Raises:
+        TunnelError: when the estimator has no weights.
+    """
+    from tunnel_sim.errors import TunnelError
+
+    if weights is None:
+        return name
+    if name != "neural_network":
+        remedy = "add --estimator neural_network, or leave it out"
+        raise TunnelError(f"{name} has no weights", where="--weights", remedy=remedy)
+    from identification.estimators.neural import NeuralNetwork
+
+    return NeuralNetwork(weights)
 
 
 def show(campaign: Campaign, estimate: Estimate, *, windows: bool) -> None:

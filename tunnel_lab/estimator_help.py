@@ -1,0 +1,45 @@
+"""The list of estimators in a command's help, from the registry, so that it is never out of date."""
+
+from __future__ import annotations
+
+import textwrap
+
+import typer
+from typer.core import TyperCommand
+
+PLACE = "{estimators}"
+"""What stands in a command's docstring where the list belongs."""
+
+_WIDTH = 78
+_INDENT = "  "
+
+
+class CommandWithEstimators(TyperCommand):
+    """A command whose help lists the estimators; the registry is read when the help is asked for."""
+
+    def format_help(self, ctx: typer.Context, formatter: object) -> None:  # type: ignore[override]  # click's own types
+        """Write the help, with the list in its place.
+
+        Args:
+            ctx: of the call.
+            formatter: that writes it.
+        """
+        if self.help and PLACE in self.help:
+            self.help = self.help.replace(f"{_INDENT}{PLACE}", listing()).replace(PLACE, listing().lstrip())
+        super().format_help(ctx, formatter)  # type: ignore[arg-type]
+
+
+def listing() -> str:
+    """One paragraph per estimator: its name, and its summary wrapped beside it."""
+    from identification.estimators import ENTRIES
+
+    column = max(len(entry.name) for entry in ENTRIES) + 2
+    return "\n".join(
+        textwrap.fill(
+            entry.summary,
+            _WIDTH,
+            initial_indent=_INDENT + entry.name.ljust(column),
+            subsequent_indent=_INDENT + " " * column,
+        )
+        for entry in ENTRIES
+    )
