@@ -60,7 +60,8 @@ def _work(
 def _client(address: str, workers: int) -> Iterator[Client]:
     from distributed import Client, LocalCluster
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line of our own
+    for name in ("distributed", "distributed.client"):  # what matters is said in one line of our own
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     if address == LOCAL:
         options: dict[str, Any] = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
         with LocalCluster(n_workers=workers, threads_per_worker=1, **options) as here, Client(here) as client:
@@ -91,7 +92,7 @@ class _Crew:
 
     def work(self, shards: Sequence[int]) -> Iterator[Finished]:
         """Shards as they finish, few in flight at a time."""
-        from distributed import wait
+        from distributed import CancelledError, wait
 
         waiting = iter(shards)
         flying: dict[Future, int] = {}
@@ -106,6 +107,8 @@ class _Crew:
             except TimeoutError:
                 self._workers()
                 continue
+            except CancelledError:
+                raise self._gone() from None
             for future in landed:
                 index = flying.pop(future)
                 done = self._result(future, index)
@@ -129,9 +132,14 @@ class _Crew:
 
         try:
             found: Finished = future.result()
-        except (KilledWorker, CancelledError) as error:
-            if self._client.status != "running":
-                raise self._gone(error) from None
+        except CancelledError:
+            raise self._gone() from None
+        except (ImportError, RuntimeError) as error:
+            raise TunnelError(
+                f"a worker cannot do a shard ({one_line(error)})",
+                remedy="give scheduler and workers the same environment as here",
+            ) from None
+        except KilledWorker:
             self._attempts[index] += 1
             if self._attempts[index] > ATTEMPTS:
                 raise TunnelError(
@@ -146,7 +154,7 @@ class _Crew:
     def _workers(self) -> None:
         """Say it when there is nobody to do the work, once each time that happens."""
         if self._client.status != "running":
-            raise self._gone(None)
+            raise self._gone()
         address = self._client.scheduler.address if self._client.scheduler else ""
         if self._client.nthreads():
             if self._alone:
@@ -160,9 +168,8 @@ class _Crew:
         """How many shards may be in flight: two for each thread."""
         return max(_FEWEST_IN_FLIGHT, 2 * sum(self._client.nthreads().values()))
 
-    def _gone(self, error: BaseException | None) -> TunnelError:
-        said = f" ({one_line(error, 80)})" if error is not None and str(error) else ""
+    def _gone(self) -> TunnelError:
         return TunnelError(
-            f"the scheduler is gone{said}",
-            remedy="what is finished stays: start it again, and then the same command",
+            "the scheduler is gone",
+            remedy="what is finished stays: start scheduler and workers again, and then the same command",
         )
