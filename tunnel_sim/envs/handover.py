@@ -1,0 +1,67 @@
+"""From episodes to a campaign that is identified and diagnosed like any other."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Protocol
+
+from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.envs.config import FreeDecayConfig
+from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.rig import Rig
+
+
+class HasRig(Protocol):
+    """An environment of free decays, alone or many at once; unwrapped.
+
+    Args:
+        config: its arguments.
+        rig: its rig.
+    """
+
+    config: FreeDecayConfig
+    rig: Rig
+
+
+def campaign_of(runs: Iterable[Run], env: HasRig, *, name: str = "episodes") -> Campaign:
+    """The runs of finished episodes as one campaign.
+
+    Args:
+        runs: ``info["run"]`` of each, in the plain preset.
+        env: the environment they come from, unwrapped.
+        name: of the campaign.
+
+    Returns:
+        The campaign. It states the rig's nominal inertia and the sensor as the environment was told, and
+        nothing of the truth. Runs of equal conditions are numbered.
+
+    Raises:
+        EnvError: when there is no run.
+    """
+    listed = list(runs)
+    if not listed:
+        raise EnvError("no run is given", where="campaign_of", remedy="give info['run'] of finished episodes")
+    repeated = {label for label, count in Counter(run.id for run in listed).items() if count > 1}
+    seen: Counter[str] = Counter()
+    numbered = []
+    for run in listed:
+        seen[run.id] += 1
+        numbered.append(replace(run, id=f"{run.id}-{seen[run.id]}") if run.id in repeated else run)
+    body = env.rig.body
+    return Campaign(
+        name=name,
+        rig=RigProperties(
+            yaw_inertia=env.rig.dynamics.yaw_inertia,
+            frontal_area=body.frontal_area,
+            reference_length=body.length,
+            width=body.width,
+        ),
+        sensor=SensorProperties(
+            sample_rate=env.config.sample_rate,
+            resolution=env.config.resolution or None,
+            noise_std=env.config.noise_std or None,
+        ),
+        runs=tuple(numbered),
+    )
