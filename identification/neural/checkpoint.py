@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,7 @@ class Checkpoint:
         return cls(tuple(told[:ended]), told[ended] if len(told) > ended else None)
 
 
-def read_checkpoint(path: str, spec: dict[str, Any]) -> Checkpoint | None:
+def read_checkpoint(path: Path, spec: dict[str, Any]) -> Checkpoint | None:
     """A checkpoint of this very training.
 
     Args:
@@ -79,13 +80,11 @@ def read_checkpoint(path: str, spec: dict[str, Any]) -> Checkpoint | None:
     Returns:
         None where there is none, or it belongs to another training.
     """
-    from pathlib import Path
-
-    if not Path(path).is_file():
+    if not path.is_file():
         return None
     try:
         with safe_open(path, framework="numpy") as file:
             metadata = (file.metadata() or {}).get("training", "")
     except SafetensorError:
         return None
-    return Checkpoint.from_bytes(Path(path).read_bytes(), spec, metadata)
+    return Checkpoint.from_bytes(path.read_bytes(), spec, metadata)

@@ -30,7 +30,7 @@ from identification.neural.networks import Errors, Networks, held_out_errors
 from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, training_pairs
 
 NETWORKS = (DAMPING, FREQUENCY)
-_START, _NOISE, _TEST = 0, 1, 2  # what a generator is for
+_START, _TEST = 0, 2  # what a generator is for
 _DATA = DataSpec()
 _NO_ERRORS = Errors(0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -65,8 +65,7 @@ class TrainingSpec:
         """What a step costs, in steps of the second network."""
         if which == FREQUENCY:
             return 1
-        copies = self.data.noisy_copies if self.data.input_noise > 0.0 else 1
-        return max(1, self.data.zeta_count * copies * parameter_count(SIZES[DAMPING]) // 12_000)
+        return max(1, self.data.zeta_count * parameter_count(SIZES[DAMPING]) // 12_000)
 
     @property
     def total_work(self) -> int:
@@ -125,8 +124,7 @@ def problem_of(spec: TrainingSpec, which: str) -> Problem:
         spec: what and how.
         which: ``damping`` or ``frequency``.
     """
-    pairs = training_pairs(spec.data, which, np.random.default_rng([spec.seed, _NOISE]))
-    return Problem.of(pairs, SIZES[which], unit_deviation=which == FREQUENCY)
+    return Problem.of(training_pairs(spec.data, which), SIZES[which], unit_deviation=which == FREQUENCY)
 
 
 def _one_start(

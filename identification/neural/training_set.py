@@ -26,9 +26,6 @@ class DataSpec:
         grid: numbers of damping ratios and of natural frequencies of the second network's set.
         frequency_scale: ``logarithmic`` or ``linear``: how t3 and ωn enter the second network before their mean is
             taken off.
-        input_noise: standard deviation of white noise on the first network's 100 points, as a share of the
-            amplitude; 0 is the paper's.
-        noisy_copies: number of times each response is drawn with that noise.
         test_count: number of responses of the test set, drawn at random over the range.
     """
 
@@ -37,8 +34,6 @@ class DataSpec:
     zeta_count: int = 300
     grid: tuple[int, int] = (12, 40)
     frequency_scale: str = LOGARITHMIC
-    input_noise: float = 0.0
-    noisy_copies: int = 1
     test_count: int = 4000
 
     def to_json_dict(self) -> dict[str, Any]:
@@ -73,25 +68,19 @@ class Pairs:
     targets: Array
 
 
-def training_pairs(spec: DataSpec, which: str, rng: np.random.Generator) -> Pairs:
+def training_pairs(spec: DataSpec, which: str) -> Pairs:
     """The training set of a network.
 
     Args:
         spec: its range and size.
         which: ``damping`` or ``frequency``.
-        rng: draws the noise, where there is any.
 
     Returns:
         Inputs and targets before scaling.
     """
     if which == DAMPING:
         zeta = np.linspace(*spec.zeta_range, spec.zeta_count)
-        inputs = network_inputs(zeta)
-        if spec.input_noise > 0.0:
-            zeta, inputs = np.repeat(zeta, spec.noisy_copies), np.repeat(inputs, spec.noisy_copies, axis=0)
-            noise = spec.input_noise * rng.standard_normal(inputs.shape)
-            inputs = inputs + noise - noise.mean(axis=1, keepdims=True)
-        return Pairs(inputs, zeta)
+        return Pairs(network_inputs(zeta), zeta)
     lowest, highest = spec.omega_range
     space = np.geomspace if spec.frequency_scale == LOGARITHMIC else np.linspace
     zeta, omega = (
@@ -100,7 +89,7 @@ def training_pairs(spec: DataSpec, which: str, rng: np.random.Generator) -> Pair
             np.linspace(*spec.zeta_range, spec.grid[0]), space(lowest, highest, spec.grid[1])
         )
     )
-    return _frequency_pairs(spec, zeta, omega)
+    return Pairs(np.column_stack((zeta, spec.to_network(cycles_time(zeta, omega)))), spec.to_network(omega))
 
 
 def held_out_points(spec: DataSpec, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -118,8 +107,3 @@ def held_out_points(spec: DataSpec, rng: np.random.Generator) -> tuple[Array, Ar
         logarithmic = np.exp(rng.uniform(np.log(low), np.log(high), spec.test_count))
         found.append(np.where(rng.random(spec.test_count) < 0.5, even, logarithmic))
     return found[0], found[1]
-
-
-def _frequency_pairs(spec: DataSpec, zeta: Array, omega: Array) -> Pairs:
-    inputs = np.column_stack((zeta, spec.to_network(cycles_time(zeta, omega))))
-    return Pairs(inputs, spec.to_network(omega))

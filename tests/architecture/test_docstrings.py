@@ -32,6 +32,7 @@ COMMANDS = {
         "sweep",
         "view",
         "render",
+        "train",
     )
 } | {f"tunnel_lab.commands.blind.{name}" for name in ("make", "diagnose", "score")}
 EXEMPT = {"tunnel_lab.cli.tunnel", *COMMANDS}
