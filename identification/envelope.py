@@ -71,11 +71,10 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
 
 
 def _carried_on(reading: Reading, rough: RunFit, zero: float, interval: float, margin: int) -> Array:
-    steps = interval * np.arange(1, margin + 1)
-    share = np.arange(1, margin + 1) / (margin + 1)
-    fade = 1.0 - share**4 * (
-        35.0 - 84.0 * share + 70.0 * share**2 - 20.0 * share**3
-    )  # three derivatives are 0
+    steps = interval * np.arange(1, margin + 1, dtype=np.float64)
+    share = steps / (steps[-1] + interval) if margin else steps
+    # From 1 to 0 with three derivatives 0 at either end: a kink would be a break of its own.
+    fade = 1.0 - share**4 * (35.0 - 84.0 * share + 70.0 * share**2 - 20.0 * share**3)
     after = free_decay(reading.time[-1] + steps, rough.decay, rough.angle, rough.rate)
     before = free_decay(-steps, rough.decay, rough.angle, rough.rate)
     return np.concatenate(((fade * before)[::-1], reading.yaw - zero, fade * after))

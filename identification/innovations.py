@@ -75,7 +75,7 @@ def innovations(values: Array, interval: float, model: Driven, noise_variance: f
     Returns:
         The innovations; None where the model is out of range.
     """
-    time = interval * np.arange(values.size)
+    time = interval * np.arange(values.size, dtype=np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
         motion = response_rows(time, model.decay)[:2]
     columns = np.vstack((values, motion, np.ones_like(time), *_started_by_moment(time, model)))

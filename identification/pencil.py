@@ -70,6 +70,7 @@ def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | 
     exponents = _exponents(poles, interval)
     if exponents is None or np.linalg.cond(vectors) > 1e8:
         return None
+    vectors = vectors.astype(np.complex128)
     duals = np.linalg.inv(vectors) @ solver
     gradients = [
         _gradient(poles[i], duals[i], right @ (vectors[:, i] / sizes)) / (poles[i] * interval) for i in (0, 1)

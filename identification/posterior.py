@@ -130,10 +130,10 @@ def posterior_of(
     width, step = _FIRST
     for _ in range(_MOST_REFINEMENTS):
         try:
-            scale = np.linalg.cholesky(spread)
+            scale = np.asarray(np.linalg.cholesky(spread), dtype=np.float64)
         except np.linalg.LinAlgError:
             return None
-        axis = np.arange(-width, width + 0.5 * step, step)
+        axis = np.arange(-width, width + 0.5 * step, step, dtype=np.float64)
         decays = centre[:, None] + scale @ _points(axis)
         likelihood, prior = _log_terms(thin, decays, knowledge)
         shape = (axis.size, axis.size)

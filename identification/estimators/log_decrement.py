@@ -103,7 +103,7 @@ def _decay_of_peaks(
         line = weighted_fit(columns, np.log(np.abs(above)), variance)
         zero += float(line.values[2])
         expected = np.exp(np.clip(line.values[0] - line.values[1] * times, -700.0, 700.0))
-    steps = np.column_stack((np.ones(count), np.arange(count)))
+    steps = np.column_stack((np.ones(count), np.arange(count, dtype=np.float64)))
     omega = np.pi * (count - 1) / float(times[count - 1] - times[0])
     instant_std = np.sqrt(3.0) * share / (half_width * omega**2 * expected[:count])
     clock = weighted_fit(steps, times[:count], instant_std**2)
