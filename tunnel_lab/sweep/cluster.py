@@ -52,8 +52,14 @@ def on_cluster(
 def _work(
     address: str, workers: int, say: Said, poll_s: float, sweep: str, shards: Sequence[int]
 ) -> Iterator[Finished]:
+    from distributed import CancelledError
+    from distributed.comm import CommClosedError
+
     with _client(address, workers) as client:
-        yield from _Crew(client, sweep, say, poll_s).work(shards)
+        try:
+            yield from _Crew(client, sweep, say, poll_s).work(shards)
+        except (CancelledError, CommClosedError):
+            raise _gone() from None
 
 
 @contextmanager
@@ -92,7 +98,7 @@ class _Crew:
 
     def work(self, shards: Sequence[int]) -> Iterator[Finished]:
         """Shards as they finish, few in flight at a time."""
-        from distributed import CancelledError, wait
+        from distributed import wait
 
         waiting = iter(shards)
         flying: dict[Future, int] = {}
@@ -107,8 +113,6 @@ class _Crew:
             except TimeoutError:
                 self._workers()
                 continue
-            except CancelledError:
-                raise self._gone() from None
             for future in landed:
                 index = flying.pop(future)
                 done = self._result(future, index)
@@ -128,12 +132,10 @@ class _Crew:
 
     def _result(self, future: Future, index: int) -> Finished | None:
         """A finished shard; None where its workers were lost and it is to be handed out again."""
-        from distributed import CancelledError, KilledWorker
+        from distributed import KilledWorker
 
         try:
             found: Finished = future.result()
-        except CancelledError:
-            raise self._gone() from None
         except (ImportError, RuntimeError) as error:
             raise TunnelError(
                 f"a worker cannot do a shard ({one_line(error)})",
@@ -154,7 +156,7 @@ class _Crew:
     def _workers(self) -> None:
         """Say it when there is nobody to do the work, once each time that happens."""
         if self._client.status != "running":
-            raise self._gone()
+            raise _gone()
         address = self._client.scheduler.address if self._client.scheduler else ""
         if self._client.nthreads():
             if self._alone:
@@ -168,8 +170,9 @@ class _Crew:
         """How many shards may be in flight: two for each thread."""
         return max(_FEWEST_IN_FLIGHT, 2 * sum(self._client.nthreads().values()))
 
-    def _gone(self) -> TunnelError:
-        return TunnelError(
-            "the scheduler is gone",
-            remedy="what is finished stays: start scheduler and workers again, and then the same command",
-        )
+
+def _gone() -> TunnelError:
+    return TunnelError(
+        "the scheduler is gone",
+        remedy="what is finished stays: start scheduler and workers again, and then the same command",
+    )

@@ -135,15 +135,15 @@ def _check_cases(sweep: Sweep, where: str) -> None:
     """Refuse what the simulator would refuse: every sensor and every effect, with each rig and conditions."""
     from tunnel_sim.virtual_campaign import plan_effects, run_settings
 
-    for case in _cases(sweep, "sensor"):
+    for case in _cases(sweep, "sensor", where):
         with _in(where):
             sampling(run_settings(case.plan.truth, case.plan.conditions[0]), case.plan.sensor.sample_rate)
-    for case in _cases(sweep, "effects"):
+    for case in _cases(sweep, "effects", where):
         with _in(where):
             plan_effects(case.plan)
 
 
-def _cases(sweep: Sweep, axis: str) -> Iterable[Case]:
+def _cases(sweep: Sweep, axis: str, where: str) -> Iterable[Case]:
     """Cases that hold every value of an axis together with every rig and conditions."""
     lengths = tuple(map(len, sweep.axes))
     wanted = (*_AXES[:2], axis)
@@ -152,8 +152,9 @@ def _cases(sweep: Sweep, axis: str) -> Iterable[Case]:
         for name, value in zip(wanted, places, strict=True):
             place[_AXES.index(name)] = value
         point = int(np.ravel_multi_index(tuple(place), lengths))
-        with _in(sweep.document.name):
-            yield sweep.case(point * sweep.document.replicates)
+        with _in(where):
+            case = sweep.case(point * sweep.document.replicates)
+        yield case
 
 
 @contextmanager

@@ -1,0 +1,170 @@
+"""``tunnel sweep``: what it says, what it refuses, and its summary. Truth of the summary: rows made by hand."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from tests.unit.sweep.small_sweep import SMALL
+from tunnel_lab.cli import main
+from tunnel_lab.sweep import figures
+from tunnel_lab.sweep.engine import run_sweep
+from tunnel_lab.sweep.product import Sweep
+from tunnel_lab.sweep.reading import read_sweep
+from tunnel_lab.sweep.rows import RESULT_COLUMNS
+from tunnel_lab.sweep.summary import Line, _lines, summarise
+
+EFFECT = 'name = "coulomb_friction"\nparameters = { friction_moment = [0.002, 0.02] }'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("seed = 1", "seed = ", "not valid TOML"),
+        ("seed = 1", "sead = 1", "unknown key 'sead'; did you mean 'seed'?"),
+        ("cn_r = -0.114", "cn_rr = -0.114", "[truth]: unknown key 'cn_rr'; did you mean 'cn_r'?"),
+        ("cn_r = -0.114", "cn_r = [-0.1, nan]", "'cn_r' = nan is not a finite number"),
+        ("cn_r = -0.114", 'cn_r = "x"', "'cn_r' = 'x' is not a number"),
+        ("cn_r = -0.114", "", "[truth]: 'cn_r' is missing; give cn_r as a number or a list of them, 1/rad"),
+        ("[0.0002, 0.002]", "[]", "[sensor]: 'noise_std' is empty"),
+        ("[0.0002, 0.002]", "[0.0002, 0.0002]", "sensor holds the same twice"),
+        ("[0.0002, 0.002]", "[0.0002, -0.1]", "'noise_std' = -0.1"),
+        ("conventional", "convetional", "unknown estimator 'convetional'; did you mean 'conventional'?"),
+        ("coulomb_friction", "coulomb_frictoin", "did you mean 'coulomb_friction'?"),
+        ("friction_moment", "friction_momnet", "did you mean 'friction_moment'?"),
+        (EFFECT, 'name = "coulomb_friction"', "friction_moment is missing"),
+        (EFFECT, 'name = "none"', "effects holds the same twice"),
+        ("0.02]", "-0.02]", "friction_moment = -0.02 is out of range"),
+        ("springs = [8]", "springs = [11]", "there is no spring 11"),
+        ("springs = [8]", "", "no spring"),
+        ("wind_speeds = [0.0, 15.0]", "wind_speeds = []", "'wind_speeds' is empty"),
+        ("sample_rate = 500.0", "sample_rate = 300.0", "no whole number of"),
+        ("replicates = 2", "replicates = 0", "'replicates' = 0"),
+        ("[conditions]", '[[rig]]\nfile = "no.toml"\n[conditions]', "no.toml"),
+        ("[conditions]", "[[rig]]\nchanges = { dynamic = { x = 1 } }\n[conditions]", "did you mean 'dynamics'?"),
+        ('["conventional"]\nrecords = true', "[]", "neither estimators nor records"),
+        ("replicates = 2", "replicates = 2\neffects = []", "small.toml"),
+    ],
+)  # fmt: skip
+def test_a_broken_file_is_one_line_and_leaves_nothing(
+    small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, said: str
+) -> None:
+    assert old in SMALL
+    small.write_text(SMALL.replace(old, new), encoding="utf-8")
+    assert main(["sweep", str(small), "--out", str(tmp_path / "out")]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert said in captured.err
+    assert ".toml" in captured.err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["FILE"], "--out is missing"),
+        (["--out", "OUT"], "FILE is missing"),
+        (["no.toml", "--out", "OUT"], "no such file"),
+        (["FILE", "--out", "OUT", "--summary", "OUT"], "takes no FILE"),
+        (["--summary", "OUT"], "no sweep.json here"),
+        (["FILE", "--out", "TAKEN"], "the folder holds something else"),
+        (["FILE", "--out", "FILE"], "cannot be written"),
+        (["FILE", "--out", "OUT", "--workers", "0"], "--workers"),
+        (["FILE", "--out", "OUT", "--scheduler", "tcp://h:1", "--workers", "2"], "leave out --workers"),
+        (["FILE", "--out", "OUT", "--scheduler", "nonsense://h"], "no scheduler answers"),
+    ],
+)
+def test_bad_words_are_one_line(
+    small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "thesis.txt").write_text("")
+    places = {"FILE": small, "OUT": tmp_path / "out", "TAKEN": tmp_path / "taken"}
+    assert main(["sweep", *(str(places.get(word, word)) for word in words)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1 or "scheduler" in said
+
+
+def test_the_summary_of_a_sweep(
+    sweep: Sweep, here, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_sweep(sweep, tmp_path / "out", here)
+    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    for part in (
+        "All cases, without effects",
+        "Error against noise",
+        "Error against coulomb friction",
+        "Time per run",
+    ):
+        assert part in said
+    files = {path.name: path for path in (tmp_path / "out" / "summary").iterdir()}
+    assert set(files) == {
+        "summary.csv", "error-by-noise-std.png", "error-by-wind-speed.png", "error-by-coulomb-friction.png",
+    }  # fmt: skip
+    assert all(path.read_bytes()[:4] == b"\x89PNG" for name, path in files.items() if name.endswith("png"))
+    table = pl.read_csv(files["summary.csv"])
+    friction = table.filter((pl.col("axis") == "severity") & (pl.col("quantity") == "zeta"))
+    assert friction["at"].to_list() == [0.0, 0.002, 0.02]
+    assert friction["count"].to_list() == [8, 8, 8]  # two noises, two replicates, wind off and on
+    assert friction["bias"][2] > friction["bias"][1] > 0.0  # dry friction is taken for damping
+
+
+def hand_made(values: list[float | None], status: str = "ok") -> pl.DataFrame:
+    """Rows of one estimator whose truth is 2: noise 1 for the first half, 10 for the second."""
+    half = len(values) // 2
+    return pl.DataFrame(
+        {
+            "effect": ["none"] * len(values),
+            "severity": [0.0] * len(values),
+            "noise_std": [1.0] * half + [10.0] * (len(values) - half),
+            "wind_speed": [0.0] * len(values),
+            "spring_stiffness": [None] * len(values),
+            "duration": [1.0] * len(values),
+            "truth": [2.0] * len(values),
+            "value": values,
+            "std": [None if value is None else 0.05 for value in values],
+            "status": [status if value is None else "ok" for value in values],
+            "unit": ["1"] * len(values),
+        }
+    )
+
+
+def test_figures_by_hand() -> None:
+    lines = list(_lines(hand_made([2.02, 1.98, 2.2, 2.2, None, 2.2], "raised"), "e", "zeta"))
+    overall, *along = lines
+    assert [line.at for line in along] == [1.0, 10.0]  # not by speed (one value) or spring (none)
+    assert overall.score.failures.count == 1
+    one, ten = (line.score for line in along)
+    assert ten.bias.value == pytest.approx(10.0)  # 2.2 of 2.0, in %
+    assert (ten.bias.std, ten.coverage.value) == (pytest.approx(0.0, abs=1e-9), 0.0)
+    assert one.rmse.value == pytest.approx(((1.0 + 1.0 + 100.0) / 3.0) ** 0.5)
+    assert one.coverage.value == pytest.approx(2.0 / 3.0)
+
+
+def test_what_runs_cannot_give_is_no_failure(here, tmp_path: Path) -> None:
+    """The conventional method estimates no zero: it has no line; wind-off runs give no Cnβ: nor has that."""
+    text = SMALL.replace("[0.0, 15.0]", "[0.0]")
+    (tmp_path / "off.toml").write_text(text[: text.index("[[effects]]")], encoding="utf-8")
+    lines = summarise(run_sweep(read_sweep(tmp_path / "off.toml"), tmp_path / "out", here).store)
+    assert {"omega_n", "zeta"} <= {line.quantity for line in lines}
+    assert not {"cn_beta", "cn_r", "sensor_zero"} & {line.quantity for line in lines}
+    assert all(line.score.failures.count == 0 for line in lines)
+
+
+def test_a_figure_without_quantities_to_draw_is_none() -> None:
+    lines: list[Line] = [*_lines(hand_made([1.0, 2.0, 3.0, 4.0]), "e", "yaw_inertia")]
+    assert figures.error_figure(lines[1:]) is None
+    assert "noise_std" in RESULT_COLUMNS
+
+
+def test_the_sweep_package_loads_nothing_heavy() -> None:
+    code = (
+        "import sys, tunnel_lab.commands.sweep, tunnel_lab.sweep.processes\n"
+        "print(sorted({'mujoco', 'numpy', 'polars', 'dask', 'distributed'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
