@@ -3,9 +3,10 @@
 Every run's decay rate a and stiffness k are linear in shared parameters (see `derivatives`); their residuals
 about the generalised least-squares fit are squared and summed, weighed by the runs' own variances, for wind-off and
 wind-on runs and for a and k apart. Where a sum exceeds, by more than chance, what noise and the stated individual
-errors of the inputs make it on the average, those runs' covariance is enlarged by the ratio: R. T. Birge, Phys.
-Rev. 40 (1932) 207–227, doi 10.1103/PhysRev.40.207. Repeats of a run count by themselves, no pairing is needed. The
-chance of a weighted sum of squares is Satterthwaite's, Biometrics Bull. 2 (1946) 110–114, doi 10.2307/3002019.
+errors of the inputs make it on the average, every run of it is given the variance of its own residual: a jackknife,
+linearised (J. G. MacKinnon & H. White, J. Econometrics 29 (1985) 305–325, doi 10.1016/0304-4076(85)90158-7).
+Repeats of a run count by themselves, no pairing is needed. The chance of a weighted sum of squares is
+Satterthwaite's, Biometrics Bull. 2 (1946) 110–114, doi 10.2307/3002019.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from tunnel_sim.record import Array
 FALSE_ALARM_RATE = 0.01
 _LEAST_DEGREES = 0.5
 _STEP = 1e-4
+_LEAST_FREE = 0.1  # of a residual that the run's own pull leaves; of less, nothing can be told
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +195,8 @@ def _side(fit: _Fit, covariance: Array, mine: Array) -> SideScatter:
         ratio = float(np.sum((root * fit.residual) ** 2)) / expected
         largest = max(largest, ratio)
         if ratio > float(chdtri(degrees, FALSE_ALARM_RATE)) / degrees:
-            own = fit.influence * chosen
-            added += (ratio - 1.0) * own @ covariance @ own.T
+            # As the jackknife does, every run is given the variance of its own residual, freed of its own pull.
+            freed = fit.residual / np.maximum(1.0 - np.diag(fit.hat), _LEAST_FREE)
+            excess = np.maximum(freed**2 - np.diag(covariance), 0.0)
+            added += (fit.influence * (chosen * excess)) @ fit.influence.T
     return SideScatter(seen, largest, fit.names, added)

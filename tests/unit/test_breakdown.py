@@ -1,0 +1,75 @@
+"""The breakdown map's campaigns and what becomes of them; truth: the reference simulator."""
+
+import io
+
+import numpy as np
+import polars as pl
+import pytest
+
+from tunnel_lab.scoring import breakdown as work
+from tunnel_lab.scoring import breakdown_view as view
+
+NAMES = ("matrix_pencil", "conventional")
+EFFECTS = ("coulomb_friction", "sensor_drift")
+
+
+@pytest.fixture(scope="module")
+def cases():
+    return work.make_cases(1, realisations=2, effects=EFFECTS, severities=(10.0,), duration=3.0)
+
+
+@pytest.fixture(scope="module")
+def found(cases):
+    return work.biases(work.break_down(cases, NAMES, 1, jobs=0))
+
+
+def test_effects_are_as_strong_as_they_should_be(cases):
+    assert [case.effect for case in cases] == ["no effect"] * 2 + [name for name in EFFECTS for _ in "ab"]
+    for case in cases:
+        assert case.reached == pytest.approx(case.severity, rel=0.15, abs=0.05)
+    assert len({case.name for case in cases}) == len(cases)
+
+
+def test_realisations_differ_in_their_noise_only(cases):
+    first, second = (case.campaign.runs[0].record.yaw_rad for case in cases[2:4])
+    assert np.std(first - second) == pytest.approx(work.NOISE * np.sqrt(2.0), rel=0.1)
+
+
+def test_friction_biases_damping_and_nothing_biases_none(found):
+    def bias(effect, quantity, name="matrix_pencil"):
+        (one,) = [b for b in found if (b.effect, b.quantity, b.estimator) == (effect, quantity, name)]
+        return one.score
+
+    none, friction = bias("no effect", "mechanical_damping"), bias("coulomb_friction", "mechanical_damping")
+    assert abs(none.bias_in_stds.value) < 5.0
+    assert friction.relative_bias.value > 20.0 * abs(none.relative_bias.value)
+    assert friction.relative_bias.value > 0.0  # dry friction takes energy, as more damping would
+
+
+def test_the_map_is_a_table_and_a_figure(found):
+    frame = work.breakdown_frame(found)
+    assert frame.height == 3 * 2 * 4
+    assert frame["bias_percent"].is_finite().all()
+    assert view.breakdown_table(found, "cn_r").row_count == 3
+    buffer = io.BytesIO()
+    view.breakdown_figure(found).savefig(buffer, format="png")
+    assert buffer.getvalue()[:4] == b"\x89PNG"
+    assert pl.DataFrame(frame).columns[:2] == ["effect", "severity_noise_powers"]
+
+
+def test_an_interrupted_map_goes_on(cases, found, tmp_path, monkeypatch):
+    work.break_down(cases, NAMES, 1, jobs=0, parts=tmp_path)
+    (tmp_path / "sensor_drift-10-1.json").unlink()
+    asked = []
+    real = work.estimate_rows
+    monkeypatch.setattr(work, "estimate_rows", lambda name, *given: asked.append(name) or real(name, *given))
+    again = work.biases(work.break_down(cases, NAMES, 1, jobs=0, parts=tmp_path))
+    assert asked == list(NAMES)
+    assert again == found
+
+
+def test_all_effects_of_the_vocabulary_have_a_form_to_inject():
+    conditions = work.conditions_of(1)
+    assert len(work.EFFECTS) == 23
+    for name in work.EFFECTS:
+        assert work._draw(conditions, name, 1.0, 1).effects[0].form.family == name
