@@ -6,22 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
 from diagnosis.least_squares import Fit
 from diagnosis.noise import Noise, NoiseTrend
+from diagnosis.noise_null import level_p_value, trend_p_values
 from diagnosis.spectra import resonance
 
 #: Rate at which a campaign without a gap is said to have one, all tests together.
 FALSE_ALARM_RATE = 1e-3
 #: The floor below 60 Hz may differ by this share from the one measured above it (quantisation colours it).
 _FLOOR_TOLERANCE = 0.03
-#: Stated noise is often rounded to one digit, which moves its square by up to this factor.
-_ROUNDED_NOISE = 1.5
-#: Scatter of local noise levels. A limit from the tuning set, not a quantile: its 32 gap-free campaigns stay at or
-#: below 10, held samples start at 186. So the test's p-value is only 0 or 1.
-_SPREAD_LIMIT = 25.0
-
 BANDS = ("below", "f0", "2f0", "3f0", "above")
 
 
@@ -59,14 +54,11 @@ def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
     # stated noise that the records bear out may still lie a little below theirs
     floor = (1.0 + _FLOOR_TOLERANCE) * max(noise.estimated / noise.used, 1.0)
     tests = dict(zip(BANDS, band_p_values(fit, floor), strict=True)) | {"offset": offset_p_value(fit, floor)}
-    noisy = {}
+    noisy: dict[str, float] = {}
     if not coarse_step and noise.source != "floor":
-        noisy["noise against amplitude"] = float(2.0 * norm.sf(abs(trend.amplitude_z)))
-        noisy["noise against rate"] = float(2.0 * norm.sf(abs(trend.rate_z)))
-        noisy["noise in bursts"] = 0.0 if trend.spread_z > _SPREAD_LIMIT else 1.0
+        noisy |= trend_p_values(trend, fit, noise)
         if noise.stated_variance is not None:
-            level = noise.estimated / noise.stated_variance
-            noisy["noise level"] = 0.0 if level > _ROUNDED_NOISE else 1.0
+            noisy["noise level"] = level_p_value(fit, noise)
     everything = tests | noisy
     limit = FALSE_ALARM_RATE / len(everything)
     smallest = min(everything.values())

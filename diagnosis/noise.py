@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -183,73 +184,87 @@ def reading_step(campaign: Campaign) -> float:
 
 @dataclass(frozen=True)
 class NoiseTrend:
-    """How the noise's level depends on the motion.
+    """How the noise's level depends on the motion and on time.
 
     Args:
-        amplitude_z: slope of the local noise variance against the squared amplitude, in its standard deviations.
+        amplitude_z: slope of the local noise variance against the squared amplitude, in its standard deviations
+            under steady white noise.
         rate_z: likewise against the squared rate.
-        spread_z: excess of the local variances' standard deviation over what their quartiles give, times the root
-            of their number: heavy tails.
+        spread: natural logarithm of the local variances' standard deviation over what their quartiles give
+            (of a normal distribution): heavy tails. Skewness alone makes it some 0.1.
+        step: of the lattice of the readings, rad.
+        judged: whether the sampling is fast enough to tell.
     """
 
     amplitude_z: float
     rate_z: float
-    spread_z: float
+    spread: float
+    step: float = 0.0
+    judged: bool = True
 
 
 _WINDOW = 0.02  # s: a small part of a swing, so that rate and angle differ
-_FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # leaves (ω dt)⁴ of the motion: far below any noise
+_FEWEST = 10  # samples in a window
 
 
 def noise_trend(campaign: Campaign) -> NoiseTrend:
-    """Test whether the noise is as strong in motion as at rest.
+    """Measure whether the noise is as strong in motion as at rest, and at all times.
 
     Args:
         campaign: the runs.
 
     Returns:
-        Trends of the variance of fourth differences of the reading in windows of 20 ms, pooled over runs. Under
-        steady white noise the slopes are about standard normal; the scatter lies above zero, for mean squares of
-        few samples are skewed, and the more so the more windows there are.
+        Trends of the variance of fourth differences of the reading in windows of 20 ms, pooled over runs. What
+        white noise and the readings' lattice alone give is simulated (`diagnosis.noise_null`).
     """
-    levels, squares, rates = [], [], []
-    for run in campaign.runs:
-        local = _local_levels(run.record)
-        if local is not None:
-            level, angle, rate = local
-            levels.append(level / np.mean(level) - 1.0)
-            squares.append(_standardised(angle**2))
-            rates.append(_standardised(rate**2))
-    if not levels:
-        return NoiseTrend(0.0, 0.0, 0.0)
-    level, square, rate = (np.concatenate(v) for v in (levels, squares, rates))
-    spread = float(np.std(level))
-    count = level.size
-    # a robust look at the tails: share of windows beyond what the bulk's own scatter allows
-    bulk = float(np.subtract(*np.quantile(level, [0.75, 0.25]))) / 1.349
-    return NoiseTrend(
-        float(level @ square) / (spread * np.sqrt(count)),
-        float(level @ rate) / (spread * np.sqrt(count)),
-        (spread / bulk - 1.0) * float(np.sqrt(count)),
-    )
+    values = trend_statistics([(run.record.yaw_rad[None], run.record.sample_rate) for run in campaign.runs])
+    if values is None:
+        return NoiseTrend(0.0, 0.0, 0.0, judged=False)
+    return NoiseTrend(*values[0].tolist(), step=reading_step(campaign))
+
+
+def trend_statistics(readings: Sequence[tuple[Array, float]]) -> Array | None:
+    """The statistics of `NoiseTrend`.
+
+    Args:
+        readings: by run, readings of any number of repetitions, shape (repetitions, n), rad, and their rate, Hz.
+
+    Returns:
+        Shape (repetitions, 3): ``amplitude_z``, ``rate_z`` and ``spread``; None where none is fast enough.
+    """
+    parts = [_local_levels(reading, rate) for reading, rate in readings if round(_WINDOW * rate) >= _FEWEST]
+    if not parts:
+        return None
+    level, square, rate = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+    scatter = np.maximum(np.std(level, axis=-1), _TINY)
+    root = np.sqrt(level.shape[-1])
+    upper, lower = np.quantile(level, [0.75, 0.25], axis=-1)
+    bulk = np.maximum((upper - lower) / 1.349, _TINY * scatter)
+    along = [np.einsum("ij,ij->i", level, over) / (scatter * root) for over in (square, rate)]
+    return np.stack([*along, np.log(scatter / bulk)], axis=-1)
+
+
+_TINY = 1e-9  # of a level's mean: the quartiles of a reading that rests on one step coincide
 
 
 def _standardised(values: Array) -> Array:
-    result: Array = (values - values.mean()) / max(float(values.std()), 1e-300)
+    centred = values - values.mean(axis=-1, keepdims=True)
+    result: Array = centred / np.maximum(centred.std(axis=-1, keepdims=True), 1e-300)
     return result
 
 
-def _local_levels(record: Record) -> tuple[Array, Array, Array] | None:
-    """Mean squared fourth difference, mean angle and rate in windows; None where sampling is too slow."""
-    width = round(_WINDOW * record.sample_rate)
-    if width < 10:
-        return None
-    reading = record.yaw_rad - np.mean(record.yaw_rad)
-    fourth = np.convolve(reading, _FOURTH, mode="same")
-    count = reading.size // width
+def _local_levels(reading: Array, rate: float) -> tuple[Array, Array, Array]:
+    """Mean squared fourth difference by window over its mean, less one; squared angle and rate, standardised."""
+    width = round(_WINDOW * rate)
+    reading = reading - reading.mean(axis=-1, keepdims=True)
+    # leaves (ω dt)⁴ of the motion: far below any noise
+    fourth = np.diff(reading, n=4, axis=-1)
+    count = fourth.shape[-1] // width
 
     def windows(values: Array) -> Array:
-        return values[: count * width].reshape(count, width)
+        return values[..., : count * width].reshape(*values.shape[:-1], count, width)
 
-    angle = windows(reading).mean(axis=1)
-    return np.mean(windows(fourth) ** 2, axis=1)[1:-1], angle[1:-1], np.gradient(angle)[1:-1]
+    level = np.mean(windows(fourth) ** 2, axis=-1)
+    level = level / np.maximum(level.mean(axis=-1, keepdims=True), 1e-300) - 1.0
+    angle = windows(reading[..., 2:]).mean(axis=-1)
+    return level, _standardised(angle**2), _standardised(np.gradient(angle, axis=-1) ** 2)

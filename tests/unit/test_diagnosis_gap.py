@@ -11,8 +11,8 @@ from diagnosis.noise import Noise, NoiseTrend
 from diagnosis.spectra import resonance
 from tests.unit.gap_campaigns import campaign, nominal
 
-STEADY = NoiseTrend(0.0, 0.0, 0.0)
-NOISE = Noise({"r1": 1.6e-7}, None, "estimated", "")
+STEADY = NoiseTrend(0.0, 0.0, 0.0, judged=False)
+NOISE = Noise({f"r{i}": 1.6e-7 for i in range(1, 7)}, None, "estimated", "")
 
 
 @pytest.fixture(scope="module")
@@ -24,6 +24,12 @@ def white(fitted, rng):
     return replace(fitted, residuals=[rng.normal(size=r.size) for r in fitted.residuals])
 
 
+def at_a_kilohertz(fitted):
+    """The same fit, as though four samples had been averaged for every block."""
+    runs = tuple(replace(run, block=4) for run in fitted.problem.data.runs)
+    return replace(fitted, problem=replace(fitted.problem, data=replace(fitted.problem.data, runs=runs)))
+
+
 def verdict(fit, *, noise=NOISE, trend=STEADY, coarse_step=False):
     return gap.test_gap(fit, noise, trend, coarse_step=coarse_step)
 
@@ -31,10 +37,7 @@ def verdict(fit, *, noise=NOISE, trend=STEADY, coarse_step=False):
 def test_white_residuals_raise_no_more_alarms_than_stated(fitted):
     rng = np.random.default_rng(12)
     trials = 2000
-    alarms = sum(
-        verdict(white(fitted, rng), trend=NoiseTrend(*rng.normal(size=2), 0.0)).detected
-        for _ in range(trials)
-    )
+    alarms = sum(verdict(white(fitted, rng)).detected for _ in range(trials))
     assert alarms <= binom.ppf(0.9999, trials, gap.FALSE_ALARM_RATE)
 
 
@@ -90,13 +93,13 @@ def test_runs_of_their_own_zero_are_seen_in_the_means(fitted):
 
 
 def test_noise_that_misbehaves_is_a_gap_unless_a_coarse_step_explains_it(fitted):
-    fit = white(fitted, np.random.default_rng(17))
-    loud = Noise({"r1": 4.0}, 1.0, "estimated", "")
-    floor = Noise({"r1": 4.0}, 1.0, "floor", "")
+    fit = white(at_a_kilohertz(fitted), np.random.default_rng(17))
+    loud = Noise(dict.fromkeys(NOISE.variance, 4.0), 1.0, "estimated", "")
+    floor = Noise(dict.fromkeys(NOISE.variance, 4.0), 1.0, "floor", "")
     cases = (
-        ("noise against rate", {"trend": NoiseTrend(0.0, 9.0, 0.0)}),
-        ("noise against amplitude", {"trend": NoiseTrend(-9.0, 0.0, 0.0)}),
-        ("noise in bursts", {"trend": NoiseTrend(0.0, 0.0, 60.0)}),
+        ("noise against rate", {"trend": NoiseTrend(0.0, 15.0, 0.1)}),
+        ("noise against amplitude", {"trend": NoiseTrend(-15.0, 0.0, 0.1)}),
+        ("noise in bursts", {"trend": NoiseTrend(0.0, 0.0, 1.0)}),
         ("noise level", {"noise": loud}),
     )
     for name, options in cases:
@@ -108,7 +111,7 @@ def test_noise_that_misbehaves_is_a_gap_unless_a_coarse_step_explains_it(fitted)
         assert not quiet.detected
         assert not quiet.noisy
     # where the accuracy of the fits stands in, the record's noise tells nothing
-    assert not verdict(fit, noise=floor, trend=NoiseTrend(9.0, 9.0, 60.0)).noisy
+    assert not verdict(fit, noise=floor, trend=NoiseTrend(15.0, 15.0, 1.0)).noisy
 
 
 def test_the_p_value_counts_the_tests(fitted):

@@ -13,6 +13,7 @@ from diagnosis.noise import (
     floor_periodogram,
     noise_trend,
     reading_step,
+    trend_statistics,
 )
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
@@ -166,7 +167,7 @@ def trends(count, change=None):
     for seed in range(count):
         data = decays(seed + 100, rate=1000.0, duration=4.0)
         trend = noise_trend(data if change is None else with_records(data, change(seed)))
-        found.append((trend.amplitude_z, trend.rate_z, trend.spread_z))
+        found.append((trend.amplitude_z, trend.rate_z, trend.spread))
     return np.array(found)
 
 
@@ -198,6 +199,25 @@ def test_bursts_are_louder_than_any_steady_noise():
     assert np.min(trends(3, bursts)[:, 2]) > 2.0 * np.max(trends(30)[:, 2])
 
 
+def test_repetitions_are_judged_each_by_itself():
+    data = decays(rate=1000.0)
+    readings = [(run.record.yaw_rad, 1000.0) for run in data.runs]
+    noisier = [(y + np.random.default_rng(3).normal(0.0, 1e-3 * np.abs(y)), rate) for y, rate in readings]
+    both = trend_statistics(
+        [(np.stack([a, b]), rate) for (a, rate), (b, _) in zip(readings, noisier, strict=True)]
+    )
+    for i, one in enumerate((readings, noisier)):
+        np.testing.assert_allclose(
+            both[i], trend_statistics([(y[None], rate) for y, rate in one])[0], rtol=1e-9
+        )
+
+
+def test_a_record_that_rests_has_finite_statistics():
+    resting = with_records(decays(rate=1000.0), lambda _t, y: np.round(y / 0.1) * 0.1)
+    trend = noise_trend(resting)
+    assert np.all(np.isfinite([trend.amplitude_z, trend.rate_z, trend.spread]))
+
+
 def test_too_slow_a_sampling_has_no_trend():
     trend = noise_trend(decays(rate=250.0))
-    assert (trend.amplitude_z, trend.rate_z, trend.spread_z) == (0.0, 0.0, 0.0)
+    assert not trend.judged
