@@ -178,7 +178,7 @@ class ManyRuns:
         self._last = np.zeros((2, count))  # angle and rate at the last period's end
 
     def start(self, row: int, settings: RunSettings) -> float:
-        """Begin a run at its release; arguments and result as in `OneRun.start`."""
+        """Begin a run at its release; result and arguments as in `OneRun.start`."""
         layout, steps, model = self._models.of(settings)
         if layout not in self._groups:
             batch = mujoco_batch.Batch(model.mj, nsim=self._count, nthread=self._nthread)
@@ -197,7 +197,7 @@ class ManyRuns:
         return float(data.qpos[at])
 
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
-        """Move all runs by one control period; arguments and result as in `OneRun.advance`."""
+        """Move all runs by one control period; result and arguments as in `OneRun.advance`."""
         if not self._members:
             self._members = self._sorted()
         if len(self._members) == 1:
@@ -215,7 +215,7 @@ class ManyRuns:
         return {one: np.flatnonzero([at == one for at in self._layout]) for one in layouts}
 
     def get_state(self, row: int) -> Array:
-        """MuJoCo's state of a run; arguments and result as in `OneRun.get_state`."""
+        """MuJoCo's state of a run; result and arguments as in `OneRun.get_state`."""
         return np.array(self._groups[self._layout[row]].batch.state[row])
 
     def set_state(self, row: int, state: Array) -> None:
@@ -226,7 +226,7 @@ class ManyRuns:
         self._last[:, row] = group.states["qpos"][row, at], group.states["qvel"][row, at]
 
     def pose(self, row: int) -> tuple[float, float]:
-        """Angles of the spring's end and of the body; arguments and result as in `OneRun.pose`."""
+        """Angles of the spring's end and of the body; result and arguments as in `OneRun.pose`."""
         return _pose(self._groups[self._layout[row]].states["qpos"][row])
 
 

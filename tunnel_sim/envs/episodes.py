@@ -35,13 +35,13 @@ class Engine(Protocol):
     """What moves the runs; see `tunnel_sim.envs.engines`."""
 
     def start(self, row: int, settings: RunSettings) -> float:
-        """Begin a run at its release; arguments and result as in `OneRun.start`."""
+        """Begin a run at its release; result and arguments as in `OneRun.start`."""
 
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
-        """Move all runs by one control period; arguments and result as in `OneRun.advance`."""
+        """Move all runs by one control period; result and arguments as in `OneRun.advance`."""
 
     def get_state(self, row: int) -> Array:
-        """MuJoCo's state of a run; arguments and result as in `OneRun.get_state`."""
+        """MuJoCo's state of a run; result and arguments as in `OneRun.get_state`."""
 
     def set_state(self, row: int, state: Array) -> None:
         """Put a run into a state; arguments as in `OneRun.set_state`."""
@@ -251,7 +251,7 @@ class Episodes:
         return plan
 
     def matrix(self, row: int) -> Array:
-        """The Fisher information so far; arguments and result as in `Information.matrix`."""
+        """The Fisher information so far; result and arguments as in `Information.matrix`."""
         return self._information.matrix(row)
 
     def get_state(self, row: int) -> EpisodeState:

@@ -35,7 +35,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
     def __init__(
         self,
         render_mode: str | None = None,
-        width: int = 480,
+        width: int = 640,
         height: int = 480,
         camera: str = "overview",
         **arguments: Any,

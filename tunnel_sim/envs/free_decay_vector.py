@@ -51,7 +51,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
         nthread: int = 0,
-        width: int = 480,
+        width: int = 640,
         height: int = 480,
         camera: str = "overview",
         **arguments: Any,
@@ -208,7 +208,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return self._episodes.matrix(index)
 
     def render(self) -> tuple[Any, ...] | None:
-        """A picture of every run; arguments and result as in `FreeDecayEnv.render`."""
+        """A picture of every run; result and arguments as in `FreeDecayEnv.render`."""
         if self.render_mode is None:
             return None
         return tuple(self._view.draw(*self._engine.pose(row)) for row in range(self.num_envs))

@@ -13,19 +13,14 @@ from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.rig import Rig
 
 
-class HasRig(Protocol):
-    """An environment of free decays, alone or many at once; unwrapped.
-
-    Args:
-        config: its arguments.
-        rig: its rig.
-    """
+class _HasRig(Protocol):
+    """An environment of free decays, alone or many at once; unwrapped."""
 
     config: FreeDecayConfig
     rig: Rig
 
 
-def campaign_of(runs: Iterable[Run], env: HasRig, *, name: str = "episodes") -> Campaign:
+def campaign_of(runs: Iterable[Run], env: _HasRig, *, name: str = "episodes") -> Campaign:
     """The runs of finished episodes as one campaign.
 
     Args:

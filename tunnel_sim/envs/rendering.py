@@ -23,6 +23,9 @@ from tunnel_sim.rig import Rig
 from tunnel_sim.run_settings import RodTwist, RunSettings
 
 RENDER_MODES = ("human", "rgb_array")
+_FILM_QUALITY = (2048, 4)
+"""Of shadows and edges: a fifth of the time of a still picture's, which looks the same at this size."""
+
 _REMEDY = "install EGL or OSMesa (Debian and Ubuntu: libegl1 or libosmesa6), or set MUJOCO_GL"
 
 
@@ -102,6 +105,7 @@ class RigView:
             raise EnvError(
                 f"unknown camera {self._camera!r}", where="camera", remedy=did_you_mean(self._camera, cameras)
             )
+        model.vis.quality.shadowsize, model.vis.quality.offsamples = _FILM_QUALITY
         model.vis.global_.offwidth = max(self._width, model.vis.global_.offwidth)
         model.vis.global_.offheight = max(self._height, model.vis.global_.offheight)
         self._model, self._data = model, mujoco.MjData(model)

@@ -78,7 +78,7 @@ class SensorChain:
         return angle
 
     def held(self, angle: Array, time_s: Array) -> Array:
-        """The same before the release, while the body is held: nothing of it enters the run's past."""
+        """The same while the body is still held, outside the run's past; arguments as in `angle`."""
         for place in range(len(self._on_angle)):
             angle = self._seen(place, [angle], [time_s])
         return angle

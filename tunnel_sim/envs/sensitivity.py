@@ -95,7 +95,7 @@ class Sensitivities:
         self._speed[row] = np.nan
 
     def snapshot(self, row: int) -> dict[str, Array]:
-        """Copies of what a run carries; arguments and result as in `Information.snapshot`."""
+        """Copies of what a run carries; result and arguments as in `Information.snapshot`."""
         return {"sensitivities": self._x[:, row].copy()}
 
     def restore(self, row: int, run: NominalRun, state: Mapping[str, Array]) -> None:
