@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors import SafetensorError, safe_open
+from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from identification.neural.evidence import Hyperparameters
@@ -42,19 +42,20 @@ class Checkpoint:
         return save(tensors or {"none": np.zeros(1)}, {"training": json.dumps(document)})
 
     @classmethod
-    def from_bytes(cls, content: bytes, spec: dict[str, Any], metadata: str) -> Checkpoint | None:
+    def from_bytes(cls, content: bytes, spec: dict[str, Any]) -> Checkpoint | None:
         """The inverse of `to_bytes`.
 
         Args:
             content: the file's.
             spec: of the training that is to go on, as JSON.
-            metadata: the file's ``training`` entry.
 
         Returns:
             None where it is no checkpoint of that spec.
         """
         try:
-            document = json.loads(metadata)
+            # A safetensors file is the length of its header, the header as JSON, and the tensors.
+            header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
+            document = json.loads(header["__metadata__"]["training"])
             if document["spec"] != json.loads(json.dumps(spec)):
                 return None
             tensors = load(content)
@@ -80,11 +81,4 @@ def read_checkpoint(path: Path, spec: dict[str, Any]) -> Checkpoint | None:
     Returns:
         None where there is none, or it belongs to another training.
     """
-    if not path.is_file():
-        return None
-    try:
-        with safe_open(path, framework="numpy") as file:
-            metadata = (file.metadata() or {}).get("training", "")
-    except SafetensorError:
-        return None
-    return Checkpoint.from_bytes(path.read_bytes(), spec, metadata)
+    return Checkpoint.from_bytes(path.read_bytes(), spec) if path.is_file() else None

@@ -1,0 +1,74 @@
+"""``tunnel train`` and ``identify --weights`` as a user meets them."""
+
+import json
+
+import pytest
+
+from tunnel_lab.cli import main
+
+QUICK = ["--starts", "1", "--damping-steps", "8", "--frequency-steps", "8"]
+
+
+def test_trains_writes_both_files_and_says_what_came_of_it(tmp_path, capsys):
+    out = tmp_path / "w.safetensors"
+    assert main(["train", str(out), "--seed", "3", *QUICK]) == 0
+    record = json.loads((tmp_path / "w.json").read_text())
+    assert record["seed"] == 3
+    said = capsys.readouterr().out
+    assert f"{record['networks']['damping']['starts'][0]['effective_parameters']:.1f} of 541" in said
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["w.json", "w.safetensors"]
+
+
+def test_interrupted_and_gone_on_with_to_the_same_bits(tmp_path, monkeypatch, capsys):
+    from identification.neural import train as module
+
+    step, taken = module.advance, []
+
+    def interrupted(progress, problem):
+        taken.append(1)
+        if len(taken) == 5:
+            raise KeyboardInterrupt
+        return step(progress, problem)
+
+    whole, out = tmp_path / "whole.safetensors", tmp_path / "w.safetensors"
+    assert main(["train", str(whole), *QUICK]) == 0
+    monkeypatch.setattr(module, "advance", interrupted)
+    assert main(["train", str(out), *QUICK]) == 130
+    assert not out.exists()
+    assert "the same command goes on" in capsys.readouterr().err
+    assert main(["train", str(out), "--seed", "9", *QUICK]) == 2
+    assert "--restart" in capsys.readouterr().err
+    assert main(["train", str(out), *QUICK]) == 0
+    assert len(taken) == 5 + 16 - 4  # it did not begin anew
+    assert out.read_bytes() == whole.read_bytes()
+    assert not (tmp_path / "w.part.safetensors").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["w.st"], "does not end in .safetensors"),
+        (["none/w.safetensors"], "its folder does not exist"),
+        (["w.safetensors", "--zeta", "0.3", "0.1"], "0.3 0.1 is no range"),
+        (["w.safetensors", "--omega", "0", "26"], "0 26 is no range"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_written(words, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["train", *words]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_identify_takes_weights_for_the_networks_only(tmp_path, capsys):
+    from identification.datasets import measured_campaign
+    from tunnel_sim.campaign_io import write_campaign
+
+    write_campaign(measured_campaign("rotary-pendulum"), tmp_path / "c")
+    shipped = ["--weights", str(tmp_path / "none.safetensors")]
+    assert main(["identify", str(tmp_path / "c"), *shipped]) == 2
+    assert "has no weights" in capsys.readouterr().err
+    assert main(["identify", str(tmp_path / "c"), "-e", "neural_network", *shipped]) == 2
+    assert "no such file" in capsys.readouterr().err
