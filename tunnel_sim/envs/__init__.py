@@ -7,8 +7,7 @@
 
 from __future__ import annotations
 
-# From the module, not the package: Gymnasium loads this file through its entry point while it is itself
-# still being imported. The environments' own modules, and MuJoCo with them, load when one is made.
+# The environments' own modules, and MuJoCo with them, load when one is made.
 from gymnasium.envs.registration import register, registry
 
 #: Entry points by identifier: of one environment, and of the native vector environment where there is one.

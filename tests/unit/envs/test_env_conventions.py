@@ -5,7 +5,8 @@ from __future__ import annotations
 import copy
 import subprocess
 import sys
-from importlib.metadata import entry_points
+import tomllib
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from tunnel_sim.envs.rendering import RigView
 from tunnel_sim.rig import load_rig
 
 PRESETS = ("plain", "operator")
+ROOT = Path(__file__).parents[3]
 
 
 class Window:
@@ -63,14 +65,29 @@ def test_a_misspelt_name_is_corrected() -> None:
         gymnasium.make("tunnel_sim/FreeDecy-v0")
 
 
-def test_the_entry_point_registers_without_an_import_of_ours() -> None:
-    if not entry_points(group="gymnasium.envs", name="tunnel_sim"):
-        pytest.skip("the installed package was built before the entry point was declared")
-    script = f"import gymnasium; print(gymnasium.spec('{NAME}').id)"
+def test_a_name_with_its_module_needs_no_import_of_ours() -> None:
+    script = f"""
+import sys
+import gymnasium
+env = gymnasium.make("tunnel_sim.envs:{NAME}", duration=0.1)
+env.reset(seed=1)
+print(env.spec.id)
+print(gymnasium.make_vec("tunnel_sim.envs:{NAME}", num_envs=2).num_envs)
+"""
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", script], capture_output=True, text=True, check=False
+        [sys.executable, "-W", "error", "-c", script], cwd=ROOT, capture_output=True, text=True, check=False
     )
-    assert done.stdout.strip() == NAME, done.stderr
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == [NAME, "2"]
+
+
+def test_the_declared_entry_point_is_the_one_that_registers() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = project.get("entry-points", {}).get("gymnasium.envs")
+    if declared is None:
+        pytest.skip("pyproject.toml declares no entry point of gymnasium.envs")
+    point = EntryPoint("tunnel_sim", declared["tunnel_sim"], "gymnasium.envs")
+    assert point.load() is register_environments
 
 
 @pytest.mark.parametrize("preset", PRESETS)
