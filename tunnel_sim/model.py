@@ -85,7 +85,7 @@ class Model:
 
         With a flexible rod the body holds the release angle and the spring's end is in balance between
         spring and twisted rod. The plugin's state (lag, angle, rate, twist and its rate, time, started)
-        starts there too, the lag at the body's angle.
+        starts there too, the lag at the body's angle; friction's deflection, its last number, starts at zero.
         """
         data = mujoco.MjData(self.mj)
         release = self.settings.release_angle
@@ -96,7 +96,7 @@ class Model:
             data.joint("rod_twist").qpos = release - end
         data.joint("yaw").qpos = end
         data.joint("yaw").qvel = self.settings.release_rate
-        data.plugin_state[:] = (release, end, self.settings.release_rate, release - end, 0.0, 0.0, 1.0)
+        data.plugin_state[:7] = (release, end, self.settings.release_rate, release - end, 0.0, 0.0, 1.0)
         return data
 
 

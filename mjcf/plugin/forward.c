@@ -6,14 +6,16 @@ typedef struct {
   double angle, rate, twist, twist_rate;
 } Motion;
 
-// What stays fixed during one step: the law, the run, and the start of the step for the lag.
+// What stays fixed during one step: the law, the run, and the start of the step for lag and friction.
 typedef struct {
   const vwt_parameters* p;
   const vwt_run* run;
   double start;        // time of the step's start, s
   Motion from;         // motion there
   double lagged;       // lag state there
-  int slip;            // sign of the slip under friction; 0: at rest
+  int slip;            // sign of the slip under Coulomb friction; 0: at rest
+  double range;        // of Dahl's friction, rad; 0: none
+  double deflection;   // Dahl's state at the start, rad
 } Step;
 
 static double wind_at(const vwt_run* run, double time) {
@@ -54,12 +56,18 @@ static double other_moment(const Step* s, double air, const Motion* y) {
   return mechanism + air;
 }
 
+static double deflection_at(const Step* s, double time, const Motion* y) {
+  return vwt_presliding_advance(s->range, s->deflection, time - s->start, s->from.angle, s->from.rate, y->angle,
+                                y->rate);
+}
+
 // Time derivative of the motion while the friction's sign is that of the step.
 static Motion derivative(const Step* s, double time, const Motion* y) {
   const vwt_parameters* p = s->p;
   const double air = air_at(s, time, y);
-  const double friction = -s->slip * p->friction_moment;
-  const int stuck = p->friction_moment > 0 && s->slip == 0;
+  const int coulomb = !(s->range > 0);
+  const double friction = (coulomb ? -s->slip : -deflection_at(s, time, y) / s->range) * p->friction_moment;
+  const int stuck = coulomb && p->friction_moment > 0 && s->slip == 0;
   Motion d = {y->rate, 0, y->twist_rate, 0};
   if (s->run->twist_stiffness > 0) {
     const double share = s->run->inertia_share;
@@ -100,6 +108,9 @@ static void move(Step* s, double h, const Motion* to) {
   if (s->p->aero_lag != 0) {
     s->lagged = lagged_at(s, s->start + h, to);
   }
+  if (s->range > 0) {
+    s->deflection = deflection_at(s, s->start + h, to);
+  }
   s->from = *to;
   s->start += h;
 }
@@ -128,7 +139,7 @@ static double reversal(const Step* s, double h, double end_rate) {
   return high;
 }
 
-// One step with friction: it ends early at each reversal, where the body sticks or slips back.
+// One step with Coulomb friction: it ends early at each reversal, where the body sticks or slips back.
 static void step_with_friction(Step* s, double h) {
   double left = h;
   for (int i = 0; i < 8 && left > 0; i++) {
@@ -161,15 +172,19 @@ static void step_with_friction(Step* s, double h) {
 }
 
 static int integrate(const vwt_parameters* p, const vwt_run* run, double* angle, double* rate) {
-  Step s = {p, run, 0, {run->angle, run->rate, run->twist, run->twist_rate}, run->lagged, 0};
+  Step s = {p, run, 0, {run->angle, run->rate, run->twist, run->twist_rate}, run->lagged, 0, 0, 0};
   const int samples = (int)run->samples, steps = (int)run->steps;
-  const int friction = p->friction_moment > 0;
+  const int coulomb = p->friction_moment > 0 && !(p->presliding > 0);
+  if (p->presliding > 0) {
+    const double share = run->twist_stiffness > 0 ? run->inertia_share : 1;
+    s.range = vwt_presliding_range(p, share * p->yaw_inertia, run->step);
+  }
   s.slip = run->rate > 0 ? 1 : run->rate < 0 ? -1 : 0;
   for (int i = 0; i < samples; i++) {
     angle[i] = s.from.angle;
     rate[i] = s.from.rate;
     for (int k = 0; k < steps; k++) {
-      if (friction) {
+      if (coulomb) {
         step_with_friction(&s, run->step);
       } else {
         const Motion y = runge_kutta(&s, run->step);

@@ -105,6 +105,26 @@ double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate,
   return (slip * stop + onward * (duration - stop)) / duration;
 }
 
+double vwt_presliding_range(const vwt_parameters* p, double inertia, double duration) {
+  return fmax(p->presliding, p->friction_moment * duration * duration / (2 * inertia));  // 2 rad in a step
+}
+
+// Deflection after a motion over `distance`, to the side 1 or -1.
+static double slide(double range, double deflection, int side, double distance) {
+  return distance > 0 ? deflection - (side * range - deflection) * expm1(-distance / range) : deflection;
+}
+
+double vwt_presliding_advance(double range, double deflection, double duration, double angle0, double rate0,
+                              double angle1, double rate1) {
+  const double change = angle1 - angle0;
+  const int side = rate0 > 0 || (rate0 == 0 && change > 0) ? 1 : -1;
+  // The way back is counted from the end, so that the way there remains a smooth function of it: Runge and
+  // Kutta's stages need that, whose angles are not those of one path.
+  const double back = rate0 * rate1 < 0 ? duration * rate1 * rate1 / (2 * fabs(rate1 - rate0)) : 0;
+  const double turned = slide(range, deflection, side, side * change + back);
+  return slide(range, turned, -side, back);
+}
+
 // Moments of the lag's kernel, w[n] = integral of z exp(-z (1 - u)) u^n over u from 0 to 1, n = 0..3.
 // Integration by parts links neighbours, w[n] = 1 - n w[n-1]/z: used upwards where z is large, downwards from
 // a series where it is small. Either way no digits are lost, however short the step.

@@ -32,6 +32,7 @@ extern "C" {
   X(shedding_phase, "rad", -VWT_ANY)             \
   /* the mechanism */                            \
   X(friction_moment, "N m", 0)                   \
+  X(presliding, "rad", 0)                        \
   X(quadratic_damping, "N m s2/rad2", -VWT_ANY)  \
   X(quadratic_damping_exponent, "1", 0)          \
   X(loss_factor, "1", -VWT_ANY)                  \
@@ -90,6 +91,17 @@ double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate);
 // the rate; where the rate would pass zero within the step, friction turns over there or holds, whichever
 // the other moments ask for. `rate` and `other`, the sum of all other moments, are those at the step's start.
 double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double duration);
+
+// Range zs of Dahl's friction, rad, which takes the place of Coulomb's where `presliding` is not zero:
+// -friction_moment z/zs, with the deflection z following dz = dangle - |dangle| z/zs. No less than what keeps the
+// contact's own oscillation, of stiffness 2 friction_moment/zs, stable in steps of `duration` s.
+double vwt_presliding_range(const vwt_parameters* p, double inertia, double duration);
+
+// Deflection after `duration` s, from `deflection`, while the angle moves from (angle0, rate0) to (angle1, rate1).
+// Exact, whatever the speed, for a motion one way; where the rate changes its sign the motion turns, at the angle
+// that a constant acceleration gives.
+double vwt_presliding_advance(double range, double deflection, double duration, double angle0, double rate0,
+                              double angle1, double rate1);
 
 // Lag state after `duration` s, from `lagged`, while the angle follows the cubic through the two given
 // ends (angle0, rate0) and (angle1, rate1). Exact for such a path.

@@ -13,7 +13,7 @@
 #include "moment.h"
 
 // Plugin state: where the present step started. Its stages read it for the lag and for friction.
-enum { kLagged, kAngle, kRate, kTwist, kTwistRate, kTime, kStarted, kStateCount };
+enum { kLagged, kAngle, kRate, kTwist, kTwistRate, kTime, kStarted, kDeflection, kStateCount };
 
 typedef struct {
   mjtNum time, angle, rate, twist, twist_rate;
@@ -30,7 +30,7 @@ typedef struct {
   int joint, twist_joint;
   int wind_speed, wind_interval;          // ids of numerics; intervals -1 where constant
   int forcing, forcing_interval;          // ids of numerics, -1 where absent
-  int aero_lag;                           // likewise
+  int aero_lag, presliding;               // likewise
   int span_count;
   Span span[VWT_PARAMETER_COUNT];         // the parameters that the model gives
   int names_size;                         // of the names of all numerics, which the ids stand for
@@ -143,9 +143,27 @@ static mjtNum other_moment(const mjModel* m, const Instance* self, const vwt_par
   return mechanism + m->jnt_stiffness[self->twist_joint] * at->twist + m->dof_damping[self->twist_dof] * at->twist_rate;
 }
 
+// What turns at the spring's end.
+static mjtNum end_inertia(const mjModel* m, const mjData* d, const Instance* self, const vwt_parameters* p) {
+  return self->twist_dof < 0 ? p->yaw_inertia : p->yaw_inertia - mass_diagonal(m, d, self->twist_dof);
+}
+
+// Dahl's state: zero until the end of the first step where the start is not known.
+static mjtNum deflection_at(const mjtNum* state, mjtNum range, const Motion* now) {
+  if (state[kStarted] == 0) {
+    return 0;
+  }
+  return vwt_presliding_advance(range, state[kDeflection], now->time - state[kTime], state[kAngle], state[kRate],
+                                now->angle, now->rate);
+}
+
 static mjtNum friction(const mjModel* m, const mjData* d, const Instance* self, const vwt_parameters* p,
                        const mjtNum* state, const Motion* now) {
-  const mjtNum inertia = self->twist_dof < 0 ? p->yaw_inertia : p->yaw_inertia - mass_diagonal(m, d, self->twist_dof);
+  const mjtNum inertia = end_inertia(m, d, self, p);
+  if (p->presliding > 0) {
+    const mjtNum range = vwt_presliding_range(p, inertia, m->opt.timestep);
+    return -deflection_at(state, range, now) / range * p->friction_moment;
+  }
   const Motion start = start_motion(state, now);
   const mjtNum applied = d->qfrc_applied[self->dof];  // by the user, on the spring's end
   const mjtNum other = other_moment(m, self, p, air_moment(m, d, self, p, state, &start), &start) + applied;
@@ -189,18 +207,27 @@ static void compute(const mjModel* m, mjData* d, int instance, int capability_bi
   }
 }
 
+static int given(const mjModel* m, int numeric) {
+  return numeric >= 0 && m->numeric_data[m->numeric_adr[numeric]] != 0;
+}
+
 static void advance(const mjModel* m, mjData* d, int instance) {
   const Instance* self = (const Instance*)d->plugin_data[instance];
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   check_same_numerics(m, self);
   const Motion now = present_motion(m, d, self);
-  mjtNum lagged = now.angle + now.twist;
-  if (self->aero_lag >= 0 && m->numeric_data[m->numeric_adr[self->aero_lag]] != 0) {
+  mjtNum lagged = now.angle + now.twist, deflection = 0;
+  if (given(m, self->aero_lag) || given(m, self->presliding)) {
     vwt_parameters p;
     read_parameters(m, d, self, &p);
     lagged = lagged_at(m, d, self, &p, state, &now);
+    if (p.presliding > 0) {
+      const mjtNum range = vwt_presliding_range(&p, end_inertia(m, d, self, &p), m->opt.timestep);
+      deflection = deflection_at(state, range, &now);
+    }
   }
   state[kLagged] = lagged;
+  state[kDeflection] = deflection;
   state[kAngle] = now.angle;
   state[kRate] = now.rate;
   state[kTwist] = now.twist;
@@ -286,6 +313,7 @@ static void find_series(const mjModel* m, Instance* self) {
 static void find_parameters(const mjModel* m, Instance* self) {
   self->span_count = 0;
   self->aero_lag = find_numeric(m, "aero_lag");
+  self->presliding = find_numeric(m, "presliding");
   for (int i = 0; i < VWT_PARAMETER_COUNT; i++) {
     const char* name = vwt_parameter_names[i];
     const int id = find_numeric(m, name);

@@ -85,7 +85,7 @@ class Oracle:
 
     def others(self, t: float, y: np.ndarray) -> tuple[float, float]:
         """Moments on the spring's end without friction, and on the body (0 where the rod is rigid)."""
-        angle, rate, twist, twist_rate, lagged = y
+        angle, rate, twist, twist_rate, lagged, _ = y
         air = self.air(t, angle + twist, rate + twist_rate, lagged)
         if self.compliance == 0.0:
             return self.mechanism(angle, rate) + air, 0.0
@@ -94,21 +94,25 @@ class Oracle:
 
     def derivative(self, t: float, y: np.ndarray, slip: int | None) -> list[float]:
         """`slip` is the sign of the rate under friction, None at rest."""
-        angle, rate, twist, twist_rate, lagged = y
+        angle, rate, twist, twist_rate, lagged, deflection = y
         end, body = self.others(t, y)
-        friction = self.term("friction_moment")
+        friction, reach, yielding = self.term("friction_moment"), self.term("presliding"), 0.0
+        share = 1.0  # of the friction's moment, against the slip
+        if reach > 0.0 and slip is not None:  # Dahl's: slip is the side to which the motion goes
+            share = slip * deflection / reach
+            yielding = rate * (1.0 - slip * deflection / reach)
         flexible = self.compliance > 0.0
         upper = self.inertia * (self.share if flexible else 1.0)
-        acceleration = 0.0 if slip is None else (end - slip * friction) / upper
+        acceleration = 0.0 if slip is None else (end - slip * share * friction) / upper
         twisting = body / (self.inertia * (1.0 - self.share)) - acceleration if flexible else 0.0
         speed = self.wind(t)
         lag = abs(self.term("aero_lag")) * LENGTH / speed if speed > 0.0 else 0.0
         following = (angle + twist - lagged) / lag if lag > 0.0 else 0.0
-        return [0.0 if slip is None else rate, acceleration, twist_rate, twisting, following]
+        return [0.0 if slip is None else rate, acceleration, twist_rate, twisting, following, yielding]
 
     def start(self) -> np.ndarray:
         end = self.release / (1.0 + self.stiffness * self.compliance)
-        return np.array([end, 0.0, self.release - end, 0.0, self.release])
+        return np.array([end, 0.0, self.release - end, 0.0, self.release, 0.0])
 
     def solve(self, samples: int, sample_rate: float) -> np.ndarray:
         """Angle of the spring's end from time 0 on, rad, shape (samples,)."""
@@ -130,7 +134,8 @@ class Oracle:
         slip: int | None = 0
         events = []
         if friction > 0.0:
-            slip = int(np.sign(y[1])) or self._slip_from_rest(t, y)
+            rest = self._way_from_rest if self.term("presliding") > 0.0 else self._slip_from_rest
+            slip = int(np.sign(y[1])) or rest(t, y)
             if slip is None:
                 events.append(lambda t, y: friction - abs(self.others(t, y)[0]))
                 events[-1].direction = -1
@@ -161,6 +166,11 @@ class Oracle:
         # just broken away counts as slipping: the event above ends a rest on the edge
         edge = self.term("friction_moment") * (1.0 - 1e-12)
         return None if abs(other) < edge else int(np.sign(other))
+
+    def _way_from_rest(self, t: float, y: np.ndarray) -> int:
+        end, body = self.others(t, y)
+        end -= self.term("friction_moment") * y[5] / self.term("presliding")
+        return 1 if (end if abs(end) > 1e-12 else body) > 0.0 else -1  # from balance it follows the body
 
 
 def closed_form(

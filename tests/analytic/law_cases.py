@@ -129,4 +129,20 @@ FRICTION = (
     ),
     Case("friction_and_lag", {"friction_moment": 0.02, "aero_lag": 2.0}, tolerance=1e-6),
 )  # fmt: skip
-CASES = (*SMOOTH, FREE_PLAY, *FRICTION)
+PRESLIDING = (
+    Case("presliding", {"friction_moment": 0.02, "presliding": 0.005}),
+    Case("wide_presliding", {"friction_moment": 0.4, "presliding": 0.1}),
+    Case(
+        "narrow_presliding", {"friction_moment": 0.05, "presliding": 3e-4}, spring=67.98,
+        tolerance=1e-6, forward_tolerance=1e-6,
+    ),
+    Case(
+        "presliding_and_turbulence", {"friction_moment": 0.02, "presliding": 0.002}, {"forcing": TURBULENCE},
+    ),
+    Case(
+        "presliding_flexible_rod", {"friction_moment": 0.02, "presliding": 0.005},
+        twist=RodTwist(2e-3, 0.3, 0.02), tolerance=3e-7, forward_tolerance=3e-7,
+    ),
+    Case("presliding_and_lag", {"friction_moment": 0.02, "presliding": 0.005, "aero_lag": 2.0}),
+)  # fmt: skip
+CASES = (*SMOOTH, FREE_PLAY, *FRICTION, *PRESLIDING)

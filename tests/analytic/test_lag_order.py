@@ -57,7 +57,7 @@ def _one_step_map(lag: float, step: float) -> np.ndarray:
     for angle, rate, lagged in np.eye(3):
         data = mujoco.MjData(model.mj)
         data.qpos[0], data.qvel[0] = angle, rate
-        data.plugin_state[:] = (lagged, angle, rate, 0.0, 0.0, 0.0, 1.0)
+        data.plugin_state[:7] = (lagged, angle, rate, 0.0, 0.0, 0.0, 1.0)
         mujoco.mj_step(model.mj, data)
         columns.append((data.qpos[0], data.qvel[0], data.plugin_state[0]))
     return np.array(columns).T
@@ -107,7 +107,7 @@ def test_lag_propagation_is_exact_for_a_cubic_path(step: float) -> None:
     data = mujoco.MjData(model.mj)
     angle, rate, lagged = 0.2, 0.7, 0.15
     data.qpos[0], data.qvel[0] = angle, rate
-    data.plugin_state[:] = (lagged, angle, rate, 0.0, 0.0, 0.0, 1.0)
+    data.plugin_state[:7] = (lagged, angle, rate, 0.0, 0.0, 0.0, 1.0)
     mujoco.mj_step(model.mj, data)
     tau = lag * LENGTH / speed
     exact = lagged + (angle - lagged - rate * tau) * -np.expm1(-step / tau) + rate * step

@@ -59,6 +59,8 @@ def reading(name: str, p: Parameters, run: Setting, *, phase: float = 0.0) -> np
     if name in SENSOR:
         return SENSOR[name](reading("", NOTHING, run), p, run, phase)
     if name == "coulomb_friction":
+        if p.get("presliding", 0.0) > 0.0:
+            return _with_presliding(p["friction_moment"], p["presliding"], run)
         return _with_friction(p["friction_moment"], run)
     if name == "free_play":
         return _with_free_play(p["half_width"], run)
@@ -227,6 +229,27 @@ def _with_friction(limit: float, run: Setting) -> np.ndarray:
         if not leg.t_events[0].size:
             return angle
         start, at = float(leg.t_events[0][0]), float(leg.y_events[0][0][0])
+
+
+def _with_presliding(limit: float, reach: float, run: Setting) -> np.ndarray:
+    """Dahl's friction −Tc z/zs, ż = β̇ − |β̇| z/zs, from reversal to reversal."""
+    base = nominal(run.spring, run.speed)
+    angle, start, y = np.empty(run.times.size), 0.0, (run.release, 0.0, 0.0)
+
+    while True:
+        way = 1.0 if base(start, y[0], 0.0) > limit * y[2] / reach else -1.0
+
+        def yielding(t: float, y: np.ndarray, way: float = way) -> tuple[float, ...]:
+            acceleration = (base(t, y[0], y[1]) - limit * y[2] / reach) / INERTIA
+            return y[1], acceleration, y[1] - way * y[1] * y[2] / reach
+
+        leg = _solve(yielding, y, run, start=start, events=[_crossing(1, 0.0, -way)])
+        here = run.times >= start
+        angle[here] = leg.sol(run.times[here])[0]
+        if not leg.t_events[0].size:
+            return angle
+        start = float(leg.t_events[0][0])
+        y = (float(leg.y_events[0][0][0]), 0.0, float(leg.y_events[0][0][2]))
 
 
 def _with_free_play(half: float, run: Setting) -> np.ndarray:

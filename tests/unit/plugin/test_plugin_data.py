@@ -13,7 +13,7 @@ from mujoco import batch as mujoco_batch
 from mujoco import rollout as mujoco_rollout
 from small_model import small_model
 
-LAW = {"aero_lag": "2", "friction_moment": "0.01", "moment_cubic": "1"}
+LAW = {"aero_lag": "2", "friction_moment": "0.01", "presliding": "0.002", "moment_cubic": "1"}
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
