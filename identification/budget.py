@@ -88,7 +88,7 @@ class Budget:
     @property
     def covariance(self) -> Array:
         """Of the quantities, all components together, shape (p, p)."""
-        return np.sum([component.covariance for component in self.components], axis=0)
+        return np.asarray(np.sum([component.covariance for component in self.components], axis=0))
 
     def std(self, name: str) -> float:
         """Combined standard uncertainty of a quantity, in its unit."""

@@ -33,8 +33,8 @@ class Change:
     Args:
         aspect: ``bias`` and ``spread`` (sizes of errors) in units of the bound, or of the truth where there is no
             bound; ``outliers``, ``coverage`` and ``failures`` as shares.
-        before: the baseline's figure.
-        now: the figure now.
+        before: the baseline's figure, in these units.
+        now: the figure now, likewise.
         p_value: probability of a change for the worse at least this large if nothing changed; 1 where the
             figure is no worse.
     """
@@ -144,7 +144,7 @@ def _coverage(pairs: Sequence[tuple[Trials, Trials]]) -> Change:
         return Change("coverage", 1.0, 1.0, 1.0)
     before, now = (count / total for count, total in zip(covered, totals, strict=True))
     worse = abs(now - NOMINAL_COVERAGE) > abs(before - NOMINAL_COVERAGE)
-    table = [[count, total - count] for count, total in zip(covered, totals, strict=True)]
+    table = np.array([[count, total - count] for count, total in zip(covered, totals, strict=True)])
     return Change("coverage", before, now, float(fisher_exact(table).pvalue) if worse else 1.0)
 
 
@@ -157,7 +157,7 @@ def _shares(aspect: Aspect, old: tuple[int, int], new: tuple[int, int]) -> Chang
     before, now = old[0] / old[1], new[0] / new[1]
     if now <= before:
         return Change(aspect, before, now, 1.0)
-    table = [[new[0], new[1] - new[0]], [old[0], old[1] - old[0]]]
+    table = np.array([[new[0], new[1] - new[0]], [old[0], old[1] - old[0]]])
     return Change(aspect, before, now, float(fisher_exact(table, alternative="greater").pvalue))
 
 

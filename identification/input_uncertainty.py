@@ -130,7 +130,7 @@ def load_uncertainties(path: Path) -> InputUncertainties:
     where = shown(path)
     common = {name: value for name, value in document.common.model_dump().items() if value > 0.0}
     individual = {name: value for name, value in document.individual.model_dump().items() if value > 0.0}
-    pairs = []
+    pairs: list[tuple[str, str, float]] = []
     for table in document.correlations:
         first, second = table.between
         for name in (first, second):

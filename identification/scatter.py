@@ -34,7 +34,7 @@ class SideScatter:
 
     Args:
         known: whether the runs leave a degree of freedom to see it by.
-        ratio: largest of the sums of squares over its expectation, of a or of k.
+        ratio: largest of the sums of squares over its expectation, of a or of k (1).
         names: parameters of the covariance.
         covariance: what the excess adds to that of the parameters, shape (p, p); zero within chance.
     """
@@ -165,7 +165,7 @@ def scaled(run: Run, name: str, factor: float) -> Run:
     Args:
         run: as stated.
         name: ``spring_stiffness``, ``wind_speed`` or ``air_density``.
-        factor: what the input is multiplied by.
+        factor: what the input is multiplied by (1).
     """
     if name == "wind_speed":
         return replace(run, wind_speed=run.wind_speed * factor)

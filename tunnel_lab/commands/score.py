@@ -84,7 +84,7 @@ def run(
       tunnel score --breakdown --out map
 
     [bold]Exit status[/bold]
-      0 scored (and no worse), 1 an estimator got worse, 2 bad input,
+      0 scored, 1 an estimator got worse, 2 bad input,
       130 interrupted (what is done stays in --out).
     """
     from tunnel_lab.scoring import check as checking

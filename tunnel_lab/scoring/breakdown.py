@@ -56,7 +56,7 @@ class Case:
 
     Args:
         effect: its name, or ``no effect``.
-        severity: noise powers it was sized for; 0 for no effect.
+        severity: what it was sized for, as a ratio to the noise's power; 0 for no effect.
         reached: noise powers it leaves after the reference's own nominal refit (a ratio).
         realisation: number of the realisation, from 0.
         campaign: what estimators see.
@@ -88,7 +88,9 @@ def conditions_of(seed: int, *, duration: float = 10.0) -> Conditions:
     start = release * (1.0 + 0.03 * np.random.default_rng(seed).standard_normal(release.size))
     return Conditions(
         spring_stiffness=springs, wind_speed=speeds, release_angle=release, start_angle=start,
-        air_density=_DENSITY, duration=duration, noise_std=NOISE, zero=radians(0.2), **TRUTH,
+        air_density=_DENSITY, duration=duration, noise_std=NOISE, zero=radians(0.2),
+        yaw_inertia=TRUTH["yaw_inertia"], mechanical_damping=TRUTH["mechanical_damping"],
+        cn_beta=TRUTH["cn_beta"], cn_r=TRUTH["cn_r"],
     )  # fmt: skip
 
 
@@ -231,7 +233,7 @@ class Bias:
 
     Args:
         effect: its name, or ``no effect``.
-        severity: noise powers it was sized for; 0 for no effect.
+        severity: what it was sized for, as a ratio to the noise's power; 0 for no effect.
         reached: noise powers it leaves on the average of the realisations (a ratio).
         estimator: its name.
         quantity: by name.

@@ -16,6 +16,7 @@ from tunnel_lab.tables import table
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
     from rich.table import Table
 
     from tunnel_sim.record import Array
@@ -120,7 +121,7 @@ def _grid(
     return values.reshape(len(effects), -1)
 
 
-def _panel(axes: Axes, values: Array) -> object:
+def _panel(axes: Axes, values: Array) -> AxesImage:
     from matplotlib.colors import LogNorm
 
     image = axes.imshow(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import ceil
 from zlib import crc32
 
 import numpy as np
@@ -180,4 +181,4 @@ def _effects(cell: Cell) -> tuple[Effect, ...]:
 
 def _timestep(cell: Cell) -> float:
     """At most a millisecond, and a whole number of steps to the sample."""
-    return 1.0 / (cell.sample_rate * max(1.0, np.ceil(1000.0 / cell.sample_rate)))
+    return 1.0 / (cell.sample_rate * max(1, ceil(1000.0 / cell.sample_rate)))

@@ -64,7 +64,7 @@ class Results:
 
         wanted = set(cells)
         return median(
-            row["milliseconds"]
+            float(row["milliseconds"])
             for row in self.rows
             if row["estimator"] == estimator and row["cell"] in wanted
         )
