@@ -97,7 +97,7 @@ def reachable(value, depth=0):
 
 
 def test_the_truth_is_hidden_unless_asked_for():
-    hidden, shown = make(**SHORT), make(**SHORT, reveal_truth=True)
+    hidden, shown = make(**SHORT), make(**SHORT, expose_truth=True)
     options = {"truth": TRUTH}
     assert "truth" not in hidden.reset(seed=1, options=options)[1]
     info = shown.reset(seed=1, options=options)[1]
@@ -206,7 +206,7 @@ def test_the_truth_is_drawn_as_stated():
 
 
 def test_an_option_leaves_the_other_draws_as_they_are():
-    free, given = CampaignEnv(reveal_truth=True), CampaignEnv(reveal_truth=True)
+    free, given = CampaignEnv(expose_truth=True), CampaignEnv(expose_truth=True)
     drawn = free.reset(seed=9)[1]["truth"]
     found = given.reset(seed=9, options={"truth": {"cn_beta": 0.5}})[1]["truth"]
     assert found == {**drawn, "cn_beta": 0.5}
@@ -317,7 +317,7 @@ def test_many_in_one_process_are_the_same_as_one_alone():
 
 
 @pytest.mark.slow
-def test_many_in_processes_of_their_own_are_the_same(tmp_path):
+def test_many_in_processes_of_their_own_are_the_same():
     results = []
     for mode in ("sync", "async"):
         many = gym.make_vec(ID, num_envs=2, vectorization_mode=mode, **SHORT)

@@ -56,7 +56,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         seconds_per_nat: how much rig time a nat is worth, s.
         max_runs: after so many the episode is truncated.
         rig: path of a rig description; None takes the packaged rig.
-        reveal_truth: put the truth into ``info``; it is never in the observation.
+        expose_truth: put the truth into ``info``; it is never in the observation.
         render_mode: None, ``human`` (a line for each run in the terminal) or ``rgb_array`` (a figure).
 
     Raises:
@@ -82,7 +82,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         seconds_per_nat: float = 600.0,
         max_runs: int | None = None,
         rig: Path | str | None = None,
-        reveal_truth: bool = False,
+        expose_truth: bool = False,
         render_mode: str | None = None,
     ) -> None:
         if preset not in PRESETS:
@@ -113,7 +113,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         self.probability = float(probability)
         self.seconds_per_nat = float(seconds_per_nat)
         self.max_runs = int(runs)
-        self.reveal_truth = reveal_truth
+        self.expose_truth = expose_truth
         self.render_mode = render_mode
         self.action_space = spaces.MultiDiscrete(list(self.conditions.menu.shape))
         self.observation_space = _observation_space(self.conditions, self.max_runs)
@@ -227,7 +227,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         if self.conditions.effects:
             named = zip(answers(self.conditions.effects), probabilities(known).tolist(), strict=True)
             info["answers"] = dict(named)
-        if self.reveal_truth and self._session is not None:
+        if self.expose_truth and self._session is not None:
             info["truth"] = self._session.truth.to_json_dict()
         return info
 

@@ -125,20 +125,18 @@ def _draw_elsewhere(
 def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, int], None] | None) -> str:
     """Draw with one back end; returns empty when it drew, else why not."""
     environment = {**os.environ, "MUJOCO_GL": backend} if backend else dict(os.environ)
-    with tempfile.TemporaryFile("w+") as errors:
-        child = subprocess.Popen(  # our own interpreter and module, no shell
-            [sys.executable, "-m", "tunnel_lab.show.film", json.dumps(order)],
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=errors,
-            text=True,
-        )
+    arguments = [sys.executable, "-m", "tunnel_lab.show.film", json.dumps(order)]  # our own module, no shell
+    with (
+        tempfile.TemporaryFile("w+") as errors,
+        subprocess.Popen(
+            arguments, env=environment, stdout=subprocess.PIPE, stderr=errors, text=True
+        ) as child,
+    ):
         try:
             silent = _follow(child, progress)
         finally:  # also when interrupted: nothing is left behind
             if child.poll() is None:
                 child.kill()
-            child.wait()
         if silent:
             return f"no answer in {FIRST_FRAME_S:.0f} s"
         if child.returncode == 0:
