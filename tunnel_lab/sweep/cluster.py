@@ -18,7 +18,7 @@ from tunnel_sim.errors import TunnelError
 from tunnel_sim.toml_input import one_line
 
 if TYPE_CHECKING:
-    from distributed import Client, Future
+    from distributed import Client
 
     from tunnel_lab.sweep.shard import Finished
 
@@ -53,7 +53,7 @@ def _work(
     address: str, workers: int, say: Said, poll_s: float, sweep: str, shards: Sequence[int]
 ) -> Iterator[Finished]:
     from distributed import CancelledError
-    from distributed.comm import CommClosedError
+    from distributed.comm.core import CommClosedError
 
     with _client(address, workers) as client:
         try:
@@ -64,17 +64,23 @@ def _work(
 
 @contextmanager
 def _client(address: str, workers: int) -> Iterator[Client]:
-    from distributed import Client, LocalCluster
+    import distributed
+
+    make_client: Any = distributed.Client  # Dask's own functions carry no types
+    make_cluster: Any = distributed.LocalCluster
 
     for name in ("distributed", "distributed.client"):  # what matters is said in one line of our own
         logging.getLogger(name).setLevel(logging.CRITICAL)
     if address == LOCAL:
         options: dict[str, Any] = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
-        with LocalCluster(n_workers=workers, threads_per_worker=1, **options) as here, Client(here) as client:
+        with (
+            make_cluster(n_workers=workers, threads_per_worker=1, **options) as here,
+            make_client(here) as client,
+        ):
             yield client
         return
     try:
-        client = Client(address, timeout=CONNECT_S)
+        client = make_client(address, timeout=CONNECT_S)
     except (OSError, ValueError, TimeoutError, ImportError) as error:
         raise TunnelError(
             f"no scheduler answers ({one_line(error, 80)})",
@@ -88,7 +94,7 @@ def _client(address: str, workers: int) -> Iterator[Client]:
 class _Crew:
     """The workers of a cluster at one sweep."""
 
-    def __init__(self, client: Client, sweep: str, say: Said, poll_s: float) -> None:
+    def __init__(self, client: Any, sweep: str, say: Said, poll_s: float) -> None:
         self._client = client
         self._sweep = sweep
         self._say = say
@@ -98,10 +104,11 @@ class _Crew:
 
     def work(self, shards: Sequence[int]) -> Iterator[Finished]:
         """Shards as they finish, few in flight at a time."""
-        from distributed import wait
+        import distributed
 
+        wait: Any = distributed.wait
         waiting = iter(shards)
-        flying: dict[Future, int] = {}
+        flying: dict[Any, int] = {}
         self._workers()
         while True:
             for index in islice(waiting, max(0, self._room() - len(flying))):
@@ -122,7 +129,7 @@ class _Crew:
                     self._alone = False
                     yield done
 
-    def _submit(self, index: int) -> Future:
+    def _submit(self, index: int) -> Any:
         from tunnel_lab.sweep.shard import run_shard
 
         attempt = self._attempts.setdefault(index, 1)
@@ -130,7 +137,7 @@ class _Crew:
             run_shard, self._sweep, index, key=f"shard-{index}-{attempt}-{id(self)}", pure=False
         )
 
-    def _result(self, future: Future, index: int) -> Finished | None:
+    def _result(self, future: Any, index: int) -> Finished | None:
         """A finished shard; None where its workers were lost and it is to be handed out again."""
         from distributed import KilledWorker
 
@@ -168,7 +175,8 @@ class _Crew:
 
     def _room(self) -> int:
         """How many shards may be in flight: two for each thread."""
-        return max(_FEWEST_IN_FLIGHT, 2 * sum(self._client.nthreads().values()))
+        threads = sum(int(count) for count in self._client.nthreads().values())
+        return max(_FEWEST_IN_FLIGHT, 2 * threads)
 
 
 def _gone() -> TunnelError:

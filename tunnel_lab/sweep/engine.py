@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,7 +67,7 @@ def run_sweep(sweep: Sweep, folder: Path, work: Work, progress: Told | None = No
     return Outcome(store, len(finished), crashes)
 
 
-def _started(work: Work, sweep: Sweep, left: Sequence[int]) -> Iterator[Finished]:
+def _started(work: Work, sweep: Sweep, left: Sequence[int]) -> Generator[Finished, None, None]:
     """The work as a generator, which is closed when it is left, however it is left."""
     if left:
         yield from work(sweep.to_json(), left)

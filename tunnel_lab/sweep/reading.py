@@ -43,8 +43,8 @@ def read_sweep(path: Path) -> Sweep:
     rigs = tuple(_rig(table.file, table.changes, path.parent) for table in document.rig)
     for table, sections in zip(document.rig, rigs, strict=True):
         parse_rig(sections, f"{where}, rig '{table.name}'")
-    for table in document.conditions:
-        check_conditions(table, f"{where}, conditions '{table.name}'")
+    for one in document.conditions:
+        check_conditions(one, f"{where}, conditions '{one.name}'")
     sweep = Sweep(_without_sources(document), rigs)
     _check_axes(sweep, where)
     _check_cases(sweep, where)
