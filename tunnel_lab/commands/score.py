@@ -147,16 +147,11 @@ def chosen(names: list[str] | None) -> tuple[str, ...]:
 
 
 def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results:
-    from importlib import resources
-
+    from tunnel_lab.scoring.packaged import packaged_baseline
     from tunnel_lab.scoring.results import read_trials
     from tunnel_sim.errors import TunnelError
 
-    if text == PACKAGED:
-        with resources.as_file(resources.files("tunnel_lab") / "data" / "score-baseline.parquet") as path:
-            baseline = read_trials(path)
-    else:
-        baseline = read_trials(Path(text))
+    baseline = packaged_baseline() if text == PACKAGED else read_trials(Path(text))
     gone = [name for name in baseline.estimators if name not in names]
     if everything and gone:
         raise TunnelError(

@@ -1,0 +1,25 @@
+"""The project's own estimators as they were scored for this version: a baseline and a breakdown map."""
+
+from __future__ import annotations
+
+from importlib import resources
+from typing import TYPE_CHECKING
+
+from tunnel_lab.scoring.results import Results, read_trials
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+def packaged_baseline() -> Results:
+    """The trials of all estimators on the packaged grid, which ``tunnel score --check packaged`` compares with."""
+    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-baseline.parquet") as path:
+        return read_trials(path)
+
+
+def packaged_breakdown() -> pl.DataFrame:
+    """What ``tunnel score --breakdown`` found; columns as in its Parquet file."""
+    import polars as pl
+
+    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-breakdown.parquet") as path:
+        return pl.read_parquet(path)
