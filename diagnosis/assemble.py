@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -12,10 +13,11 @@ from diagnosis.candidates import candidates
 from diagnosis.cautions import cautions
 from diagnosis.coefficients import coefficients, rival_fits
 from diagnosis.decide import RIVAL_PROBABILITY, UNKNOWN_SHARE, Weighed
-from diagnosis.held_out import predict_held_out
+from diagnosis.held_out import HeldOut, predict_held_out
 from diagnosis.least_squares import Fit
 from diagnosis.localisation.maps import Maps
 from diagnosis.next_run import separating_run
+from diagnosis.reference_sizes import size_note, sized_coefficients
 from diagnosis.reported import excess_base, gap_summary, report_fits
 from diagnosis.result import (
     Coefficients,
@@ -33,13 +35,14 @@ _LATE_START = (
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
 
-def assemble(study: Study, where: Where, maps: Maps) -> Diagnosis:
+def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = ()) -> Diagnosis:
     """Compose the answer.
 
     Args:
         study: what was found.
         where: where the gap is.
         maps: the pictures' data.
+        left_out: sentences on runs that were left out.
 
     Returns:
         The diagnosis.
@@ -53,7 +56,6 @@ def assemble(study: Study, where: Where, maps: Maps) -> Diagnosis:
     study.seconds["confirmation"] = time.perf_counter() - begun
     gap = gap_summary(study, base, shown)
     weighed = candidates(study, base)
-    rivals = rival_fits(study.weighed, study.hypotheses, chosen)
     data = study.nominal.problem.data
     return Diagnosis(
         campaign=study.campaign.name,
@@ -72,13 +74,7 @@ def assemble(study: Study, where: Where, maps: Maps) -> Diagnosis:
         candidates=weighed,
         ambiguous_with=_rival_names(study),
         next_run=_next_run(study, chosen),
-        coefficients=Coefficients(
-            before=coefficients(
-                study.nominal, nominal_out, study.campaign, [(chosen, 1.0)] if study.causes else ()
-            ),
-            after=coefficients(chosen, chosen_out, study.campaign, rivals),
-            note=cnr_note(study.causes),
-        ),
+        coefficients=_coefficients(study, chosen, nominal_out, chosen_out),
         confirmation=shown.confirmation,
         noise=_noise(study),
         blind_spots=blind_spots(
@@ -91,6 +87,7 @@ def assemble(study: Study, where: Where, maps: Maps) -> Diagnosis:
         seconds=study.seconds,
         provenance={"versions": {name: version(name) for name in _PACKAGES}},
         cautions=(
+            *left_out,
             *cautions(
                 study.campaign,
                 study.noise,
@@ -121,6 +118,19 @@ def chosen_fit(study: Study) -> Fit:
         return study.nominal if random.beside is None else random.beside.fit
     hypothesis = study.hypothesis(fitted) if fitted else None
     return study.nominal if hypothesis is None else hypothesis.fit
+
+
+def _coefficients(study: Study, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Coefficients:
+    campaign = study.campaign
+    before = coefficients(study.nominal, nominal_out, campaign, [(chosen, 1.0)] if study.causes else ())
+    rivals = rival_fits(study.weighed, study.hypotheses, chosen)
+    after = coefficients(chosen, chosen_out, campaign, rivals)
+    notes = (cnr_note(study.causes), size_note(campaign.rig, windy="cn_beta" in before))
+    return Coefficients(
+        before=sized_coefficients(before, campaign.rig),
+        after=sized_coefficients(after, campaign.rig),
+        note=" ".join(note for note in notes if note),
+    )
 
 
 def _rivals(study: Study) -> list[Weighed]:

@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.decide import Weighed
 from diagnosis.gap import FALSE_ALARM_RATE
 from diagnosis.random_moments import RandomAnswer
+from diagnosis.reference_sizes import parameter_unit
 from diagnosis.reported import Base
 from diagnosis.result import Candidate, ParameterEstimate
 from diagnosis.study import Study
@@ -84,7 +85,10 @@ def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
             found[name] = ParameterEstimate(value, 0.0, units[name])
     if random is not None:
         found |= _random_parameters(random)
-    return found
+    return {
+        name: replace(value, unit=parameter_unit(name, value.unit, study.campaign))
+        for name, value in found.items()
+    }
 
 
 def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:

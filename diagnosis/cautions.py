@@ -28,7 +28,7 @@ def cautions(
     Returns:
         Sentences; none where nothing is missing.
     """
-    found = [*_stiffness(campaign), *_reference(campaign), *_noise(noise), *_integrators(confirmation)]
+    found = [*_stiffness(campaign), *_noise(noise), *_integrators(confirmation)]
     if len(campaign.runs) < _FEW:
         number = "one run" if len(campaign.runs) == 1 else f"{len(campaign.runs)} runs"
         found.append(
@@ -50,26 +50,11 @@ def cautions(
 
 
 def _stiffness(campaign: Campaign) -> list[str]:
-    bare = [run.id for run in campaign.runs if run.spring_stiffness is None]
-    if not bare or len(campaign.runs) == 1:
-        return []
-    which = "No run states" if len(bare) == len(campaign.runs) else f"{', '.join(bare)}: without"
-    return [
-        f"{which} spring_stiffness, so all runs are taken to have the same spring. State it, or leave out runs "
-        f"with another spring: a different spring looks like a gap."
-    ]
-
-
-def _reference(campaign: Campaign) -> list[str]:
-    rig = campaign.rig
-    values = {"frontal_area": rig.frontal_area, "reference_length": rig.reference_length}
-    missing = [name for name, value in values.items() if value is None]
-    windy = any(run.wind_on for run in campaign.runs)
-    if not missing or not windy or any(run.spring_stiffness is None for run in campaign.runs):
+    if len(campaign.runs) == 1 or any(run.spring_stiffness is not None for run in campaign.runs):
         return []
     return [
-        f"[rig] states no {' and no '.join(missing)}, taken as 1: the coefficients are not Cnβ and Cnr before "
-        f"{'they are' if len(missing) > 1 else 'it is'} stated."
+        "No run states spring_stiffness, so all runs are taken to have the same spring, and moments are per unit "
+        "inertia. State it, or leave out runs with another spring: a different spring looks like a gap."
     ]
 
 

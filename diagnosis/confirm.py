@@ -157,8 +157,9 @@ class _Case:
         """Block means of the reading from the motion at the blocks' ends."""
         run = self.run
         ends = CubicHermiteSpline(motion.time_s, motion.angle, motion.rate)
-        time = np.arange(run.reading.size * run.block) * (run.interval / run.block)
-        angle = np.asarray(ends(time), np.float64)
+        samples = run.reading.size * run.block
+        time: Array = np.asarray(np.arange(samples) * (run.interval / run.block), np.float64)
+        angle: Array = np.asarray(ends(time), np.float64)
         for effect, draw in zip(self.effects, self.draws, strict=True):
             angle = effect.on_angle(angle, time, self.stated, draw)
         reading = angle + self.zero

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnosis.assemble import assemble, chosen_fit
+from diagnosis.comparable import comparable_runs
 from diagnosis.localise import localise
 from diagnosis.result import Diagnosis
 from diagnosis.study import Progress, study
@@ -24,17 +25,18 @@ def diagnose(
         progress: told what is being done.
 
     Returns:
-        The answer.
+        The answer, for the runs that one model can be fitted to; its cautions name any others.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
+    campaign, left_out = comparable_runs(campaign)
     found = study(campaign, kinds, progress)
     if progress is not None:
         progress("where, and how far it closes")
     best = chosen_fit(found)
     where, maps = localise(campaign, found.nominal, None if best is found.nominal else best, found.causes)
-    return assemble(found, where, maps)
+    return assemble(found, where, maps, left_out)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

@@ -220,7 +220,8 @@ def noise_trend(campaign: Campaign) -> NoiseTrend:
     values = trend_statistics([(run.record.yaw_rad[None], run.record.sample_rate) for run in campaign.runs])
     if values is None:
         return NoiseTrend(0.0, 0.0, 0.0, judged=False)
-    return NoiseTrend(*values[0].tolist(), step=reading_step(campaign))
+    amplitude, rate, spread = values[0].tolist()
+    return NoiseTrend(amplitude, rate, spread, step=reading_step(campaign))
 
 
 def trend_statistics(readings: Sequence[tuple[Array, float]]) -> Array | None:

@@ -117,7 +117,8 @@ class Coefficients:
     """Coefficients of the nominal model before and after the causes are added.
 
     Args:
-        before: by name: ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` for runs in normalised form.
+        before: by name: ``cn_beta`` and ``cn_r``; these times the rig's sizes that are not stated
+            (``cn_beta_area_length``, ``cn_r_area_length2``); or ``omega_n`` and ``zeta`` in normalised form.
         after: likewise.
         note: what is meant by them, where that needs saying (a lag changes what Cnr means).
     """

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
 
-from tunnel_lab.formatting import significant, with_std
+from tunnel_lab.formatting import coefficient_label, significant, unit_mark, with_std
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,14 +17,6 @@ SHOWN_PROBABILITY = 1e-3
 
 SHOWN_ANSWERS = 6
 """At most this many answers are listed."""
-
-SYMBOLS: Mapping[str, str] = {
-    "cn_beta": "Cnβ [1/rad]",
-    "cn_r": "Cnr [1/rad]",
-    "omega_n": "ωn [rad/s]",
-    "zeta": "ζ [1]",
-}
-"""Coefficients as the paper writes them, with units."""
 
 Document = Mapping[str, Any]
 
@@ -83,7 +74,7 @@ def parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
             lines.append(f"{owner}:")
         fixed = given["std"] == 0.0
         value = significant(given["value"]) if fixed else with_std(given["value"], given["std"])
-        mark = "" if given["unit"] == "1" else " " + re.sub(r"(?<=[a-z])2\b", "²", given["unit"])
+        mark = "" if given["unit"] == "1" else " " + unit_mark(given["unit"])
         lines += [f"{name} =", f"  {value}{mark}"]
     return lines
 
@@ -135,12 +126,12 @@ def coefficients_table(document: Document) -> Table:
         "Coefficients ± one standard deviation", "", "before", "after", "change", right=("change",)
     )
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
-    for name, symbol in SYMBOLS.items():
-        if name in before and name in after:
+    for name in before:
+        if name in after:
             one, two = before[name], after[name]
             change = 100.0 * (two["value"] - one["value"]) / abs(one["value"]) if one["value"] else 0.0
             result.add_row(
-                Text(symbol),
+                Text(coefficient_label(name, one["unit"])),
                 with_std(one["value"], one["std"]),
                 with_std(two["value"], two["std"]),
                 f"{change:+.2g} %",

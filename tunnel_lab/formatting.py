@@ -3,12 +3,53 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Mapping
+
+COEFFICIENTS: Mapping[str, str] = {
+    "cn_beta": "Cnβ",
+    "cn_r": "Cnr",
+    "cn_beta_area": "Cnβ·A",
+    "cn_r_area": "Cnr·A",
+    "cn_beta_length": "Cnβ·l",
+    "cn_r_length2": "Cnr·l²",
+    "cn_beta_area_length": "Cnβ·A·l",
+    "cn_r_area_length2": "Cnr·A·l²",
+    "omega_n": "ωn",
+    "zeta": "ζ",
+}
+"""Coefficients of a diagnosis as the paper writes them, those times sizes that are not stated included."""
 
 FIXED_DECIMALS = 9
 """Beyond this many decimals, a million or below a ten-thousandth a number takes a power of ten."""
 
 NEGLIGIBLE = 1e-9
 """A standard deviation below this share of the value no longer decides how many digits are worth printing."""
+
+
+def unit_mark(unit: str) -> str:
+    """A unit as it is set: powers raised.
+
+    Args:
+        unit: of a document, such as ``m3/rad`` or ``N m s2/rad2``.
+
+    Returns:
+        Text such as ``m³/rad``; a 1 stays.
+    """
+    return re.sub(r"(?<=[A-Za-z])[234]\b", lambda found: "²³⁴"[int(found[0]) - 2], unit)
+
+
+def coefficient_label(name: str, unit: str) -> str:
+    """A coefficient's symbol and unit.
+
+    Args:
+        name: of a document.
+        unit: likewise.
+
+    Returns:
+        Text such as ``Cnβ [1/rad]``.
+    """
+    return f"{COEFFICIENTS.get(name, name)} [{unit_mark(unit)}]"
 
 
 def significant(value: float, digits: int = 4) -> str:
@@ -92,7 +133,7 @@ def in_stds(error: float, std: float | None) -> str:
 
 
 def unit(text: str) -> str:
-    """A unit as printed: squares and cubes as such, in brackets.
+    """A unit as printed, in brackets.
 
     Args:
         text: as in an estimate's JSON, such as ``kg m2``.
@@ -100,7 +141,7 @@ def unit(text: str) -> str:
     Returns:
         Text such as ``[kg m²]``.
     """
-    return f"[{text.replace('m2', 'm²').replace('m3', 'm³')}]"
+    return f"[{unit_mark(text)}]"
 
 
 def _special(value: float, std: float | None) -> str:

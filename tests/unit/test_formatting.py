@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tunnel_lab.formatting import concise, in_stds, significant, unit, with_std
+from tunnel_lab.formatting import coefficient_label, concise, in_stds, significant, unit, unit_mark, with_std
 
 
 @pytest.mark.parametrize(
@@ -96,3 +96,18 @@ def test_the_short_notation(value: float, std: float | None, text: str) -> None:
 def test_units_are_printed_with_their_powers() -> None:
     assert unit("kg m2") == "[kg m²]"
     assert unit("1/rad") == "[1/rad]"
+
+
+@pytest.mark.parametrize(
+    ("unit", "shown"),
+    [("m3/rad", "m³/rad"), ("N m s2/rad2", "N m s²/rad²"), ("1/(kg m2)", "1/(kg m²)"), ("m4/rad", "m⁴/rad"),
+     ("rad/s2", "rad/s²"), ("1/rad", "1/rad"), ("l/V", "l/V"), ("1", "1")],
+)  # fmt: skip
+def test_powers_of_units_are_raised(unit: str, shown: str) -> None:
+    assert unit_mark(unit) == shown
+
+
+def test_coefficients_have_symbol_and_unit() -> None:
+    assert coefficient_label("cn_beta", "1/rad") == "Cnβ [1/rad]"
+    assert coefficient_label("cn_r_area_length2", "m4/rad") == "Cnr·A·l² [m⁴/rad]"
+    assert coefficient_label("other", "s") == "other [s]"

@@ -17,6 +17,7 @@ from tunnel_lab.diagnosis_figures.common import (
     plain,
     quiet,
 )
+from tunnel_lab.formatting import coefficient_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,12 +26,6 @@ if TYPE_CHECKING:
 
 SHOWN = 8
 """Candidates drawn: the rest have next to no probability."""
-NAMES = {
-    "cn_beta": "Cnβ [1/rad]",
-    "cn_r": "Cnr [1/rad]",
-    "omega_n": "ωn [rad/s]",
-    "zeta": "ζ [1]",
-}
 
 
 def candidates_figure(document: Document) -> Figure:
@@ -160,7 +155,7 @@ def coefficients_figure(document: Document) -> Figure | None:
             )  # fmt: skip
         axes.set_yticks([0, 1], ["before", "after"])
         axes.set_ylim(1.6, -0.6)
-        axes.set_xlabel(NAMES.get(name, name))
+        axes.set_xlabel(coefficient_label(name, before[name]["unit"]))
         axes.locator_params(axis="x", nbins=5)
         quiet(axes)
     return fig

@@ -6,15 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tunnel_lab.formatting import significant, with_std
+from tunnel_lab.formatting import COEFFICIENTS, significant, unit_mark, with_std
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 
 Document = Mapping[str, Any]
 _EFFECTS = frozenset(kind.name for kind in ALL_EFFECTS)
 _CONDITIONS = {"always": "wind on and off", "wind_on": "wind on only", None: "not told by these runs"}
-_SYMBOLS = {"cn_beta": "Cnβ", "cn_r": "Cnr", "omega_n": "ωn", "zeta": "ζ"}
-_UNITS = {"rad/s2": "rad/s²", "1": "", "N m s2/rad2": "N m s²/rad²", "1/rad2": "1/rad²"}
 _ONCE_PER_SENTENCE = 0.01  # candidates less probable are counted, not listed
 
 
@@ -190,7 +188,7 @@ def estimate(values: Document) -> str:
         if not values["std"]
         else with_std(values["value"], values["std"])
     )
-    return _minus(f"{number} {_UNITS.get(unit, unit)}".strip()).replace(" ", "\u00a0")
+    return _minus(f"{number} {'' if unit == '1' else unit_mark(unit)}".strip()).replace(" ", "\u00a0")
 
 
 def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
@@ -232,7 +230,7 @@ def coefficient_rows(document: Document) -> list[dict[str, str]]:
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
     return [
         {
-            "symbol": _SYMBOLS.get(name, name),
+            "symbol": COEFFICIENTS.get(name, name),
             "before": estimate(before[name]) if name in before else "–",
             "after": estimate(after[name]) if name in after else "–",
             "interval": _interval95(after.get(name) or before[name]),

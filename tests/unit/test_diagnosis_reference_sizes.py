@@ -1,0 +1,84 @@
+"""Where sizes or springs are not stated, what is identified has its own name and unit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.diagnose import diagnose, vocabulary
+from diagnosis.reference_sizes import parameter_unit, size_note, sized_coefficients
+from diagnosis.result import ParameterEstimate
+from tests.reference import free_decays
+from tests.reference.free_decays import AREA, LENGTH, Setting
+from tunnel_sim.campaign import RigProperties
+from tunnel_sim.effects import ALL_EFFECTS
+
+SETTINGS = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0))
+RIGS = {
+    "both": (RigProperties(None, AREA, LENGTH), {"cn_beta": 1.0, "cn_r": 1.0}, ("1/rad", "1/rad")),
+    "no area": (
+        RigProperties(None, None, LENGTH), {"cn_beta_area": AREA, "cn_r_area": AREA}, ("m2/rad", "m2/rad"),
+    ),
+    "no length": (
+        RigProperties(None, AREA, None),
+        {"cn_beta_length": LENGTH, "cn_r_length2": LENGTH**2}, ("m/rad", "m2/rad"),
+    ),
+    "neither": (
+        RigProperties(),
+        {"cn_beta_area_length": AREA * LENGTH, "cn_r_area_length2": AREA * LENGTH**2}, ("m3/rad", "m4/rad"),
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def data():
+    return free_decays.campaign(SETTINGS, noise=4e-4, duration=5.0, rate=500.0, rng=np.random.default_rng(2))
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_what_is_identified_is_the_coefficient_times_the_missing_sizes(data, name):
+    rig, sizes, units = RIGS[name]
+    truth = free_decays.Truth()
+    answer = diagnose(replace(data, rig=rig), kinds=vocabulary(["sensor_drift"]))
+    assert answer.causes == ()
+    for found in (answer.coefficients.before, answer.coefficients.after):
+        assert set(found) == set(sizes)
+        for (key, size), unit, value in zip(sizes.items(), units, (truth.cn_beta, truth.cn_r), strict=True):
+            assert found[key].unit == unit
+            assert abs(found[key].value - size * value) < 4.0 * found[key].std < 0.1 * abs(size * value)
+    note = answer.coefficients.note
+    assert (note == "") == (name == "both")
+    if name == "neither":
+        assert "Cnβ·A·l and Cnr·A·l² are identified, not Cnβ and Cnr" in note
+
+
+def test_other_coefficients_keep_their_names():
+    found = {"omega_n": ParameterEstimate(12.0, 0.1, "rad/s")}
+    assert sized_coefficients(found, RigProperties()) == found
+    assert size_note(RigProperties(), windy=False) == ""
+
+
+def test_units_without_springs_and_sizes(data):
+    bare = replace(data, runs=tuple(replace(run, spring_stiffness=None) for run in data.runs))
+    small = replace(data, rig=RigProperties())
+    cases = {
+        "coulomb_friction.friction_moment": ("N m", "rad/s2", "N m"),
+        "gravity_stiffness.stiffness": ("N m/rad", "1/s2", "N m/rad"),
+        "quadratic_damping.coefficient": ("N m s2/rad2", "1/rad", "N m s2/rad2"),
+        "rod_flexibility.compliance": ("rad/(N m)", "s2", "rad/(N m)"),
+        "buffeting.intensity": ("1", "1/(kg m2)", "m3"),
+        "vortex_shedding.amplitude": ("1", "1/(kg m2)", "m3"),
+        "unsteady_aero_lag.lag": ("l/V", "l/V", "m/V"),
+        "sensor_drift.drift": ("rad", "rad", "rad"),
+    }
+    for name, units in cases.items():
+        assert tuple(parameter_unit(name, units[0], d) for d in (data, bare, small)) == units
+    nothing = replace(bare, rig=RigProperties())
+    assert parameter_unit("buffeting.intensity", "1", nothing) == "m/kg"
+
+
+def test_no_unit_of_a_moment_is_left_in_normalised_form(data):
+    bare = replace(data, runs=tuple(replace(run, spring_stiffness=None) for run in data.runs))
+    for kind in ALL_EFFECTS:
+        for info in kind.parameters():
+            assert "N m" not in parameter_unit(f"{kind.name}.{info.name}", info.unit, bare)
