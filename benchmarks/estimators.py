@@ -1,0 +1,172 @@
+"""Estimators side by side with other packages: RMSE over the Cramér–Rao bound and time, on the same records.
+
+Run as ``python benchmarks/estimators.py``; see README.md beside it. Every record goes through every method in
+turn, so that other load on the machine meets all of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import time
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from peers import Method, present
+from rich.console import Console
+from rich.table import Table
+
+from identification.cramer_rao import damped_sinusoid_bound
+from identification.estimators import ALL_ESTIMATORS, make_estimator
+from identification.estimators.output_error import OutputError
+from identification.run_fit import NO_WINDOWS
+from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.record import Record
+
+AMPLITUDE, ZERO, RATE, DURATION = 0.35, 0.004, 1000.0, 20.0
+DAMPING_RATIOS, FREQUENCIES, NOISE_SHARES = (0.002, 0.01, 0.05), (0.8, 2.0, 4.0), (0.001, 0.01)
+SLOW = {"mujoco.sysid"}  # gets the first record of every cell only
+
+
+@dataclass
+class Tally:
+    """What one method did: errors over the bound, 95 % intervals that held, times, failures."""
+
+    zeta: list[float] = field(default_factory=list)
+    omega: list[float] = field(default_factory=list)
+    held: list[bool] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    cells: dict[tuple[float, ...], list[float]] = field(default_factory=dict)
+    failures: int = 0
+
+
+def records(count: int, seed: int) -> Iterator[tuple[tuple[float, ...], int, Campaign]]:
+    """Cell (ζ, f, S/A), number within it and a campaign of one run."""
+    rng = np.random.default_rng(seed)
+    clock = np.arange(round(RATE * DURATION)) / RATE
+    for zeta, frequency, share in itertools.product(DAMPING_RATIOS, FREQUENCIES, NOISE_SHARES):
+        omega = 2.0 * np.pi * frequency / np.sqrt(1.0 - zeta**2)
+        for number in range(count):
+            phase = rng.uniform(0.0, 2.0 * np.pi)
+            yaw = AMPLITUDE * np.exp(-zeta * omega * clock) * np.cos(2.0 * np.pi * frequency * clock + phase)
+            yaw = yaw + ZERO + share * AMPLITUDE * rng.standard_normal(clock.size)
+            sensor = SensorProperties(RATE, None, share * AMPLITUDE)
+            run = Run("r", Record(clock, yaw), 0.0)
+            yield (zeta, frequency, share, phase), number, Campaign("b", RigProperties(), sensor, (run,))
+
+
+def own(name: str) -> Method:
+    """One of ours as a method of one record; output error also without its windows, which the others lack."""
+    plain = name.endswith(", no windows")
+    estimator = OutputError(cycles_per_window=NO_WINDOWS) if plain else make_estimator(name)
+
+    def method(campaign: Campaign) -> tuple[float, float, float | None]:
+        run = estimator.estimate(campaign).runs[0]
+        if run.omega_n is None or run.zeta is None:
+            raise ValueError(run.status.value)
+        return run.omega_n.value, run.zeta.value, run.zeta.std
+
+    return method  # type: ignore[return-value]
+
+
+def other(method: Method) -> Method:
+    """A peer as a method of one record."""
+
+    def adapted(campaign: Campaign) -> tuple[float, float, float | None]:
+        record = campaign.runs[0].record
+        omega, zeta = method(record.time_s, record.yaw_rad, RATE)
+        if not (np.isfinite(omega) and np.isfinite(zeta)):
+            raise ValueError("not finite")
+        return omega, zeta, None
+
+    return adapted  # type: ignore[return-value]
+
+
+def measure(methods: dict[str, Method], count: int, seed: int) -> dict[str, Tally]:
+    """Run everything on everything."""
+    tallies = {name: Tally() for name in methods}
+    for cell, number, campaign in records(count, seed):
+        zeta, frequency, share, phase = cell
+        bound = damped_sinusoid_bound(
+            campaign.runs[0].record.time_s, amplitude=AMPLITUDE, phase=phase, frequency=frequency, zeta=zeta,
+            noise_std=share * AMPLITUDE,
+        )  # fmt: skip
+        for name, method in methods.items():
+            if name in SLOW and number > 0:
+                continue
+            tally, begin = tallies[name], time.thread_time()
+            try:
+                omega, found, std = method(campaign)
+            except (ValueError, RuntimeError, IndexError, np.linalg.LinAlgError):
+                tally.failures += 1
+                continue
+            finally:
+                tally.seconds.append(time.thread_time() - begin)
+            error = (found - zeta) / bound.zeta
+            tally.zeta.append(error)
+            tally.omega.append((omega - 2.0 * np.pi * frequency / np.sqrt(1.0 - zeta**2)) / bound.omega_n)
+            tally.cells.setdefault(cell[:3], []).append(error)
+            if std is not None:
+                tally.held.append(abs(found - zeta) <= 1.959964 * std)
+    return tallies
+
+
+def rms(values: list[float]) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values else np.nan
+
+
+def show(console: Console, tallies: dict[str, Tally], ours: list[str]) -> None:
+    """The table, and who is ahead."""
+    table = Table(title="RMSE over the Cramér–Rao bound; 20 s at 1 kHz, ζ 0.002–0.05, 0.8–4 Hz, S/A 0.1–1 %")
+    for head in ("method", "ζ", "ωn", "ζ, worst cell", "95 % held", "failed", "ms per record", "records"):
+        table.add_column(head, justify="left" if head == "method" else "right")
+    for name, tally in tallies.items():
+        held = f"{100 * np.mean(tally.held):.1f} %" if tally.held else ""
+        worst = max((rms(errors) for errors in tally.cells.values()), default=np.nan)
+        table.add_row(
+            name, f"{rms(tally.zeta):.3f}", f"{rms(tally.omega):.3f}", f"{worst:.2f}", held,
+            str(tally.failures), f"{1e3 * np.median(tally.seconds):.1f}", str(len(tally.seconds)),
+        )  # fmt: skip
+        if name == ours[-1]:
+            table.add_section()
+    console.print(table)
+    sampling = 1.0 / np.sqrt(2.0 * max(len(tally.zeta) for tally in tallies.values()))
+    console.print(f"Each RMSE is known to ± {100 * sampling:.0f} % (one standard deviation of sampling).")
+    for name in (n for n in tallies if n not in ours):
+        ahead = [
+            mine for mine in ours
+            if rms(tallies[mine].zeta) <= 1.001 * rms(tallies[name].zeta)
+            and np.median(tallies[mine].seconds) < np.median(tallies[name].seconds)
+            and tallies[mine].failures <= tallies[name].failures
+        ]  # fmt: skip
+        console.print(
+            f"Ahead of {name}, or level in RMSE (to 0.1 %), and quicker: {', '.join(ahead) or 'none'}"
+        )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--records", type=int, default=10, help="records in each of the 18 cells")
+    parser.add_argument("--seed", type=int, default=1, help="of the noise")
+    parser.add_argument("--only", nargs="*", help="names of methods, as in the table")
+    options = parser.parse_args()
+    found, absent = present()
+    ours = [*ALL_ESTIMATORS, "output_error, no windows"]
+    methods = {name: own(name) for name in ours} | {name: other(method) for name, method in found.items()}
+    if options.only:
+        methods = {name: method for name, method in methods.items() if name in options.only}
+        ours = [name for name in ours if name in methods]
+    console = Console(width=130)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the peers' own
+        show(console, measure(methods, options.records, options.seed), ours)
+    for name, line in absent.items():
+        console.print(f"Absent: {name} ({line})")
+
+
+if __name__ == "__main__":
+    main()
