@@ -17,7 +17,7 @@ from tunnel_sim.errors import TunnelError
 Outcome = tuple[int, str, str]
 Tunnel = Callable[..., Outcome]
 
-COMMANDS = ("demo", "simulate", "identify", "plot", "springs", "effects", "score")
+COMMANDS = ("demo", "simulate", "identify", "plot", "springs", "effects", "score", "sweep")
 
 
 def assert_refused(outcome: Outcome, *parts: str) -> None:
