@@ -41,6 +41,7 @@ MIXED = [
     replace(PLAIN, duration=0.9, release_rate=0.2),
     replace(PLAIN, timestep=5e-4, parameters={"free_play": 0.01}),
     replace(PLAIN, rod_twist=TWIST, parameters={"friction_moment": 0.02, "aero_lag": -1.0}),
+    replace(PLAIN, rod_twist=TWIST, parameters={"friction_moment": 0.02, "presliding": 0.003}),
 ]
 
 

@@ -108,7 +108,7 @@ def test_the_truth_holds_what_was_injected(plan: CampaignPlan) -> None:
     assert (truth["noise_std"], truth["sensor_zero"], truth["seed"]) == (0.0004, 0.002, 4)
     assert truth["effects"] == ["coulomb_friction", "mains_hum"]
     assert truth["parameters"] == {
-        "coulomb_friction": {"friction_moment": 0.05},
+        "coulomb_friction": {"friction_moment": 0.05, "presliding": 0.0},
         "mains_hum": {"amplitude": 0.003, "frequency": 50.0},
     }
     assert set(truth["versions"]) == {"mujoco", "numpy"}
