@@ -10,7 +10,7 @@ other forms (docs/blind-check.md); test sets are drawn with other seeds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy as np
 #: Exponent of the share left open.
 STEEPNESS = 3.0
 #: Misfit of form that counts as none, as a share of the gap.
-FORM_MISFIT = 0.01
+FORM_MISFIT = 0.005
 #: Effects that have no form to miss, a factor on a stated number, and the misfit that counts as none of them.
 EXACT = frozenset({"spring_miscalibration"})
 EXACT_MISFIT = 0.001
@@ -26,9 +26,15 @@ EXACT_MISFIT = 0.001
 #: reason to overlook a second effect a thousand times the noise.
 FORM_MISFIT_UP_TO = 1000.0
 #: Share at which a cause is as likely as an unknown one.
-UNKNOWN_SHARE = 0.25
+UNKNOWN_SHARE = 0.2
 #: A second effect must leave less than this share of what the first leaves.
 PAIR_SHARE = 0.40
+#: A freed form must leave less than this share of what is left without it.
+FORM_SHARE = 0.80
+#: Share of the probability that is spread as if the weights were their cube roots: how often an answer whose weight
+#: is overwhelming was wrong on the tuning sets, where something was at work that neither fits nor rivals know.
+LAPSE = 0.04
+_TEMPERATURE = 3.0
 #: Answers less likely than this are not called rivals.
 RIVAL_PROBABILITY = 0.05
 
@@ -67,6 +73,7 @@ def weigh(
     chance: float,
     excess: float,
     outside: float = UNKNOWN_SHARE,
+    forms: Mapping[tuple[str, ...], int] | None = None,
 ) -> list[Weighed]:
     """Probabilities of the answers.
 
@@ -75,6 +82,7 @@ def weigh(
         chance: standard deviation of a share by chance alone.
         excess: of the nominal model's block means.
         outside: share that something outside the vocabulary leaves open; counts where it is below `UNKNOWN_SHARE`.
+        forms: how many forms were freed, by sorted effect names; 0 where not given.
 
     Returns:
         All answers, ``unknown`` among them, most probable first.
@@ -87,11 +95,22 @@ def weigh(
     for names, share in shares:
         key = tuple(sorted(names))
         answers[key] = min(max(share, 0.0), answers.get(key, np.inf))
-    weights = {names: _evidence(share, floor(names)) * _prior(len(names)) for names, share in answers.items()}
+    freed = forms or {}
+    weights = {
+        names: _evidence(share, floor(names)) * _prior(len(names), freed.get(names, 0))
+        for names, share in answers.items()
+    }
     answers[("unknown",)] = min(UNKNOWN_SHARE, max(outside, 0.0))
     weights[("unknown",)] = _evidence(answers[("unknown",)], floor(()))
-    total = sum(weights.values())
-    found = [Weighed(names, answers[names], weight / total) for names, weight in weights.items()]
+    total, flat = sum(weights.values()), sum(w ** (1.0 / _TEMPERATURE) for w in weights.values())
+    found = [
+        Weighed(
+            names,
+            answers[names],
+            (1.0 - LAPSE) * weight / total + LAPSE * weight ** (1.0 / _TEMPERATURE) / flat,
+        )
+        for names, weight in weights.items()
+    ]
     return sorted(found, key=lambda w: -w.probability)
 
 
@@ -106,6 +125,6 @@ def _evidence(share: float, floor: float) -> float:
     return float(known * beyond ** (2.0 * STEEPNESS))
 
 
-def _prior(count: int) -> float:
-    """A pair starts behind by what it must close more than a single effect."""
-    return float(PAIR_SHARE ** (STEEPNESS * max(0, count - 1)))
+def _prior(count: int, forms: int) -> float:
+    """A pair, and a freed form, start behind by what they must close more than one textbook effect."""
+    return float(PAIR_SHARE ** (STEEPNESS * max(0, count - 1)) * FORM_SHARE ** (STEEPNESS * forms))

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.decide import FORM_SHARE
 from diagnosis.least_squares import Fit, FitError, fit, fit_growing
 from diagnosis.problem import Point, Problem
 from diagnosis.start import Lead, is_gross, leads
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.base import ParameterInfo
 
 #: Effects that no deterministic residual fits, or that are read off the record before fitting.
 NOT_FITTED = frozenset({"buffeting", "sensor_quantisation", "mains_hum"})
@@ -43,6 +45,12 @@ class Hypothesis:
     def names(self) -> tuple[str, ...]:
         """Names of the effects, sorted."""
         return tuple(sorted(self.effects))
+
+    @property
+    def forms(self) -> int:
+        """How many form parameters were freed."""
+        problem = self.fit.problem
+        return sum(i.form for k in problem.effects if k.name in problem.bent for i in k.parameters())
 
 
 def rank_singles(
@@ -102,10 +110,10 @@ def _with_forms(found: list[Hypothesis], base: Fit) -> list[Hypothesis]:
     bent = []
     for hypothesis in ranked[:_BENT]:
         fitted = hypothesis.fit
-        if fitted.excess > _BEND_FROM * max(base.excess, 0.0) and (freed := _bend(fitted)) is not None:
-            bent.append(Hypothesis(hypothesis.effects, freed))
-        else:
-            bent.append(hypothesis)
+        freed = _bend(fitted) if fitted.excess > _BEND_FROM * max(base.excess, 0.0) else None
+        bend = None if freed is None else Hypothesis(hypothesis.effects, freed)
+        pays = bend is not None and bend.fit.excess < FORM_SHARE**bend.forms * fitted.excess
+        bent.append(bend if bend is not None and pays else hypothesis)
     return sorted([*bent, *ranked[_BENT:]], key=lambda h: h.fit.total)
 
 
@@ -135,13 +143,18 @@ def _bend(fitted: Fit, tolerance: float = 1e-4) -> Fit | None:
         return None
     freed = Problem(problem.data, problem.effects, problem.fixed, tuple(kind.name for kind in kinds))
     values = dict(zip(problem.names, fitted.point.common.tolist(), strict=True))
-    defaults = {f"{k.name}.{i.name}": i.default for k in kinds for i in k.parameters() if i.form}
+    defaults = {f"{k.name}.{i.name}": _within(i) for k in kinds for i in k.parameters() if i.form}
     start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
     try:
         found = fit(freed, start, tolerance=tolerance)
     except (FitError, np.linalg.LinAlgError):
         return None
     return found if found.total < fitted.total else None
+
+
+def _within(info: ParameterInfo) -> float:
+    """Where a form starts: the textbook's, or a step inside where that is a bound: its slope may vanish there."""
+    return info.default + 0.5 * info.scale if info.default == info.lower else info.default
 
 
 def _promising(

@@ -184,7 +184,13 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     shares += [(answer.effects, answer.share) for answer in random]
     chance = float(np.sqrt(2.0 / nominal.count)) / max(nominal.excess, 1e-3)
     outsider = weigh_outsiders(nominal)
-    weighed = weigh(shares, chance, nominal.excess, UNKNOWN_SHARE if outsider is None else outsider.share)
+    weighed = weigh(
+        shares,
+        chance,
+        nominal.excess,
+        UNKNOWN_SHARE if outsider is None else outsider.share,
+        {h.names: h.forms for h in hypotheses},
+    )
     if weighed[0].effects == ("unknown",) and _read_off_explains(found):
         weighed = []  # what is left belongs to the cause read off the records
     elif weighed[0].effects != ("unknown",):
