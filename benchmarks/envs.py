@@ -6,8 +6,10 @@ Run as ``python benchmarks/envs.py``; see README.md beside it. Both sides of a r
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from collections.abc import Callable
+from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -44,19 +46,31 @@ def bare(count: int, periods: int, substeps: int) -> Callable[[], float]:
     return repetition
 
 
-def stepping(envs: Any, periods: int) -> Callable[[], float]:
-    """A repetition of ``step`` with sampled actions: elapsed time, s."""
+def stepping(envs: Any, periods: int, clock: Callable[[], float] = time.perf_counter) -> Callable[[], float]:
+    """A repetition of ``step`` with sampled actions: time by the clock, s."""
     envs.action_space.seed(1)
     actions = [envs.action_space.sample() for _ in range(periods)]
 
     def repetition() -> float:
         envs.reset(seed=1)
-        begin = time.perf_counter()
+        begin = clock()
         for action in actions:
             envs.step(action)
-        return time.perf_counter() - begin
+        return clock() - begin
 
     return repetition
+
+
+def processor_time(envs: Any) -> Callable[[], float]:
+    """Processor time of this process and an async environment's workers, s (Linux)."""
+    files = [Path(f"/proc/{worker.pid}/stat") for worker in getattr(envs, "processes", [])]
+
+    def clock() -> float:
+        spent = [file.read_text().rpartition(")")[2].split()[11:13] for file in files]
+        ticks = sum(int(part) for parts in spent for part in parts)
+        return time.process_time() + ticks / os.sysconf("SC_CLK_TCK")
+
+    return clock
 
 
 def vector(count: int, mode: str, preset: str) -> Any:
@@ -72,7 +86,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=256, help="runs side by side, against mujoco.batch")
-    parser.add_argument("--workers", type=int, default=16, help="runs side by side, against async")
+    parser.add_argument("--workers", type=int, default=32, help="runs side by side, against async")
     parser.add_argument("--periods", type=int, default=40, help="control periods of a repetition")
     parser.add_argument("--repetitions", type=int, default=9, help="repetitions of each side")
     options = parser.parse_args()
@@ -106,6 +120,9 @@ def main() -> None:
         workers = vector(options.workers, "async", preset)
         sides = (stepping(workers, options.periods), stepping(native, options.periods))
         line(f"{preset}: native against async", options.workers, *sides, "≥ 5" if preset == "plain" else "")
+        if Path("/proc/self/stat").exists():
+            timed = [stepping(envs, options.periods, processor_time(envs)) for envs in (workers, native)]
+            line("the same by processor time", options.workers, timed[0], timed[1], "")
         workers.close()
         native.close()
     Console(width=118).print(table)
