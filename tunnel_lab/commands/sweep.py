@@ -50,21 +50,17 @@ def run(
       replicates = 10              # of every case, with other noise
       estimators = ["output_error", "conventional"]
       records = false              # true keeps the runs, too
-      [conditions]                 # [[conditions]] for several
-      springs = [5, 8]             # of the paper's Table II
-      wind_speeds = [0.0, 15.0]    # m/s; 0 is wind-off
-      release_angles_deg = [20.0]
-      duration = 10.0              # s
-      [truth]                      # a number or a list of them
-      cn_beta = [0.35, 0.495]      # 1/rad
-      cn_r = -0.114                # 1/rad
-      [sensor]
-      noise_std = [0.0002, 0.0005, 0.002]   # rad
-      \[[effects]]
-      name = "none"
-      \[[effects]]
-      name = "coulomb_friction"
-      parameters = { friction_moment = [0.002, 0.004] }   # N m
+      conditions.springs = [5, 8]            # of the paper's Table II
+      conditions.wind_speeds = [0.0, 15.0]   # m/s; 0 is wind-off
+      conditions.release_angles_deg = [20.0]
+      conditions.duration = 10.0             # s
+      truth.cn_beta = [0.35, 0.495]          # 1/rad; a number or a list
+      truth.cn_r = -0.114                    # 1/rad
+      sensor.noise_std = [0.0002, 0.0005, 0.002]   # rad
+      effects = [
+        { name = "none" },
+        { name = "coulomb_friction", parameters.friction_moment = [0.002, 0.004] },
+      ]
 
     [bold]Examples[/bold]
       tunnel sweep sweep.toml --out results
@@ -117,14 +113,13 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
             remedy="leave out --workers",
         )
     sweep = read_sweep(file)
-    estimates = sweep.size * len(sweep.document.estimators)
-    say(f"Sweep {sweep.document.name}: {sweep.size} cases, {sweep.runs} runs, {estimates} estimates")
     work = _work(workers, scheduler, sweep)
     with bar("cases", sweep.size) as tell:
         outcome = run_sweep(sweep, out, work, lambda done, total: tell(done, total, ""))
     if outcome.found:
         say(f"{outcome.found} of {sweep.shards} shards were finished before")
-    say(f"Written: {out} (tunnel sweep --summary {out} draws it)")
+    estimates = sweep.size * len(sweep.document.estimators)
+    say(f"Written: {out} ({sweep.size} cases, {sweep.runs} runs, {estimates} estimates)")
     if outcome.crashes:
         say(f"{outcome.crashes} estimates ended in an error: see status 'raised' in the results", stderr=True)
         raise typer.Exit(1)

@@ -11,7 +11,7 @@ import pytest
 
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
-from tunnel_lab.sweep import figures
+from tunnel_lab.sweep import cluster, figures
 from tunnel_lab.sweep.engine import run_sweep
 from tunnel_lab.sweep.product import Sweep
 from tunnel_lab.sweep.reading import read_sweep
@@ -74,18 +74,36 @@ def test_a_broken_file_is_one_line_and_leaves_nothing(
         (["FILE", "--out", "TAKEN"], "the folder holds something else"),
         (["FILE", "--out", "FILE"], "cannot be written"),
         (["FILE", "--out", "OUT", "--workers", "0"], "--workers"),
+        (["FILE", "--out", "OUT", "--scheduler", "tcp://127.0.0.1:1"], "no scheduler answers"),
         (["FILE", "--out", "OUT", "--scheduler", "tcp://h:1", "--workers", "2"], "leave out --workers"),
         (["FILE", "--out", "OUT", "--scheduler", "nonsense://h"], "no scheduler answers"),
     ],
 )
 def test_bad_words_are_one_line(
-    small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+    small: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[str],
+    said: str,
 ) -> None:
+    monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
     (tmp_path / "taken").mkdir()
     (tmp_path / "taken" / "thesis.txt").write_text("")
     places = {"FILE": small, "OUT": tmp_path / "out", "TAKEN": tmp_path / "taken"}
     assert main(["sweep", *(str(places.get(word, word)) for word in words)]) == 2
-    assert capsys.readouterr().err.count("\n") == 1 or "scheduler" in said
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err.count("\n")) == ("", 1)
+    assert said in captured.err
+
+
+def test_the_file_in_the_help_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("COLUMNS", "100")
+        assert main(["sweep", "--help"]) == 0
+    shown = capsys.readouterr().out.partition("A sweep file")[2].partition("Examples")[0]
+    (tmp_path / "help.toml").write_text(shown, encoding="utf-8")
+    assert read_sweep(tmp_path / "help.toml").size == 2 * 3 * 3 * 10
 
 
 def test_the_summary_of_a_sweep(
