@@ -46,8 +46,9 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
         if len(same) < len(bare):
             other = [run for run in bare if run not in same]
             said.append(
-                f"Left out, since unlike frequencies at equal wind show more than one spring, and these are not known "
-                f"to have that of the rest: {_ids(other)}. State spring_stiffness, or diagnose these by themselves."
+                f"Left out, since unlike frequencies at equal wind show more than one spring, and these are not "
+                f"known to have that of the rest: {_ids(other)}. State spring_stiffness, or diagnose these by "
+                f"themselves."
             )
         kept = same
     order = {run.id for run in kept}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.least_squares import fit, normal_equations, sensitivities
-from diagnosis.next_run import separating_run
+from diagnosis.next_run import planned_run, separating_run, separation
 from diagnosis.problem import Point, Problem
 from diagnosis.start import leads
 from tests.unit.gap_campaigns import campaign, nominal
@@ -58,6 +58,70 @@ def test_a_model_is_not_told_from_itself(rivals):
     found = separating_run(rivals[0], rivals[0])
     assert found is not None
     assert found["separation"] == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.fixture(scope="module")
+def shedding():
+    """A fit with vortices, whose phase every run has of its own, and the same with the phases elsewhere."""
+    base = nominal(campaign())
+    problem = Problem(base.problem.data, (effect_class("vortex_shedding"),))
+    values = {"vortex_shedding.amplitude": 0.01, "vortex_shedding.strouhal_number": 0.03}
+    common = np.append(base.point.common, [values[name] for name in problem.effect_names])
+
+    def at(phase):
+        release = np.column_stack([base.point.release, np.full(len(base.problem.data.runs), phase)])
+        return replace(base, problem=problem, point=Point(common, release))
+
+    return base, at
+
+
+@pytest.mark.parametrize("phase", [0.0, 2.0])
+def test_phases_that_every_run_has_of_its_own_separate_nothing(shedding, phase):
+    """The fitted phases belong to the runs made: the same model with others is the same model."""
+    base, at = shedding
+    run = planned_run(base, spring_stiffness=16.12, wind_speed=20.0, air_density=1.2, duration=10.0)
+    assert separation(at(0.0), at(phase), run, 0.35) == pytest.approx(0.0, abs=1e-3)
+    assert separation(at(phase), base, run, 0.35) == pytest.approx(separation(at(0.0), base, run, 0.35))
+    assert separation(base, at(phase), run, 0.35) > 5.0
+
+
+def test_a_rival_s_phase_is_refitted(shedding):
+    """Two sizes of the same vortices differ by the difference, never by the sum, whatever the phases."""
+    base, at = shedding
+    run = planned_run(base, spring_stiffness=16.12, wind_speed=20.0, air_density=1.2, duration=10.0)
+    weak, strong = at(0.0), at(0.0)
+    column = weak.problem.names.index("vortex_shedding.amplitude")
+    common = strong.point.common.copy()
+    common[column] *= 1.5
+    strong = replace(strong, point=Point(common, strong.point.release))
+    alone = separation(base, weak, run, 0.35)
+    assert separation(weak, strong, run, 0.35) == pytest.approx(0.5 * alone, rel=0.05)
+
+
+def test_the_separation_is_the_least_over_the_rival_s_phases(shedding):
+    """Vortices of another Strouhal number drift apart by a radian: a search over phases finds as much."""
+    base, at = shedding
+    run = planned_run(base, spring_stiffness=16.12, wind_speed=20.0, air_density=1.2, duration=10.0)
+    first, second = at(0.0), at(0.0)
+    common = second.point.common.copy()
+    common[second.problem.names.index("vortex_shedding.strouhal_number")] += (
+        0.5 * 0.225 / (20.0 * np.pi * 10.0)
+    )
+    second = replace(second, point=Point(common, second.point.release))
+
+    def reading(one, phase, angle=0.35, rate=0.0):
+        problem = Problem(one.problem.data.with_runs((run,)), one.problem.effects)
+        point = Point(one.point.common, np.array([[angle, rate, phase]]))
+        return problem.predict([point])[0][0] / np.sqrt(run.noise_variance)
+
+    release = [reading(second, 0.0, 0.3501), reading(second, 0.0, rate=1e-3)]
+    slopes = np.stack([moved - reading(second, 0.0) for moved in release], axis=1)
+    misses = []
+    for phase in np.arange(-1.5, 1.5, 0.05):
+        change = reading(first, 0.0) - reading(second, phase)
+        misses.append(np.linalg.norm(change - slopes @ np.linalg.lstsq(slopes, change)[0]))
+    assert misses[30] > 1.3 * min(misses)  # at the phases of the runs made
+    assert separation(first, second, run, 0.35) == pytest.approx(min(misses), rel=0.1)
 
 
 def test_runs_without_stiffness_propose_none():
