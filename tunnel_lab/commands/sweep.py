@@ -59,7 +59,7 @@ def run(
       sensor.noise_std = [0.0002, 0.0005, 0.002]   # rad
       effects = [
         { name = "none" },
-        { name = "coulomb_friction", parameters.friction_moment = [0.002, 0.004] },
+        { name = "mains_hum", parameters.amplitude = [1e-4, 1e-3] },   # rad
       ]
 
     [bold]Examples[/bold]
