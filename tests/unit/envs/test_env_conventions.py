@@ -20,6 +20,7 @@ from gymnasium.wrappers import RecordEpisodeStatistics, RecordVideo, TimeLimit
 import tunnel_sim.envs.rendering as rendering
 from tunnel_sim.envs import register_environments
 from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs.handover import campaign_of
 from tunnel_sim.envs.rendering import RigView
 from tunnel_sim.rig import load_rig
 
@@ -257,3 +258,17 @@ def test_environments_can_be_copied_and_made_from_their_spec() -> None:
     again = gymnasium.make(copy.deepcopy(env.spec))
     assert again.unwrapped.config == env.unwrapped.config
     assert gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json()) == env.spec
+
+
+def test_finished_runs_become_a_campaign_with_ids_of_their_own() -> None:
+    env = make(duration=0.1, noise_std=0.001)
+    options = {"spring": 5, "wind_speed": 0.0, "release_angle": 0.2}
+    runs = [episode(env, seed=seed, options=options)[2]["run"] for seed in (1, 2)]
+    runs.append(episode(env, seed=3, options=options | {"wind_speed": 12.0})[2]["run"])
+    campaign = campaign_of(runs, env.unwrapped, name="three")
+    assert [run.id for run in campaign.runs] == ["k16.12-v0-a11.5-1", "k16.12-v0-a11.5-2", "k16.12-v12-a11.5"]
+    assert [run.air_density for run in campaign.runs] == [None, None, 1.204]
+    assert campaign.sensor.noise_std == 0.001
+    assert campaign.rig.yaw_inertia == env.unwrapped.rig.dynamics.yaw_inertia
+    with pytest.raises(EnvError, match="no run is given"):
+        campaign_of([], env.unwrapped)
