@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import ClassVar
 
@@ -83,13 +84,18 @@ class WindowReading:
         window: where it lies.
         zeta: damping ratio.
         omega_n: natural frequency, rad/s.
-        noise: covariance of (ζ, ωn) from the reading's noise, shape (2, 2).
+        noise: how the samples' noise, in standard deviations, makes errors of ζ and ωn, shape (2, n).
     """
 
     window: ThreeCycles
     zeta: float
     omega_n: float
     noise: Array
+
+    @property
+    def variances(self) -> Array:
+        """Of ζ and ωn, from the reading's noise: shape (2,)."""
+        return np.asarray(np.sum(self.noise**2, axis=1))
 
 
 def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None:
@@ -108,9 +114,9 @@ def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None
     if float(np.sqrt(np.mean((inputs - clean) ** 2))) > _UNLIKE:
         return None
     omega_n = float(networks.omega_n(np.array([zeta]), np.array([window.t3]))[0])
-    covariance = window.noise.covariance(window.shape, networks.damping.input_gradient(inputs))
+    weights = window.noise.weights(window.shape, networks.damping.input_gradient(inputs))
     slopes = np.array([[1.0, 0.0], networks.omega_slopes(zeta, window.t3)])
-    return WindowReading(window, zeta, omega_n, slopes @ covariance @ slopes.T)
+    return WindowReading(window, zeta, omega_n, slopes @ weights)
 
 
 def read_windows(run: Run, sensor: SensorProperties, networks: Networks) -> tuple[list[WindowReading], float]:
@@ -141,10 +147,8 @@ def _identified(
     if not readings:
         short = 0.0 < cycles < CYCLES
         return RunEstimate(run.id, (Status.TOO_FEW_CYCLES if short else Status.NO_OSCILLATION,)), None
-    zeta, zeta_std, departs = _average([one.zeta for one in readings], [one.noise[0, 0] for one in readings])
-    omega, omega_std, drifts = _average(
-        [one.omega_n for one in readings], [one.noise[1, 1] for one in readings]
-    )
+    zeta, zeta_std, departs = _average(np.array([one.zeta for one in readings]), _covariance(readings, 0))
+    omega, omega_std, drifts = _average(np.array([one.omega_n for one in readings]), _covariance(readings, 1))
     if not networks.trained_for(zeta, omega):
         return RunEstimate(run.id, (Status.OUTSIDE_TRAINING,)), None
     own_zeta, own_omega = networks.own_stds(zeta, readings[0].window.t3)
@@ -175,18 +179,32 @@ def _identified(
     return estimate, paired
 
 
-def _average(values: Sequence[float], variances: Sequence[float]) -> tuple[float, float, bool]:
+def _covariance(readings: Sequence[WindowReading], row: int) -> Array:
+    # Of one quantity over the windows: neighbours share the crossing between them, and its noise.
+    covariance = np.diag([one.variances[row] for one in readings])
+    for place, (one, other) in enumerate(pairwise(readings)):
+        offset = other.window.noise.first - one.window.noise.first
+        shared = one.noise.shape[1] - offset
+        if shared > 0:
+            common = float(one.noise[row, offset:] @ other.noise[row, :shared])
+            covariance[place, place + 1] = covariance[place + 1, place] = common
+    return covariance
+
+
+def _average(values: Array, covariance: Array) -> tuple[float, float, bool]:
     # Weighted mean, its standard deviation, widened where the windows scatter beyond chance, and whether they do.
-    value, variance = np.array(values), np.array(variances)
-    weights = 1.0 / variance
-    mean = float(weights @ value / weights.sum())
-    std = float(1.0 / np.sqrt(weights.sum()))
-    if value.size < _LEAST_FOR_SCATTER:
+    weights = 1.0 / np.diag(covariance)
+    weights = weights / weights.sum()
+    mean = float(weights @ values)
+    std = float(np.sqrt(weights @ covariance @ weights))
+    if values.size < _LEAST_FOR_SCATTER:
         return mean, std, False
-    scatter = float(np.sum((value - mean) ** 2 * weights))
-    chance = _TOLERANCE * float(chi2.isf(0.5 * FALSE_ALARM_RATE, value.size - 1))
+    inverse = np.linalg.inv(covariance)
+    away = values - float(inverse.sum(axis=0) @ values) / float(inverse.sum())
+    scatter = float(away @ inverse @ away)
+    chance = _TOLERANCE * float(chi2.isf(0.5 * FALSE_ALARM_RATE, values.size - 1))
     departs = scatter > chance
-    return mean, std * float(np.sqrt(scatter / (value.size - 1))) if departs else std, departs
+    return mean, std * float(np.sqrt(scatter / (values.size - 1))) if departs else std, departs
 
 
 def _shown(reading: WindowReading, networks: Networks) -> WindowEstimate:
@@ -203,9 +221,9 @@ def _shown(reading: WindowReading, networks: Networks) -> WindowEstimate:
         amplitude=Quantity(amplitude, level / unit * middle, "rad"),
         omega_n=Quantity(
             reading.omega_n,
-            float(np.hypot(np.sqrt(reading.noise[1, 1]), own_omega * reading.omega_n)),
+            float(np.hypot(np.sqrt(reading.variances[1]), own_omega * reading.omega_n)),
             "rad/s",
         ),
-        zeta=Quantity(zeta, float(np.hypot(np.sqrt(reading.noise[0, 0]), own_zeta)), "1"),
+        zeta=Quantity(zeta, float(np.hypot(np.sqrt(reading.variances[0]), own_zeta)), "1"),
         cycles=CYCLES,
     )

@@ -64,27 +64,28 @@ class Propagation:
         points: weights of the samples in the 100 points, shape (100, n).
         timing: weights of the samples in t0 and t3, s/rad, shape (2, n).
         by_timing: how the points move with t0 and t3, rad/s, shape (100, 2).
+        first: index of the first sample that has a weight.
     """
 
     std: float
     points: Array
     timing: Array
     by_timing: Array
+    first: int
 
-    def covariance(self, shape: Shape, gradient: Array) -> Array:
-        """Covariance of (ζ, t3) from the noise.
+    def weights(self, shape: Shape, gradient: Array) -> Array:
+        """How the samples' noise, in standard deviations, makes errors of ζ and t3.
 
         Args:
             shape: the window's.
             gradient: of ζ by the network's inputs, shape (100,).
 
         Returns:
-            Shape (2, 2), in 1, s and s².
+            Shape (2, n), in 1 and s.
         """
         pulled = shape.pull_back(gradient)
         zeta = pulled @ self.points + (pulled @ self.by_timing) @ self.timing
-        rows = np.stack((zeta, self.timing[1]))
-        return np.asarray(rows @ rows.T * self.std**2)
+        return np.stack((zeta, self.timing[1])) * self.std
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,6 +267,7 @@ def _window(trace: _Trace, place: _Place) -> ThreeCycles | None:
         sign * _shares(trace, edges, part),
         _timing_weights(trace, place, instants, level_weights, part),
         sign * _by_timing(trace, edges, sign * points, t3),
+        int(first),
     )
     return ThreeCycles(place.start, t3, place.zero, place.decay, shape, noise)
 

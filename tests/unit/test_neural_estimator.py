@@ -105,7 +105,7 @@ def test_noise_reaches_the_results_as_the_propagation_says():
         windows, _ = find_windows(record(0.02, 12.5, cycles=3.6, noise=noise, rng=rng), noise)
         reading = read_window(windows[0], networks)
         values.append((reading.zeta, reading.omega_n))
-        claimed.append(np.sqrt(np.diag(reading.noise)))
+        claimed.append(np.sqrt(reading.variances))
     scatter = np.std(values, axis=0, ddof=1)
     # A standard deviation of 100 values is known to 7 %; three of them.
     np.testing.assert_allclose(np.mean(claimed, axis=0), scatter, rtol=0.22)
