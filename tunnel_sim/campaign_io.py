@@ -127,7 +127,7 @@ def _read_run(folder: Path, run: RunTable, sample_rate: float | None) -> Run:
     path = folder / run.file
     where = run_place(path, run.id)
     _check_inside(folder, path, where)
-    time_s, reading, column = read_table(path, where)
+    time_s, reading, column = read_table(path, where, timed=sample_rate is None)
     if time_s is None:
         if sample_rate is None:
             raise TunnelError(

@@ -9,7 +9,10 @@ from tunnel_sim.errors import TunnelError
 from tunnel_sim.record import Array, Record
 
 STEP_TOLERANCE = 0.01  # of the step, as the campaign format states
-RATE_TOLERANCE = 0.1  # between sample_rate and time_s: far beyond clock errors, short of any change of unit
+# Milliseconds taken for seconds, or kHz for Hz, put a power of a thousand between time_s and sample_rate. Any other
+# rate may be a run's own: sample_rate is for runs without times.
+_TIME_SLIPS = (1e-6, 1e-3, 1e3, 1e6)
+_SLIP_TOLERANCE = 0.1
 MINIMUM_CYCLES = 3.0
 # The count scatters, most where damping is heavy or the sensor drifts; a run of three cycles must pass.
 CYCLE_TOLERANCE = 0.25
@@ -26,7 +29,7 @@ def uniform_times(time_s: Array, sample_rate: float | None, where: str) -> None:
         where: file and run, for messages.
 
     Raises:
-        TunnelError: a step back, a gap, a step that differs by more than 1 %, or a contradicting rate.
+        TunnelError: a step back, a gap, a step that differs by more than 1 %, or times in another unit than s.
     """
     if time_s.size < 2:
         raise TunnelError("only one sample", where=where, remedy="record three cycles or more")
@@ -46,7 +49,8 @@ def uniform_times(time_s: Array, sample_rate: float | None, where: str) -> None:
     uneven = np.flatnonzero(np.abs(steps - step) > allowed)
     if uneven.size:
         raise _uneven(time_s, steps, step, int(uneven[0]), where)
-    if sample_rate is not None and abs(step * sample_rate - 1.0) > RATE_TOLERANCE:
+    ratio = 1.0 if sample_rate is None else step * sample_rate
+    if any(abs(ratio / slip - 1.0) < _SLIP_TOLERANCE for slip in _TIME_SLIPS):
         raise TunnelError(
             f"time_s steps by {step:.6g}, which is {1.0 / step:.6g} Hz if it is seconds, but [sensor] "
             f"sample_rate is {sample_rate:g} Hz",
@@ -74,7 +78,7 @@ def angle_in_radians(yaw: Array, column: str, release_angle: float | None, where
     """Convert a reading to radians and check that its unit was named rightly.
 
     The sensor's zero is free, so half the span of the reading is judged, not its value. More than half a turn
-    is no oscillation about a rest position; a pendulum let go at 2.4 rad is.
+    in ``yaw_rad`` is no oscillation about a rest position; a pendulum let go at 2.4 rad is.
 
     Args:
         yaw: the reading, shape (n,), in the unit its column names.
@@ -90,16 +94,11 @@ def angle_in_radians(yaw: Array, column: str, release_angle: float | None, where
     """
     angle = np.deg2rad(yaw) if column == "yaw_deg" else yaw
     half_span = 0.5 * (float(angle.max()) - float(angle.min()))
-    if not half_span <= np.pi:
-        named = {"yaw_rad": "it looks like degrees", "yaw_deg": "it cannot be degrees of an oscillation"}
-        remedy = {
-            "yaw_rad": "name the column yaw_deg, or convert it to radians",
-            "yaw_deg": "give the angle in degrees, without turns added up",
-        }
+    if column == "yaw_rad" and not half_span <= np.pi:
         raise TunnelError(
-            f"{column} swings by ±{0.5 * (float(yaw.max()) - float(yaw.min())):.4g}: {named[column]}",
+            f"yaw_rad swings by ±{half_span:.4g}: it looks like degrees",
             where=where,
-            remedy=remedy[column],
+            remedy="name the column yaw_deg, or convert it to radians",
         )
     if release_angle and half_span > 0.0:
         ratio = abs(release_angle) / half_span

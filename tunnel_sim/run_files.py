@@ -15,15 +15,17 @@ from tunnel_sim.record import Array, Record
 from tunnel_sim.toml_input import one_line
 
 RUN_FORMATS = ("parquet", "csv")
+_USED = ("time_s", "yaw_rad", "yaw_deg")
 _COLUMNS = "a column yaw_rad or yaw_deg, and time_s unless [sensor] sample_rate is given"
 
 
-def read_table(path: Path, where: str) -> tuple[Array | None, Array, str]:
-    """Read the columns of a run file.
+def read_table(path: Path, where: str, *, timed: bool = False) -> tuple[Array | None, Array, str]:
+    """Read the columns of a run file; others than those of the format are left alone.
 
     Args:
         path: a ``.csv`` or ``.parquet`` file.
         where: file and run, for messages.
+        timed: whether times are needed, as no ``sample_rate`` is stated.
 
     Returns:
         Times in s (None without a column time_s), the reading as written, and the name of its column:
@@ -54,7 +56,7 @@ def read_table(path: Path, where: str) -> tuple[Array | None, Array, str]:
     if not content.strip():
         raise TunnelError("the file is empty", where=where, remedy=f"give it {_COLUMNS}")
     table, first_line = reader(content, where)
-    return _columns(table, first_line, where)
+    return _columns(table, first_line, where, timed=timed)
 
 
 def write_table(record: Record, path: Path) -> None:
@@ -95,11 +97,13 @@ def _read_csv(content: bytes, where: str) -> tuple[pl.DataFrame, int]:
         )
     if len(names) == 1 and re.search(r"[;\t]", names[0]):
         raise TunnelError("not comma-separated", where=where, remedy="put commas between the columns")
-    twice = next((name for name in names if name and names.count(name) > 1), None)
+    twice = next((name for name in names if name in _USED and names.count(name) > 1), None)
     if twice is not None:
         raise TunnelError(f"the column {twice} is there twice", where=where, remedy="leave one of them out")
-    # Nameless columns are kept apart by their position; nobody asks for them.
-    rows.columns = [name or f"(column {i + 1})" for i, name in enumerate(names)]
+    # Other columns that have no name, or share one, are kept apart by their position; nobody asks for them.
+    rows.columns = [
+        name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)
+    ]
     return rows.slice(1), 2
 
 
@@ -116,7 +120,9 @@ def _read_parquet(content: bytes, where: str) -> tuple[pl.DataFrame, int]:
         ) from None
 
 
-def _columns(table: pl.DataFrame, first_line: int, where: str) -> tuple[Array | None, Array, str]:
+def _columns(
+    table: pl.DataFrame, first_line: int, where: str, *, timed: bool
+) -> tuple[Array | None, Array, str]:
     names = table.columns
     if "yaw_rad" in names and "yaw_deg" in names:
         raise TunnelError("both yaw_rad and yaw_deg", where=where, remedy="leave one of them out")
@@ -128,13 +134,12 @@ def _columns(table: pl.DataFrame, first_line: int, where: str) -> tuple[Array | 
             where=where,
             remedy="name the angle's column yaw_rad (radians) or yaw_deg (degrees)",
         )
-    # A time column by another name would silently be replaced by the sample rate, whatever its unit.
     stray = next((name for name in names if name != "time_s" and re.match(r"(?i)t$|time", name)), None)
-    if "time_s" not in names and stray is not None:
+    if timed and "time_s" not in names and stray is not None:
         raise TunnelError(
-            f"unknown column '{one_line(stray, 40)}'",
+            f"no column time_s and no sample_rate, but a column '{one_line(stray, 40)}'",
             where=where,
-            remedy="did you mean 'time_s' (in seconds)? Otherwise leave it out",
+            remedy="did you mean 'time_s' (in seconds)? Otherwise state sample_rate in Hz under [sensor]",
         )
     used = [name for name in ("time_s", column) if name in names]
     table = table.select(used)

@@ -308,13 +308,50 @@ def test_a_decoder_that_panics_is_reported_like_any_broken_file(
     assert "run 'r2': not a readable Parquet file (assertion failed)" in refusal(folder)
 
 
-@pytest.mark.parametrize("rate", ["1000", "0.2"])
-def test_times_that_contradict_the_sample_rate(folder: Path, rate: str) -> None:
+@pytest.mark.parametrize(("rate", "unit"), [("200", 1e3), ("0.2", 1.0), ("200", 1e6)])
+def test_times_or_a_sample_rate_in_another_unit(folder: Path, rate: str, unit: float) -> None:
+    (folder / "runs" / "r1.csv").write_text(csv(TIME * unit, YAW), encoding="utf-8")
     toml = swap("resolution = 0.0005", f"sample_rate = {rate}")
     (folder / "campaign.toml").write_text(toml, encoding="utf-8")
     text = refusal(folder)
     for part in ("r1.csv", "run 'r1'", f"sample_rate is {rate} Hz", "seconds"):
         assert part in text
+
+
+@pytest.mark.parametrize("rate", ["1000.0", "190.0", "20.0"])
+def test_a_run_with_times_may_have_a_rate_of_its_own(folder: Path, rate: str) -> None:
+    """``sample_rate`` is for runs without times; where a run has them, they count."""
+    (folder / "campaign.toml").write_text(swap("resolution = 0.0005", f"sample_rate = {rate}"))
+    for run in read_campaign(folder).runs:
+        assert run.record.sample_rate == pytest.approx(200.0)
+        np.testing.assert_array_equal(run.record.time_s, TIME)
+
+
+@pytest.mark.parametrize("name", ["time_ms", "Time", "t"])
+def test_columns_of_other_names_are_left_alone_where_the_rate_is_stated(folder: Path, name: str) -> None:
+    (folder / "campaign.toml").write_text(swap("resolution = 0.0005", "sample_rate = 200.0"))
+    text = GOOD.replace("time_s", name)
+    (folder / "runs" / "r1.csv").write_text(text, encoding="utf-8")
+    (run, _) = read_campaign(folder).runs
+    np.testing.assert_allclose(run.record.time_s, TIME)
+    np.testing.assert_array_equal(run.record.yaw_rad, YAW)
+
+
+def test_further_columns_may_share_a_name_or_hold_text(folder: Path) -> None:
+    lines = [
+        "time_s,force,yaw_rad,force,note",
+        *(f"{t},1,{y},2,rest" for t, y in zip(TIME, YAW, strict=True)),
+    ]
+    (folder / "runs" / "r1.csv").write_text("\n".join(lines), encoding="utf-8")
+    np.testing.assert_array_equal(read_campaign(folder).runs[0].record.yaw_rad, YAW)
+
+
+def test_degrees_may_swing_by_more_than_half_a_turn(folder: Path) -> None:
+    """The format refuses degrees named radians, not large angles named degrees."""
+    wide = csv(TIME, 200.0 * YAW / 0.349, "yaw_deg")
+    (folder / "runs" / "r2.csv").write_text(wide, encoding="utf-8")
+    run = read_campaign(folder).runs[1]
+    np.testing.assert_allclose(run.record.yaw_rad, np.deg2rad(200.0 * YAW / 0.349))
 
 
 @pytest.mark.parametrize(("column", "factor"), [("yaw_rad", 180 / np.pi), ("yaw_deg", 1.0)])

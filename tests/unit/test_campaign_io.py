@@ -270,7 +270,7 @@ def test_a_disk_that_fails_leaves_the_old_campaign_and_no_litter(
         ({"runs": (replace(campaign().runs[0], record=decay(duration=1.0)),)}, "fewer than three"),
         ({"runs": (replace(campaign().runs[0], record=decay(noise=np.nan)),)}, "NaN"),
         ({"name": ""}, "blank"),
-        ({"sensor": SensorProperties(sample_rate=2000.0)}, "sample_rate"),
+        ({"sensor": SensorProperties(sample_rate=0.2)}, "sample_rate"),
     ],
 )
 def test_what_could_not_be_read_is_not_written(
