@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -63,7 +63,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         TunnelError: when an argument is out of range or names what does not exist.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 1}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 1}  # noqa: RUF012
 
     def __init__(
         self,
@@ -177,7 +177,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             info["campaign"] = self.campaign
         return self._observation(), float(reward), done, truncated, info
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """The last run and how far the campaign has come.
 
         Returns:
@@ -248,7 +248,7 @@ def reached(known: Knowledge, targets: tuple[float, float], probability: float) 
     return belief.relative_std("cn_beta") <= targets[0] and belief.relative_std("cn_r") <= targets[1]
 
 
-def _observation_space(conditions: Conditions, max_runs: int) -> spaces.Dict:
+def _observation_space(conditions: Conditions, max_runs: int) -> spaces.Space[Observation]:
     menu = conditions.menu
     stiffest = max(stiffness for _, stiffness in menu.springs)
     highest = [stiffest, max(menu.wind_speeds), max(menu.release_angles), max(menu.durations)]
@@ -263,7 +263,7 @@ def _observation_space(conditions: Conditions, max_runs: int) -> spaces.Dict:
     }
     if conditions.effects:
         parts["probabilities"] = spaces.Box(0.0, 1.0, (len(conditions.effects) + 3,), np.float64)
-    return spaces.Dict(parts)
+    return cast("spaces.Space[Observation]", spaces.Dict(parts))
 
 
 def _checked_severities(

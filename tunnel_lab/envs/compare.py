@@ -126,15 +126,14 @@ def from_csv(text: str) -> list[Row]:
     Args:
         text: of the file.
     """
-    kinds = {"seed": int, "runs": int, "rig_time_s": float, "cn_beta_error": float, "cn_r_error": float}
+    kinds: dict[str, Any] = {"seed": int, "runs": int, "rig_time_s": float}
+    kinds |= {"cn_beta_error": float, "cn_r_error": float}
     flags = ("reached", "on_first", "right")
-    return [
-        Row(**{
-            name: value == "True" if name in flags else kinds.get(name, str)(value)
-            for name, value in line.items()
-        })
-        for line in csv.DictReader(io.StringIO(text))
-    ]  # fmt: skip
+    rows = []
+    for line in csv.DictReader(io.StringIO(text)):
+        values: dict[str, Any] = {name: kinds.get(name, str)(value) for name, value in line.items()}
+        rows.append(Row(**{**values, **{name: line[name] == "True" for name in flags}}))
+    return rows
 
 
 def median_interval(values: Array) -> tuple[float, float, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +54,7 @@ def picture(known: Knowledge, targets: tuple[float, float], probability: float) 
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(WIDTH / _DPI, HEIGHT / _DPI), dpi=_DPI, layout="constrained")
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)  # matplotlib types it in parts only
     left, right = figure.subplots(1, 2)
     _draw_record(left, known)
     if known.conditions.effects:
@@ -89,7 +89,7 @@ def _draw_spread(axes: Axes, known: Knowledge, targets: tuple[float, float]) -> 
         axes.axhline(100.0 * target, color=COLOURS[place], linestyle="--", linewidth=1)
     axes.set_xlabel("runs that tell something")
     axes.set_ylabel("standard deviation [%]")
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.set_xticks(range(0, len(history), 1 + len(history) // 10))
     axes.legend(loc="upper right")
     axes.set_title(f"{known.rig_time / 60.0:.0f} min of rig time; dashed: the goal", fontsize=10)
 

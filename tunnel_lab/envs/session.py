@@ -254,7 +254,7 @@ def probabilities(known: Knowledge) -> Array:
     for answer in known.study.weighed:
         name = answer.effects[0] if len(answer.effects) == 1 else "several"
         found[names.index(name)] += answer.probability
-    return found / found.sum()
+    return np.asarray(found / found.sum())
 
 
 def diagnostic_information(known: Knowledge) -> float:

@@ -222,9 +222,10 @@ def _draw(order: dict[str, Any]) -> None:
     import imageio.v2 as imageio
 
     times = look.frame_times(run.settings.duration)
-    with imageio.get_writer(
+    writer: Any = imageio.get_writer(
         path, format="FFMPEG", mode="I", fps=look.fps, codec="libx264", quality=7, macro_block_size=2
-    ) as writer:
+    )
+    with writer:
         for number, frame in enumerate(frames(run, look, times), 1):
             writer.append_data(frame)
             print(f"{number}/{len(times)}", flush=True)

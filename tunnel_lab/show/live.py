@@ -53,7 +53,7 @@ class LiveRun:
         step()
 
     def _steps(self, seconds: float) -> int:
-        return max(0, round(seconds / self.model.mj.opt.timestep))
+        return max(0, round(seconds / float(self.model.mj.opt.timestep)))
 
     @property
     def angle(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +75,7 @@ def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
 
     figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
     figure.set_layout_engine("constrained", w_pad=0.15, h_pad=0.1)  # inches
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)  # matplotlib types it in parts only
     axes = figure.add_subplot()
     time, angle = record.time_s - record.time_s[0], record.yaw_rad
     (line,) = axes.plot(time, angle, color="0.85", linewidth=1.2)
@@ -99,9 +100,6 @@ def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
     )
 
 
-def _pixels(canvas: object) -> Image:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    assert isinstance(canvas, FigureCanvasAgg)
+def _pixels(canvas: Any) -> Image:
     canvas.draw()
     return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3], dtype=np.uint8)
