@@ -104,11 +104,24 @@ def write_trials(path: Path, results: Results) -> Path:
     """
     import polars as pl
 
-    frame = pl.DataFrame(
-        {name: [row[name] for row in results.rows] for name in _COLUMNS}, schema_overrides=_types()
-    )
+    frame = trials_frame(results)
     told = json.dumps(results.grid.to_json_dict(), sort_keys=True)
     return write_whole(path, parquet(frame.with_columns(pl.lit(told).alias("grid"))))
+
+
+def trials_frame(results: Results) -> pl.DataFrame:
+    """A row for every trial, estimator and quantity.
+
+    Args:
+        results: what to show.
+
+    Returns:
+        Columns as in the rows; ``cell`` is the index of the grid's cell.
+    """
+    import polars as pl
+
+    columns = {name: [row[name] for row in results.rows] for name in _COLUMNS}
+    return pl.DataFrame(columns, schema_overrides=_types())
 
 
 def read_trials(path: Path) -> Results:

@@ -30,11 +30,12 @@ ABOUT = (
 _SHOWN_WORSE = 12
 
 
-def summary_tables(results: Results) -> list[Table]:
+def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
     """One table for each kind of cell, all cells of it taken together.
 
     Args:
         results: a finished score.
+        times: whether to show what a record takes, too.
 
     Returns:
         Tables with a section for each estimator and a row for each quantity.
@@ -49,7 +50,7 @@ def summary_tables(results: Results) -> list[Table]:
             right=("worst",),
         )
         for name in results.estimators:
-            _section(one, results, name, cells)
+            _section(one, results, name, cells, times=times)
             for quantity in results.grid.cells[cells[0]].quantities:
                 one.add_row(
                     f"  {NAMES[quantity]}", *_summary([trials[name, cell, quantity] for cell in cells])
@@ -58,13 +59,14 @@ def summary_tables(results: Results) -> list[Table]:
     return found
 
 
-def _section(one: Table, results: Results, name: str, cells: Sequence[int]) -> None:
+def _section(one: Table, results: Results, name: str, cells: Sequence[int], *, times: bool = True) -> None:
     """The estimator's name and its time."""
     if one.row_count:
         one.add_section()
     one.columns[0].no_wrap = True
     one.add_row(Text(name, style="bold"))
-    one.add_row("  ms/record", significant(results.milliseconds(name, cells), 2))
+    if times:
+        one.add_row("  ms/record", significant(results.milliseconds(name, cells), 2))
 
 
 def _summary(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
