@@ -24,7 +24,7 @@ class SpectralPeak:
     prominence: float
 
 
-def psd_peak(record: Record, *, padding: int = _PADDING) -> SpectralPeak:
+def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) -> SpectralPeak:
     """The damped frequency, as the peak of the power spectral density.
 
     The mean is taken off, a Hann window keeps the offset and the negative frequencies from leaking into the
@@ -35,13 +35,16 @@ def psd_peak(record: Record, *, padding: int = _PADDING) -> SpectralPeak:
         record: the reading, n samples, rad against s.
         padding: number of times its length the record is padded to at least; 1 is quicker, and good enough to
             start a fit of many cycles from.
+        falling: whether the window falls from the record's start on, in place of rising first: it then sees a
+            decay that is over long before the record is.
 
     Returns:
         The peak.
     """
     centred = record.yaw_rad - record.yaw_rad.mean()
     size = 1 << int(np.ceil(np.log2(padding * centred.size)))
-    power = np.abs(np.fft.rfft(centred * np.hanning(centred.size), size)) ** 2
+    window = np.hanning(2 * centred.size)[centred.size :] if falling else np.hanning(centred.size)
+    power = np.abs(np.fft.rfft(centred * window, size)) ** 2
     # Below one cycle per record the spectrum holds the offset's remainder, not the oscillation.
     lowest = max(1, int(size / centred.size))
     peak = lowest + int(np.argmax(power[lowest:-1]))

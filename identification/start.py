@@ -50,7 +50,7 @@ def starting_frequency(record: Record) -> float | None:
     Returns:
         Hz; None where the record is constant.
     """
-    frequency = psd_peak(record, padding=8 if record.time_s.size < _LONG else 1).frequency
+    frequency = psd_peak(record, padding=8 if record.time_s.size < _LONG else 1, falling=True).frequency
     return None if frequency == 0.0 or np.ptp(record.yaw_rad) == 0.0 else frequency
 
 
