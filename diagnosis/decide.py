@@ -45,8 +45,8 @@ class Weighed:
 
     Args:
         effects: names, sorted; ``("unknown",)`` for a gap nothing closes.
-        share: of the gap it leaves open, at least 0.
-        probability: among all answers weighed.
+        share: share of the gap it leaves open, at least 0.
+        probability: among all answers weighed, a fraction.
     """
 
     effects: tuple[str, ...]

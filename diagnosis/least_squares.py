@@ -26,8 +26,8 @@ class Fit:
         problem: what was fitted.
         point: the parameter values found.
         residuals: reading minus prediction in noise standard deviations, by run.
-        chi2: sum of their squares, by run.
-        covariance: of the common parameters for the assumed noise, releases eliminated.
+        chi2: sum of their squares, by run, shape (runs,).
+        covariance: of the common parameters for the assumed noise, releases eliminated, shape (common, common).
         jacobian: of the scaled residuals' prediction with respect to the common parameters, by run, shape
             (n, common), and to the run's release, shape (n, 2).
         iterations: Gauss–Newton steps made.
@@ -184,13 +184,29 @@ class _State:
 
 
 def clip(problem: Problem, point: Point) -> Point:
-    """Bring the common parameters inside their bounds."""
+    """Bring the common parameters inside their bounds.
+
+    Args:
+        problem: gives the bounds.
+        point: parameter values.
+
+    Returns:
+        The point, its common parameters clipped.
+    """
     lower, upper = problem.bounds
     return Point(np.clip(point.common, lower, upper), point.release)
 
 
 def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
-    """Reading minus prediction in noise standard deviations, by run."""
+    """Reading minus prediction.
+
+    Args:
+        problem: runs and effects.
+        point: parameter values.
+
+    Returns:
+        Residuals in noise standard deviations, by run, each of the shape of the run's reading.
+    """
     return _scaled(problem, problem.predict([point])[0])
 
 
@@ -207,7 +223,15 @@ def _cost(residuals: list[Array]) -> float:
 
 
 def difference_steps(problem: Problem, common: Array) -> Array:
-    """Steps for finite differences of the common parameters, one way, away from bounds."""
+    """Steps for finite differences of the common parameters, one way, away from bounds.
+
+    Args:
+        problem: gives the parameters and their bounds.
+        common: their values, shape (common,).
+
+    Returns:
+        Steps, shape (common,), each in its parameter's unit.
+    """
     scales = {
         "yaw_inertia": 0.1,
         "stiffness": 10.0,

@@ -35,7 +35,7 @@ class Hum:
         frequency: Hz.
         amplitude: of the fundamental, rad, root mean square over the runs.
         std: its standard deviation, rad.
-        excess: what it adds to the mean squared residual over the noise variance.
+        excess: what it adds to the mean squared residual over the noise variance, a ratio.
     """
 
     frequency: float

@@ -27,7 +27,7 @@ class Outsider:
 
     Args:
         words: what it is.
-        share: of the gap it leaves open.
+        share: share of the gap it leaves open.
     """
 
     words: str

@@ -34,7 +34,7 @@ class Point:
     """A value of every parameter of a problem.
 
     Args:
-        common: parameters common to the runs, in the order of `Problem.names`.
+        common: parameters common to the runs, in the order of `Problem.names`, shape (common,).
         release: of every run its own parameters, shape (runs, own): angle (rad) and rate (rad/s) of the
             sensor's end at the record's start, then the phase (rad) of each periodic effect.
     """
@@ -102,7 +102,7 @@ class Problem:
         """The effects with their parameters.
 
         Args:
-            common: as in `Point`.
+            common: as in `Point`, shape (common,).
 
         Returns:
             One effect per class.
@@ -117,7 +117,7 @@ class Problem:
         """The nominal physics of one run.
 
         Args:
-            common: as in `Point`.
+            common: as in `Point`, shape (common,).
             release: of the run, shape (2,).
             run: conditions.
 
@@ -143,7 +143,7 @@ class Problem:
         """What each effect draws from in one run: its phase.
 
         Args:
-            own: the run's own parameters, a row of ``Point.release``.
+            own: the run's own parameters, a row of ``Point.release``, shape (own,).
 
         Returns:
             One stand-in for a generator per effect.

@@ -36,7 +36,7 @@ class Spectrum:
     """A random moment's spectrum: first order about a centre.
 
     Args:
-        intensity: standard deviation of the moment coefficient.
+        intensity: standard deviation of the moment coefficient, dimensionless.
         bandwidth: corner frequency beside the centre, Hz.
         centre: Hz; 0 for turbulence without one.
         strouhal_number: of a centre that follows the wind on the body's width; 0 where none does.
@@ -54,8 +54,8 @@ class ProcessNoise:
 
     Args:
         spectrum: as fitted.
-        drop: of −2 ln L against white measurement noise alone, wind-on runs.
-        cost: −2 ln L without constants, wind-on runs.
+        drop: of −2 ln L against white measurement noise alone, wind-on runs, dimensionless.
+        cost: −2 ln L without constants, wind-on runs, dimensionless.
         white_excess: mean squared scaled residual minus one of the same samples, without the moment.
         excess: likewise of the scaled innovations.
         innovations: scaled, by wind-on run.

@@ -71,10 +71,11 @@ class Line:
 
     Args:
         parameter: frequency in Hz for the mains, Strouhal number for shedding.
-        drop: of χ² by taking it out of the runs concerned.
-        contrast: drop at the line over the drop beside it (the greatest for the mains, the median for shedding).
+        drop: of χ² by taking it out of the runs concerned, dimensionless.
+        contrast: ratio of the drop at the line to the drop beside it (the greatest for the mains, the median for
+            shedding).
         amplitude: rad at the sensor for the mains, moment coefficient for shedding.
-        phases: of sine, rad, by run; zero for runs not concerned.
+        phases: of sine, rad, by run, shape (runs,); zero for runs not concerned.
         runs: how many runs it was sought in.
     """
 
@@ -188,13 +189,29 @@ def _local_excess(power: Array) -> Array:
 
 
 def resonance(fit: Fit, run_index: int) -> float:
-    """Frequency of a run's free motion in the fitted model, Hz."""
+    """Frequency of a run's free motion in the fitted model.
+
+    Args:
+        fit: parameter values.
+        run_index: of the run.
+
+    Returns:
+        Hz.
+    """
     inertia, _, stiffness = linear_coefficients(fit, run_index)
     return float(np.sqrt(max(stiffness, 1e-12) / inertia) / (2.0 * np.pi))
 
 
 def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
-    """Inertia, damping and stiffness of a run in the fitted model, air included, SI units."""
+    """Inertia, damping and stiffness of a run in the fitted model, air included.
+
+    Args:
+        fit: parameter values.
+        run_index: of the run.
+
+    Returns:
+        kg m², N m s/rad and N m/rad; per unit inertia in normalised form.
+    """
     problem = fit.problem
     run = problem.data.runs[run_index]
     stated = problem.stated(fit.point.common, fit.point.release[run_index], run)

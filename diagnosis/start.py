@@ -76,7 +76,7 @@ class Lead:
     Args:
         problem: the fit with the effect added.
         point: where to start.
-        promise: drop of χ² by linear theory.
+        promise: drop of χ² by linear theory, dimensionless.
         balanced: whether the point comes from the balance of moments.
     """
 
