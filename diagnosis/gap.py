@@ -75,7 +75,7 @@ def offset_p_value(fit: Fit, floor: float = 1.0) -> float:
 
     Args:
         fit: its residuals, in noise standard deviations.
-        floor: power of white noise that counts as chance, in noise variances.
+        floor: power of white noise that counts as chance, a factor on the noise variance.
 
     Returns:
         The p-value, one degree of freedom given to the zero.
@@ -90,7 +90,7 @@ def band_p_values(fit: Fit, floor: float = 1.0) -> tuple[float, ...]:
 
     Args:
         fit: its residuals, in noise standard deviations.
-        floor: power of white noise that counts as chance, in noise variances.
+        floor: power of white noise that counts as chance, a factor on the noise variance.
 
     Returns:
         One p-value per band of `BANDS`; the bands are multiples of each run's own frequency.

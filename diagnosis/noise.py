@@ -73,7 +73,7 @@ def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
     """One-sided periodogram with a window whose leakage stays below the floor.
 
     Args:
-        values: samples.
+        values: samples, shape (n,).
         rate: Hz.
 
     Returns:
@@ -187,11 +187,11 @@ class NoiseTrend:
     """How the noise's level depends on the motion and on time.
 
     Args:
-        amplitude_z: slope of the local noise variance against the squared amplitude, in its standard deviations
-            under steady white noise.
+        amplitude_z: slope of the local noise variance against the squared amplitude, in units of its standard
+            deviation under steady white noise.
         rate_z: likewise against the squared rate.
-        spread: natural logarithm of the local variances' standard deviation over what their quartiles give
-            (of a normal distribution): heavy tails. Skewness alone makes it some 0.1.
+        spread: natural logarithm of the ratio of the local variances' standard deviation to what their quartiles
+            give (of a normal distribution): heavy tails. Skewness alone makes it some 0.1.
         step: of the lattice of the readings, rad.
         judged: whether the sampling is fast enough to tell.
     """

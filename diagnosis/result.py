@@ -14,8 +14,8 @@ class ParameterEstimate:
     """A value with its standard deviation and unit.
 
     Args:
-        value: estimate.
-        std: standard deviation.
+        value: estimate, in the unit given.
+        std: standard deviation, in the unit given.
         unit: of both.
     """
 
@@ -34,7 +34,7 @@ class RunGap:
 
     Args:
         id: of the run.
-        before: mean squared residual over the noise variance, minus one, of the nominal model.
+        before: ratio of mean squared residual to noise variance, minus one, of the nominal model.
         after: likewise with the causes added, predicted from the other runs where it could be held out.
         held_out: whether it could; else ``after`` is that of the fit of all runs.
     """
@@ -51,11 +51,12 @@ class GapSummary:
 
     Args:
         detected: whether the gap is beyond chance.
-        excess_before: of the nominal model, all runs.
-        excess_after: with the causes added, on runs not used for the fit, as far as runs could be held out.
+        excess_before: of the nominal model, all runs, in units of the noise variance.
+        excess_after: with the causes added, on runs not used for the fit, as far as runs could be held out, in
+            units of the noise variance.
         closed: share of the gap closed on runs held out, 0 to 1; of all runs where none could be.
         runs: by run.
-        false_alarm_rate: of the test of detection.
+        false_alarm_rate: of the test of detection, a fraction of the campaigns without a gap.
         p_value: of the strongest test, corrected for the number of tests.
         tests: p-value by name of test.
     """
@@ -99,8 +100,8 @@ class Candidate:
 
     Args:
         effect: name, ``none`` or ``unknown``; two names joined by `` + `` for a pair.
-        probability: that it is the answer.
-        excess_after: with it added, in the fitted runs.
+        probability: that it is the answer, a fraction.
+        excess_after: with it added, in the fitted runs, in units of the noise variance.
         closed: share of the gap it closes there.
         parameters: its fitted parameters by name (``effect.parameter`` for a pair).
     """

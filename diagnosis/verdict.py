@@ -33,10 +33,10 @@ def verdict(
 
     Args:
         causes: names; empty for no gap.
-        before: excess of the nominal model.
-        after: excess on held-out runs with the causes added.
+        before: excess of the nominal model, in units of the noise variance.
+        after: excess on held-out runs with the causes added, in units of the noise variance.
         closed: share of the gap closed there.
-        probability: of the answer.
+        probability: of the answer, a fraction.
         held_out: whether any run could be held out; else ``after`` and ``closed`` are those of the fitted runs.
 
     Returns:

@@ -45,10 +45,10 @@ class Explanation:
         omega_n: base natural frequency, that of the linear model they are added to, rad/s.
         zeta: base damping ratio.
         columns: as simulated and windowed.
-        chi2_zeta: sum of squared residuals of the ζ column over its scatter².
+        chi2_zeta: sum of squared residuals of the ζ column over its scatter², dimensionless.
         chi2_omega: likewise of the ωn column.
-        bic: Bayesian information criterion.
-        probability: among the hypotheses weighed, all equally likely before.
+        bic: Bayesian information criterion, dimensionless.
+        probability: among the hypotheses weighed, all equally likely before, a fraction.
     """
 
     effects: tuple[Effect, ...]
@@ -104,7 +104,7 @@ class WindowDiagnosis:
         """The hypothesis that holds just these effects.
 
         Args:
-            *names: of its effects, in any order; none is the linear model.
+            names: of its effects, in any order; none is the linear model.
 
         Returns:
             Its fit.

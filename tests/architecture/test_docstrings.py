@@ -16,7 +16,7 @@ from typing import Any
 import pydantic
 import pytest
 
-PACKAGES = ("tunnel_sim", "identification", "tunnel_lab")
+PACKAGES = ("tunnel_sim", "identification", "diagnosis", "tunnel_lab")
 # Typer turns the arguments of a command into its help; test_cli.py reads that.
 COMMANDS = {
     f"tunnel_lab.commands.{name}.run"
