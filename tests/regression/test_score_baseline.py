@@ -1,0 +1,57 @@
+"""No estimator is worse than when its baseline was stored, beyond sampling error; a spoilt one is caught.
+
+Truth: the forward integrator. Who changes an estimator on purpose writes the baseline anew, see score-grid.toml;
+``tunnel score --check packaged`` is the same on the full grid.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.estimators import ALL_ESTIMATORS
+from tunnel_lab.scoring.check import check
+from tunnel_lab.scoring.grid import load_grid
+from tunnel_lab.scoring.packaged import packaged_baseline
+from tunnel_lab.scoring.results import Results, read_trials
+from tunnel_lab.scoring.work import score_grid
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="module")
+def baseline():
+    return read_trials(HERE / "score-baseline.parquet")
+
+
+@pytest.fixture(scope="module")
+def now(baseline):
+    rows = score_grid(baseline.grid, baseline.estimators, jobs=0)
+    return Results(baseline.grid, baseline.estimators, tuple(rows))
+
+
+def test_the_baselines_are_of_all_estimators_and_of_their_grids(baseline):
+    assert set(baseline.estimators) == set(packaged_baseline().estimators) == set(ALL_ESTIMATORS)
+    assert baseline.grid == load_grid(HERE / "score-grid.toml")
+
+
+def test_no_estimator_got_worse(baseline, now):
+    verdict = check(baseline, now)
+    assert verdict.worse == ()
+
+
+@pytest.mark.parametrize("name", ALL_ESTIMATORS)
+def test_an_estimator_that_is_spoilt_is_caught(baseline, now, name):
+    """Its ζ gets noise of four of its own standard deviations."""
+    rng = np.random.default_rng(2)
+
+    def spoil(row):
+        if row["quantity"] != "zeta" or row["value"] is None:
+            return row
+        return row | {"value": row["value"] + 4.0 * row["std"] * rng.standard_normal()}
+
+    mine = tuple(row for row in now.rows if row["estimator"] == name)
+    assert check(baseline, replace(now, estimators=(name,), rows=mine)).passed
+    spoilt = replace(now, estimators=(name,), rows=tuple(map(spoil, mine)))
+    assert {finding.quantity for finding in check(baseline, spoilt).worse} == {"zeta"}
