@@ -192,11 +192,8 @@ def pace_table(found: Sequence[Pace]) -> Table:
     """
     result = table("Time per run", "step", "median [ms]", "quartiles [ms]", right=("median [ms]",))
     for one in found:
-        result.add_row(
-            one.step,
-            significant(one.milliseconds, 3),
-            f"{significant(one.low, 3)} to {significant(one.high, 3)}",
-        )
+        middle, low, high = (significant(1e3 * value, 3) for value in (one.middle, one.low, one.high))
+        result.add_row(one.step, middle, f"{low} to {high}")
     return result
 
 

@@ -167,13 +167,13 @@ class Pace:
 
     Args:
         step: ``simulate``, an estimator's name or ``pack``.
-        milliseconds: per run, median over the shards.
-        low: their lower quartile, milliseconds.
-        high: their upper quartile, milliseconds.
+        middle: median over the shards, s per run.
+        low: their lower quartile, s per run.
+        high: their upper quartile, s per run.
     """
 
     step: str
-    milliseconds: float
+    middle: float
     low: float
     high: float
 
@@ -189,7 +189,7 @@ def paces(store: Store) -> Sequence[Pace]:
     """
     import polars as pl
 
-    each = 1e3 * pl.col("seconds") / pl.col("runs")
+    each = pl.col("seconds") / pl.col("runs")
     table = (
         store.scan(TIMINGS)
         .group_by("step", maintain_order=True)
