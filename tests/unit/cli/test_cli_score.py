@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import signal
+import subprocess
+import sys
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -158,3 +163,32 @@ def test_a_baseline_of_other_cells_or_of_a_vanished_estimator_is_refused(
     status, _, err = tunnel("score", grid, "--check", tmp_path / "gone.parquet", "--jobs", "0")
     assert status == 2
     assert "gone_one, which the registry does not" in err
+
+
+@pytest.mark.slow
+def test_an_interrupted_score_keeps_what_is_done_and_goes_on(
+    tunnel: Tunnel, grid: Path, tmp_path: Path
+) -> None:
+    """A real process with two children, interrupted by a real signal."""
+    out = tmp_path / "scores"
+    command = ["score", str(grid), "--estimator", "matrix_pencil", "--trials", "400", "--out", str(out)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "tunnel_lab.cli", *command], stderr=subprocess.PIPE, text=True
+    ) as process:
+        until = time.monotonic() + 120.0
+        while len(list(out.glob("parts/*.json"))) < 4 and time.monotonic() < until:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.startswith("tunnel: interrupted")
+    kept = {path: path.read_bytes() for path in out.glob("parts/*")}
+    assert 4 <= len(kept) < 320
+    assert all(path.suffix == ".json" for path in kept)
+    changed = min(kept)
+    document = json.loads(kept[changed])
+    document["rows"][0]["value"] = 0.0101  # shows afterwards that it was not estimated again
+    changed.write_text(json.dumps(document))
+    assert tunnel(*command)[0] == 0
+    assert not (out / "parts").exists()
+    assert 0.0101 in pl.read_parquet(out / "trials.parquet")["value"].to_list()
