@@ -35,7 +35,7 @@ class DrivenFit:
         model: decay and random moment.
         covariance: of (a, k, ln q), shape (3, 3).
         innovations: at the maximum.
-        drop: of −2 ln L against no random moment at all.
+        drop: of −2 ln L against no random moment at all, dimensionless.
     """
 
     model: Driven

@@ -55,7 +55,7 @@ class Innovations:
     Args:
         values: shape (n,), rad.
         variance: that they should have, rad².
-        cost: −2 ln L but for a constant.
+        cost: −2 ln L but for a constant, dimensionless.
     """
 
     values: Array

@@ -14,16 +14,13 @@ _WIDTH = 78
 _INDENT = "  "
 
 
-class CommandWithEstimators(TyperCommand):
-    """A command whose help lists the estimators; the registry is read when the help is asked for."""
+def command_with_estimators() -> type[TyperCommand]:
+    """The kind of command whose help lists the estimators; the registry is read when the help is asked for."""
+    return _CommandWithEstimators
 
+
+class _CommandWithEstimators(TyperCommand):
     def format_help(self, ctx: typer.Context, formatter: object) -> None:  # type: ignore[override]  # click's own types
-        """Write the help, with the list in its place.
-
-        Args:
-            ctx: of the call.
-            formatter: that writes it.
-        """
         if self.help and PLACE in self.help:
             self.help = self.help.replace(f"{_INDENT}{PLACE}", listing()).replace(PLACE, listing().lstrip())
         super().format_help(ctx, formatter)  # type: ignore[arg-type]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tunnel_lab.estimator_help import CommandWithEstimators
+from tunnel_lab.estimator_help import command_with_estimators
 
 if TYPE_CHECKING:
     from identification.budget import Budget
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tunnel_sim.campaign import Campaign
 
 NAME = "identify"
-COMMAND = CommandWithEstimators
+COMMAND = command_with_estimators()
 FEW_RUNS = 3
 """Up to this many runs, the windows are shown without being asked for."""
 
