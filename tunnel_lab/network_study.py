@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.stats import chi2
@@ -158,13 +159,15 @@ def noise_row(
 def _bounds(zeta: float, omega_n: float, noise: float, time: Array, angle: float) -> tuple[float, float]:
     # Of ζ: from the whole record, and from three cycles after its first zero crossing.
     root = float(np.sqrt(1.0 - zeta**2))
-    shape = {"frequency": omega_n * root / (2.0 * np.pi), "zeta": zeta, "noise_std": noise}
+    bound = partial(
+        damped_sinusoid_bound, frequency=omega_n * root / (2.0 * np.pi), zeta=zeta, noise_std=noise
+    )
     lag = -float(np.arctan2(zeta, root))
-    whole = damped_sinusoid_bound(time, amplitude=angle / root, phase=lag, **shape)
+    whole = bound(time, amplitude=angle / root, phase=lag)
     crossing = (0.5 * np.pi - lag) / (omega_n * root)
     size = angle / root * float(np.exp(-zeta * omega_n * crossing))
     t3 = 6.0 * np.pi / (omega_n * root)
-    three = damped_sinusoid_bound(time[time < t3], amplitude=size, phase=-0.5 * np.pi, **shape)
+    three = bound(time[time < t3], amplitude=size, phase=-0.5 * np.pi)
     return whole.zeta, three.zeta
 
 

@@ -118,15 +118,16 @@ def _network(tensors: Mapping[str, Array], name: str) -> Network:
         raise ValueError(name)
     if not all(np.all(np.isfinite(value)) for value in values.values()):
         raise ValueError(name)
-    scalings = [
+    inputs, output = (
         Scaling(tuple(values[end][0].tolist()), tuple(values[end][1].tolist()))
         for end in ("inputs", "output")
-    ]
+    )
     return Network(
-        SIZES[name],
-        values["weights"],
-        *scalings,
-        values["directions"],
-        values["precision"],
-        float(values["prior_precision"][0]),
+        sizes=SIZES[name],
+        weights=values["weights"],
+        inputs=inputs,
+        output=output,
+        directions=values["directions"],
+        precision=values["precision"],
+        prior_precision=float(values["prior_precision"][0]),
     )

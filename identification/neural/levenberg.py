@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -125,6 +125,11 @@ def one_thread() -> Iterator[None]:
         torch.set_num_threads(threads)
 
 
+def _layers(weights: Tensor, sizes: tuple[int, ...]) -> list[tuple[Tensor, Tensor]]:
+    # Slicing and reshaping are torch's as they are NumPy's.
+    return cast("list[tuple[Tensor, Tensor]]", split(cast("Array", weights), sizes))
+
+
 def outputs_and_jacobian(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor) -> tuple[Tensor, Tensor]:
     """The network's outputs and their derivatives by the weights, in closed form.
 
@@ -138,7 +143,7 @@ def outputs_and_jacobian(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor
     """
     import torch
 
-    layers = split(weights, sizes)  # type: ignore[arg-type,type-var]  # slices and shapes are torch's as well
+    layers = _layers(weights, sizes)
     activations = [inputs]
     for matrix, bias in layers[:-1]:
         activations.append(torch.tanh(activations[-1] @ matrix.T + bias))
@@ -157,7 +162,7 @@ def outputs_only(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor) -> Ten
     """The network's outputs, shape (N,); arguments as in `outputs_and_jacobian`."""
     import torch
 
-    layers = split(weights, sizes)  # type: ignore[arg-type,type-var]
+    layers = _layers(weights, sizes)
     hidden = inputs
     for matrix, bias in layers[:-1]:
         hidden = torch.tanh(hidden @ matrix.T + bias)

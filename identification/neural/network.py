@@ -94,7 +94,8 @@ class Network:
         activations = [self.inputs.apply(inputs)]
         for matrix, bias in layers[:-1]:
             activations.append(np.tanh(matrix @ activations[-1] + bias))
-        slope, parts = np.ones(1), []
+        slope: Array = np.ones(1)
+        parts: list[Array] = []
         for (matrix, _), before in zip(reversed(layers), reversed(activations), strict=True):
             parts[:0] = [np.outer(slope, before).ravel(), slope]
             slope = matrix.T @ slope

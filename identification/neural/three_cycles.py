@@ -186,7 +186,7 @@ def _refined(trace: _Trace, place: _Place) -> _Place | None:
     # Crossings, zero and decay by turns; None where the decay is lost in noise.
     number = np.arange(HALVES + 1)
     for _ in range(_ROUNDS):
-        instants = place.start + place.half * number
+        instants = np.asarray(place.start + place.half * number, dtype=np.float64)
         zero, decay = _zero_and_decay(trace, instants)
         if not 0.0 < decay < 1.5:
             return None
@@ -229,7 +229,7 @@ def _fit_rows(trace: _Trace, instant: float, half: float) -> tuple[slice, Array]
     part = slice(low, min(high, trace.time.size))
     # Powers of an abscissa from −1 to 1: the normal equations lose no more than four digits.
     powers = ((trace.time[part] - instant) / (_REACH * half)) ** _EXPONENTS
-    rows = np.linalg.solve(powers @ powers.T, powers)[:2]
+    rows = np.asarray(np.linalg.solve(powers @ powers.T, powers)[:2], dtype=np.float64)
     rows[1] /= _REACH * half
     return part, rows
 
@@ -250,7 +250,7 @@ def _level_weights(trace: _Trace, instants: Array, half: float, part: slice) -> 
 
 
 def _window(trace: _Trace, place: _Place) -> ThreeCycles | None:
-    instants = place.start + place.half * np.arange(HALVES + 1)
+    instants = np.asarray(place.start + place.half * np.arange(HALVES + 1), dtype=np.float64)
     t3 = HALVES * place.half
     edges = place.start + t3 * np.linspace(0.0, 1.0, POINTS + 1)
     sign = 1.0 if place.slope > 0.0 else -1.0

@@ -43,7 +43,9 @@ def printed(codes: list[str], folder: Path) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "count"), [("the-papers-own-gap", 6), ("measured-records", 3)])
+@pytest.mark.parametrize(
+    ("name", "count"), [("the-papers-own-gap", 6), ("measured-records", 3), ("the-papers-networks", 7)]
+)
 def test_shown_output_is_real_output(name: str, count: int, tmp_path: Path) -> None:
     shown = steps(PAGES / f"{name}.md")
     real = printed([code for code, _ in shown], tmp_path)
@@ -53,7 +55,11 @@ def test_shown_output_is_real_output(name: str, count: int, tmp_path: Path) -> N
 
 
 def test_every_page_is_executed() -> None:
-    assert {page.stem for page in PAGES.glob("*.md")} == {"the-papers-own-gap", "measured-records"}
+    assert {page.stem for page in PAGES.glob("*.md")} == {
+        "the-papers-own-gap",
+        "measured-records",
+        "the-papers-networks",
+    }
 
 
 @pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=lambda page: page.stem)
