@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize_scalar
+from scipy.signal.windows import tukey
 from scipy.stats import chi2
 
 from diagnosis.least_squares import Fit
@@ -123,7 +124,9 @@ def _line_power(record: Record, frequency: float) -> float:
 def _remove(record: Record, frequency: float, swells: bool) -> tuple[Record, float, float]:
     """A record without the line and its harmonics, the fundamental's amplitude and the mean square removed."""
     design = np.column_stack([_lines(record, frequency), *([_swell(record, frequency)] if swells else [])])
-    coefficients = _windowed_fit(record, design)
+    # the ends of a swelling hum must be seen to be taken out
+    window = tukey(record.time_s.size, 0.3) if swells else np.hanning(record.time_s.size)
+    coefficients = _windowed_fit(record, design, window)
     wave: Array = design @ coefficients
     amplitude = float(np.hypot(coefficients[0], coefficients[1]))
     return Record(record.time_s, record.yaw_rad - wave), amplitude, float(np.mean(wave**2))
@@ -166,9 +169,8 @@ def _swells(records: list[Record], frequency: float, variance: float) -> bool:
     return count > 0 and power > float(chi2.isf(_SWELL_RATE, count))
 
 
-def _windowed_fit(record: Record, design: Array) -> Array:
+def _windowed_fit(record: Record, design: Array, window: Array) -> Array:
     """Coefficients of the columns; windowed, the slow motion leaks little into a line 40 times its frequency."""
-    window = np.hanning(record.time_s.size)
     return np.asarray(
         np.linalg.lstsq(design * window[:, None], _detrended(record.yaw_rad) * window, rcond=None)[0]
     )

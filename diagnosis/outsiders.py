@@ -2,7 +2,8 @@
 
 An effect of the vocabulary may close most of a gap it has no part in. Where something outside closes it better, the
 answer is `unknown`, with a word on what would explain it. Each outsider is linear in its size, so that the nominal
-fit's own residuals and sensitivities weigh it without a simulation.
+fit's own residuals and sensitivities weigh it without a simulation. A gain that drifts in proportion to time is not
+among them: the damping absorbs it.
 """
 
 from __future__ import annotations
@@ -91,14 +92,8 @@ def _zero_follows_power(motions: list[_Motion]) -> list[list[Array]]:
     return trials
 
 
-def _gain_drifts(motions: list[_Motion]) -> list[list[Array]]:
-    """A gain that changes in proportion to time within every run."""
-    return [[np.linspace(0.0, 1.0, m.angle.size) * m.angle / m.noise for m in motions]]
-
-
 _OUTSIDERS: tuple[tuple[str, Callable[[list[_Motion]], list[list[Array]]]], ...] = (
     ("a sensor zero that follows the power of the motion", _zero_follows_power),
-    ("a sensor gain that drifts within every run", _gain_drifts),
 )
 
 

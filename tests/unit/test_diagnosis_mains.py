@@ -93,3 +93,30 @@ def test_clipped_motions_have_no_hum():
 
 def test_backlash_has_no_hum():
     assert find_hum(nominal(reread(lambda angle: backlash(angle, 3e-3, angle[0])))) is None
+
+
+def swelling(data, amplitude, depth):
+    phases = iter(np.random.default_rng(4).uniform(0.0, 2.0 * np.pi, 2 * len(data.runs)))
+
+    def add(t, y):
+        a, b = next(phases), next(phases)
+        return y + amplitude * (1.0 + depth * np.sin(2.0 * np.pi * 0.4 * t + b)) * np.sin(
+            2.0 * np.pi * 50.0 * t + a
+        )
+
+    return with_records(data, add)
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.5])
+def test_a_hum_that_swells_is_taken_out_too_and_a_steady_one_costs_no_more(depth):
+    clean = decays()
+    data = swelling(clean, 1e-3, depth)
+    cleaned, hum = remove_hum(data, 50.0, NOISE**2)
+    left = [
+        np.mean((a.record.yaw_rad - b.record.yaw_rad) ** 2)
+        for a, b in zip(cleaned.runs, clean.runs, strict=True)
+    ]
+    # what the removed columns take of the noise itself, and at most a hundredth of the hum
+    columns = 2 * 5 + (2 * 7 if depth else 0)
+    noise = columns / clean.runs[0].record.yaw_rad.size * NOISE**2
+    assert np.mean(left) < 3.0 * noise + 0.01 * hum.excess * NOISE**2
