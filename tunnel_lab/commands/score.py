@@ -248,7 +248,7 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
             cases, names, seed, jobs=jobs, parts=parts, progress=lambda n, all_: tell(n, all_, "")
         )
     found = work.biases(rows)
-    show_tables(*(view.breakdown_table(found, quantity) for quantity in view.SHOWN))
+    show_tables(*(one for quantity in view.SHOWN for one in view.breakdown_tables(found, quantity)))
     say(view.ABOUT)
     if out is not None:
         say(f"Written: {write_whole(out / 'breakdown.parquet', parquet(work.breakdown_frame(found)))}")

@@ -26,27 +26,33 @@ ABOUT = (
     "Bias in % of the truth; in brackets in reported standard deviations. Severity: noise powers that the effect "
     "leaves after the nominal refit."
 )
+_SIDE_BY_SIDE = 3  # estimators in one table of a terminal of 80 columns
 _TINY, _HUGE = 1e-3, 1e2  # % at the ends of the colours
 
 
-def breakdown_table(found: Sequence[Bias], quantity: str) -> Table:
-    """The bias of one quantity: effects by rows, estimators by columns.
+def breakdown_tables(found: Sequence[Bias], quantity: str) -> list[Table]:
+    """The bias of one quantity: effects by rows, estimators by columns, three of them side by side.
 
     Args:
         found: of `tunnel_lab.scoring.breakdown.biases`.
         quantity: by name.
 
     Returns:
-        A table with a row for each effect and severity.
+        Tables with a row for each effect and severity.
     """
     mine = [one for one in found if one.quantity == quantity]
     estimators = list(dict.fromkeys(one.estimator for one in mine))
-    result = table(f"Bias of {NAMES[quantity]}", "effect", "×", *estimators, right=("×", *estimators))
     cells = {(one.effect, one.severity, one.estimator): _cell(one) for one in mine}
-    for effect, severity in dict.fromkeys((one.effect, one.severity) for one in mine):
-        row = [cells[effect, severity, name] for name in estimators]
-        result.add_row(Text(effect), f"{severity:g}" if severity else "", *row)
-    return result
+    tables = []
+    for first in range(0, len(estimators), _SIDE_BY_SIDE):
+        some = estimators[first : first + _SIDE_BY_SIDE]
+        one_table = table(f"Bias of {NAMES[quantity]} [%]", "effect", "×", *some, right=("×", *some))
+        one_table.columns[0].no_wrap = True
+        for effect, severity in dict.fromkeys((one.effect, one.severity) for one in mine):
+            row = [cells[effect, severity, name] for name in some]
+            one_table.add_row(Text(effect), f"{severity:g}" if severity else "", *row)
+        tables.append(one_table)
+    return tables
 
 
 def _cell(one: Bias) -> str:
@@ -54,7 +60,7 @@ def _cell(one: Bias) -> str:
     if relative is None:
         return "failed" if one.score.failures.count else "–"
     deviations = "–" if in_stds is None else _compact(in_stds.value)
-    return f"{_compact(relative.value)} % ({deviations}σ)"
+    return f"{_compact(relative.value)} ({deviations}σ)"
 
 
 def _compact(value: float) -> str:
