@@ -331,10 +331,12 @@ def test_many_in_processes_of_their_own_are_the_same():
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_video_can_be_recorded(tmp_path):
-    env = gym.wrappers.RecordVideo(make(**SHORT, max_runs=2, render_mode="rgb_array"), str(tmp_path))
+    env = gym.wrappers.RecordVideo(
+        make(**SHORT, max_runs=2, render_mode="rgb_array"), str(tmp_path / "films")
+    )
     env.reset(seed=0)
     env.step(OFF)
     env.step(ON)
     env.close()
-    (film,) = tmp_path.glob("*.mp4")
+    (film,) = (tmp_path / "films").glob("*.mp4")
     assert film.stat().st_size > 1000

@@ -1,0 +1,88 @@
+"""The pages of the campaign environment: code runs, tables are those of the code, links lead somewhere."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+from test_readme import assert_same
+from test_tutorials import printed, steps
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = DOCS / "reference" / "envs" / "campaign.md"
+TEXT = PAGE.read_text(encoding="utf-8")
+PAGES = (PAGE, DOCS / "campaign-design.md", DOCS / "how-to" / "watch-the-rig.md")
+
+
+def rows(heading: str) -> list[list[str]]:
+    """The tables' rows of a section, without their heads."""
+    section = TEXT.partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
+    lines = [line for line in section.splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if "---" not in line][1:]
+
+
+def test_the_page_has_every_section() -> None:
+    wanted = ["Action", "Observation", "Reward", "Start", "End", "Arguments", "Version history"]
+    assert re.findall(r"^## (.*)$", TEXT, re.MULTILINE) == wanted
+
+
+@pytest.mark.slow
+def test_the_code_runs_and_prints_what_is_shown(tmp_path: Path) -> None:
+    shown = steps(PAGE)
+    real = printed([code for code, _ in shown], tmp_path)
+    assert len(shown) == len(real) == 2
+    for (_, text), output in zip(shown, real, strict=True):
+        assert text.strip()
+        assert_same(text.splitlines(), output.splitlines())
+
+
+def test_the_arguments_are_those_of_the_code() -> None:
+    from tunnel_lab.envs.campaign import CampaignEnv
+
+    table = {
+        name: default.strip("`").replace('"', "'")
+        for names, default, _ in rows("Arguments")
+        for name in re.findall(r"`(\w+)`", names)
+    }
+    parameters = inspect.signature(CampaignEnv.__init__).parameters.values()
+    assert table == {p.name: repr(p.default) for p in parameters if p.name != "self"}
+
+
+def test_the_menus_are_those_of_the_code() -> None:
+    from tunnel_lab.envs.presets import PRESETS
+
+    for _, name, *shown, _ in rows("Action"):
+        key = name.split("`")[1]
+        for preset, values in zip(PRESETS.values(), shown, strict=True):
+            assert [float(value) for value in values.split(",")] == list(getattr(preset, key))
+    words = {name: text for names, _, text in rows("Arguments") for name in re.findall(r"`(\w+)`", names)}
+    for effect, (low, high) in PRESETS["diagnosis"].severities.items():
+        assert f"`{effect}` {low:g} to {high:g}" in words["severities"]
+    assert words["noise_std"].endswith("0.05; 0.01 in the diagnosis preset")
+    assert [preset.noise_std for preset in PRESETS.values()] == [0.05, 0.01]
+    assert [preset.max_runs for preset in PRESETS.values()] == [24, 12]
+
+
+def test_the_truth_is_drawn_as_the_page_says() -> None:
+    from tunnel_lab.envs.truth import MEAN, STD
+
+    shown = {name.strip("`"): (float(mean), float(std)) for _, name, mean, std, _ in rows("Start")}
+    assert shown.pop("sensor_zero") == (0.0, 0.004)
+    assert shown == {name: (MEAN[name], STD[name]) for name in MEAN}
+
+
+def test_the_costs_are_those_of_the_code() -> None:
+    from tunnel_lab.envs.menu import Costs
+
+    costs = Costs()
+    for name in ("setup", "spring_change", "speed_change"):
+        assert f"`{name}` {getattr(costs, name):g} s" in TEXT
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_links_lead_somewhere(page: Path) -> None:
+    links = [link for link in re.findall(r"\]\(([^)]+)\)", page.read_text("utf-8")) if "://" not in link]
+    assert links
+    assert [link for link in links if not (page.parent / link.partition("#")[0]).exists()] == []
