@@ -31,10 +31,9 @@ UNKNOWN_SHARE = 0.2
 PAIR_SHARE = 0.40
 #: A freed form must leave less than this share of what is left without it.
 FORM_SHARE = 0.80
-#: Share of the probability that is spread as if the weights were their cube roots: how often an answer whose weight
-#: is overwhelming was wrong on the tuning sets, where something was at work that neither fits nor rivals know.
-LAPSE = 0.04
-_TEMPERATURE = 3.0
+#: Share of the probability that is spread evenly over all answers: how often one of overwhelming weight was wrong on
+#: the tuning sets, where something was at work that neither fits nor rivals know.
+LAPSE = 0.03
 #: Answers less likely than this are not called rivals.
 RIVAL_PROBABILITY = 0.05
 
@@ -102,13 +101,9 @@ def weigh(
     }
     answers[("unknown",)] = min(UNKNOWN_SHARE, max(outside, 0.0))
     weights[("unknown",)] = _evidence(answers[("unknown",)], floor(()))
-    total, flat = sum(weights.values()), sum(w ** (1.0 / _TEMPERATURE) for w in weights.values())
+    total, even = sum(weights.values()), LAPSE / len(weights)
     found = [
-        Weighed(
-            names,
-            answers[names],
-            (1.0 - LAPSE) * weight / total + LAPSE * weight ** (1.0 / _TEMPERATURE) / flat,
-        )
+        Weighed(names, answers[names], (1.0 - LAPSE) * weight / total + even)
         for names, weight in weights.items()
     ]
     return sorted(found, key=lambda w: -w.probability)
