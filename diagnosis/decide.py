@@ -31,8 +31,8 @@ UNKNOWN_SHARE = 0.2
 PAIR_SHARE = 0.40
 #: A freed form must leave less than this share of what is left without it.
 FORM_SHARE = 0.80
-#: Share of the probability that is spread evenly over all answers: how often one of overwhelming weight was wrong on
-#: the tuning sets, where something was at work that neither fits nor rivals know.
+#: Share of the probability that is spread evenly over all answers: how often one of overwhelming weight was wrong
+#: on the tuning sets, where something was at work that neither fits nor rivals know.
 LAPSE = 0.03
 #: Answers less likely than this are not called rivals.
 RIVAL_PROBABILITY = 0.05
