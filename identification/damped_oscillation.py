@@ -68,20 +68,22 @@ class Decay:
         return cls(zeta * omega_n, omega_n**2)
 
 
-def response_rows(time: Array, decay: Decay) -> Array:
+def response_rows(time: Array, decay: Decay, *, constant: bool = False) -> Array:
     """The four functions of time a decay and its sensitivities are made of.
 
     Args:
         time: times since the initial state, shape (n,), s.
         decay: rate and stiffness.
+        constant: whether a row of ones, the sensor's zero, comes last.
 
     Returns:
-        Rows u [-], s [s], w [s³], t·s [s²], shape (4, n): unit-angle response, unit-rate response, and the
-        two functions of the derivatives.
+        Rows u [-], s [s], w [s³], t·s [s²], shape (4, n) or (5, n): unit-angle response, unit-rate response, and
+        the two functions of the derivatives.
     """
     delta = decay.stiffness - decay.rate**2
-    rows = np.empty((4, time.size))
-    unit, sine, slope, ramp = rows
+    rows = np.empty((5 if constant else 4, time.size))
+    rows[4:] = 1.0
+    unit, sine, slope, ramp = rows[:4]
     cosine, sine[:] = _oscillating(time, decay.rate, delta) if delta >= 0.0 else _creeping(time, decay, delta)
     if delta != 0.0:
         np.multiply(time, cosine, out=slope)

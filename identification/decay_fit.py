@@ -265,7 +265,7 @@ def _project(
 
 
 def _rows(time: Array, decay: Decay) -> Array:
-    return np.vstack((response_rows(time, decay), np.ones_like(time)))
+    return response_rows(time, decay, constant=True)
 
 
 def _local_weights(decay: Decay, angle: float, rate: float) -> Array:

@@ -72,9 +72,8 @@ def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | 
         return None
     vectors = vectors.astype(np.complex128)
     duals = np.linalg.inv(vectors) @ solver
-    gradients = [
-        _gradient(poles[i], duals[i], right @ (vectors[:, i] / sizes)) / (poles[i] * interval) for i in (0, 1)
-    ]
+    images = right.astype(np.complex128) @ (vectors / sizes[:, None])
+    gradients = [_gradient(poles[i], duals[i], images[:, i]) / (poles[i] * interval) for i in (0, 1)]
     stiffness = exponents[0] * exponents[1]
     slope = np.array(
         [

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from tunnel_sim.record import Array, Record
+from tunnel_sim.record import Array, Record, read_only
 
 _PADDING = 8  # zero padding: eight times the record, so the interpolated peak sits within 1/16 of a bin
 
@@ -43,8 +44,7 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
     """
     centred = record.yaw_rad - record.yaw_rad.mean()
     size = 1 << int(np.ceil(np.log2(padding * centred.size)))
-    window = np.hanning(2 * centred.size)[centred.size :] if falling else np.hanning(centred.size)
-    power = np.abs(np.fft.rfft(centred * window, size)) ** 2
+    power = np.abs(np.fft.rfft(centred * _window(centred.size, falling), size)) ** 2
     # Below one cycle per record the spectrum holds the offset's remainder, not the oscillation.
     lowest = max(1, int(size / centred.size))
     peak = lowest + int(np.argmax(power[lowest:-1]))
@@ -53,6 +53,11 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
     place = peak + _parabola_offset(power[peak - 1 : peak + 2])
     median = max(float(np.median(power[lowest:])), 1e-300)
     return SpectralPeak(place * record.sample_rate / size, float(power[peak]) / median)
+
+
+@lru_cache(maxsize=4)  # the runs of a campaign are mostly of one length
+def _window(size: int, falling: bool) -> Array:
+    return read_only(np.hanning(2 * size)[size:] if falling else np.hanning(size))
 
 
 def _parabola_offset(power: Array) -> float:

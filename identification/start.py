@@ -11,7 +11,7 @@ from identification.thinning import mean_of_blocks
 from tunnel_sim.record import Array, Record
 
 _SAMPLES = 1024  # the start is judged on a thinned record; the fit itself sees every sample
-_LONG = 4096  # samples; a longer record is not padded for its spectrum
+_LONG = 4096  # samples that a spectrum to start from needs; a longer record is thinned to them and not padded
 _DAMPING_RATIOS = (0.0, 0.002, 0.006, 0.02, 0.06, 0.2, 0.5)
 
 
@@ -50,7 +50,11 @@ def starting_frequency(record: Record) -> float | None:
     Returns:
         Hz; None where the record is constant.
     """
-    frequency = psd_peak(record, padding=8 if record.time_s.size < _LONG else 1, falling=True).frequency
+    # A block mean hides what has two samples to the cycle or fewer: a record of some two thousand cycles.
+    factor = max(1, record.time_s.size // _LONG)
+    if factor > 1:
+        record = Record(mean_of_blocks(record.time_s, factor), mean_of_blocks(record.yaw_rad, factor))
+    frequency = psd_peak(record, padding=8 if factor == 1 else 1, falling=True).frequency
     return None if frequency == 0.0 or np.ptp(record.yaw_rad) == 0.0 else frequency
 
 

@@ -168,7 +168,11 @@ def buffeted(name, kind, seeds=150):
         zeta, frequency = rng.choice([0.01, 0.02, 0.03]), rng.uniform(1.5, 3.5)
         omega = 2.0 * np.pi * frequency / np.sqrt(1.0 - zeta**2)
         yaw = AMPLITUDE * np.exp(-zeta * omega * clock) * np.cos(2.0 * np.pi * frequency * clock)
-        yaw = yaw + response(random_moment(kind, seed), omega, zeta) + 5e-4 * rng.standard_normal(clock.size)
+        yaw = (
+            yaw
+            + response(random_moment(kind, 10_000 + seed), omega, zeta)
+            + 5e-4 * rng.standard_normal(clock.size)
+        )
         run = method.estimate(single(clock, yaw, 5e-4, wind=20.0)).runs[0]
         errors.append([run.zeta.value - zeta, run.omega_n.value - omega])
         deviations.append([run.zeta.std, run.omega_n.std])
