@@ -22,6 +22,7 @@ from tunnel_sim.run_settings import RunSettings
 
 _FASTEST_TURN = 2.5  # rad of the rod's own oscillation in one step; RK4 is unstable beyond 2.8
 _SERIES = ("wind_speed", "forcing")
+_THINNEST = 1e-3  # width over length: MuJoCo refuses the inertias of a body without any
 _NATIVE = frozenset({"spring_stiffness", "mechanical_damping", "yaw_inertia"})  # owned by joint and body
 
 
@@ -220,7 +221,8 @@ def _set_inertia(body: mujoco.MjsBody, rig: Rig, yaw_inertia: float, mass: float
 
 def _inertia(rig: Rig, yaw_inertia: float) -> tuple[float, float, float]:
     """Principal inertias, kg m²: yaw as given, the others those of a box scaled alike (never in motion)."""
-    length, width, height = rig.body.length, rig.body.width, rig.body.height
+    length, height = rig.body.length, rig.body.height
+    width = max(rig.body.width, _THINNEST * length)
     scale = yaw_inertia / (length**2 + width**2)
     return scale * (width**2 + height**2), scale * (length**2 + height**2), yaw_inertia
 

@@ -70,6 +70,20 @@ def test_every_run_may_have_parameters_of_its_own():
     assert np.max(np.abs(mixed.differences[1])) < 3e-5
 
 
+@pytest.mark.parametrize("inertia", [0.1013999944767101, 0.11, 1.0])
+@pytest.mark.parametrize(
+    "sizes", [(0.036, 0.625, 0.225), (1.0, 1.0, 0.0), (0.036, 0.625, 0.0), (1.0, 3.0, 0.0)]
+)
+def test_campaigns_that_do_not_state_their_sizes_are_predicted_too(sizes, inertia):
+    made = problem()
+    made = dataclasses.replace(
+        made,
+        data=dataclasses.replace(made.data, frontal_area=sizes[0], reference_length=sizes[1], width=sizes[2]),
+    )
+    common = np.array([inertia, DAMPING, 0.02, -0.01, 0.001])
+    assert confirm([compare(made, common, RELEASE)]).agrees
+
+
 def test_what_the_sensor_does_to_samples_is_not_done_to_their_means():
     """A clipped reading bends inside a block; the mean of a block cannot show that by being clipped."""
     found = compare(problem("sensor_clipping"), np.array([*NOMINAL, 0.25]), RELEASE)
