@@ -43,16 +43,23 @@ def test_a_form_bends_the_effect_and_its_default_is_the_textbooks(kind, info) ->
     assert run != bent_run or not np.array_equal(reading, bent_reading)
 
 
-def test_a_drift_follows_a_power_of_time() -> None:
-    assert read("sensor_drift", drift=0.01, exponent=2.0) - ANGLE == pytest.approx(0.01 * (TIME / 10.0) ** 2)
+def settled(time: np.ndarray, constant: float) -> np.ndarray:
+    """A drift over 10 s that settles with a time constant, 1 at the end."""
+    return (1.0 - np.exp(-time / constant)) / (1.0 - np.exp(-10.0 / constant))
 
 
-def test_a_drifting_wind_follows_a_power_of_time() -> None:
-    effect = effect_from("wind_speed_drift", {"drift": 0.1, "exponent": 0.5})
+@pytest.mark.parametrize("constant", [4.0, -5.0])
+def test_a_drift_settles_or_quickens(constant: float) -> None:
+    drifted = read("sensor_drift", drift=0.01, settling=10.0 / constant)
+    assert drifted - ANGLE == pytest.approx(0.01 * settled(TIME, constant), abs=1e-15)
+
+
+def test_a_drifting_wind_settles() -> None:
+    effect = effect_from("wind_speed_drift", {"drift": 0.1, "settling": 2.5})
     series = effect.on_run(STATED, STATED, RNG).series["wind_speed"]
     place = np.arange(len(series.values)) * series.interval
     assert np.array(series.values) == pytest.approx(
-        STATED.wind_speed * (1.0 + 0.1 * np.sqrt(place / 10.0)), rel=1e-12
+        STATED.wind_speed * (1.0 + 0.1 * settled(place, 4.0)), rel=1e-12
     )
     assert place[-1] == pytest.approx(10.0)
 

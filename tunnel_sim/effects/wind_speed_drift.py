@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, exponent, parameter
+from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.ramp import EQUATION, ramp, settling
 from tunnel_sim.run_settings import RunSettings, Series
 
-_SAMPLES = 201  # of a bent ramp, linear in between: within 1e-4 of the drift beyond the first fiftieth
+_SAMPLES = 201  # of a bent ramp, linear in between: within 1e-4 of the drift up to k = 5
 
 
 @dataclass(frozen=True)
@@ -19,27 +20,27 @@ class WindSpeedDrift(Effect):
 
     Args:
         drift: share of the speed gained over the run, dimensionless.
-        exponent: power of time with which it grows, dimensionless; 1 is the textbook's.
+        settling: length of the run over the drift's time constant, dimensionless; 0 is the textbook's ramp.
     """
 
     name = "wind_speed_drift"
     channel = "stiffness"
     condition = "wind_on"
-    equation = "V(t) = V (1 + d t/T) over a run of length T; bent: (t/T)^n"
+    equation = "V(t) = V (1 + d t/T) over a run of length T; bent: " + EQUATION + " for t/T"
     signature = "The frequency of wind-on runs moves with time, whatever the amplitude."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
 
     drift: float = parameter(
         "d", "1", "share of the speed gained over the run", scale=0.02, lower=-0.9, upper=5.0
     )
-    exponent: float = exponent("n", "power of time with which it grows", 1.0)
+    settling: float = settling()
 
     def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
         """Replace the constant wind by a ramp, sampled where it is bent."""
         del rng
         if stated.wind_speed <= 0.0 or self.is_null:
             return run
-        part = np.linspace(0.0, 1.0, 2 if self.exponent == 1.0 else _SAMPLES) ** self.exponent
+        part = ramp(np.linspace(0.0, 1.0, 2 if self.settling == 0.0 else _SAMPLES), self.settling)
         speeds = run.wind_speed * (1.0 + self.drift * part)
-        ramp = Series(tuple(speeds.tolist()), run.duration / (part.size - 1))
-        return dataclasses.replace(run, series={**run.series, "wind_speed": ramp})
+        drifting = Series(tuple(speeds.tolist()), run.duration / (part.size - 1))
+        return dataclasses.replace(run, series={**run.series, "wind_speed": drifting})
