@@ -352,32 +352,6 @@ def _covariance(jacobian: list[tuple[Array, Array]]) -> Array:
     return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64)
 
 
-def fit_releases(problem: Problem, start: Point, slopes: list[Array]) -> list[Array]:
-    """Fit only what each run has of its own: release and phases.
-
-    Args:
-        problem: runs and effects.
-        start: common parameters, which stay, and releases to start from.
-        slopes: derivatives of the scaled prediction to each run's own parameters, shape (n, own), from a fit of
-            about the same parameters.
-
-    Returns:
-        Scaled residuals by run.
-    """
-    point = start
-    residuals = scaled_residuals(problem, point)
-    for _ in range(4):
-        steps = [
-            np.linalg.lstsq(slope, r, rcond=1e-10)[0] for slope, r in zip(slopes, residuals, strict=True)
-        ]
-        point = Point(point.common, point.release + np.stack(steps))
-        moved = scaled_residuals(problem, point)
-        if not _cost(moved) < _cost(residuals) * (1.0 - 1e-6):
-            break
-        residuals = moved
-    return residuals
-
-
 def project_release(change: Array, slopes: Array) -> Array:
     """What of a change of one run's prediction its release cannot absorb.
 

@@ -19,13 +19,18 @@ from tunnel_sim.record import Array
 from tunnel_sim.rig import Rig, load_rig
 from tunnel_sim.run_settings import RunSettings
 
-_LONGEST_STEP = 4.001e-3  # s: RK4 then errs by some 1e-6 rad over 10 s at 2 Hz
+_LONGEST_STEP = 4.001e-3  # s
+_RESOLUTION = 0.055  # rad of the oscillation in one step: RK4 then errs by some 1e-6 rad over 10 s
 _ROD_RESOLUTION = 0.5  # rad of the rod's own oscillation in one step
 _THREADS = 2
 _SOFT_ROD = 2e-5  # rad/(N m): a stiffer rod's ringing at the release stays below the noise
 _PHASED = ("vortex_shedding", "mains_hum")
-#: Bounds tighter than the effect's own: beyond them the rod rings faster than the integrator steps.
-_FIT_BOUNDS = {"rod_flexibility.compliance": (0.0, 0.01), "rod_flexibility.inertia_share": (0.02, 0.9)}
+#: Bounds tighter than the effect's own: beyond them rod or contact move faster than the integrator steps.
+_FIT_BOUNDS = {
+    "rod_flexibility.compliance": (0.0, 0.01),
+    "rod_flexibility.inertia_share": (0.02, 0.9),
+    "coulomb_friction.presliding": (5e-4, 0.2),
+}
 _POOL = ThreadPoolExecutor(_THREADS)
 
 
@@ -271,11 +276,13 @@ def held_end(physics: RunSettings) -> RunSettings:
 
 def _longest_step(physics: RunSettings) -> float:
     twist = physics.rod_twist
+    omega = np.sqrt(physics.spring_stiffness / physics.yaw_inertia)
+    longest = min(_LONGEST_STEP, _RESOLUTION / max(omega, 1e-9))
     if twist is None:
-        return _LONGEST_STEP
+        return float(longest)
     share = twist.inertia_share
     own = np.sqrt(1.0 / (twist.compliance * physics.yaw_inertia * share * (1.0 - share)))
-    return float(min(_LONGEST_STEP, max(_ROD_RESOLUTION / own, 2e-4)))
+    return float(min(longest, max(_ROD_RESOLUTION / own, 2e-4)))
 
 
 def campaign_rig(data: Data) -> Rig:

@@ -222,8 +222,8 @@ def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> F
                     [index],
                     [scale * (quantity.value - truth[name])],
                     yerr=[1.96 * scale * quantity.std],
-                    color=COLOURS[index],
-                    marker=MARKERS[index],
+                    color=COLOURS[index % len(COLOURS)],
+                    marker=MARKERS[index % len(MARKERS)],
                     markersize=7,
                     capsize=5,
                 )

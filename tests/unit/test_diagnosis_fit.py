@@ -12,7 +12,6 @@ from diagnosis.least_squares import (
     clip,
     fit,
     fit_growing,
-    fit_releases,
     normal_equations,
     project_release,
     scaled_residuals,
@@ -183,17 +182,6 @@ def test_a_model_that_grows_without_bound_is_refused():
     wild[1] = -500.0  # mechanical damping
     with pytest.raises(FitError):
         fit(Problem(data), Point(wild, start.release))
-
-
-def test_only_releases_are_fitted_where_only_they_may_move():
-    data = prepared()
-    truth = Truth()
-    common = np.array([truth.yaw_inertia, truth.mechanical_damping, truth.cn_beta, truth.cn_r, 0.004])
-    problem = Problem(data)
-    wrong = Point(common, np.tile([0.31, 0.4], (6, 1)))
-    slopes = [own for _, own in sensitivities(problem, Point(common, np.tile([0.35, 0.0], (6, 1))))]
-    left = fit_releases(problem, wrong, slopes)
-    assert sum(float(r @ r) for r in left) / sum(r.size for r in left) == pytest.approx(1.0, abs=0.1)
 
 
 def test_what_a_release_cannot_absorb_is_orthogonal_to_it():
