@@ -50,37 +50,40 @@ def coefficients(
             p * (other - value) ** 2 for f, p in rivals if (other := _value_only(f, name)) is not None
         )
         rounding = abs(value) * _density_rounding(campaign) if name.startswith("cn_") else 0.0
-        unseen = _unseen_form(fit) if name == "cn_r" else 0.0
+        unseen = _unseen_form(fit, name) if name.startswith("cn_") else 0.0
         variance = std**2 + rounding**2 + unseen**2 + spread
         result[name] = ParameterEstimate(value, math.sqrt(variance), _UNITS[name])
     return result
 
 
-def _unseen_form(fit: Fit) -> float:
-    """Standard deviation of Cnr, 1/rad, from what no free decay shows of a cause's form.
+def _unseen_form(fit: Fit, name: str) -> float:
+    """Standard deviation of Cnβ or Cnr, 1/rad, from what no free decay shows of a cause's form.
 
     To first order a lag is a change a·Cnβ of Cnr, and only its second order is seen: two time constants, as in
     Jones's approximation (NACA Report 681, 1940), have a mean up to a third below the one that fits, and a lead
     mirrors them. A constant loss factor damps by η Kr/ω at the frequency ω of the motion, or by η Kr/ωn of the rig
-    in still air; the runs with wind do not tell which.
+    in still air, and causality may stiffen the spring by (2η/π) ln(ω/ωn) (Crandall, J. Sound Vib. 11 (1970) 3);
+    the runs with wind do not tell which.
     """
     names = {kind.name for kind in fit.problem.effects}
     variance = 0.0
-    if "unsteady_aero_lag" in names:
+    if name == "cn_r" and "unsteady_aero_lag" in names:
         variance += (_LAG_FORM * fit.value("unsteady_aero_lag.lag") * fit.value("cn_beta")) ** 2
-    if "structural_damping" in names:
+    rates = _wind_on_rates(fit) if "structural_damping" in names else []
+    if rates:
         loss = fit.value("structural_damping.loss_factor")
-        shifts = [
-            loss * (stiffness / omega - stiffness / still) / load
-            for stiffness, omega, still, load in _wind_on_rates(fit)
-        ]
-        if shifts:
-            variance += (sum(shifts) / len(shifts)) ** 2 / 3.0  # anywhere between the two
+        if name == "cn_r":
+            shifts = [loss * (k / omega - k / still) / load for k, omega, still, load, _ in rates]
+        else:
+            shifts = [
+                2.0 * loss / math.pi * k * math.log(still / omega) / q for k, omega, still, _, q in rates
+            ]
+        variance += (sum(shifts) / len(shifts)) ** 2 / 3.0  # anywhere between the two
     return math.sqrt(variance)
 
 
-def _wind_on_rates(fit: Fit) -> list[tuple[float, float, float, float]]:
-    """Of every wind-on run Kr, ω, ωn of the rig in still air, and ½ρVAl² that multiplies Cnr."""
+def _wind_on_rates(fit: Fit) -> list[tuple[float, float, float, float, float]]:
+    """Of every wind-on run Kr, ω, ωn of the rig in still air, and ½ρVAl² and ½ρV²Al that multiply Cnr and Cnβ."""
     data = fit.problem.data
     found = []
     for i, run in enumerate(data.runs):
@@ -91,7 +94,8 @@ def _wind_on_rates(fit: Fit) -> list[tuple[float, float, float, float]]:
         if stiffness <= 0.0 or spring <= 0.0:
             continue
         load = 0.5 * run.air_density * run.wind_speed * data.frontal_area * data.reference_length**2
-        found.append((spring, math.sqrt(stiffness / inertia), math.sqrt(spring / inertia), load))
+        omega, still = math.sqrt(stiffness / inertia), math.sqrt(spring / inertia)
+        found.append((spring, omega, still, load, load * run.wind_speed / data.reference_length))
     return found
 
 
