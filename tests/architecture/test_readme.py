@@ -135,3 +135,9 @@ def test_the_measured_campaign_shown_can_be_read(tmp_path: Path) -> None:
     rows = (f"{t:.2f},{0.2 * np.exp(-0.1 * t) * np.cos(6.0 * t):.5f}" for t in time)
     (tmp_path / "runs" / "first-swing.csv").write_text("time_s,yaw_rad\n" + "\n".join(rows) + "\n")
     assert [run.id for run in read_campaign(tmp_path).runs] == ["first-swing"]
+
+
+def test_the_episode_shown_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    (text,) = [text for text in blocks("python") if "gymnasium" in text]
+    exec(compile(text, "README.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("Record(")

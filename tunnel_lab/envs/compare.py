@@ -33,10 +33,11 @@ ARGUMENTS: dict[str, dict[str, Any]] = {
     "identification": {},
     "diagnosis": {
         "severities": {"cubic_stiffness": (0.2, 0.4), "nonlinear_yaw_moment": (4.0, 8.0)},
+        "noise_std": 0.015,
         "max_runs": 8,
     },
 }
-"""What the environments are made with; two rivals instead of four, and fewer runs."""
+"""What the environments are made with; two rivals instead of four, and noise that leaves run one short."""
 _CONFIDENCE = 0.95
 
 
