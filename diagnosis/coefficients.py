@@ -8,7 +8,7 @@ from decimal import Decimal
 
 import numpy as np
 
-from diagnosis.decide import Weighed
+from diagnosis.decide import LAPSE, Weighed
 from diagnosis.held_out import HeldOut
 from diagnosis.least_squares import Fit
 from diagnosis.rank import Hypothesis
@@ -110,13 +110,15 @@ def rival_fits(
         chosen: the fit of the answer.
 
     Returns:
-        Fit and probability of each fitted rival.
+        Fit and probability of each fitted rival, without the lapse: it stands for what nobody thought of, not for
+        a rival the runs refute.
     """
     found = []
+    even = LAPSE / max(len(weighed), 1)
     for answer in weighed:
         for hypothesis in hypotheses:
             if hypothesis.names == answer.effects and hypothesis.fit is not chosen:
-                found.append((hypothesis.fit, answer.probability))
+                found.append((hypothesis.fit, max(answer.probability - even, 0.0)))
     return found
 
 

@@ -12,7 +12,7 @@ from tunnel_lab.formatting import coefficient_label, significant, unit_mark, wit
 if TYPE_CHECKING:
     from rich.table import Table
 
-SHOWN_PROBABILITY = 1e-3
+SHOWN_PROBABILITY = 0.005
 """Answers less probable than this are counted, not listed."""
 
 SHOWN_ANSWERS = 6
