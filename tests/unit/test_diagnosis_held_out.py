@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from diagnosis.coefficients import coefficients, rival_fits
 from diagnosis.data import Data, RunData
-from diagnosis.decide import Weighed
+from diagnosis.decide import LAPSE, Weighed
 from diagnosis.held_out import HeldOut, folds, predict_held_out
 from diagnosis.least_squares import fit
 from diagnosis.rank import Hypothesis
@@ -141,7 +141,9 @@ def test_rivals_are_the_fits_that_were_not_chosen(base, best):
         Weighed(("unknown",), 0.33, 0.05),
     ]
     hypotheses = [Hypothesis((CAUSE,), best), Hypothesis(("free_play",), base)]
-    assert rival_fits(weighed, hypotheses, best) == [(base, 0.15)]
+    ((fit, probability),) = rival_fits(weighed, hypotheses, best)
+    assert fit is base
+    assert probability == pytest.approx(0.15 - LAPSE / 3)  # no less than nothing, and without the lapse
 
 
 def test_normalised_runs_have_frequency_and_damping_ratio(data):
