@@ -17,7 +17,9 @@ class Status(Enum):
         "fewer than the three cycles the networks need after the first zero crossing: lengthen the record, or use "
         "output_error"
     )
-    OUTSIDE_TRAINING = "damping or frequency outside the range the networks were trained for: use output_error, or train others"
+    OUTSIDE_TRAINING = (
+        "damping or frequency outside the range the networks were trained for: use output_error, or train others"
+    )
     RUN_LEFT_OUT = "a run could not be identified and was left out: see the status of the runs"
     MODEL_DEPARTS = "model departs from the data: run the diagnosis; the intervals are widened meanwhile"
     NOISE_DISAGREES = (
