@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from decimal import Decimal
 
 import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from diagnosis.decide import LAPSE, Weighed
 from diagnosis.held_out import HeldOut
@@ -21,10 +23,16 @@ _UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1"}
 _COLOURED = 0.03
 #: Share of a lag's first order, a·Cnβ, by which its form leaves Cnr open.
 _LAG_FORM = 0.2
+#: Share of what freeing the forms has moved a coefficient by that counts as its standard deviation.
+_FORM_MOVES = 0.5
 
 
 def coefficients(
-    fit: Fit, held_out: HeldOut, campaign: Campaign, rivals: Sequence[tuple[Fit, float]] = ()
+    fit: Fit,
+    held_out: HeldOut,
+    campaign: Campaign,
+    rivals: Sequence[tuple[Fit, float]] = (),
+    textbook: Fit | None = None,
 ) -> dict[str, ParameterEstimate]:
     """The coefficients of a fit.
 
@@ -33,12 +41,14 @@ def coefficients(
         held_out: the same without groups of runs.
         campaign: for the digits to which air density is stated.
         rivals: other fits and their probabilities.
+        textbook: the same effects with the textbook's forms, where the fit freed them.
 
     Returns:
         ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` in normalised form. The variance is that of the
-        fit scaled by its excess, or of the delete-a-group jackknife (Kott, J. Off. Stat. 17 (2001) 521) where
-        the residuals are coloured and that is larger, plus the rounding of the air density, plus what the form
-        of a cause leaves open that no free decay shows, plus the spread over rivals.
+        fit scaled by its excess, or where the residuals are coloured the greatest of that, the delete-a-group
+        jackknife (Kott, J. Off. Stat. 17 (2001) 521) and the scatter of the runs; plus the rounding of the air
+        density, plus what the form of a cause leaves open that no free decay shows, plus half of what freeing
+        the forms has moved (another family of forms may move as much), plus the spread over rivals.
     """
     names = ("omega_n", "zeta") if fit.problem.data.normalised else ("cn_beta", "cn_r")
     result = {}
@@ -51,7 +61,9 @@ def coefficients(
         )
         rounding = abs(value) * _density_rounding(campaign) if name.startswith("cn_") else 0.0
         unseen = _unseen_form(fit, name) if name.startswith("cn_") else 0.0
-        variance = std**2 + rounding**2 + unseen**2 + spread
+        straight = None if textbook is None else _value_only(textbook, name)
+        moved = 0.0 if straight is None else _FORM_MOVES * (value - straight)
+        variance = std**2 + rounding**2 + unseen**2 + moved**2 + spread
         result[name] = ParameterEstimate(value, math.sqrt(variance), _UNITS[name])
     return result
 
@@ -133,7 +145,30 @@ def _value(fit: Fit, held_out: HeldOut, name: str) -> tuple[float | None, float]
         count = len(values)
         jackknife = math.sqrt((count - 1.0) / count * sum((v - value) ** 2 for v in values if v is not None))
         std = max(std, jackknife)
+    if fit.excess > _COLOURED and name in fit.problem.names:
+        std = max(std, _scatter_of_runs(fit, name))
     return value, std
+
+
+def _scatter_of_runs(fit: Fit, name: str) -> float:
+    """Standard deviation of a common parameter from the runs' own scores, whatever colours their residuals.
+
+    The sandwich estimator with a run as the cluster (Liang & Zeger, Biometrika 73 (1986) 13,
+    doi 10.1093/biomet/73.1.13), widened by Student's t for the few runs with wind that speak for Cnβ and Cnr.
+    """
+    count = len(fit.problem.names)
+    information, scores = np.zeros((count, count)), []
+    for (common, release), residual in zip(fit.jacobian, fit.residuals, strict=True):
+        left = common - release @ np.linalg.lstsq(release, common, rcond=1e-10)[0]
+        information += left.T @ left
+        scores.append(left.T @ residual)
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+    influence = np.array(scores) / scale @ inverse / scale
+    speaking = sum(run.wind_on or not name.startswith("cn_") for run in fit.problem.data.runs)
+    free = max(speaking - 2, 1)
+    variance = float(np.sum(influence[:, fit.problem.names.index(name)] ** 2)) * speaking / free
+    return math.sqrt(variance) * float(student.ppf(0.975, free) / norm.ppf(0.975))
 
 
 def _value_only(fit: Fit, name: str) -> float | None:

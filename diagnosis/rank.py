@@ -36,10 +36,12 @@ class Hypothesis:
     Args:
         effects: names, in the order they were added.
         fit: the fit.
+        textbook: where forms were freed in the end, the fit with the textbook's; None otherwise.
     """
 
     effects: tuple[str, ...]
     fit: Fit
+    textbook: Fit | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -131,8 +133,21 @@ def polish(chosen: Hypothesis) -> Hypothesis:
         with suppress(FitError, np.linalg.LinAlgError):
             better = fit(chosen.fit.problem, chosen.fit.point, tolerance=_POLISH)
     if better is None or better.total > chosen.fit.total:
-        return chosen
-    return Hypothesis(chosen.effects, better)
+        better = chosen.fit
+    textbook = _straight(better, chosen.fit) if better.problem.bent else None
+    return Hypothesis(chosen.effects, better, textbook)
+
+
+def _straight(bent: Fit, first: Fit) -> Fit | None:
+    """The same effects in the textbook's form: as fitted at first where it was, else from the bent ones."""
+    if not first.problem.bent:
+        return first
+    problem = Problem(bent.problem.data, bent.problem.effects, bent.problem.fixed)
+    values = dict(zip(bent.problem.names, bent.point.common.tolist(), strict=True))
+    start = Point(np.array([values[name] for name in problem.names]), bent.point.release)
+    with suppress(FitError, np.linalg.LinAlgError):
+        return fit(problem, start)
+    return None
 
 
 def _bend(fitted: Fit, tolerance: float = 1e-4) -> Fit | None:

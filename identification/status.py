@@ -18,7 +18,7 @@ class Status(Enum):
         "output_error"
     )
     OUTSIDE_TRAINING = (
-        "damping or frequency outside the range the networks were trained for: use output_error, or train others"
+        "damping or frequency outside the networks' training range: use output_error, or train others"
     )
     RUN_LEFT_OUT = "a run could not be identified and was left out: see the status of the runs"
     MODEL_DEPARTS = "model departs from the data: run the diagnosis; the intervals are widened meanwhile"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import socket
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import time
 import urllib.request
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -104,8 +106,12 @@ def test_film_and_picture_are_whole_where_the_machine_can_draw(tunnel: Tunnel, t
     assert {path.name for path in tmp_path.iterdir()} == {"film.mp4", "still.png"}
     import imageio.v2 as imageio
 
-    with imageio.get_reader(film) as reader:
-        frames = [np.asarray(frame) for frame in reader]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)  # the reader leaves its pipes to the collector
+        with imageio.get_reader(film) as reader:
+            frames = [np.asarray(frame) for frame in reader]
+        del reader
+        gc.collect()
     assert len(frames) == 6
     assert frames[0].shape == (160, 240, 3)
     assert np.asarray(imageio.imread(still)).shape[:2] == (160, 240)
