@@ -21,9 +21,10 @@ from tunnel_sim.campaign import Campaign
 _UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1"}
 #: Excess of block means beyond which the residuals are no longer white, and runs must speak for the scatter.
 _COLOURED = 0.03
-#: Share of a lag's first order, a·Cnβ, by which its form leaves Cnr open.
+#: Share of a lag's first order, a·Cnβ, by which its form leaves Cnr open: chosen on the tuning sets' errors.
 _LAG_FORM = 0.2
-#: Share of what freeing the forms has moved a coefficient by that counts as its standard deviation.
+#: Share of what freeing the forms has moved a coefficient by that counts as its standard deviation: a judgement,
+#: made when a sealed set had shown Cnβ's intervals too narrow, and held against campaigns drawn afterwards.
 _FORM_MOVES = 0.5
 
 
