@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 from scipy.special import fdtri
@@ -85,7 +86,7 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
     squares = sum(float(residual.values @ residual.values) for residual in residuals)
     total = max(float(np.sqrt(squares / max(count - unknowns, 1))), floor)
     fast, degrees = _fast_part(residuals, total)
-    fast = max(fast, floor, (sensor.resolution or 0.0) / np.sqrt(12.0))
+    fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
     stated = stated_noise(sensor)
     stated = None if stated is None else max(stated, floor)
     bears_out = stated is not None and _agree(fast, stated, degrees)
@@ -117,7 +118,7 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
     peak = 0.5 * float(np.ptp(reading))
     floor = max(_FLOOR * peak, 1e-300)
     fast, degrees = _fast_part([Residual(reading, 1, 0, peak)], floor)
-    fast = max(fast, floor, (sensor.resolution or 0.0) / np.sqrt(12.0))
+    fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
     stated = stated_noise(sensor)
     return max(stated, floor) if stated is not None and _agree(fast, max(stated, floor), degrees) else fast
 
@@ -151,5 +152,5 @@ def _slow_part(
         return 1.0, False
     ratio = power / degrees / reference**2
     chance = float(fdtri(degrees, min(reference_degrees, 1e9), 1.0 - FALSE_ALARM_RATE))
-    departs = ratio > chance * (1.0 + _STATEMENT_TOLERANCE) ** 2
+    departs = bool(ratio > chance * (1.0 + _STATEMENT_TOLERANCE) ** 2)
     return max(ratio, 1.0), departs

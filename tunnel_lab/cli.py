@@ -125,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command = typer.main.get_command(app)
     try:
         status = command.main(args=arguments, prog_name="tunnel", standalone_mode=False)
-        sys.stdout.flush()
+        _flush()
     except TunnelError as error:
         return _refuse(str(error))
     except CommandLineError as error:
@@ -134,15 +134,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status = INTERRUPTED
     except BrokenPipeError:
         # The reader went away (``tunnel springs | head -1``): not an error, and Python must not flush again.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _settle_output()
         return 0
     except OSError as error:
+        _settle_output()
         return _refuse(
             f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}; check disk and path"
         )
     if status == INTERRUPTED:
         print("tunnel: interrupted; no file is left half written", file=sys.stderr)
     return status if isinstance(status, int) else 0
+
+
+def _flush() -> None:
+    """Write out what was printed; a process may be started without standard output."""
+    if sys.stdout is not None:
+        sys.stdout.flush()
+
+
+def _settle_output() -> None:
+    """Send what cannot be printed nowhere, so that Python's own flush at the end does not fail again."""
+    try:
+        _flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _refuse(reason: str) -> int:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from tunnel_lab.diagnosis_figures import answer, where
 from tunnel_lab.diagnosis_figures.common import Document
-from tunnel_lab.files import output_folder
 from tunnel_lab.plots import save
 from tunnel_sim.campaign import Campaign
+from tunnel_sim.writing import output_folder
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,7 +6,6 @@ those of Okabe and Ito (2008), told apart by colour-blind readers too.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
@@ -14,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tunnel_lab.files import write_whole
-from tunnel_lab.formatting import unit
+from tunnel_lab.formatting import figure_text, unit
 from tunnel_lab.tables import SYMBOLS
 from tunnel_sim.campaign import Campaign, Run
 from tunnel_sim.record import Array
+from tunnel_sim.writing import write_encoded
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,13 +50,11 @@ def save(figure: Figure, path: Path) -> Path:
     Raises:
         TunnelError: when the file cannot be written.
     """
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=150)
-    return write_whole(path, buffer.getvalue())
+    return write_encoded(path, lambda stream: figure.savefig(stream, format="png", dpi=150))
 
 
 def run_label(run: Run) -> str:
-    """The conditions of a run in a few words.
+    """The conditions of a run in a few words, for a figure.
 
     Args:
         run: any run.
@@ -65,7 +62,7 @@ def run_label(run: Run) -> str:
     Returns:
         Text such as ``r02 · 16.12 N m/rad · 15 m/s``.
     """
-    parts = [run.id]
+    parts = [figure_text(run.id)]
     if run.spring_stiffness is not None:
         parts.append(f"{run.spring_stiffness:g} N m/rad")
     if run.wind_on:
@@ -178,7 +175,7 @@ def windows_figure(estimate: Estimate) -> Figure:
     for index, run in enumerate(estimate.runs[:RUNS_PER_PLOT]):
         if not run.windows:
             continue
-        style = {"color": COLOURS[index], "marker": MARKERS[index], "label": run.id}
+        style = {"color": COLOURS[index], "marker": MARKERS[index], "label": figure_text(run.id)}
         amplitude = [window.amplitude.value for window in run.windows]
         omega_n = [window.omega_n for window in run.windows]
         _intervals(damping, amplitude, [window.zeta for window in run.windows], style)

@@ -68,17 +68,16 @@ def render_rig(path: Path, *, width: int = 1280, height: int = 800, camera: str 
 
 def _draw(path: Path, width: int, height: int, camera: str) -> None:
     """Render in this process; what goes wrong ends it."""
-    import io
     from math import radians
 
     import mujoco
     from matplotlib import image
 
-    from tunnel_lab.files import write_whole
     from tunnel_sim.aero import AeroDerivatives
     from tunnel_sim.model import build_model
     from tunnel_sim.rig import load_rig
     from tunnel_sim.run_settings import RunSettings
+    from tunnel_sim.writing import write_encoded
 
     rig = load_rig()
     settings = RunSettings(
@@ -95,9 +94,8 @@ def _draw(path: Path, width: int, height: int, camera: str) -> None:
     mujoco.mj_forward(model.mj, data)
     with mujoco.Renderer(model.mj, height, width) as renderer:
         renderer.update_scene(data, camera=camera)
-        buffer = io.BytesIO()
-        image.imsave(buffer, renderer.render(), format="png")
-    write_whole(path, buffer.getvalue())
+        picture = renderer.render()
+    write_encoded(path, lambda stream: image.imsave(stream, picture, format="png"))
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ class _Console(Console):
 
 
 def console(*, stderr: bool = False) -> Console:
-    """A console that colours nothing by guesswork.
+    """A console that colours nothing by guesswork and reads no markup: text is shown as it is.
 
     Args:
         stderr: print to standard error, where progress and status lines go.
@@ -46,7 +46,7 @@ def console(*, stderr: bool = False) -> Console:
     Returns:
         The console.
     """
-    return _Console(stderr=stderr, highlight=False)
+    return _Console(stderr=stderr, highlight=False, markup=False, emoji=False)
 
 
 def say(line: str, *, stderr: bool = False) -> None:
@@ -56,7 +56,7 @@ def say(line: str, *, stderr: bool = False) -> None:
         line: the text.
         stderr: print to standard error.
     """
-    console(stderr=stderr).print(line, markup=False, soft_wrap=True)
+    console(stderr=stderr).print(line, soft_wrap=True)
 
 
 def show_tables(*tables: Table) -> None:

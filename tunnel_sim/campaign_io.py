@@ -5,12 +5,8 @@ The reader never opens ``truth.json``. The writer writes the whole campaign or n
 
 from __future__ import annotations
 
-import json
 import re
-import shutil
-import uuid
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +26,13 @@ from tunnel_sim.campaign_schema import (
     sensor_properties,
 )
 from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim.json_text import json_text
+from tunnel_sim.leftovers import clear_leftovers
 from tunnel_sim.record import Record
 from tunnel_sim.run_checks import angle_in_radians, enough_cycles, uniform_times
-from tunnel_sim.run_files import RUN_FORMATS, read_table, write_table
+from tunnel_sim.run_files import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.toml_input import shown
+from tunnel_sim.writing import whole_folder
 
 TRUTH_FILE = "truth.json"
 RUN_FOLDER = "runs"
@@ -101,25 +100,19 @@ def write_campaign(
             where=shown(folder),
             remedy=did_you_mean(run_format, RUN_FORMATS),
         )
+    clear_leftovers(folder.resolve().parent)  # what a killed command set aside is there again
     _check_target(folder, overwrite=overwrite)
     files = _run_files(campaign, run_format)
     document = campaign_document(campaign, files)
     _check_campaign(campaign, document, folder)
-    truth_text = None if truth is None else json.dumps(truth, indent=1, allow_nan=False) + "\n"
-    try:
-        with _whole_or_nothing(folder) as partial:
-            (partial / RUN_FOLDER).mkdir()
-            for run in campaign.runs:
-                write_table(run.record, partial / files[run.id])
-            if truth_text is not None:
-                (partial / TRUTH_FILE).write_text(truth_text, encoding="utf-8")
-            (partial / CAMPAIGN_FILE).write_bytes(tomli_w.dumps(document).encode())
-    except OSError as error:
-        raise TunnelError(
-            f"cannot be written ({error.strerror or error})",
-            where=shown(folder),
-            remedy="choose another folder",
-        ) from error
+    truth_text = None if truth is None else json_text(truth)
+    with whole_folder(folder) as partial:
+        (partial / RUN_FOLDER).mkdir()
+        for run in campaign.runs:
+            (partial / files[run.id]).write_bytes(table_bytes(run.record, folder / files[run.id]))
+        if truth_text is not None:
+            (partial / TRUTH_FILE).write_bytes(truth_text.encode())
+        (partial / CAMPAIGN_FILE).write_bytes(tomli_w.dumps(document).encode())
     return folder
 
 
@@ -215,27 +208,3 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
             where=where,
             remedy="move that away, or choose another folder",
         )
-
-
-@contextmanager
-def _whole_or_nothing(folder: Path) -> Iterator[Path]:
-    """A sibling folder to write in, which becomes ``folder`` at the end or vanishes."""
-    target = folder.resolve()
-    target.parent.mkdir(parents=True, exist_ok=True)
-    mark = uuid.uuid4().hex[:8]
-    partial = target.with_name(f".{target.name}.{mark}.partial")
-    replaced = target.with_name(f".{target.name}.{mark}.replaced")
-    try:
-        partial.mkdir()
-        yield partial
-        if target.exists():
-            target.rename(replaced)
-        try:
-            partial.rename(target)
-        except OSError:
-            if replaced.exists():
-                replaced.rename(target)
-            raise
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
-    shutil.rmtree(replaced, ignore_errors=True)

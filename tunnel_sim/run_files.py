@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.record import Array, Record
 from tunnel_sim.toml_input import one_line
+from tunnel_sim.writing import encoded
 
 RUN_FORMATS = ("parquet", "csv")
 _USED = ("time_s", "yaw_rad", "yaw_deg")
@@ -59,18 +60,19 @@ def read_table(path: Path, where: str, *, timed: bool = False) -> tuple[Array | 
     return _columns(table, first_line, where, timed=timed)
 
 
-def write_table(record: Record, path: Path) -> None:
-    """Write a record so that reading it gives the same numbers.
+def table_bytes(record: Record, path: Path) -> bytes:
+    """A record as the content of a run file; reading it gives the same numbers.
 
     Args:
         record: what to write; columns time_s and yaw_rad.
-        path: a ``.csv`` or ``.parquet`` file in an existing folder.
+        path: the ``.csv`` or ``.parquet`` file that it is for.
+
+    Raises:
+        TunnelError: when the table cannot be encoded.
     """
     table = pl.DataFrame({"time_s": record.time_s, "yaw_rad": record.yaw_rad})
-    if path.suffix == ".csv":
-        table.write_csv(path)  # shortest digits that read back as the same float
-    else:
-        table.write_parquet(path)
+    # CSV gets the shortest digits that read back as the same float.
+    return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
 
 
 def _read_csv(content: bytes, where: str) -> tuple[pl.DataFrame, int]:

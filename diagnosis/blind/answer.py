@@ -22,6 +22,7 @@ from diagnosis.blind.files import (
 from diagnosis.diagnose import diagnose, vocabulary
 from tunnel_sim.campaign_io import read_campaign
 from tunnel_sim.errors import TunnelError
+from tunnel_sim.writing import output_folder
 
 Told = Callable[[int, int, str], None]
 
@@ -62,7 +63,7 @@ def answer_set(
     campaigns = campaign_folders(folder)
     vocabulary(exclude=excluded)
     target = answers_folder(folder, excluded)
-    target.mkdir(exist_ok=True)
+    output_folder(target)
     hashes = _answered(target)
     names = {path.name for path in campaigns}
     left = [path for path in campaigns if path.name not in hashes]

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from tunnel_sim.errors import TunnelError
+from tunnel_sim.json_text import json_text
+from tunnel_sim.writing import write_whole
 
 SCHEMA_VERSION = 1
 SEAL = "seal.json"
@@ -27,23 +27,17 @@ def write_document(path: Path, document: Mapping[str, Any]) -> str:
 
     Args:
         path: the file; replaced when it exists.
-        document: plain values, no NaN.
+        document: as for `tunnel_sim.json_text.json_text`.
 
     Returns:
         SHA-256 of what was written, in hexadecimal.
 
     Raises:
+        TunnelError: when the file cannot be written.
         ValueError: when the document holds NaN or infinity.
     """
-    content = (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    finally:
-        Path(name).unlink(missing_ok=True)
+    content = json_text(document).encode()
+    write_whole(path, content)
     return hashlib.sha256(content).hexdigest()
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import secrets
-import shutil
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,7 @@ from tunnel_sim.campaign_io import write_campaign
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.reference.draw import DEFAULT_SHARES, Mixture
 from tunnel_sim.reference.make import as_campaign, draw_set, simulate_set, truth_of
+from tunnel_sim.writing import whole_folder
 
 CHUNK = 100
 """Campaigns simulated together: their runs advance in one array, so that few at a time would cost as much."""
@@ -60,9 +59,7 @@ def make_blind(
         if path.is_file() or (path.is_dir() and any(path.iterdir())):
             raise TunnelError("exists already", where=str(path), remedy="name another")
     mixture = mixture or Mixture()
-    out.parent.mkdir(parents=True, exist_ok=True)
-    partial = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}.", suffix=".part"))
-    try:
+    with whole_folder(out) as partial:
         truths = _write_campaigns(partial, count, seed, shares, mixture, progress, tell_steps)
         document = {
             "schema_version": SCHEMA_VERSION,
@@ -76,18 +73,12 @@ def make_blind(
             },
             "truths": truths,
         }
-        sealed = write_document(partial / KEY, document)
+        sealed = write_document(partial / KEY if key is None else key, document)
         hashes = {name: folder_hash(partial / name) for name in truths}
         write_document(
             partial / SEAL,
             {"schema_version": SCHEMA_VERSION, "key_sha256": sealed, "campaigns_sha256": hashes},
         )
-        partial.chmod(0o755)
-        if key is not None:
-            shutil.move(partial / KEY, key)
-        partial.replace(out)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
     return target
 
 

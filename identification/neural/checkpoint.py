@@ -13,6 +13,7 @@ from safetensors.numpy import load, save
 
 from identification.neural.evidence import Hyperparameters
 from identification.neural.levenberg import Progress
+from tunnel_sim.json_text import json_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +40,7 @@ class Checkpoint:
             [one.held.alpha, one.held.beta, one.damping, one.iteration, one.finished] for one in told
         ]  # Python writes floats so that they read back to the same bits
         document = {"spec": spec, "state": state, "ended": len(self.ended)}
-        return save(tensors or {"none": np.zeros(1)}, {"training": json.dumps(document)})
+        return save(tensors or {"none": np.zeros(1)}, {"training": json_line(document)})
 
     @classmethod
     def from_bytes(cls, content: bytes, spec: dict[str, Any]) -> Checkpoint | None:
@@ -56,7 +57,7 @@ class Checkpoint:
             # A safetensors file is the length of its header, the header as JSON, and the tensors.
             header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
             document = json.loads(header["__metadata__"]["training"])
-            if document["spec"] != json.loads(json.dumps(spec)):
+            if document["spec"] != json.loads(json_line(spec)):
                 return None
             tensors = load(content)
             told = [

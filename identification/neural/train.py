@@ -28,6 +28,7 @@ from identification.neural.levenberg import (
 from identification.neural.network import Network, parameter_count
 from identification.neural.networks import Errors, Networks, held_out_errors
 from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, training_pairs
+from tunnel_sim.json_text import json_line
 
 NETWORKS = (DAMPING, FREQUENCY)
 _START, _TEST = 0, 2  # what a generator is for
@@ -189,7 +190,7 @@ def _collect(spec: TrainingSpec, checkpoint: Checkpoint) -> Trained:
         },
         "weights_sha256": hashlib.sha256(weights).hexdigest(),
     }
-    return Trained(networks, weights, json.loads(json.dumps(record)))
+    return Trained(networks, weights, json.loads(json_line(record)))
 
 
 def _described(progress: Progress, outcome: Outcome) -> dict[str, Any]:

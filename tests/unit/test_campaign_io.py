@@ -16,7 +16,7 @@ from tunnel_sim.campaign_io import read_campaign, write_campaign
 from tunnel_sim.cycles import count_cycles
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.record import Record
-from tunnel_sim.run_files import read_table, write_table
+from tunnel_sim.run_files import read_table, table_bytes
 
 
 def decay(
@@ -74,7 +74,7 @@ def test_what_is_written_reads_back_as_the_same_numbers(tmp_path: Path, run_form
 def test_any_float_survives_a_run_file(tmp_path: Path, values: list[float], suffix: str) -> None:
     path = tmp_path / f"run{suffix}"
     record = Record(np.arange(len(values)) / 3.0, np.array(values))
-    write_table(record, path)
+    path.write_bytes(table_bytes(record, path))
     time_s, yaw, column = read_table(path, "here")
     assert column == "yaw_rad"
     assert time_s is not None
@@ -248,14 +248,14 @@ def test_a_disk_that_fails_leaves_the_old_campaign_and_no_litter(
 ) -> None:
     folder = write_campaign(campaign(), tmp_path / "c")
 
-    def full(record: Record, path: Path) -> None:
+    def full(record: Record, path: Path) -> bytes:
         if path.stem == "on":
             raise OSError(28, "No space left on device")
-        write_table(record, path)
+        return table_bytes(record, path)
 
-    monkeypatch.setattr(campaign_io, "write_table", full)
+    monkeypatch.setattr(campaign_io, "table_bytes", full)
     for target in (folder, tmp_path / "other"):
-        with pytest.raises(TunnelError, match="No space left on device"):
+        with pytest.raises(TunnelError, match="no space left on device"):
             write_campaign(campaign(), target, overwrite=True)
     assert list(tmp_path.iterdir()) == [folder]
     assert_same(read_campaign(folder), campaign())

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tunnel_lab.commands.diagnose import refuse_unwritable, split_names
+from tunnel_lab.commands.diagnose import split_names
 
 NAME = "blind"
 HELP = """Blind checks: campaigns with sealed truth, diagnosed, then scored.
@@ -68,6 +68,7 @@ def make(
     from tunnel_lab.tables import say
     from tunnel_sim.reference.draw import DEFAULT_SHARES, Mixture
     from tunnel_sim.reference.make import parse_shares
+    from tunnel_sim.writing import refuse_unwritable
 
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
     if key is not None:
@@ -131,8 +132,8 @@ def score(
     from diagnosis.blind import score_set
     from diagnosis.diagnose import vocabulary
     from tunnel_lab import blind_page
-    from tunnel_lab.files import write_json, write_whole
     from tunnel_lab.tables import say, show_tables
+    from tunnel_sim.writing import refuse_unwritable, write_json, write_whole
 
     names = split_names(exclude)
     vocabulary(exclude=names)
@@ -140,6 +141,10 @@ def score(
         if path is not None:
             refuse_unwritable(path)
     found = score_set(folder, excluded=names, key=key)
+    if markdown is not None:
+        write_whole(markdown, blind_page.markdown(found, str(folder)).encode())
+    if json is not None:
+        write_json(json, found.to_json_dict())
     for line in blind_page.origin_lines(found):
         say(line)
     say("")
@@ -147,10 +152,9 @@ def score(
         show_tables(blind_page.as_table(section))
         if section.note:
             say(section.note + "\n")
-    if markdown is not None:
-        say(f"Written: {write_whole(markdown, blind_page.markdown(found, str(folder)).encode())}")
-    if json is not None:
-        say(f"Written: {write_json(json, found.to_json_dict())}")
+    for path in (markdown, json):
+        if path is not None:
+            say(f"Written: {path}")
 
 
 def _terminal() -> bool:

@@ -46,17 +46,22 @@ def run(
       0 success, 1 an estimate failed or output_error missed the truth by more
       than four standard deviations, 2 bad input.
     """
-    from tunnel_lab.files import output_folder
     from tunnel_lab.tables import say
     from tunnel_sim.plan import paper_plan
+    from tunnel_sim.writing import output_folder
 
     folder = output_folder(out)
     plan = paper_plan()
     if seed is not None:
         plan = replace(plan, seed=seed)
+    # Everything is written before anything is printed: whoever reads may stop before the end.
     campaign, estimates = simulated_part(plan, folder)
     measured = measured_part(folder)
-    draw(folder, campaign, estimates, plan, measured)
+    problem = draw(folder, campaign, estimates, plan, measured[1])
+    show_simulated(campaign, estimates, plan)
+    show_measured(*measured)
+    say("\nFigures: traces.png, spectrum.png, windows.png, estimates.png")
+    say(f"No picture of the rig: {problem}" if problem else "Picture of the rig: rig.png")
     say(f"Campaign, estimates (JSON) and figures are in {folder}")
     if missed := misses(estimates, plan):
         say(f"Check failed: {'; '.join(missed)}", stderr=True)
@@ -106,7 +111,7 @@ def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
 
 
 def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Estimate, ...]]:
-    """Simulate, write, identify by the paper's two methods and the default one, and print the comparison.
+    """Simulate, identify by the paper's two methods and the default one, and write all of it.
 
     Args:
         plan: of the campaign.
@@ -117,13 +122,12 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
     """
     from identification import identify
     from tunnel_lab.commands.simulate import simulate_with_progress
-    from tunnel_lab.files import write_json
-    from tunnel_lab.tables import console, say, show_tables, status_lines, truth_table
+    from tunnel_lab.tables import console
     from tunnel_sim.campaign_io import write_campaign
     from tunnel_sim.virtual_campaign import truth_document
+    from tunnel_sim.writing import write_json
 
     campaign = simulate_with_progress(plan)
-    say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")
     write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
     estimates = []
     for name in SHOWN:
@@ -131,39 +135,62 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
             estimate = identify(campaign, name, throw=False)
         write_json(folder / f"estimate-{name}.json", estimate.to_json_dict())
         estimates.append(estimate)
+    return campaign, tuple(estimates)
+
+
+def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: CampaignPlan) -> None:
+    """Print the comparison with the truth.
+
+    Args:
+        campaign: the simulated one.
+        estimates: of it, one per estimator.
+        plan: of it.
+    """
+    from tunnel_lab.tables import say, show_tables, status_lines, truth_table
+
+    say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")
     show_tables(truth_table(estimates, truth_of(plan)))
     for estimate in estimates:
         for line in status_lines(estimate):
             say(f"Note, {estimate.estimator}: {line}")
-    return campaign, tuple(estimates)
 
 
-def measured_part(folder: Path) -> Estimate:
-    """Identify a packaged measured campaign in normalised form and print its windows.
+def measured_part(folder: Path) -> tuple[Campaign, Estimate]:
+    """Identify a packaged measured campaign in normalised form.
 
     Args:
         folder: where the estimate goes.
 
     Returns:
-        The estimate.
+        The campaign and its estimate.
     """
     from identification import identify
     from identification.datasets import measured_campaign
-    from tunnel_lab.commands.identify import show
-    from tunnel_lab.files import write_json
-    from tunnel_lab.tables import say
+    from tunnel_sim.writing import write_json
 
     campaign = measured_campaign(MEASURED)
     estimate = identify(campaign, CHECKED_ESTIMATOR, throw=False)
     write_json(folder / f"estimate-{MEASURED}.json", estimate.to_json_dict())
+    return campaign, estimate
+
+
+def show_measured(campaign: Campaign, estimate: Estimate) -> None:
+    """Print a measured campaign's estimate with its windows.
+
+    Args:
+        campaign: the runs.
+        estimate: of it.
+    """
+    from tunnel_lab.commands.identify import show
+    from tunnel_lab.tables import say
+
     say(f"Measured: {campaign.name}, {len(campaign.runs)} runs. {campaign.description}\n")
     show(campaign, estimate, windows=True)
-    return estimate
 
 
 def draw(
     folder: Path, campaign: Campaign, estimates: Sequence[Estimate], plan: CampaignPlan, measured: Estimate
-) -> None:
+) -> str:
     """Draw the figures and the rig.
 
     Args:
@@ -172,20 +199,21 @@ def draw(
         estimates: of it, one per estimator.
         plan: of it.
         measured: estimate of the measured campaign.
+
+    Returns:
+        Why there is no picture of the rig; empty where there is one.
     """
     from tunnel_lab import plots
     from tunnel_lab.rendering import render_rig
-    from tunnel_lab.tables import console, say
+    from tunnel_lab.tables import console
 
     off, on = wind_off_on_pair(campaign)
     plots.save(plots.wind_off_on_figure(off, on), folder / "traces.png")
     plots.save(plots.spectrum_figure((off, on)), folder / "spectrum.png")
     plots.save(plots.windows_figure(measured), folder / "windows.png")
     plots.save(plots.truth_figure(estimates, truth_of(plan)), folder / "estimates.png")
-    say("\nFigures: traces.png, spectrum.png, windows.png, estimates.png")
     with console(stderr=True).status("rendering the rig"):
-        problem = render_rig(folder / "rig.png")
-    say(f"No picture of the rig: {problem}" if problem else "Picture of the rig: rig.png")
+        return render_rig(folder / "rig.png")
 
 
 def wind_off_on_pair(campaign: Campaign) -> tuple[Run, Run]:

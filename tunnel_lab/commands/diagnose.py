@@ -64,9 +64,10 @@ def run(
       written whole or not at all.
     """
     from diagnosis.diagnose import vocabulary
-    from tunnel_lab.files import json_text, write_json
     from tunnel_lab.tables import say
     from tunnel_sim.campaign_io import read_campaign
+    from tunnel_sim.json_text import json_text
+    from tunnel_sim.writing import refuse_unwritable, write_json
 
     kinds = vocabulary(split_names(effects), split_names(exclude))
     data = read_campaign(campaign)
@@ -75,20 +76,20 @@ def run(
         if path is not None:
             refuse_unwritable(path)
     document = diagnose_with_progress(data, kinds).to_json_dict()
-    if to_stdout:
-        typer.echo(json_text(document), nl=False)
-    else:
-        if json is not None:
-            write_json(json, document)
-        show(document)
+    # Files first: whoever reads what is printed may stop before its end.
+    if json is not None and not to_stdout:
+        write_json(json, document)
     if report is not None:
         from tunnel_lab.report import write_report
 
         write_report(document, data, report)
-    if not to_stdout:
-        for path in (json, report):
-            if path is not None:
-                say(f"Written: {path}")
+    if to_stdout:
+        typer.echo(json_text(document), nl=False)
+        return
+    show(document)
+    for path in (json, report):
+        if path is not None:
+            say(f"Written: {path}")
 
 
 def split_names(words: list[str] | None) -> tuple[str, ...]:
@@ -101,23 +102,6 @@ def split_names(words: list[str] | None) -> tuple[str, ...]:
         Names without blanks, in the order given.
     """
     return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())
-
-
-def refuse_unwritable(path: Path) -> None:
-    """Refuse, before the work is done, a file that could not be written after it.
-
-    Args:
-        path: the file.
-
-    Raises:
-        TunnelError: when it is a folder, or its folder does not exist.
-    """
-    from tunnel_sim.errors import TunnelError
-
-    if path.is_dir():
-        raise TunnelError("is a folder, not a file", where=str(path), remedy="name a file")
-    if not path.parent.is_dir():
-        raise TunnelError("its folder does not exist", where=str(path), remedy=f"make {path.parent} first")
 
 
 def diagnose_with_progress(campaign: Campaign, kinds: tuple[type[Effect], ...]) -> Diagnosis:

@@ -34,15 +34,19 @@ def run(
     [bold]Exit status[/bold]
       0 shown, 2 bad input.
     """
-    from tunnel_lab import effect_listing, files, tables
+    from tunnel_lab import effect_listing, tables
     from tunnel_sim.effects import ALL_EFFECTS, effect_class
+    from tunnel_sim.writing import refuse_unwritable, write_json, write_whole
 
     kinds = ALL_EFFECTS if name is None else (effect_class(name),)
+    for path in (json, markdown):
+        if path is not None:
+            refuse_unwritable(path)
     written = []
     if json is not None:
-        written.append(files.write_json(json, effect_listing.document(kinds)))
+        written.append(write_json(json, effect_listing.document(kinds)))
     if markdown is not None:
-        written.append(files.write_whole(markdown, effect_listing.markdown(kinds).encode()))
+        written.append(write_whole(markdown, effect_listing.markdown(kinds).encode()))
     for path in written:
         tables.say(f"Written: {path}")
     if written:

@@ -91,15 +91,18 @@ def run(
       0 identified, 1 nothing could be identified, 2 bad input.
     """
     from identification import identify
-    from tunnel_lab.files import json_text, write_json
     from tunnel_lab.tables import say
     from tunnel_sim.campaign_io import read_campaign
     from tunnel_sim.errors import TunnelError
+    from tunnel_sim.json_text import json_text
+    from tunnel_sim.writing import refuse_unwritable, write_json
 
     for name in (estimator, *(models or ())):
         known_estimator(name)
     if models and not budget and uncertainties is None:
         raise TunnelError("goes with --budget only", where="--model", remedy="add --budget, or leave it out")
+    if json is not None and str(json) != "-":
+        refuse_unwritable(json)
     data = read_campaign(campaign)
     chosen = with_weights(estimator, weights)
     estimate = identify(data, chosen, throw=False)
@@ -145,6 +148,8 @@ def budgeted(
     """
     from functools import partial
 
+    from rich.text import Text
+
     from identification import identify
     from identification.budget import make_budget, with_budget
     from identification.input_uncertainty import InputUncertainties, load_uncertainties
@@ -162,7 +167,7 @@ def budgeted(
             partial(identify, estimator=chosen, throw=False),
             inputs,
             others=others,
-            told=lambda what: status.update(f"uncertainty budget: {what}"),
+            told=lambda what: status.update(Text(f"uncertainty budget: {what}")),
         )
     return with_budget(estimate, found), found
 

@@ -36,9 +36,9 @@ def run(
     """
     from identification import identify
     from tunnel_lab import plots
-    from tunnel_lab.files import output_folder
     from tunnel_lab.tables import say
     from tunnel_sim.campaign_io import read_campaign
+    from tunnel_sim.writing import output_folder
 
     data = read_campaign(campaign)
     folder = output_folder(out / campaign.resolve().name)

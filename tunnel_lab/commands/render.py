@@ -75,6 +75,7 @@ def run(
             write_still(request, look, path, min(at, length) if out is None else at)
         else:
             _film(request, look, path)
+    for path in targets:
         say(f"Written: {path}")
 
 
@@ -97,8 +98,8 @@ def _film(request: object, look: object, path: Path) -> None:
 
 def _targets(out: list[Path] | None) -> list[Path]:
     """The files to write, refused before the work is done where they cannot be."""
-    from tunnel_lab.files import output_folder
     from tunnel_sim.errors import TunnelError
+    from tunnel_sim.writing import output_folder
 
     targets = out if out else list(_DEFAULT)
     for path in targets:

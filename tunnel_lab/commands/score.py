@@ -103,16 +103,17 @@ def run(
     _refuse_occupied(out, overwrite)
     _refuse_unwritable(write_baseline)
     results = Results(wanted, names, tuple(_rows(wanted, names, jobs, out)))
+    written = [] if out is None else _keep(out, results)
+    if write_baseline is not None:
+        written.append(write_trials(write_baseline, results))
     show_tables(*tables.summary_tables(results))
     if cells:
         show_tables(*tables.cell_tables(results))
     say(tables.ABOUT)
     for name, kinds in results.raised().items():
         say(f"Note: {name} raised {', '.join(kinds)}; counted as failures")
-    if out is not None:
-        _keep(out, results)
-    if write_baseline is not None:
-        say(f"Written: {write_trials(write_baseline, results)}")
+    for path in written:
+        say(f"Written: {path}")
     if baseline is not None:
         verdict = checking.check(baseline, results)
         say("")
@@ -182,23 +183,21 @@ def _rows(grid: Grid, names: tuple[str, ...], jobs: int, out: Path | None) -> li
         return score_grid(grid, names, jobs=jobs, parts=parts, progress=lambda n, all_: tell(n, all_, ""))
 
 
-def _keep(out: Path, results: Results) -> None:
+def _keep(out: Path, results: Results) -> list[Path]:
     import shutil
 
-    from tunnel_lab.files import write_whole
     from tunnel_lab.plots import save
     from tunnel_lab.scoring.figures import score_figure
     from tunnel_lab.scoring.results import parquet, scores_frame, write_trials
-    from tunnel_lab.tables import say
+    from tunnel_sim.writing import write_whole
 
-    written = (
+    written = [
         write_trials(out / "trials.parquet", results),
         write_whole(out / "scores.parquet", parquet(scores_frame(results))),
         save(score_figure(results), out / "score.png"),
-    )
+    ]
     shutil.rmtree(out / "parts", ignore_errors=True)
-    for path in written:
-        say(f"Written: {path}")
+    return written
 
 
 def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
@@ -214,7 +213,7 @@ def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
 
 
 def _refuse_unwritable(path: Path | None) -> None:
-    from tunnel_lab.commands.diagnose import refuse_unwritable
+    from tunnel_sim.writing import refuse_unwritable
 
     if path is not None:
         refuse_unwritable(path)
@@ -232,13 +231,13 @@ def _refuse_of_the_grid(given: dict[str, object]) -> None:
 def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, trials: int | None) -> None:
     import shutil
 
-    from tunnel_lab.files import write_whole
     from tunnel_lab.plots import save
     from tunnel_lab.progress import bar
     from tunnel_lab.scoring import breakdown as work
     from tunnel_lab.scoring import breakdown_view as view
     from tunnel_lab.scoring.results import parquet
     from tunnel_lab.tables import console, say, show_tables
+    from tunnel_sim.writing import write_whole
 
     terminal = console(stderr=True).is_terminal
     cases = work.make_cases(seed, realisations=trials or work.REALISATIONS, tell_steps=terminal)
@@ -248,9 +247,12 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
             cases, names, seed, jobs=jobs, parts=parts, progress=lambda n, all_: tell(n, all_, "")
         )
     found = work.biases(rows)
+    written = []
+    if out is not None:
+        written.append(write_whole(out / "breakdown.parquet", parquet(work.breakdown_frame(found))))
+        written.append(save(view.breakdown_figure(found), out / "breakdown.png"))
+        shutil.rmtree(out / "parts", ignore_errors=True)
     show_tables(*(one for quantity in view.SHOWN for one in view.breakdown_tables(found, quantity)))
     say(view.ABOUT)
-    if out is not None:
-        say(f"Written: {write_whole(out / 'breakdown.parquet', parquet(work.breakdown_frame(found)))}")
-        say(f"Written: {save(view.breakdown_figure(found), out / 'breakdown.png')}")
-        shutil.rmtree(out / "parts", ignore_errors=True)
+    for path in written:
+        say(f"Written: {path}")

@@ -100,7 +100,9 @@ def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
         TunnelError: when it is a file, or exists and may not be replaced.
     """
     from tunnel_sim.errors import TunnelError
+    from tunnel_sim.leftovers import clear_leftovers
 
+    clear_leftovers(folder.resolve().parent)  # what a killed command set aside is there again
     if folder.exists() and not folder.is_dir():
         raise TunnelError("is a file, not a folder", where=str(folder), remedy="name another --out")
     if folder.exists() and not overwrite:

@@ -150,32 +150,30 @@ def show_summary(folder: Path) -> None:
     import polars as pl
 
     from tunnel_lab import plots
-    from tunnel_lab.files import output_folder, write_whole
     from tunnel_lab.sweep import figures
     from tunnel_lab.sweep.store import open_store
     from tunnel_lab.sweep.summary import paces, summarise
     from tunnel_lab.tables import say, show_tables
+    from tunnel_sim.writing import output_folder, write_encoded
 
     store = open_store(folder)
     lines = summarise(store)
+    grouped = figures.groups(lines)
+    target = output_folder(folder / "summary")
+    written = [
+        write_encoded(target / "summary.csv", pl.DataFrame([line.to_row() for line in lines]).write_csv)
+    ]
+    for name, part in grouped.items():
+        drawn = figures.error_figure(part)
+        if drawn is not None:
+            written.append(plots.save(drawn, target / f"{name}.png"))
     done, shards = len(store.finished()), store.sweep.shards
     if done < shards:
         say(f"Finished: {done} of {shards} shards; the same command goes on with the rest\n")
-    grouped = figures.groups(lines)
     show_tables(
         figures.overall_table(lines),
         *map(figures.axis_table, grouped.values()),
         figures.pace_table(paces(store)),
     )
     say(figures.BRACKETS)
-    target = output_folder(folder / "summary")
-    written = [
-        write_whole(
-            target / "summary.csv", pl.DataFrame([line.to_row() for line in lines]).write_csv().encode()
-        )
-    ]
-    for name, part in grouped.items():
-        drawn = figures.error_figure(part)
-        if drawn is not None:
-            written.append(plots.save(drawn, target / f"{name}.png"))
     say(f"Written to {target}: {', '.join(path.name for path in written)}")

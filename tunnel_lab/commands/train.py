@@ -74,10 +74,9 @@ def _train(out: Path, spec: TrainingSpec, *, restart: bool) -> None:
 
     from identification.neural.checkpoint import Checkpoint, read_checkpoint
     from identification.neural.train import train
-    from tunnel_lab.commands.diagnose import refuse_unwritable
-    from tunnel_lab.files import write_json, write_whole
     from tunnel_lab.progress import bar
     from tunnel_lab.tables import say
+    from tunnel_sim.writing import refuse_unwritable, write_json, write_whole
 
     partial = out.with_suffix(".part.safetensors")
     for path in (out, out.with_suffix(".json"), partial):

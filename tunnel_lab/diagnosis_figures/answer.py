@@ -17,7 +17,7 @@ from tunnel_lab.diagnosis_figures.common import (
     plain,
     quiet,
 )
-from tunnel_lab.formatting import coefficient_label
+from tunnel_lab.formatting import coefficient_label, figure_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,7 +84,7 @@ def closure_figure(document: Document) -> Figure:
         axes.axvspan(-3.0 * max(noise), 3.0 * max(noise), color="0.92", linewidth=0, label="noise (3σ)")
     axes.axvline(0.0, color=QUIET, linewidth=0.8)
     axes.set_xscale("symlog", linthresh=3.0 * max(noise, default=0.03))
-    axes.set_yticks(rows, [run["id"] for run in runs], fontsize=8)
+    axes.set_yticks(rows, [figure_text(run["id"]) for run in runs], fontsize=8)
     axes.margins(x=0.04)
     axes.invert_yaxis()
     axes.set_xlabel("excess: mean squared residual over noise variance, minus one")
@@ -116,7 +116,7 @@ def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
         step = max(1, record.yaw_rad.size // 1500)
         time = record.time_s - record.time_s[0]
         top.plot(time[::step], record.yaw_rad[::step], color="0.25", linewidth=0.7)
-        top.set_title(f"{trace['id']}: reading [rad]", fontsize=10, loc="left")
+        top.set_title(f"{figure_text(trace['id'])}: reading [rad]", fontsize=10, loc="left")
         when, before = array(trace["time_s"]), 1e3 * array(trace["before_rad"])
         bottom.plot(when, before, color=BEFORE, linewidth=0.8, label="nominal model")
         if trace["after_rad"] is not None:

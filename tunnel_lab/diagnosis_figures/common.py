@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tunnel_lab.formatting import figure_text
 from tunnel_sim.record import Array
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def run_label(run: Document) -> str:
     Returns:
         Text such as ``r02 · 16.1 N m/rad · 15 m/s``.
     """
-    parts = [str(run["id"])]
+    parts = [figure_text(str(run["id"]))]
     if run["spring_stiffness"] is not None:
         parts.append(f"{run['spring_stiffness']:.4g} N m/rad")
         parts.append(f"{run['wind_speed']:g} m/s" if run["wind_speed"] > 0 else "wind off")

@@ -24,8 +24,8 @@ from tunnel_lab.envs.campaign import CampaignEnv, reached
 from tunnel_lab.envs.picture import beliefs
 from tunnel_lab.envs.policies import POLICIES, run_campaign
 from tunnel_lab.envs.session import Knowledge, answers, probabilities
-from tunnel_lab.files import write_whole
 from tunnel_sim.record import Array
+from tunnel_sim.writing import write_whole
 
 CONTESTS = {"identification": ("scripted", "greedy"), "diagnosis": ("scripted", "separating")}
 SEEDS = {"identification": 50, "diagnosis": 50}

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from tunnel_lab.diagnosis_plots import diagnosis_figures
-from tunnel_lab.files import write_whole
 from tunnel_lab.formatting import significant
 from tunnel_lab.report import view
 from tunnel_lab.report.svg import inline_svg
 from tunnel_sim.campaign import Campaign
+from tunnel_sim.writing import write_whole
 
 Document = Mapping[str, Any]
 

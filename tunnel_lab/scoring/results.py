@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 from identification.estimate import Quantity
 from identification.scoring import Outcome, Score, Trials, collect, score
-from tunnel_lab.files import write_whole
 from tunnel_lab.scoring.grid import NO_EFFECT, Cell, Grid
 from tunnel_lab.scoring.work import Row, describe
 from tunnel_sim.errors import TunnelError
+from tunnel_sim.json_text import json_line
+from tunnel_sim.writing import write_whole
 
 if TYPE_CHECKING:
     import polars as pl
@@ -105,7 +106,7 @@ def write_trials(path: Path, results: Results) -> Path:
     import polars as pl
 
     frame = trials_frame(results)
-    told = json.dumps(results.grid.to_json_dict(), sort_keys=True)
+    told = json_line(results.grid.to_json_dict(), sort_keys=True)
     return write_whole(path, parquet(frame.with_columns(pl.lit(told).alias("grid"))))
 
 

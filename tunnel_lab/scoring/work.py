@@ -16,8 +16,8 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from tunnel_lab.files import output_folder, write_json
 from tunnel_lab.scoring.grid import Cell, Grid
+from tunnel_sim.writing import output_folder, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_lab.files import write_whole
 from tunnel_lab.rendering import REMEDY, backends
 from tunnel_lab.show.request import Request, ShownRun, shown_run
 from tunnel_sim.errors import TunnelError
+from tunnel_sim.writing import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

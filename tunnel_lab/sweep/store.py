@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tunnel_lab.files import output_folder, write_json, write_whole
 from tunnel_lab.sweep.product import Sweep
 from tunnel_sim.errors import TunnelError
+from tunnel_sim.leftovers import clear_leftovers
 from tunnel_sim.toml_input import shown
+from tunnel_sim.writing import output_folder, write_json, write_whole
 
 if TYPE_CHECKING:
     import polars as pl
@@ -73,8 +74,7 @@ class Store:
     def tidy(self) -> None:
         """Remove what a killed run left half written."""
         for name in (RESULTS, RECORDS, TIMINGS):
-            for path in (self.folder / name).glob(".*.part"):
-                path.unlink(missing_ok=True)
+            clear_leftovers(self.folder / name)
 
     def scan(self, dataset: str = RESULTS) -> pl.LazyFrame:
         """What the finished shards hold, in the order of the cases.
@@ -123,11 +123,12 @@ def begin(sweep: Sweep, folder: Path) -> Store:
         store = open_store(folder)
         _check_same(store, sweep, made_with())
         return store
+    clear_leftovers(folder)
     if folder.is_dir() and any(not path.name.startswith(f".{MANIFEST}.") for path in folder.iterdir()):
         raise TunnelError("the folder holds something else", where=shown(folder), remedy=_ELSEWHERE)
     output_folder(folder)
     for name in (RESULTS, TIMINGS, *([RECORDS] if sweep.document.records else [])):
-        (folder / name).mkdir(exist_ok=True)
+        output_folder(folder / name)
     write_json(
         folder / MANIFEST,
         {

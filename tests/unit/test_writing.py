@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tunnel_lab.files import output_folder, write_json, write_whole
 from tunnel_sim.errors import TunnelError
+from tunnel_sim.writing import output_folder, write_json, write_whole
 
 
 def test_a_file_is_written_and_nothing_else(tmp_path: Path) -> None:

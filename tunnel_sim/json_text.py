@@ -1,0 +1,74 @@
+"""Documents as JSON text: the one encoder of everything this program writes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+
+def json_text(document: Mapping[str, object]) -> str:
+    """A document as JSON for a file.
+
+    Args:
+        document: plain values, and NumPy's scalars and arrays; no NaN and no infinity, which JSON does not have.
+
+    Returns:
+        Indented JSON that ends in a line feed.
+
+    Raises:
+        ValueError: when a number is not finite; the message names its place. That is a fault of the program.
+        TypeError: when a value is of a type that JSON does not have.
+    """
+    return _encoded(document, indent=2) + "\n"
+
+
+def json_line(document: object, *, sort_keys: bool = False) -> str:
+    """A document as JSON on one line, for a field of another file.
+
+    Args:
+        document: as for `json_text`.
+        sort_keys: whether equal documents must give equal text.
+
+    Returns:
+        JSON without line feeds.
+
+    Raises:
+        ValueError: as for `json_text`.
+        TypeError: likewise.
+    """
+    return _encoded(document, sort_keys=sort_keys)
+
+
+def _encoded(document: object, **layout: Any) -> str:
+    try:
+        return json.dumps(document, default=_plain, ensure_ascii=False, allow_nan=False, **layout)
+    except ValueError as error:
+        place = _not_finite(document)
+        if place is None:
+            raise
+        raise ValueError(f"internal error: {place}, which JSON cannot hold") from error
+
+
+def _plain(value: object) -> object:
+    """What JSON knows of a NumPy value."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError(f"internal error: JSON cannot hold a {type(value).__name__}")
+
+
+def _not_finite(value: object, place: str = "the document") -> str | None:
+    """The first number that is not finite, with its place; None where there is none."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, float):
+        return None if math.isfinite(value) else f"{place} is {value}"
+    items: list[tuple[str, object]] = []
+    if isinstance(value, Mapping):
+        items = [(f"{place}.{key}", item) for key, item in value.items()]
+    elif isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        items = [(f"{place}[{index}]", item) for index, item in enumerate(value)]
+    return next((found for name, item in items if (found := _not_finite(item, name)) is not None), None)
