@@ -132,7 +132,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(error.format_message())  # type: ignore[attr-defined]  # click's, see CommandLineError
     except (KeyboardInterrupt, typer.Abort):
         status = INTERRUPTED
-    except BrokenPipeError:
+    except (BrokenPipeError, SystemExit):  # Typer ends the process itself at some closed pipes
         # The reader went away (``tunnel springs | head -1``): not an error, and Python must not flush again.
         _settle_output()
         return 0

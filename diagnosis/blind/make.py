@@ -10,6 +10,7 @@ from typing import Any
 from diagnosis.blind.files import KEY, SCHEMA_VERSION, SEAL, folder_hash, write_document
 from tunnel_sim.campaign_io import write_campaign
 from tunnel_sim.errors import TunnelError
+from tunnel_sim.leftovers import clear_leftovers
 from tunnel_sim.reference.draw import DEFAULT_SHARES, Mixture
 from tunnel_sim.reference.make import as_campaign, draw_set, simulate_set, truth_of
 from tunnel_sim.writing import whole_folder
@@ -54,6 +55,7 @@ def make_blind(
     """
     if count < 1:
         raise TunnelError(f"{count} campaigns make no set", where="--count", remedy="give 1 or more")
+    clear_leftovers(out.resolve().parent)  # what a killed command set aside is there again
     target = out / KEY if key is None else key
     for path in (out, target):
         if path.is_file() or (path.is_dir() and any(path.iterdir())):

@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 import json
+import os
+import stat
+import subprocess
+import sys
+import threading
+from io import BytesIO
 from pathlib import Path
+from typing import BinaryIO
 
+import polars as pl
 import pytest
 
 from tunnel_sim.errors import TunnelError
-from tunnel_sim.writing import output_folder, write_json, write_whole
+from tunnel_sim.writing import (
+    output_folder,
+    refuse_unwritable,
+    write_encoded,
+    write_json,
+    write_whole,
+)
 
 
 def test_a_file_is_written_and_nothing_else(tmp_path: Path) -> None:
@@ -67,3 +81,171 @@ def test_a_file_is_no_output_folder(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("")
     with pytest.raises(TunnelError, match="cannot be written"):
         output_folder(tmp_path / "a")
+
+
+def test_a_symbolic_link_stays_and_its_target_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    target = tmp_path / "there" / "a.json"
+    target.write_text("old")
+    link, second = tmp_path / "link", tmp_path / "second"
+    link.symlink_to(Path("there") / "a.json")
+    second.symlink_to(link)
+    assert write_whole(second, b"new") == second
+    assert target.read_text() == "new"
+    assert link.is_symlink()
+    assert second.is_symlink()
+    assert len(list((tmp_path / "there").iterdir())) == 1
+
+
+def test_a_link_to_a_file_that_is_not_there_yet(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "a.json")
+    write_whole(tmp_path / "link", b"new")
+    assert (tmp_path / "a.json").read_text() == "new"
+    assert (tmp_path / "link").is_symlink()
+
+
+def test_links_in_a_circle_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "a").symlink_to(tmp_path / "b")
+    (tmp_path / "b").symlink_to(tmp_path / "a")
+    for refused in (refuse_unwritable, lambda path: write_whole(path, b"")):
+        with pytest.raises(TunnelError, match="cannot be written"):
+            refused(tmp_path / "a")
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_folder_is_refused(tmp_path: Path, linked: bool) -> None:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    path = tmp_path / "link" if linked else folder
+    if linked:
+        path.symlink_to(folder)
+    for refused in (refuse_unwritable, lambda path: write_whole(path, b"")):
+        with pytest.raises(TunnelError, match="is a folder, not a file; name a file"):
+            refused(path)
+
+
+def test_a_name_too_long_for_the_disk_is_one_line(tmp_path: Path) -> None:
+    for refused in (refuse_unwritable, lambda path: write_whole(path, b"")):
+        with pytest.raises(TunnelError, match="file name too long"):
+            refused(tmp_path / ("a" * 300))
+
+
+def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    read: list[bytes] = []
+    reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()))
+    reader.start()
+    refuse_unwritable(pipe)
+    write_whole(pipe, b"content")
+    reader.join(timeout=10.0)
+    assert read == [b"content"]
+    assert list(tmp_path.iterdir()) == [pipe]
+    assert pipe.is_fifo()
+
+
+def test_a_device_stays_a_device() -> None:
+    write_whole(Path("/dev/null"), b"content")
+    assert Path("/dev/null").is_char_device()
+
+
+def test_a_device_node_of_root_stays_a_device_node(tmp_path: Path) -> None:
+    node = tmp_path / "null"
+    try:
+        os.mknod(node, 0o666 | stat.S_IFCHR, os.makedev(1, 3))
+    except PermissionError:
+        pytest.skip("only root makes device nodes")
+    try:
+        write_whole(node, b"content")
+    except TunnelError:
+        pytest.skip("devices are not opened on this file system")
+    assert node.is_char_device()
+    assert list(tmp_path.iterdir()) == [node]
+
+
+def child(code: str, *arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
+    words = [sys.executable, "-c", code, *map(str, arguments)]
+    return subprocess.run(words, check=False, text=True, **{"capture_output": True, **options})  # type: ignore[call-overload]
+
+
+STANDARD_OUTPUT = """
+from pathlib import Path
+from tunnel_sim.writing import write_whole
+print("before", flush=False)
+write_whole(Path("/dev/stdout"), b"content\\n")
+print("after")
+"""
+
+
+def test_standard_output_by_name_into_a_pipe_and_into_a_file(tmp_path: Path) -> None:
+    assert child(STANDARD_OUTPUT).stdout == "before\ncontent\nafter\n"
+    with (tmp_path / "out").open("w") as stream:
+        child(STANDARD_OUTPUT, capture_output=False, stdout=stream)
+    assert (tmp_path / "out").read_text() == "before\ncontent\nafter\n"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_is_one_line() -> None:
+    with pytest.raises(TunnelError, match="/dev/full: cannot be written \\(no space left on device\\)"):
+        write_whole(Path("/dev/full"), b"content")
+
+
+LIMITED = """
+import resource, signal, sys
+from pathlib import Path
+import numpy as np
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.campaign_io import write_campaign
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.record import Record
+time = np.arange(5000) / 500.0
+run = Run("a", Record(time, 0.3 * np.cos(9.0 * time) + 1e-3 * np.sin(1e4 * time)), 0.0)
+campaign = Campaign("c", RigProperties(), SensorProperties(), (run,))
+try:
+    write_campaign(campaign, Path(sys.argv[1]) / "c", run_format=sys.argv[2])
+except TunnelError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("run_format", ["parquet", "csv"])
+def test_a_disk_that_fills_while_a_campaign_is_written_is_one_line(tmp_path: Path, run_format: str) -> None:
+    done = child(LIMITED, tmp_path, run_format)
+    assert done.stderr == ""
+    assert "c: cannot be written (file too large)" in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+class Panic(BaseException):
+    """As libraries written in Rust raise it."""
+
+
+@pytest.mark.parametrize(
+    "error", [ValueError("odd\ntext"), Panic("no"), OSError("disk"), SyntaxError(), MemoryError()]
+)
+def test_whatever_a_writer_raises_is_one_line(tmp_path: Path, error: BaseException) -> None:
+    def fails(stream: BinaryIO) -> None:
+        stream.write(b"half")
+        raise error
+
+    with pytest.raises(TunnelError, match=r"a\.png: cannot be written \(") as raised:
+        write_encoded(tmp_path / "a.png", fails)
+    assert "\n" not in str(raised.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_writer_stays_interrupted(tmp_path: Path) -> None:
+    def interrupted(_: BinaryIO) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_encoded(tmp_path / "a.png", interrupted)
+
+
+def test_a_table_is_written_by_its_library(tmp_path: Path) -> None:
+    frame = pl.DataFrame({"a": [1.0, 2.0]})
+    write_encoded(tmp_path / "a.parquet", frame.write_parquet)
+    assert pl.read_parquet(BytesIO((tmp_path / "a.parquet").read_bytes())).equals(frame)

@@ -70,11 +70,11 @@ def run(
     from tunnel_sim.writing import refuse_unwritable, write_json
 
     kinds = vocabulary(split_names(effects), split_names(exclude))
-    data = read_campaign(campaign)
     to_stdout = json is not None and str(json) == "-"
     for path in (None if to_stdout else json, report):
         if path is not None:
             refuse_unwritable(path)
+    data = read_campaign(campaign)
     document = diagnose_with_progress(data, kinds).to_json_dict()
     # Files first: whoever reads what is printed may stop before its end.
     if json is not None and not to_stdout:

@@ -12,8 +12,9 @@ if TYPE_CHECKING:
 _NOT_HTML = (
     re.compile(r"^.*?(?=<svg)", re.DOTALL),  # the XML declaration and document type, which name an address
     re.compile(r"<metadata>.*?</metadata>\s*", re.DOTALL),
-    re.compile(r'\s+xmlns(:\w+)?="[^"]*"'),  # HTML knows SVG's names by itself
 )
+_TAG = re.compile(r"<[^>]+>")  # text between tags may hold names of runs, which look like anything
+_NAMES = re.compile(r'\s+xmlns(:\w+)?="[^"]*"')  # HTML knows SVG's names by itself
 _OPENING = re.compile(r"<svg[^>]*>")
 _SIZE = re.compile(r' (width|height)="[^"]*"')
 _ID = re.compile(r'\bid="([^"]+)"')
@@ -39,11 +40,16 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
     text = buffer.getvalue()
     for pattern in _NOT_HTML:
         text = pattern.sub("", text)
-    text = _ID.sub(rf'id="{name}-\1"', text)
-    text = _REFERENCE.sub(rf"\1{name}-\2", text)
+    text = _TAG.sub(lambda found: _in_page(found[0], name), text)
     text = _OPENING.sub(lambda found: _SIZE.sub("", found[0]), text, count=1)
     label = _escaped(description)
     return text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
+
+
+def _in_page(tag: str, name: str) -> str:
+    """A tag with ids of its own in the page."""
+    tag = _ID.sub(rf'id="{name}-\1"', _NAMES.sub("", tag))
+    return _REFERENCE.sub(rf"\1{name}-\2", tag)
 
 
 def _escaped(text: str) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from tests.unit.killed import names_of_the_dead
 from tests.unit.sweep.small_sweep import SMALL, contents
 from tunnel_lab.sweep import shard as shard_module
 from tunnel_lab.sweep.engine import run_sweep
@@ -112,7 +113,7 @@ def test_half_a_part_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
     whole = contents(tmp_path / "out")
     part = tmp_path / "out" / "results" / "part-00004.parquet"
     part.write_bytes(part.read_bytes()[:-100])  # a disk that was full, or lost its power
-    (part.parent / ".part-00005.parquet.abc.part").write_bytes(b"PAR1")
+    names_of_the_dead(part.with_name("part-00005.parquet"))[0].write_bytes(b"PAR1")
     assert 4 not in store.finished()
     assert run_sweep(sweep, tmp_path / "out", here).found == 11
     assert contents(tmp_path / "out") == whole
