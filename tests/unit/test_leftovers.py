@@ -11,7 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.reference.free_decays import Setting, campaign
 from tests.unit.killed import names_of_the_dead
+from tunnel_sim.campaign_io import read_campaign, write_campaign
+from tunnel_sim.errors import TunnelError
 from tunnel_sim.leftovers import clear_leftovers, temporary_names
 from tunnel_sim.writing import whole_folder, write_whole
 
@@ -149,3 +152,24 @@ def test_an_interrupt_between_the_renamings_puts_the_old_folder_back(
         (folder / "file").write_text("new")
     assert [path.name for path in tmp_path.iterdir()] == ["campaign"]
     assert (target / "file").read_text() == "old"
+
+
+def test_a_command_that_refuses_an_occupied_folder_clears_first(tmp_path: Path) -> None:
+    from tunnel_lab.commands import score, simulate
+
+    names_of_the_dead(tmp_path / "trials.parquet")[0].write_text("half")
+    score._refuse_occupied(tmp_path, overwrite=False)
+    assert list(tmp_path.iterdir()) == []
+    names_of_the_dead(tmp_path / "campaign")[1].mkdir()
+    with pytest.raises(TunnelError, match="exists already"):
+        simulate.refuse_occupied(tmp_path / "campaign", overwrite=False)
+
+
+def test_a_campaign_that_was_set_aside_is_not_overwritten_unasked(tmp_path: Path) -> None:
+    data = campaign([Setting(16.12, 0.0)], duration=4.0, rate=200.0)
+    folder = write_campaign(data, tmp_path / "c")
+    folder.rename(names_of_the_dead(folder)[1])
+    with pytest.raises(TunnelError, match="the folder exists"):
+        write_campaign(data, folder)
+    assert [path.name for path in tmp_path.iterdir()] == ["c"]
+    assert len(read_campaign(folder).runs) == 1

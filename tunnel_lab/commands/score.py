@@ -203,9 +203,11 @@ def _keep(out: Path, results: Results) -> list[Path]:
 def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
     """Only an interrupted score may be in the folder, or, with ``overwrite``, a finished one."""
     from tunnel_sim.errors import TunnelError
+    from tunnel_sim.leftovers import clear_leftovers
 
     if out is None or not out.exists():
         return
+    clear_leftovers(out)
     if not out.is_dir():
         raise TunnelError("is a file, not a folder", where=str(out), remedy="name another --out")
     if any(path.name != "parts" for path in out.iterdir()) and not overwrite:
