@@ -25,6 +25,7 @@ from diagnosis.result import (
     Where,
 )
 from tests.reference.rigs import rig
+from tests.unit.gone_reader import unheard
 from tunnel_lab import blind_page
 from tunnel_lab.cli import main
 from tunnel_sim.campaign_io import read_campaign
@@ -351,6 +352,9 @@ def test_the_commands_agree_with_one_another(blind, quick, capsys, tmp_path):
     sealed = hashlib.sha256((blind / "answers" / "seal.json").read_bytes()).hexdigest()
     assert sealed in told
     page, figures = tmp_path / "page.md", tmp_path / "score.json"
+    assert unheard("blind", "score", blind, "--markdown", page, "--json", figures) == 0
+    assert page.exists()
+    assert figures.exists()
     assert main(["blind", "score", str(blind), "--markdown", str(page), "--json", str(figures)]) == 0
     out = capsys.readouterr().out
     for text in (sealed, "verified", "Causes exactly right", "Calibration", "Seconds"):

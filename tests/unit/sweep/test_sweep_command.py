@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from tests.unit.gone_reader import unheard
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
 from tunnel_lab.sweep import cluster, figures
@@ -110,6 +112,9 @@ def test_the_summary_of_a_sweep(
     sweep: Sweep, here, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run_sweep(sweep, tmp_path / "out", here)
+    assert unheard("sweep", "--summary", tmp_path / "out") == 0
+    assert len(list((tmp_path / "out" / "summary").iterdir())) == 4  # written before the first word
+    shutil.rmtree(tmp_path / "out" / "summary")
     assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
     for part in (
