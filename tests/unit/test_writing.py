@@ -249,3 +249,15 @@ def test_a_table_is_written_by_its_library(tmp_path: Path) -> None:
     frame = pl.DataFrame({"a": [1.0, 2.0]})
     write_encoded(tmp_path / "a.parquet", frame.write_parquet)
     assert pl.read_parquet(BytesIO((tmp_path / "a.parquet").read_bytes())).equals(frame)
+
+
+def test_a_report_that_cannot_be_drawn_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tunnel_lab.report import page
+
+    def fails(*_: object) -> str:
+        raise ValueError("no such glyph")
+
+    monkeypatch.setattr(page, "render_report", fails)
+    with pytest.raises(TunnelError, match="cannot be written \\(ValueError: no such glyph\\)"):
+        page.write_report({}, None, tmp_path / "a.html")
+    assert list(tmp_path.iterdir()) == []

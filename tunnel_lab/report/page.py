@@ -12,7 +12,7 @@ from tunnel_lab.formatting import significant
 from tunnel_lab.report import view
 from tunnel_lab.report.svg import inline_svg
 from tunnel_sim.campaign import Campaign
-from tunnel_sim.writing import write_whole
+from tunnel_sim.writing import write_encoded
 
 Document = Mapping[str, Any]
 
@@ -41,9 +41,9 @@ def write_report(document: Document, campaign: Campaign, path: Path) -> Path:
         The same path.
 
     Raises:
-        TunnelError: when the file cannot be written.
+        TunnelError: when the page cannot be drawn or the file cannot be written.
     """
-    return write_whole(path, render_report(document, campaign).encode())
+    return write_encoded(path, lambda stream: stream.write(render_report(document, campaign).encode()))
 
 
 def render_report(document: Document, campaign: Campaign) -> str:
