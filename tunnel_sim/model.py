@@ -15,6 +15,7 @@ import numpy as np
 from tunnel_sim import scenery
 from tunnel_sim.davis import davis_vertices
 from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim.moment_law import state_vector
 from tunnel_sim.plugin import load_plugin
 from tunnel_sim.record import Array
 from tunnel_sim.rig import Rig
@@ -97,7 +98,8 @@ class Model:
             data.joint("rod_twist").qpos = release - end
         data.joint("yaw").qpos = end
         data.joint("yaw").qvel = self.settings.release_rate
-        data.plugin_state[:7] = (release, end, self.settings.release_rate, release - end, 0.0, 0.0, 1.0)
+        started = {"lagged": release, "angle": end, "twist": release - end, "started": 1.0}
+        data.plugin_state[:] = state_vector({**started, "rate": self.settings.release_rate})
         return data
 
 
