@@ -11,34 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.moment_law import forward_library, parameter_names, parameter_vector
+from tunnel_sim.moment_law import forward_library, parameter_names, parameter_vector, run_dtype
 from tunnel_sim.motion import Motion, sampling
 from tunnel_sim.record import Array
 from tunnel_sim.rig import Rig
 from tunnel_sim.run_settings import RunSettings
-
-#: One run apart from its moment law, field for field the C structure ``vwt_run``.
-RUN_DTYPE = np.dtype(
-    [
-        ("wind", np.uintp),
-        ("wind_count", np.float64),
-        ("wind_interval", np.float64),
-        ("forcing", np.uintp),
-        ("forcing_count", np.float64),
-        ("forcing_interval", np.float64),
-        ("angle", np.float64),
-        ("rate", np.float64),
-        ("twist", np.float64),
-        ("twist_rate", np.float64),
-        ("lagged", np.float64),
-        ("twist_stiffness", np.float64),
-        ("twist_damping", np.float64),
-        ("inertia_share", np.float64),
-        ("step", np.float64),
-        ("steps", np.float64),
-        ("samples", np.float64),
-    ]
-)
 
 
 def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, Array, int]:
@@ -46,7 +23,7 @@ def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, 
 
     Args:
         law: the moment law's parameters, shape (n, number of parameters), in the law's order.
-        runs: shape (n,), of `RUN_DTYPE`; what ``wind`` and ``forcing`` point at must stay alive.
+        runs: shape (n,), of `run_dtype`; what ``wind`` and ``forcing`` point at must stay alive.
         samples: samples per run, the first at time 0.
 
     Returns:
@@ -102,10 +79,10 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
         settings: the run's physics.
 
     Returns:
-        Array of shape (1,) and `RUN_DTYPE`, at the release (see ``Model.release_state``), and the arrays it
+        Array of shape (1,) and `run_dtype`, at the release (see ``Model.release_state``), and the arrays it
         points at, which the caller keeps alive.
     """
-    run = np.zeros(1, dtype=RUN_DTYPE)
+    run = np.zeros(1, dtype=run_dtype())
     wind = settings.series.get("wind_speed")
     forcing = settings.series.get("forcing")
     values = np.array(wind.values if wind is not None else [settings.wind_speed], dtype=np.float64)

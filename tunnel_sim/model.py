@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import resources
-from math import pi
 
 import mujoco
 import numpy as np
@@ -15,12 +14,13 @@ import numpy as np
 from tunnel_sim import scenery
 from tunnel_sim.davis import davis_vertices
 from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim.moment_law import state_vector
 from tunnel_sim.plugin import load_plugin
 from tunnel_sim.record import Array
 from tunnel_sim.rig import Rig
 from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.steps import check_stable
 
-_FASTEST_TURN = 2.5  # rad of the rod's own oscillation in one step; RK4 is unstable beyond 2.8
 _SERIES = ("wind_speed", "forcing")
 _THINNEST = 1e-3  # width over length: MuJoCo refuses the inertias of a body without any
 _NATIVE = frozenset({"spring_stiffness", "mechanical_damping", "yaw_inertia"})  # owned by joint and body
@@ -57,9 +57,9 @@ class Model:
             A model whose physics equals to the bit that of ``build_model(rig, settings)``.
 
         Raises:
-            TunnelError: when the plugin refuses the numbers.
+            TunnelError: when the plugin refuses the numbers, or the steps are too long for them.
         """
-        _check_rod(settings)
+        check_stable(self.rig, settings)
         mj = copy.copy(self.mj)
         twist = settings.rod_twist
         share = twist.inertia_share if twist is not None else 0.0
@@ -97,7 +97,8 @@ class Model:
             data.joint("rod_twist").qpos = release - end
         data.joint("yaw").qpos = end
         data.joint("yaw").qvel = self.settings.release_rate
-        data.plugin_state[:7] = (release, end, self.settings.release_rate, release - end, 0.0, 0.0, 1.0)
+        started = {"lagged": release, "angle": end, "twist": release - end, "started": 1.0}
+        data.plugin_state[:] = state_vector({**started, "rate": self.settings.release_rate})
         return data
 
 
@@ -112,28 +113,15 @@ def build_model(rig: Rig, settings: RunSettings) -> Model:
         The model.
 
     Raises:
-        TunnelError: when MuJoCo or the plugin refuses the configuration.
+        TunnelError: when MuJoCo or the plugin refuses the configuration, or the steps are too long for it.
     """
-    _check_rod(settings)
+    check_stable(rig, settings)
     spec = build_spec(rig, settings)
     try:
         compiled = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise _refusal(error) from error
     return Model(compiled, rig, settings, spec)
-
-
-def _check_rod(settings: RunSettings) -> None:
-    twist = settings.rod_twist
-    if twist is None:
-        return
-    frequency = twist.frequency(settings.yaw_inertia, settings.spring_stiffness)
-    if frequency * settings.timestep > _FASTEST_TURN:
-        raise TunnelError(
-            f"the rod's own oscillation of {frequency / (2.0 * pi):.0f} Hz is too fast for steps of "
-            f"{settings.timestep:g} s",
-            remedy="give a larger compliance (0 for a rigid rod) or an inertia_share further from 0 and 1",
-        )
 
 
 def _refusal(error: Exception) -> TunnelError:

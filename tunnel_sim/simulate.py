@@ -18,6 +18,7 @@ from tunnel_sim.record import Array, Record
 from tunnel_sim.rig import Rig
 from tunnel_sim.run_settings import RunSettings
 from tunnel_sim.sensor import read_motion
+from tunnel_sim.steps import follow_fastest
 
 Progress = Callable[[int, int], None]
 _CHUNK_STEPS = 4_000_000  # steps recorded at once: bounds the memory of a large batch
@@ -71,7 +72,7 @@ def simulate(
     Raises:
         TunnelError: when the integration leaves the finite range or the settings are refused.
     """
-    model = build_model(rig, apply_effects(settings, effects, rng))
+    model = build_model(rig, follow_fastest(rig, apply_effects(settings, effects, rng)))
     return read_motion(simulate_motion(model, sensor.sample_rate), settings, sensor, rng, effects)
 
 
@@ -151,8 +152,13 @@ def simulate_motions(
 
     Returns:
         One motion per run, in order.
+
+    Raises:
+        TunnelError: when a run leaves the finite range, its settings are refused, or its fastest motion asks
+            for too many steps.
     """
     motions: dict[int, Motion] = {}
+    settings = [_followed(rig, run, number) for number, run in enumerate(settings, 1)]
     for group in _groups(settings):
         samples, steps = sampling(settings[group[0]], sample_rate)
         size = max(1, _CHUNK_STEPS // (samples * steps))
@@ -165,6 +171,13 @@ def simulate_motions(
             if progress is not None:
                 progress(len(motions), len(settings))
     return [motions[i] for i in range(len(settings))]
+
+
+def _followed(rig: Rig, run: RunSettings, number: int) -> RunSettings:
+    try:
+        return follow_fastest(rig, run)
+    except TunnelError as error:
+        raise TunnelError(error.what, where=f"run {number}", remedy=error.remedy) from error
 
 
 def _groups(settings: Sequence[RunSettings]) -> list[list[int]]:

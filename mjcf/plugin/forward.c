@@ -220,7 +220,3 @@ void vwt_backlash(int count, const double* in, double half, double start, double
     out[i] = at;
   }
 }
-
-int vwt_parameter_count(void) { return VWT_PARAMETER_COUNT; }
-const char* vwt_parameter_name(int index) { return vwt_parameter_names[index]; }
-const char* vwt_parameter_unit(int index) { return vwt_parameter_units[index]; }

@@ -14,23 +14,32 @@
 #define VWT_API __attribute__((visibility("default")))
 #endif
 
-// A run apart from its moment law. All fields are eight bytes wide: Python fills an array of this layout.
+// A run apart from its moment law: fields that point at samples, and numbers.
+#define VWT_RUN(POINTER, NUMBER)                                                    \
+  POINTER(wind)            /* m/s, wind_count samples at wind_interval s */         \
+  NUMBER(wind_count)                                                                \
+  NUMBER(wind_interval)                                                             \
+  POINTER(forcing)         /* 1, forcing_count samples at forcing_interval s */     \
+  NUMBER(forcing_count)    /* 0: none */                                            \
+  NUMBER(forcing_interval)                                                          \
+  NUMBER(angle)            /* rad, of the spring's end at time 0 */                 \
+  NUMBER(rate)             /* rad/s */                                              \
+  NUMBER(twist)            /* rad, of the body against the spring's end */          \
+  NUMBER(twist_rate)       /* rad/s */                                              \
+  NUMBER(lagged)           /* rad, the lag's state */                               \
+  NUMBER(twist_stiffness)  /* N m/rad; 0: the rod is rigid */                       \
+  NUMBER(twist_damping)    /* N m s/rad */                                          \
+  NUMBER(inertia_share)    /* of Izz at the spring's end */                         \
+  NUMBER(step)             /* s */                                                  \
+  NUMBER(steps)            /* between samples */                                    \
+  NUMBER(samples)          /* the first at time 0 */
+
 typedef struct {
-  const double* wind;     // m/s, wind_count samples at wind_interval s
-  double wind_count;
-  double wind_interval;
-  const double* forcing;  // 1, forcing_count samples at forcing_interval s; count 0: none
-  double forcing_count;
-  double forcing_interval;
-  double angle, rate;     // of the spring's end at time 0, rad and rad/s
-  double twist, twist_rate;  // of the body against it
-  double lagged;          // lag state, rad
-  double twist_stiffness; // N m/rad; 0: the rod is rigid
-  double twist_damping;   // N m s/rad
-  double inertia_share;   // of Izz at the spring's end
-  double step;            // s
-  double steps;           // number of steps between samples
-  double samples;         // number of samples, the first at time 0
+#define POINTER(name) const double* name;
+#define NUMBER(name) double name;
+  VWT_RUN(POINTER, NUMBER)
+#undef POINTER
+#undef NUMBER
 } vwt_run;
 
 // Fills angle and rate (of the spring's end, `samples` each) for `count` runs.
@@ -41,8 +50,16 @@ VWT_API int vwt_forward(int count, const vwt_parameters* parameters, const vwt_r
 // Reading behind a backlash of half width `half`: moves only when pushed. In and out may be the same.
 VWT_API void vwt_backlash(int count, const double* in, double half, double start, double* out);
 
+// The law's parameters, the numbers of the plugin's state and the fields of vwt_run, for who fills them by name.
 VWT_API int vwt_parameter_count(void);
 VWT_API const char* vwt_parameter_name(int index);
 VWT_API const char* vwt_parameter_unit(int index);
+VWT_API int vwt_state_count(void);
+VWT_API const char* vwt_state_name(int index);
+VWT_API int vwt_run_size(void);  // bytes
+VWT_API int vwt_run_count(void);
+VWT_API const char* vwt_run_name(int index);
+VWT_API int vwt_run_offset(int index);      // bytes from the start
+VWT_API int vwt_run_is_pointer(int index);  // 1, or 0 where it is a number
 
 #endif  // VWT_FORWARD_H_

@@ -1,6 +1,6 @@
 // The one moment law of the rig: what air and mechanism add to the linear spring and damper.
 //
-// Nothing here knows MuJoCo. The engine plugin (plugin.c) and the forward integrator (forward.c) both call
+// Nothing here knows MuJoCo. The engine plugin (binding.c) and the forward integrator (forward.c) both call
 // these functions, so a term exists once. Angles in rad, moments in N m, positive the way yaw is positive.
 
 #ifndef VWT_MOMENT_H_

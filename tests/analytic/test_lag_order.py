@@ -11,6 +11,7 @@ from scipy.linalg import expm
 
 from tunnel_sim.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.model import build_model
+from tunnel_sim.moment_law import state_names, state_vector
 from tunnel_sim.simulate import simulate_motion
 
 STEPS = np.array([8e-3, 4e-3, 2e-3])
@@ -57,9 +58,9 @@ def _one_step_map(lag: float, step: float) -> np.ndarray:
     for angle, rate, lagged in np.eye(3):
         data = mujoco.MjData(model.mj)
         data.qpos[0], data.qvel[0] = angle, rate
-        data.plugin_state[:7] = (lagged, angle, rate, 0.0, 0.0, 0.0, 1.0)
+        data.plugin_state[:] = state_vector({"lagged": lagged, "angle": angle, "rate": rate, "started": 1.0})
         mujoco.mj_step(model.mj, data)
-        columns.append((data.qpos[0], data.qvel[0], data.plugin_state[0]))
+        columns.append((data.qpos[0], data.qvel[0], data.plugin_state[state_names().index("lagged")]))
     return np.array(columns).T
 
 
@@ -107,8 +108,8 @@ def test_lag_propagation_is_exact_for_a_cubic_path(step: float) -> None:
     data = mujoco.MjData(model.mj)
     angle, rate, lagged = 0.2, 0.7, 0.15
     data.qpos[0], data.qvel[0] = angle, rate
-    data.plugin_state[:7] = (lagged, angle, rate, 0.0, 0.0, 0.0, 1.0)
+    data.plugin_state[:] = state_vector({"lagged": lagged, "angle": angle, "rate": rate, "started": 1.0})
     mujoco.mj_step(model.mj, data)
     tau = lag * LENGTH / speed
     exact = lagged + (angle - lagged - rate * tau) * -np.expm1(-step / tau) + rate * step
-    assert data.plugin_state[0] == pytest.approx(exact, rel=1e-15, abs=1e-16)
+    assert data.plugin_state[state_names().index("lagged")] == pytest.approx(exact, rel=1e-15, abs=1e-16)

@@ -14,6 +14,7 @@ from tests.reference.effect_oracle import Setting, reading
 from tunnel_sim.effects import effect_from
 from tunnel_sim.forward import forward_motion
 from tunnel_sim.model import Model, build_model
+from tunnel_sim.moment_law import state_names
 from tunnel_sim.plan import SensorModel
 from tunnel_sim.run_settings import RunSettings
 from tunnel_sim.simulate import simulate_batch, simulate_motion
@@ -21,7 +22,7 @@ from tunnel_sim.simulate import simulate_batch, simulate_motion
 RNG = np.random.default_rng(0)
 SAMPLE_RATE = 500.0
 
-_DEFLECTION = 7  # its place in the plugin's state
+_DEFLECTION = state_names().index("deflection")
 
 
 def _with_friction(run: RunSettings, moment: float, reach: float) -> RunSettings:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil
 from zlib import crc32
 
 import numpy as np
@@ -26,6 +25,7 @@ from tunnel_sim.record import Record
 from tunnel_sim.rig import Rig, load_rig
 from tunnel_sim.run_settings import RunSettings
 from tunnel_sim.sensor import read_motion
+from tunnel_sim.steps import follow_fastest, whole_steps
 
 _ZETA_SPREAD, _FREQUENCY_SPREAD, _RELEASE_SPREAD = 0.05, 0.02, 0.03
 _ZERO_STD = 0.004  # rad
@@ -137,7 +137,7 @@ def _campaign(
             air_density=rig.air.density,
             release_angle=release,
             duration=cell.duration,
-            timestep=_timestep(cell),
+            timestep=whole_steps(cell.sample_rate),
         )
         runs.append(
             Run(
@@ -165,7 +165,7 @@ def _record(
     for effect in effects:
         run = effect.on_run(run, settings, rng.spawn(1)[0])
     try:
-        motion = forward_motion(rig, run, cell.sample_rate)
+        motion = forward_motion(rig, follow_fastest(rig, run), cell.sample_rate)
     except ValueError as error:
         remedy = "choose a stiffer spring or less wind"
         raise TunnelError(str(error), where=cell.label, remedy=remedy) from error
@@ -177,8 +177,3 @@ def _effects(cell: Cell) -> tuple[Effect, ...]:
         return ()
     setting = parse_effect(cell.effect)
     return (effect_from(setting.name, setting.parameters),)
-
-
-def _timestep(cell: Cell) -> float:
-    """At most a millisecond, and a whole number of steps to the sample."""
-    return 1.0 / (cell.sample_rate * max(1, ceil(1000.0 / cell.sample_rate)))

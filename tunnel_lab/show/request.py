@@ -104,13 +104,14 @@ def shown_run(request: Request) -> ShownRun:
             of range.
     """
     from tunnel_sim.simulate import apply_effects
+    from tunnel_sim.steps import follow_fastest
     from tunnel_sim.virtual_campaign import plan_effects, run_settings
 
     rig = load_rig()
     plan, condition = _plan_and_condition(request, rig)
     stated = run_settings(plan.truth, condition)
     effects = plan_effects(plan)
-    settings = apply_effects(stated, effects, np.random.default_rng([plan.seed, 0]))
+    settings = follow_fastest(rig, apply_effects(stated, effects, np.random.default_rng([plan.seed, 0])))
     wind = f"{condition.wind_speed:g} m/s" if condition.wind_speed > 0.0 else "wind off"
     names = "".join(f", {effect.name.replace('_', ' ')}" for effect in effects if not effect.is_null)
     title = (

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
-from math import ceil, sqrt
 
 import numpy as np
 
+from tunnel_sim import steps
 from tunnel_sim.effects.base import Effect, parameter, with_law
 from tunnel_sim.run_settings import RunSettings
-
-_MOST_SUBSTEPS = 40
-_LEAST_RANGE = 1e-6  # rad: for a shorter one steps are not shortened further
 
 
 @dataclass(frozen=True)
@@ -51,15 +47,6 @@ class CoulombFriction(Effect):
         del stated, rng
         if self.is_null or self.presliding == 0.0:
             return with_law(run, friction_moment=self.friction_moment)
-        run = with_law(run, friction_moment=self.friction_moment, presliding=self.presliding)
-        return dataclasses.replace(run, timestep=run.timestep / self._substeps(run))
-
-    def _substeps(self, run: RunSettings) -> int:
-        """How many steps replace one, so that from a reversal on the motion covers half the range in one."""
-        share = run.rod_twist.inertia_share if run.rod_twist is not None else 1.0
-        inertia = share * run.yaw_inertia
-        swing = run.spring_stiffness * abs(run.release_angle)
-        swing += sqrt(run.spring_stiffness * inertia) * abs(run.release_rate)
-        acceleration = max(swing, self.friction_moment) / inertia
-        step = sqrt(max(self.presliding, _LEAST_RANGE) / acceleration)
-        return min(_MOST_SUBSTEPS, max(1, ceil(run.timestep / step)))
+        return steps.for_contact(
+            with_law(run, friction_moment=self.friction_moment, presliding=self.presliding)
+        )

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from math import ceil
 
 import numpy as np
 
+from tunnel_sim import steps
 from tunnel_sim.effects.base import Effect, parameter
 from tunnel_sim.run_settings import RodTwist, RunSettings
-
-_TURN = 0.5  # rad of the rod's own oscillation in one step: RK4 then errs by less than 1e-5 rad
-_MOST_SUBSTEPS = 64
 
 
 @dataclass(frozen=True)
@@ -55,7 +52,6 @@ class RodFlexibility(Effect):
         del stated, rng
         if self.is_null:
             return run
-        twist = RodTwist(self.compliance, self.inertia_share)
-        turn = run.timestep * twist.frequency(run.yaw_inertia, run.spring_stiffness)
-        shorter = min(_MOST_SUBSTEPS, max(1, ceil(turn / _TURN)))
-        return dataclasses.replace(run, rod_twist=twist, timestep=run.timestep / shorter)
+        return steps.for_rod(
+            dataclasses.replace(run, rod_twist=RodTwist(self.compliance, self.inertia_share))
+        )

@@ -14,6 +14,7 @@ from tunnel_sim.motion import sampling
 from tunnel_sim.record import Array
 from tunnel_sim.rig import Rig
 from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.steps import follow_fastest
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """What MuJoCo needs to go on to the bit: full physics with plugin state, inputs, and the solver's warm start."""
@@ -57,6 +58,7 @@ class Models:
         Returns:
             Layout, number of steps, model.
         """
+        settings = follow_fastest(self._rig, settings)
         _, steps = sampling(settings, self._sample_rate)
         layout = settings.layout()
         if layout not in self._compiled:

@@ -120,19 +120,25 @@ def test_rollout_gives_each_model_its_own_coefficients() -> None:
     assert len({row.tobytes() for row in states[:, -1]}) == 3
 
 
-def test_models_with_other_numerics_may_not_share_data() -> None:
-    # equal in size, so MuJoCo sees no difference: one coefficient would take the value of another
-    first, second = _model({"moment_cubic": "1"}), _model({"gravity_angle": "1"})
-    start = np.array([_state(first, mujoco.MjData(first))] * 2)
-    with pytest.raises(mujoco.FatalError, match="numerics"):
-        mujoco_rollout.rollout([first, second], mujoco.MjData(first), start, nstep=10)
-    batch = mujoco_batch.Batch(first, nsim=2, nthread=1)
-    batch.set_models([first, second])
-    with pytest.raises(mujoco_batch.SimulationError, match="numerics"):
-        batch.step()
+def test_models_with_other_numerics_share_data() -> None:
+    # equal in size, so MuJoCo sees no difference: every model must find its own coefficients all the same
+    models = [_model({"moment_cubic": "1"}), _model({"gravity_stiffness": "0.5"})] * 2
+    start = []
+    for model in models:
+        data = mujoco.MjData(model)
+        data.joint("yaw").qpos = 0.3
+        start.append(_state(model, data))
+    alone = [_state(model, _moving(model)) for model in models]
+    states, _ = mujoco_rollout.rollout(models, mujoco.MjData(models[0]), np.array(start), nstep=100)
+    assert np.array_equal(states[:, -1], alone)
+    batch = mujoco_batch.Batch(models[0], nsim=4, nthread=1)
+    batch.set_models(models)
+    batch.bind("qpos")[:, 1] = 0.3
+    batch.step(nstep=100)
+    assert np.array_equal(batch.bind("qpos"), [_moving(model).qpos for model in models])
 
 
-def test_data_of_other_numerics_cannot_be_copied_across_unnoticed() -> None:
+def test_data_of_other_numerics_takes_a_copy() -> None:
     model, other = _model({"moment_cubic": "1"}), _model({"user_some_longer_name": "1"})
     data = mujoco.MjData(other)
     mujoco.mj_copyData(data, model, _moving(model))

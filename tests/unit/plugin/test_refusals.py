@@ -140,9 +140,12 @@ def test_refusals_do_not_harm_the_process() -> None:
 )
 def test_another_version_of_mujoco_is_refused(tmp_path: Path) -> None:
     source = tmp_path / "other_version.c"
+    parts = "".join(
+        f'#include "{PLUGIN_SOURCE / name}.c"\n'
+        for name in ("plugin", "instance", "find_ids", "binding", "moment")
+    )
     source.write_text(
-        "#include <mujoco/mujoco.h>\n#undef mjVERSION_HEADER\n#define mjVERSION_HEADER 1\n"
-        f'#include "{PLUGIN_SOURCE / "plugin.c"}"\n#include "{PLUGIN_SOURCE / "moment.c"}"\n',
+        f"#include <mujoco/mujoco.h>\n#undef mjVERSION_HEADER\n#define mjVERSION_HEADER 1\n{parts}",
         encoding="utf-8",
     )
     mujoco_dir = Path(mujoco.__file__).parent

@@ -1,0 +1,170 @@
+#include "binding.h"
+
+#include <string.h>
+
+_Static_assert(sizeof(mjtNum) == sizeof(double), "the law and the state are in double precision");
+
+typedef struct {
+  mjtNum time, angle, rate, twist, twist_rate;
+} Motion;
+
+static mjtNum mass_diagonal(const mjModel* m, const mjData* d, int dof) {
+  return d->M[m->M_rowadr[dof] + m->M_rownnz[dof] - 1];
+}
+
+static mjtNum series_at(const mjModel* m, int values, int interval, mjtNum time) {
+  return vwt_series(m->numeric_data + m->numeric_adr[values], m->numeric_size[values],
+                    interval < 0 ? 0 : m->numeric_data[m->numeric_adr[interval]], time);
+}
+
+static void read_parameters(const mjModel* m, const mjData* d, const vwt_ids* self, vwt_parameters* p) {
+  double* table = (double*)p;  // a structure of doubles only, in the order of the law
+  if (self->span[0].count == VWT_OWN) {  // all in one piece, as build_model writes them: much the fastest
+    memcpy(p, m->numeric_data + m->numeric_adr[self->span[0].numeric], VWT_OWN * sizeof(double));
+  } else {
+    memset(p, 0, sizeof(*p));
+    for (int i = 0; i < self->span_count; i++) {
+      const vwt_span* span = &self->span[i];
+      memcpy(table + span->parameter, m->numeric_data + m->numeric_adr[span->numeric], span->count * sizeof(double));
+    }
+  }
+  p->spring_stiffness = m->jnt_stiffness[self->joint];
+  p->mechanical_damping = m->dof_damping[self->dof];
+  p->yaw_inertia = mass_diagonal(m, d, self->dof);
+}
+
+static mjtNum wind_speed_at(const mjModel* m, const mjData* d, const vwt_ids* self, mjtNum time) {
+  const mjtNum live = m->nuserdata > 0 ? d->userdata[0] : 0;  // live input: departure from the series
+  const mjtNum speed = series_at(m, self->wind_speed, self->wind_interval, time) + live;
+  return speed > 0 ? speed : 0;
+}
+
+static Motion present_motion(const mjModel* m, const mjData* d, const vwt_ids* self) {
+  Motion now = {d->time, d->qpos[m->jnt_qposadr[self->joint]], d->qvel[self->dof], 0, 0};
+  if (self->twist_dof >= 0) {
+    now.twist = d->qpos[m->jnt_qposadr[self->twist_joint]];
+    now.twist_rate = d->qvel[self->twist_dof];
+  }
+  return now;
+}
+
+// Motion at the start of the step; the present one before the first step.
+static Motion start_motion(const vwt_state* state, const Motion* now) {
+  if (state->started == 0) {
+    return *now;
+  }
+  const Motion start = {state->time, state->angle, state->rate, state->twist, state->twist_rate};
+  return start;
+}
+
+// The lag's time constant changes with the wind: that of the time halfway from the step's start is taken.
+static mjtNum lagged_at(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
+                        const vwt_state* state, const Motion* now) {
+  const mjtNum angle = now->angle + now->twist, rate = now->rate + now->twist_rate;
+  if (p->aero_lag == 0 || state->started == 0) {
+    return angle;
+  }
+  const mjtNum halfway = wind_speed_at(m, d, self, 0.5 * (state->time + now->time));
+  return vwt_lag_advance(vwt_lag_time(p, halfway), state->lagged, now->time - state->time,
+                         state->angle + state->twist, state->rate + state->twist_rate, angle, rate);
+}
+
+static mjtNum air_moment(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
+                         const vwt_state* state, const Motion* at) {
+  const vwt_air_state air = {
+      .time = at->time,
+      .wind_speed = wind_speed_at(m, d, self, at->time),
+      .angle = at->angle + at->twist,
+      .rate = at->rate + at->twist_rate,
+      .lagged = p->aero_lag != 0 ? lagged_at(m, d, self, p, state, at) : 0,
+      .forcing = self->forcing < 0 ? 0 : series_at(m, self->forcing, self->forcing_interval, at->time),
+  };
+  return vwt_air_moment(p, &air);
+}
+
+// All moments on the spring's end but friction, those of MuJoCo's own spring, damper and rod included.
+static mjtNum other_moment(const mjModel* m, const vwt_ids* self, const vwt_parameters* p, mjtNum air,
+                           const Motion* at) {
+  const mjtNum mechanism = vwt_mechanism_moment(p, at->angle, at->rate) - p->spring_stiffness * at->angle -
+                           p->mechanical_damping * at->rate;
+  if (self->twist_dof < 0) {
+    return mechanism + air;
+  }
+  return mechanism + m->jnt_stiffness[self->twist_joint] * at->twist + m->dof_damping[self->twist_dof] * at->twist_rate;
+}
+
+// What turns at the spring's end.
+static mjtNum end_inertia(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p) {
+  return self->twist_dof < 0 ? p->yaw_inertia : p->yaw_inertia - mass_diagonal(m, d, self->twist_dof);
+}
+
+// Dahl's state: zero until the end of the first step where the start is not known.
+static mjtNum deflection_at(const vwt_state* state, mjtNum range, const Motion* now) {
+  if (state->started == 0) {
+    return 0;
+  }
+  return vwt_presliding_advance(range, state->deflection, now->time - state->time, state->angle, state->rate,
+                                now->angle, now->rate);
+}
+
+static mjtNum friction(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
+                       const vwt_state* state, const Motion* now) {
+  const mjtNum inertia = end_inertia(m, d, self, p);
+  if (p->presliding > 0) {
+    const mjtNum range = vwt_presliding_range(p, inertia, m->opt.timestep);
+    return -deflection_at(state, range, now) / range * p->friction_moment;
+  }
+  const Motion start = start_motion(state, now);
+  const mjtNum applied = d->qfrc_applied[self->dof];  // by the user, on the spring's end
+  const mjtNum other = other_moment(m, self, p, air_moment(m, d, self, p, state, &start), &start) + applied;
+  return vwt_friction_moment(p, inertia, start.rate, other, m->opt.timestep);
+}
+
+void vwt_apply_moments(const mjModel* m, mjData* d, const vwt_ids* self, const vwt_state* state) {
+  vwt_parameters p;
+  read_parameters(m, d, self, &p);
+  const Motion now = present_motion(m, d, self);
+  const mjtNum air = air_moment(m, d, self, &p, state, &now);
+  mjtNum mechanism = vwt_mechanism_moment(&p, now.angle, now.rate);
+  if (p.friction_moment > 0) {
+    mechanism += friction(m, d, self, &p, state, &now);
+  }
+  d->qfrc_passive[self->dof] += air + mechanism;
+  if (self->twist_dof >= 0) {
+    d->qfrc_passive[self->twist_dof] += air;
+  }
+}
+
+void vwt_sense_moment(const mjModel* m, mjData* d, const vwt_ids* self, const vwt_state* state, int instance) {
+  vwt_parameters p;
+  read_parameters(m, d, self, &p);
+  const Motion now = present_motion(m, d, self);
+  const mjtNum moment = air_moment(m, d, self, &p, state, &now);
+  for (int i = 0; i < m->nsensor; i++) {
+    if (m->sensor_type[i] == mjSENS_PLUGIN && m->sensor_plugin[i] == instance) {
+      d->sensordata[m->sensor_adr[i]] = moment;
+    }
+  }
+}
+
+static int given(const mjModel* m, int numeric) {
+  return numeric >= 0 && m->numeric_data[m->numeric_adr[numeric]] != 0;
+}
+
+void vwt_end_step(const mjModel* m, const mjData* d, const vwt_ids* self, vwt_state* state) {
+  const Motion now = present_motion(m, d, self);
+  vwt_state end = {
+      .lagged = now.angle + now.twist, .angle = now.angle, .rate = now.rate, .twist = now.twist,
+      .twist_rate = now.twist_rate, .time = now.time, .started = 1,
+  };
+  if (given(m, self->aero_lag) || given(m, self->presliding)) {
+    vwt_parameters p;
+    read_parameters(m, d, self, &p);
+    end.lagged = lagged_at(m, d, self, &p, state, &now);
+    if (p.presliding > 0) {
+      const mjtNum range = vwt_presliding_range(&p, end_inertia(m, d, self, &p), m->opt.timestep);
+      end.deflection = deflection_at(state, range, &now);
+    }
+  }
+  *state = end;
+}

@@ -1,0 +1,169 @@
+// The plugin and the forward integrator under AddressSanitizer and UndefinedBehaviorSanitizer: one model, two
+// models on one mjData, copies, refusals. Built and run by the option VWT_SANITIZE of CMakeLists.txt. It fails by
+// a sanitizer's report or by EXPECT.
+
+#include <setjmp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <mujoco/mujoco.h>
+
+#include "forward.h"
+
+#define EXPECT(condition)                                              \
+  do {                                                                 \
+    if (!(condition)) {                                                \
+      fprintf(stderr, "line %d: not so: %s\n", __LINE__, #condition);  \
+      exit(1);                                                         \
+    }                                                                  \
+  } while (0)
+
+static jmp_buf back;
+static char message[1024];
+
+static void on_error(const char* text) {
+  snprintf(message, sizeof(message), "%s", text);
+  longjmp(back, 1);
+}
+
+// Runs a statement that ends in an error with this text.
+#define EXPECT_ERROR(statement, text)              \
+  do {                                             \
+    if (!setjmp(back)) {                           \
+      statement;                                   \
+      EXPECT(!"an error was due");                 \
+    }                                              \
+    EXPECT(strstr(message, text) != NULL);         \
+  } while (0)
+
+static const char* const required =
+    "<numeric name='air_density' data='1.204'/><numeric name='frontal_area' data='0.036'/>"
+    "<numeric name='reference_length' data='0.625'/><numeric name='cn_beta' data='0.35'/>"
+    "<numeric name='cn_r' data='-0.7'/>";
+static const char* const steady = "<numeric name='wind_speed' data='20'/>";
+static const char* const yaw_only = "<config key='joint' value='yaw'/>";
+static const char* const twisting = "<config key='joint' value='yaw'/><config key='twist_joint' value='twist'/>";
+
+static mjModel* model(const char* config, const char* before, const char* after, const char* joints, const char* more) {
+  static char xml[8192];
+  char error[500] = "";
+  snprintf(xml, sizeof(xml),
+           "<mujoco><option integrator='RK4' timestep='0.001'/><size nuserdata='1' memory='256K'/>"
+           "<extension><plugin plugin='vwt.yaw_moment'><instance name='air'>%s</instance>%s</plugin></extension>"
+           "<custom>%s%s%s</custom><worldbody><body><joint name='yaw' axis='0 0 1' stiffness='16' damping='0.02'/>%s"
+           "<inertial pos='0 0 0' mass='1' diaginertia='0.05 0.05 0.05'/>"
+           "<body><joint name='twist' axis='0 0 1' stiffness='500' damping='0.01'/>"
+           "<inertial pos='0 0 0' mass='1' diaginertia='0.05 0.05 0.05'/></body></body></worldbody>"
+           "<sensor><plugin plugin='vwt.yaw_moment' instance='air'/></sensor></mujoco>",
+           config, more, before, required, after, joints);
+  mjSpec* spec = mj_parseXMLString(xml, NULL, error, sizeof(error));
+  EXPECT(spec != NULL);
+  mjModel* m = mj_compile(spec, NULL);
+  if (!m) {
+    fprintf(stderr, "%s\n", mjs_getError(spec));
+  }
+  EXPECT(m != NULL);
+  mj_deleteSpec(spec);
+  return m;
+}
+
+static mjtNum run(const mjModel* m, mjData* d) {
+  mj_resetData(m, d);
+  d->qpos[0] = 0.3;
+  mj_forward(m, d);
+  for (int i = 0; i < 200; i++) {
+    d->userdata[0] = 0.01 * i;
+    mj_step(m, d);
+  }
+  return d->qpos[0] + d->qvel[0] + d->sensordata[0] + d->plugin_state[0];
+}
+
+static mjtNum alone(const mjModel* m) {
+  mjData* d = mj_makeData(m);
+  const mjtNum result = run(m, d);
+  mj_deleteData(d);
+  return result;
+}
+
+static void check_models_on_one_data(void) {
+  mjModel* models[] = {
+      model(yaw_only, steady, "", "", ""),
+      model(yaw_only, "<numeric name='user_a' data='1 2 3'/>", steady, "", ""),
+      model(yaw_only, steady, "<numeric name='gravity_stiffness' data='0.5'/><numeric name='aero_lag' data='2'/>"
+            "<numeric name='user_of_a_long_name_that_stands_far_from_the_others' data='1'/>", "", ""),
+      model(yaw_only, "<numeric name='wind_speed' data='18 19 20 19'/>",
+            "<numeric name='wind_speed_interval' data='0.05'/>", "", ""),
+      model(twisting, steady, "<numeric name='friction_moment' data='0.02'/><numeric name='presliding' data='0.002'/>",
+            "", ""),
+      model("<config key='joint' value='twist'/>", steady, "<numeric name='friction_moment' data='0.02'/>", "", ""),
+  };
+  enum { kCount = sizeof(models) / sizeof(models[0]) };
+  for (int first = 0; first < kCount; first++) {
+    mjData* d = mj_makeData(models[first]);
+    for (int i = 0; i < 2 * kCount; i++) {
+      const mjModel* m = models[i % kCount];
+      EXPECT(run(m, d) == alone(m));
+    }
+    mjData* copied = mj_copyData(NULL, models[first], d);
+    EXPECT(run(models[(first + 1) % kCount], copied) == alone(models[(first + 1) % kCount]));
+    mj_copyData(copied, models[first], d);
+    mj_deleteData(d);
+    EXPECT(run(models[first], copied) == alone(models[first]));
+    mj_deleteData(copied);
+  }
+  for (int i = 0; i < kCount; i++) {
+    mj_deleteModel(models[i]);
+  }
+}
+
+static void check_data_of_other_sizes(void) {
+  const char* const other = "mjData was made for a model of other sizes";
+  mjModel* small = model(yaw_only, steady, "", "", "");
+  mjModel* large = model(yaw_only, steady, "", "<joint name='more' type='slide'/>", "");
+  mjModel* two = model(yaw_only, steady, "", "", "<instance name='b'><config key='joint' value='twist'/></instance>");
+  mjData* d = mj_makeData(large);
+  EXPECT_ERROR(mj_forward(small, d), other);
+  mj_deleteData(d);
+  d = mj_makeData(large);
+  EXPECT_ERROR(mj_step(small, d), other);
+  mj_deleteData(d);
+  d = mj_makeData(two);
+  EXPECT_ERROR(mj_resetData(small, d), other);
+  mj_deleteData(d);
+  mj_deleteModel(small);
+  mj_deleteModel(large);
+  mj_deleteModel(two);
+}
+
+static void check_forward(void) {
+  enum { kSamples = 200 };
+  const double wind[] = {18, 20, 19};
+  double angle[kSamples], rate[kSamples], *angles[] = {angle}, *rates[] = {rate};
+  for (int kind = 0; kind < 4; kind++) {
+    vwt_parameters p = {.air_density = 1.2, .frontal_area = 0.036, .reference_length = 0.625, .cn_beta = 0.35,
+                        .cn_r = -0.7, .spring_stiffness = 16, .yaw_inertia = 0.1, .mechanical_damping = 0.02,
+                        .aero_lag = 2, .friction_moment = kind ? 0.02 : 0, .presliding = kind == 2 ? 0.002 : 0};
+    const vwt_run one = {.wind = wind, .wind_count = 3, .wind_interval = 0.05, .angle = 0.3, .lagged = 0.3,
+                         .twist_stiffness = kind == 3 ? 500 : 0, .inertia_share = 0.3, .step = 0.001, .steps = 2,
+                         .samples = kSamples};
+    EXPECT(vwt_forward(1, &p, &one, angles, rates) == 0);
+    EXPECT(angle[kSamples - 1] > -1 && angle[kSamples - 1] < 1);
+  }
+  vwt_backlash(kSamples, angle, 0.01, 0.3, angle);
+  for (int i = 0; i < vwt_run_count(); i++) {
+    EXPECT(vwt_run_offset(i) + (int)sizeof(double) <= vwt_run_size() && vwt_run_name(i)[0]);
+  }
+  for (int i = 0; i < vwt_state_count(); i++) {
+    EXPECT(vwt_state_name(i)[0]);
+  }
+}
+
+int main(void) {
+  check_forward();
+  mju_user_error = on_error;
+  check_models_on_one_data();
+  check_data_of_other_sizes();
+  puts("the plugin is clean with one model and with two");
+  return 0;
+}

@@ -1,0 +1,116 @@
+"""The one place that decides how long a step is: what is left alone, what is shortened, what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tunnel_sim.aero import AeroDerivatives
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.model import build_model
+from tunnel_sim.rig import load_rig
+from tunnel_sim.run_settings import RodTwist, RunSettings, Series
+from tunnel_sim.steps import (
+    BODY_TURN,
+    MOST_SUBSTEPS,
+    body_rate,
+    check_stable,
+    follow_fastest,
+    for_contact,
+    for_rod,
+    whole_steps,
+)
+
+RIG = load_rig()
+PLAIN = RunSettings(
+    67.98, AeroDerivatives(0.35, -0.7), 0.1014, 0.05, wind_speed=30.0, air_density=1.204, release_angle=0.3
+)
+
+
+@pytest.mark.parametrize("spring", [2.38, 16.12, 67.98])
+@pytest.mark.parametrize("speed", [0.0, 5.0, 40.0])
+@pytest.mark.parametrize("law", [{}, {"stiffness_cubic": 1.0, "gravity_stiffness": 0.5, "moment_cubic": 1.0}])
+def test_ordinary_rigs_keep_their_steps(spring: float, speed: float, law: dict[str, float]) -> None:
+    run = replace(PLAIN, spring_stiffness=spring, wind_speed=speed, parameters=law)
+    assert follow_fastest(RIG, run) is run
+
+
+@given(
+    spring=st.floats(0.1, 3e7),
+    inertia=st.floats(1e-3, 10.0),
+    damping=st.floats(0.0, 100.0),
+    cn_beta=st.floats(-3.0, 3.0),
+    rate=st.sampled_from([50.0, 200.0, 333.0, 1000.0, 2000.0]),
+)
+def test_the_step_divides_the_sample_and_follows_the_fastest(
+    spring: float, inertia: float, damping: float, cn_beta: float, rate: float
+) -> None:
+    air = AeroDerivatives(cn_beta, -0.7)
+    run = replace(
+        PLAIN, spring_stiffness=spring, yaw_inertia=inertia, mechanical_damping=damping, derivatives=air,
+        timestep=whole_steps(rate),
+    )  # fmt: skip
+    fastest = body_rate(RIG, run)
+    needed = fastest * run.timestep / BODY_TURN
+    if needed > MOST_SUBSTEPS:
+        with pytest.raises(TunnelError, match="too fast for steps"):
+            follow_fastest(RIG, run)
+        return
+    followed = follow_fastest(RIG, run)
+    number = run.timestep / followed.timestep
+    assert number == pytest.approx(round(number), rel=1e-12)
+    assert max(1.0, needed) <= round(number) < needed + 1.0 + 1e-9
+    assert fastest * followed.timestep <= BODY_TURN * (1.0 + 1e-12)
+    assert follow_fastest(RIG, followed) == followed
+    assert fastest >= np.sqrt(spring / inertia) * (1.0 - 1e-12)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"derivatives": AeroDerivatives(-3e3, -0.7)},
+        {"derivatives": AeroDerivatives(0.35, -3e3)},
+        {"series": {"wind_speed": Series((10.0, 2e3), 1.0)}, "derivatives": AeroDerivatives(-1.0, 0.0)},
+        {"parameters": {"stiffness_cubic": 1e4}},
+        {"parameters": {"stiffness_cubic": 1e4, "stiffness_cubic_exponent": 2.0}},
+        {"parameters": {"gravity_stiffness": 1e4}},
+        {"parameters": {"moment_cubic": -1e5}},
+        {"parameters": {"loss_factor": 20.0}},
+        {"mechanical_damping": 20.0},
+        {"rod_twist": RodTwist(1e-7, 0.3)},
+    ],
+    ids=str,
+)
+def test_whatever_makes_the_motion_faster_shortens_the_steps(changes: dict[str, object]) -> None:
+    run = replace(PLAIN, **changes)  # type: ignore[arg-type]
+    assert follow_fastest(RIG, run).timestep < run.timestep
+
+
+def test_steps_in_which_the_integration_diverges_are_refused_by_the_model_too() -> None:
+    # a model may be built with coarse steps on purpose, but not with such
+    build_model(RIG, replace(PLAIN, timestep=8e-3))
+    with pytest.raises(TunnelError, match=r"body's motion on its spring of .* too fast for steps of 0.2 s"):
+        build_model(RIG, replace(PLAIN, timestep=0.2))
+    with pytest.raises(TunnelError, match="larger compliance"):
+        check_stable(RIG, replace(PLAIN, rod_twist=RodTwist(1e-9, 0.001)))
+
+
+def test_a_term_beyond_all_numbers_is_refused_and_no_traceback() -> None:
+    law = {"stiffness_cubic": 1e300, "stiffness_cubic_exponent": 1e6}
+    with pytest.raises(TunnelError, match="too fast for steps"):
+        follow_fastest(RIG, replace(PLAIN, parameters=law, release_angle=3.0))
+
+
+def test_rod_and_contact_shorten_what_they_find() -> None:
+    rod = for_rod(replace(PLAIN, rod_twist=RodTwist(1e-5, 0.3)))
+    contact = for_contact(replace(PLAIN, parameters={"friction_moment": 0.02, "presliding": 1e-5}))
+    for run in (rod, contact):
+        number = PLAIN.timestep / run.timestep
+        assert number > 1.0
+        assert number == pytest.approx(round(number), rel=1e-12)
+    assert for_rod(PLAIN) is PLAIN
+    assert for_contact(PLAIN) is PLAIN
