@@ -15,7 +15,7 @@ from math import log
 import numpy as np
 from scipy.optimize import least_squares
 
-from diagnosis.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
+from docs.studies.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
 from identification.datasets import WindowRow, paper_windows
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.errors import TunnelError
