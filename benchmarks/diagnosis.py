@@ -26,8 +26,7 @@ from diagnosis.diagnose import diagnose
 from diagnosis.least_squares import Fit, fit
 from diagnosis.noise import campaign_noise
 from diagnosis.problem import Problem, campaign_rig, held_end
-from diagnosis.rank import NOT_FITTED
-from diagnosis.start import Lead, leads, nominal_start
+from diagnosis.start import StartingPoint, nominal_start, starting_points
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.model import Model, build_model
@@ -101,7 +100,7 @@ class SysidFit:
     extension points of sysid. A model is made from one compiled model per run, which spares sysid compilations.
     """
 
-    def __init__(self, lead: Lead) -> None:
+    def __init__(self, lead: StartingPoint) -> None:
         self.lead, self.problem = lead, lead.problem
         self.rig = campaign_rig(self.problem.data)
         self.own = lead.point.release.shape[1]
@@ -126,10 +125,8 @@ class SysidFit:
         common, own = self._values(params, index)
         stated = self.problem.stated(common, own, self._runs[index])
         stated = dataclasses.replace(stated, timestep=STEP)
-        physics = stated
-        for effect, draw in zip(self.problem.effects_at(common), self.problem.draws(own), strict=True):
-            physics = effect.on_run(physics, stated, draw)
-        return held_end(physics)
+        chain = dataclasses.replace(self.problem.chain(common, own, self._runs[index]), stated=stated)
+        return held_end(chain.physics())
 
     def _model(self, params: Any, index: int) -> Model:
         return self.models[index].with_settings(self._settings(params, index))
@@ -198,14 +195,9 @@ class SysidFit:
     ) -> tuple[np.ndarray, Any, Any]:
         common, own = self._values(params, index)
         run = self._runs[index]
-        stated = self.problem.stated(common, own, run)
-        angle = predicted.data[:, 0]
-        effects, draws = self.problem.effects_at(common), self.problem.draws(own)
-        for effect, draw in zip(effects, draws, strict=True):
-            angle = effect.on_angle(angle, predicted.times, stated, draw)
-        reading = angle + common[self.problem.names.index("zero")]
-        for effect in effects:
-            reading = effect.on_reading(reading)
+        chain = self.problem.chain(common, own, run)
+        angle = chain.angle(predicted.data[:, 0], predicted.times)
+        reading = chain.reading(angle + common[self.problem.names.index("zero")])
         left = (record.data[:, 0] - reading) / np.sqrt(run.noise_variance)
         return left[:, None], predicted, record
 
@@ -233,7 +225,7 @@ def against_sysid(console: Console, wanted: int) -> None:
     for head in ("candidate", "own s", "sysid s", "ratio", "own χ²", "sysid χ²"):
         table.add_column(head, justify="left" if head == "candidate" else "right")
     for kind in ALL_EFFECTS:
-        starts = [] if kind.name in {*NOT_FITTED, "rod_flexibility"} else leads(nominal, kind)
+        starts = starting_points(nominal, kind) if kind.fitted and kind.tries < 3 else []
         if not starts or candidates >= wanted:
             continue
         own, chi2 = timed_fit(starts[0], nominal)
@@ -251,7 +243,7 @@ def against_sysid(console: Console, wanted: int) -> None:
     )
 
 
-def timed_fit(lead: Lead, nominal: Fit) -> tuple[float, float]:
+def timed_fit(lead: StartingPoint, nominal: Fit) -> tuple[float, float]:
     """Seconds and χ² of the diagnosis's own fit."""
     begin = time.perf_counter()
     found = fit(lead.problem, lead.point, base=nominal)

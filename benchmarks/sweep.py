@@ -60,15 +60,15 @@ def bare(file: Path, threads: int) -> dict[str, float]:
     from mujoco import batch as mujoco_batch
 
     from tunnel_lab.sweep.reading import read_sweep
+    from tunnel_sim.effects import EffectChain
     from tunnel_sim.model import build_model
-    from tunnel_sim.simulate import apply_effects
     from tunnel_sim.virtual_campaign import plan_effects, run_settings
 
     sweep, rng = read_sweep(file), np.random.default_rng(1)
     step = max(1, sweep.size // (BARE_RUNS // 4))
     cases = [sweep.case(place) for place in range(0, sweep.size, step)][: BARE_RUNS // 4]
     runs = [
-        apply_effects(run_settings(case.plan.truth, condition), plan_effects(case.plan), rng)
+        EffectChain.draw(run_settings(case.plan.truth, condition), plan_effects(case.plan), rng).physics()
         for case in cases
         for condition in case.plan.conditions
     ]

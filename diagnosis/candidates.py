@@ -13,7 +13,7 @@ from diagnosis.random_moments import RandomAnswer
 from diagnosis.reference_sizes import parameter_unit
 from diagnosis.reported import Base
 from diagnosis.result import Candidate, ParameterEstimate
-from diagnosis.study import Study
+from diagnosis.study import COARSE_STEP, HUM, Study
 
 
 def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
@@ -85,15 +85,14 @@ def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
             found[name] = ParameterEstimate(value, 0.0, units[name])
     if random is not None:
         found |= _random_parameters(random)
-    return {
-        name: replace(value, unit=parameter_unit(name, value.unit, study.campaign))
-        for name, value in found.items()
-    }
+    return {name: replace(value, unit=parameter_unit(name, study.campaign)) for name, value in found.items()}
 
 
 def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
     """Of a random moment; its size is known as well as the number of its correlation times allows."""
     process, spectrum = answer.process, answer.process.spectrum
+    kind = answer.kind
+    severity, place = kind.parameters()
     seconds = process.interval * sum(i.size for i in process.innovations)
     independent = max(seconds * min(4.0 * spectrum.bandwidth, 1.0 / process.interval), 2.0)
     relative = float(np.sqrt(0.5 / independent))
@@ -101,25 +100,30 @@ def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
         amplitude = float(np.sqrt(2.0)) * spectrum.intensity
         width = spectrum.bandwidth / max(spectrum.strouhal_number, 1e-9)
         return {
-            "vortex_shedding.amplitude": ParameterEstimate(amplitude, amplitude * relative, "1"),
-            "vortex_shedding.strouhal_number": ParameterEstimate(
+            f"{kind.name}.{severity.name}": ParameterEstimate(amplitude, amplitude * relative, "1"),
+            f"{kind.name}.{place.name}": ParameterEstimate(
                 spectrum.strouhal_number, spectrum.strouhal_number * width * relative, "1"
             ),
         }
     # a corner beyond the rig's own frequencies is seen as white: only the size over its root is known there
     return {
-        "buffeting.intensity": ParameterEstimate(spectrum.intensity, spectrum.intensity * relative, "1"),
-        "buffeting.bandwidth": ParameterEstimate(spectrum.bandwidth, spectrum.bandwidth, "Hz"),
+        f"{kind.name}.{severity.name}": ParameterEstimate(
+            spectrum.intensity, spectrum.intensity * relative, "1"
+        ),
+        f"{kind.name}.{place.name}": ParameterEstimate(spectrum.bandwidth, spectrum.bandwidth, "Hz"),
     }
 
 
 def _read_parameters(study: Study) -> dict[str, ParameterEstimate]:
     found: dict[str, ParameterEstimate] = {}
     if study.hum is not None:
-        found["mains_hum.amplitude"] = ParameterEstimate(study.hum.amplitude, study.hum.std, "rad")
-        found["mains_hum.frequency"] = ParameterEstimate(study.hum.frequency, 1e-3, "Hz")
+        amplitude, frequency = (f"{HUM.name}.{info.name}" for info in HUM.parameters())
+        found[amplitude] = ParameterEstimate(study.hum.amplitude, study.hum.std, "rad")
+        found[frequency] = ParameterEstimate(study.hum.frequency, 1e-3, "Hz")
     if study.coarse:
-        found["sensor_quantisation.step"] = ParameterEstimate(study.step, 1e-7, "rad")
+        found[f"{COARSE_STEP.name}.{COARSE_STEP.parameters()[0].name}"] = ParameterEstimate(
+            study.step, 1e-7, "rad"
+        )
     return found
 
 

@@ -17,12 +17,11 @@ from diagnosis.rank import Hypothesis
 from diagnosis.result import ParameterEstimate
 from diagnosis.spectra import linear_coefficients
 from tunnel_sim.campaign import Campaign
+from tunnel_sim.effects.base import WindOnRun
 
 _UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1"}
 #: Excess of block means beyond which the residuals are no longer white, and runs must speak for the scatter.
 _COLOURED = 0.03
-#: Share of a lag's first order, a·Cnβ, by which its form leaves Cnr open: chosen on the tuning sets' errors.
-_LAG_FORM = 0.2
 #: Share of what freeing the forms has moved a coefficient by that counts as its standard deviation: a judgement,
 #: made when a sealed set had shown Cnβ's intervals too narrow, and held against campaigns drawn afterwards.
 _FORM_MOVES = 0.5
@@ -70,33 +69,14 @@ def coefficients(
 
 
 def _unseen_form(fit: Fit, name: str) -> float:
-    """Standard deviation of Cnβ or Cnr, 1/rad, from what no free decay shows of a cause's form.
-
-    To first order a lag is a change a·Cnβ of Cnr, and only its second order is seen: two time constants, as in
-    Jones's approximation (NACA Report 681, 1940), have a mean up to a third below the one that fits, and a lead
-    mirrors them. A constant loss factor damps by η Kr/ω at the frequency ω of the motion, or by η Kr/ωn of the rig
-    in still air, and causality may stiffen the spring by (2η/π) ln(ω/ωn) (Crandall, J. Sound Vib. 11 (1970) 3);
-    the runs with wind do not tell which.
-    """
-    names = {kind.name for kind in fit.problem.effects}
-    variance = 0.0
-    if name == "cn_r" and "unsteady_aero_lag" in names:
-        variance += (_LAG_FORM * fit.value("unsteady_aero_lag.lag") * fit.value("cn_beta")) ** 2
-    rates = _wind_on_rates(fit) if "structural_damping" in names else []
-    if rates:
-        loss = fit.value("structural_damping.loss_factor")
-        if name == "cn_r":
-            shifts = [loss * (k / omega - k / still) / load for k, omega, still, load, _ in rates]
-        else:
-            shifts = [
-                2.0 * loss / math.pi * k * math.log(still / omega) / q for k, omega, still, _, q in rates
-            ]
-        variance += (sum(shifts) / len(shifts)) ** 2 / 3.0  # anywhere between the two
-    return math.sqrt(variance)
+    """Standard deviation of Cnβ or Cnr, 1/rad, from what no free decay shows of the causes' forms."""
+    runs = _wind_on_runs(fit)
+    place = 0 if name == "cn_beta" else 1
+    effects = fit.problem.effects_at(fit.point.common)
+    return math.hypot(*(effect.unseen_form(fit.value("cn_beta"), runs)[place] for effect in effects))
 
 
-def _wind_on_rates(fit: Fit) -> list[tuple[float, float, float, float, float]]:
-    """Of every wind-on run Kr, ω, ωn of the rig in still air, and ½ρVAl² and ½ρV²Al that multiply Cnr and Cnβ."""
+def _wind_on_runs(fit: Fit) -> list[WindOnRun]:
     data = fit.problem.data
     found = []
     for i, run in enumerate(data.runs):
@@ -108,7 +88,8 @@ def _wind_on_rates(fit: Fit) -> list[tuple[float, float, float, float, float]]:
             continue
         load = 0.5 * run.air_density * run.wind_speed * data.frontal_area * data.reference_length**2
         omega, still = math.sqrt(stiffness / inertia), math.sqrt(spring / inertia)
-        found.append((spring, omega, still, load, load * run.wind_speed / data.reference_length))
+        pressure = load * run.wind_speed / data.reference_length
+        found.append(WindOnRun(spring, omega, still, pressure, load))
     return found
 
 

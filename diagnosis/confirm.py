@@ -140,14 +140,9 @@ class _Case:
 
     def __init__(self, problem: Problem, common: Array, own: Array, run: RunData) -> None:
         self.run = run
-        self.effects = problem.effects_at(common)
-        self.draws = problem.draws(own)
-        self.stated = problem.stated(common, own, run)
+        self.chain = problem.chain(common, own, run)
         self.zero = float(common[problem.nominal_names.index("zero")])
-        physics = self.stated
-        for effect, draw in zip(self.effects, self.draws, strict=True):
-            physics = effect.on_run(physics, self.stated, draw)
-        physics = held_end(condensed(physics, problem.data))
+        physics = held_end(condensed(self.chain.physics(), problem.data))
         steps = int(np.ceil(run.interval / _longest_step(physics) - 1e-9))
         self.physics = dataclasses.replace(
             physics, timestep=run.interval / steps, duration=(run.reading.size + 1) * run.interval
@@ -160,11 +155,7 @@ class _Case:
         samples = run.reading.size * run.block
         time: Array = np.asarray(np.arange(samples) * (run.interval / run.block), np.float64)
         angle: Array = np.asarray(ends(time), np.float64)
-        for effect, draw in zip(self.effects, self.draws, strict=True):
-            angle = effect.on_angle(angle, time, self.stated, draw)
-        reading = angle + self.zero
-        for effect in self.effects:
-            reading = effect.on_reading(reading)
+        reading = self.chain.reading(self.chain.angle(angle, time) + self.zero)
         means: Array = reading.reshape(run.reading.size, run.block).mean(axis=1)
         return means
 

@@ -15,12 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tunnel_sim.effects import effect_class
+
 #: Exponent of the share left open.
 STEEPNESS = 3.0
 #: Misfit of form that counts as none, as a share of the gap.
 FORM_MISFIT = 0.005
-#: Effects that have no form to miss, a factor on a stated number, and the misfit that counts as none of them.
-EXACT = frozenset({"spring_miscalibration"})
+#: The same of effects that have no form to miss.
 EXACT_MISFIT = 0.001
 #: Excess of block means beyond which that share no longer grows with the gap: a motion missed grossly is no
 #: reason to overlook a second effect a thousand times the noise.
@@ -63,7 +64,8 @@ def form_floor(excess: float, effects: Sequence[str] = ()) -> float:
     Returns:
         The share.
     """
-    misfit = EXACT_MISFIT if effects and EXACT.issuperset(effects) else FORM_MISFIT
+    exact = bool(effects) and all(effect_class(name).exact for name in effects)
+    misfit = EXACT_MISFIT if exact else FORM_MISFIT
     return misfit * min(1.0, FORM_MISFIT_UP_TO / max(excess, 1e-9))
 
 

@@ -7,8 +7,6 @@ error method; Klein & Morelli, Aircraft System Identification, AIAA 2006) gives 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.signal import savgol_filter
@@ -21,17 +19,6 @@ from tunnel_sim.record import Array
 _SMOOTHING = 0.05  # of a period: the length of the smoothing polynomial
 _ORDER = 3
 
-_Column = Callable[[Array, Array, float], Array]
-
-#: Moment per unit of the first parameter, from angle, rate and the stiffness it scales with.
-_COLUMNS: dict[str, _Column] = {
-    "coulomb_friction": lambda _angle, rate, _spring: -np.sign(rate),
-    "quadratic_damping": lambda _angle, rate, _spring: -np.abs(rate) * rate,
-    "cubic_stiffness": lambda angle, _rate, spring: -spring * angle**3,
-    "asymmetric_stiffness": lambda angle, _rate, spring: -spring * angle**2,
-    "gravity_stiffness": lambda angle, _rate, _spring: -np.sin(angle),
-}
-
 
 def equation_error_start(problem: Problem) -> Point | None:
     """Parameter values by regression of the balance of moments.
@@ -42,7 +29,8 @@ def equation_error_start(problem: Problem) -> Point | None:
     Returns:
         A starting point; None where an effect is not linear in its severity, or the regression fails.
     """
-    if any(kind.name not in _COLUMNS for kind in problem.effects):
+    nothing = np.zeros(1)
+    if any(kind.regressor(nothing, nothing, 1.0) is None for kind in problem.effects):
         return None
     data = problem.data
     zero = float(np.median([np.median(run.reading[-run.reading.size // 4 :]) for run in data.runs]))
@@ -81,7 +69,7 @@ def _solution_bounds(problem: Problem) -> tuple[Array, Array]:
 
 def _is_share(problem: Problem, kind: type[Effect]) -> bool:
     """Whether an effect's severity is a share of a stiffness not yet known: it is regressed as a moment."""
-    return problem.data.normalised and kind.name in ("cubic_stiffness", "asymmetric_stiffness")
+    return problem.data.normalised and kind.parameters()[0].per_stiffness
 
 
 def _smoothed(run: RunData, zero: float) -> tuple[Array, Array, Array]:
@@ -105,7 +93,8 @@ def _balance(
         pressure = 0.5 * run.air_density * run.wind_speed**2 * data.frontal_area * data.reference_length
         columns.append(pressure * angle)
         columns.append(pressure * data.reference_length / max(run.wind_speed, 1e-9) * rate)
-    columns += [_COLUMNS[kind.name](angle, rate, spring) for kind in problem.effects]
+    regressors = [kind.regressor(angle, rate, spring) for kind in problem.effects]
+    columns += [column for column in regressors if column is not None]
     return np.stack(columns, axis=1), acceleration if data.normalised else spring * angle
 
 

@@ -82,7 +82,8 @@ def _as_measured(campaign: Campaign, nominal: Fit, causes: tuple[str, ...]) -> t
     """
     data = nominal.problem.data
     level = float(np.mean([run.noise_variance * run.block for run in data.runs]))
-    stated = campaign_noise(campaign).stated_variance if "sensor_quantisation" in causes else None
+    coarse = any(effect_class(name).lattice for name in causes if name in _NAMES)
+    stated = campaign_noise(campaign).stated_variance if coarse else None
     ratio = level / stated if stated else 1.0
     given = prepare(campaign, {run.id: run.noise_variance * run.block / ratio for run in data.runs})
     readings = {run.id: run.reading for run in given.runs}

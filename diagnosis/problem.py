@@ -12,7 +12,7 @@ import numpy as np
 
 from diagnosis.data import Data, RunData, hermite_means
 from tunnel_sim.aero import AeroDerivatives
-from tunnel_sim.effects import Effect
+from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.forward import forward_run, integrate
 from tunnel_sim.moment_law import parameter_vector
 from tunnel_sim.record import Array
@@ -24,13 +24,6 @@ _RESOLUTION = 0.055  # rad of the oscillation in one step: RK4 then errs by some
 _ROD_RESOLUTION = 0.5  # rad of the rod's own oscillation in one step
 _THREADS = 2
 _SOFT_ROD = 2e-5  # rad/(N m): a stiffer rod's ringing at the release stays below the noise
-_PHASED = ("vortex_shedding", "mains_hum")
-#: Bounds tighter than the effect's own: beyond them rod or contact move faster than the integrator steps.
-_FIT_BOUNDS = {
-    "rod_flexibility.compliance": (0.0, 0.01),
-    "rod_flexibility.inertia_share": (0.02, 0.9),
-    "coulomb_friction.presliding": (5e-4, 0.2),
-}
 _POOL = ThreadPoolExecutor(_THREADS)
 
 
@@ -91,16 +84,15 @@ class Problem:
     @cached_property
     def phased(self) -> tuple[str, ...]:
         """Names of the effects that have a phase of their own in every run."""
-        return tuple(kind.name for kind in self.effects if kind.name in _PHASED)
+        return tuple(kind.name for kind in self.effects if kind.line)
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Least and greatest values of the common parameters."""
         low = {"yaw_inertia": 1e-9, "stiffness": 1e-9}
         infos = {f"{kind.name}.{info.name}": info for kind in self.effects for info in kind.parameters()}
-        fit_bounds = {name: (info.lower, info.upper) for name, info in infos.items()} | _FIT_BOUNDS
-        lower = [fit_bounds[name][0] if name in infos else low.get(name, -np.inf) for name in self.names]
-        upper = [fit_bounds[name][1] if name in infos else np.inf for name in self.names]
+        lower = [infos[name].fit_lower if name in infos else low.get(name, -np.inf) for name in self.names]
+        upper = [infos[name].fit_upper if name in infos else np.inf for name in self.names]
         return np.array(lower), np.array(upper)
 
     def effects_at(self, common: Array) -> tuple[Effect, ...]:
@@ -144,17 +136,20 @@ class Problem:
             duration=run.duration,
         )
 
-    def draws(self, own: Array) -> list[np.random.Generator]:
-        """What each effect draws from in one run: its phase.
+    def chain(self, common: Array, own: Array, run: RunData) -> EffectChain:
+        """The effects of one run.
 
         Args:
+            common: as in `Point`, shape (common,).
             own: the run's own parameters, a row of ``Point.release``, shape (own,).
+            run: conditions.
 
         Returns:
-            One stand-in for a generator per effect.
+            The effects with the phases that the run has.
         """
         phases = dict(zip(self.phased, own[2:].tolist(), strict=True))
-        return [_Phase(float(phases.get(kind.name, 0.0))) for kind in self.effects]
+        drawn = tuple(phases.get(kind.name) for kind in self.effects)
+        return EffectChain(self.stated(common, own, run), self.effects_at(common), drawn)
 
     def predict(self, points: Sequence[Point]) -> list[list[Array]]:
         """Predicted block means.
@@ -167,8 +162,7 @@ class Problem:
             without bound.
         """
         cases = [(p, r) for p in range(len(points)) for r in range(len(self.data.runs))]
-        effects = [self.effects_at(point.common) for point in points]
-        jobs = [_Job(self, points[p], effects[p], r) for p, r in cases]
+        jobs = [_Job(self, points[p], r) for p, r in cases]
         half = (len(jobs) + _THREADS - 1) // _THREADS
         results = list(_POOL.map(_run_jobs, [jobs[i : i + half] for i in range(0, len(jobs), half)]))
         flat = [values for part in results for values in part]
@@ -179,20 +173,14 @@ class Problem:
 class _Job:
     """One run at one point."""
 
-    def __init__(self, problem: Problem, point: Point, effects: tuple[Effect, ...], run_index: int) -> None:
+    def __init__(self, problem: Problem, point: Point, run_index: int) -> None:
         run = problem.data.runs[run_index]
         self.run = run
         self.zero = float(point.common[problem.nominal_names.index("zero")])
-        self.effects = effects
-        self.stated = problem.stated(point.common, point.release[run_index], run)
-        self.draws = problem.draws(point.release[run_index])
-        physics = self.stated
-        for effect, draw in zip(self.effects, self.draws, strict=True):
-            physics = effect.on_run(physics, self.stated, draw)
-        self.rig = campaign_rig(problem.data)
-        physics = held_end(condensed(physics, problem.data))
+        self.chain = problem.chain(point.common, point.release[run_index], run)
+        physics = held_end(condensed(self.chain.physics(), problem.data))
         self.row, self.keep_alive = forward_run(physics)
-        self.law = parameter_vector(physics.law(self.rig))
+        self.law = parameter_vector(physics.law(campaign_rig(problem.data)))
         substeps = int(np.ceil(run.interval / _longest_step(physics)))
         self.row["step"], self.row["steps"] = run.interval / substeps, substeps
 
@@ -208,28 +196,7 @@ class _Job:
         time = np.asarray(
             (np.arange(mean.size) + 0.5 * (self.run.block - 1) / self.run.block) * h, np.float64
         )
-        for effect, draw in zip(self.effects, self.draws, strict=True):
-            mean = effect.on_angle(mean, time, self.stated, draw)
-        mean = mean + self.zero
-        for effect in self.effects:
-            mean = effect.on_reading(mean)
-        return mean
-
-
-class _Phase(np.random.Generator):
-    """Stands in for the generator a periodic effect draws its phase from: in a fit it is given."""
-
-    def __init__(self, phase: float) -> None:
-        super().__init__(_BITS)
-        self._phase = phase
-
-    def uniform(self, *args: object, **kwargs: object) -> float:  # type: ignore[override]
-        """The phase, rad."""
-        del args, kwargs
-        return self._phase
-
-
-_BITS = np.random.PCG64(0)
+        return self.chain.reading(self.chain.angle(mean, time) + self.zero)
 
 
 def condensed(physics: RunSettings, data: Data) -> RunSettings:

@@ -11,6 +11,7 @@ import numpy as np
 from diagnosis.least_squares import Fit
 from diagnosis.process_noise import ProcessNoise, fit_turbulence, fit_wandering_shedding, whiteness
 from diagnosis.rank import Hypothesis
+from tunnel_sim.effects import Effect, the_effect
 
 #: Largest departure of the innovations' power by band from white, in its standard deviations. Among 64 to 100
 #: bands the greatest is below 3.5 by chance; a real spectrum is not first-order, which adds some.
@@ -35,16 +36,21 @@ class RandomAnswer:
     """A random moment, alone or beside one effect.
 
     Args:
-        effects: ``buffeting`` or ``vortex_shedding``, and the effect beside it.
+        kind: of the random moment.
         process: its fit.
         beside: the fitted effect beside it, or None.
         share: of the gap left open: the innovations' and the wind-off runs' excess over the nominal one's.
     """
 
-    effects: tuple[str, ...]
+    kind: type[Effect]
     process: ProcessNoise
     beside: Hypothesis | None
     share: float
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects, sorted."""
+        return tuple(sorted((self.kind.name, *(() if self.beside is None else self.beside.effects))))
 
 
 def weigh_random_moments(
@@ -66,10 +72,11 @@ def weigh_random_moments(
     if any(max(hypothesis.fit.excess, 0.0) < _CLOSED * nominal.excess for hypothesis in (*singles, *pairs)):
         return []
     kinds: tuple[tuple[str, tuple[_Kind, ...]], ...] = (
-        ("buffeting", (fit_turbulence, partial(fit_turbulence, centred=True))),
-        ("vortex_shedding", (fit_wandering_shedding,)),
+        ("broad_band", (fit_turbulence, partial(fit_turbulence, centred=True))),
+        ("narrow_band", (fit_wandering_shedding,)),
     )
-    tried = [_likeliest(name, fits, nominal, singles) for name, fits in kinds if name in allowed]
+    known = [(the_effect(random=random), fits) for random, fits in kinds]
+    tried = [_likeliest(kind, fits, nominal, singles) for kind, fits in known if kind.name in allowed]
     answers = [answer for answer in tried if answer is not None]
     least = min((answer.process.cost for answer in answers), default=0.0)
     return [answer for answer in answers if answer.process.cost < least + _RIVAL_EVIDENCE]
@@ -79,12 +86,12 @@ _Kind = Callable[[Fit], ProcessNoise | None]
 
 
 def _likeliest(
-    name: str, fits: Sequence[_Kind], nominal: Fit, singles: Sequence[Hypothesis]
+    kind: type[Effect], fits: Sequence[_Kind], nominal: Fit, singles: Sequence[Hypothesis]
 ) -> RandomAnswer | None:
     for explain in fits:  # a spectrum with more freedom only where the simpler one does not pass
-        alone = _try(name, explain, nominal, None, nominal)
-        partners = [s for s in singles if s.effects != (name,)][:_PARTNERS]
-        beside = [a for s in partners if (a := _try(name, explain, s.fit, s, nominal)) is not None]
+        alone = _try(kind, explain, nominal, None, nominal)
+        partners = [s for s in singles if s.effects != (kind.name,)][:_PARTNERS]
+        beside = [a for s in partners if (a := _try(kind, explain, s.fit, s, nominal)) is not None]
         best = min(beside, key=lambda a: a.process.cost, default=None)
         if alone is None or (best is not None and best.process.cost < alone.process.cost - _EVIDENCE):
             alone = best
@@ -93,7 +100,9 @@ def _likeliest(
     return None
 
 
-def _try(name: str, explain: _Kind, fit: Fit, beside: Hypothesis | None, nominal: Fit) -> RandomAnswer | None:
+def _try(
+    kind: type[Effect], explain: _Kind, fit: Fit, beside: Hypothesis | None, nominal: Fit
+) -> RandomAnswer | None:
     off = wind_off_excess(fit)
     if off > max(_WIND_OFF_SHARE * nominal.excess, 0.1):
         return None
@@ -103,9 +112,8 @@ def _try(name: str, explain: _Kind, fit: Fit, beside: Hypothesis | None, nominal
     band, quarter, _ = whiteness(process)
     if band > _BAND_LIMIT or quarter > _TIME_LIMIT:
         return None
-    names = (name,) if beside is None else tuple(sorted((*beside.effects, name)))
     share = (abs(process.excess) + max(off, 0.0)) / max(nominal.excess, 1e-9)
-    return RandomAnswer(names, process, beside, share)
+    return RandomAnswer(kind, process, beside, share)
 
 
 def wind_off_excess(fit: Fit) -> float:

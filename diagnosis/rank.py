@@ -11,20 +11,17 @@ import numpy as np
 from diagnosis.decide import FORM_SHARE
 from diagnosis.least_squares import Fit, FitError, fit, fit_growing
 from diagnosis.problem import Point, Problem
-from diagnosis.start import Lead, is_gross, leads
+from diagnosis.start import StartingPoint, is_gross, starting_points
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import ParameterInfo
 
-#: Effects that no deterministic residual fits, or that are read off the record before fitting.
-NOT_FITTED = frozenset({"buffeting", "sensor_quantisation", "mains_hum"})
-_ALWAYS_FITTED = 7  # leads refitted whatever they promise: linear theory ranks well but cannot judge
-_PROMISING = 0.01  # share of χ² beyond which a lead is refitted too
+_ALWAYS_FITTED = 7  # starting points fitted whatever linear theory predicts: it ranks well but cannot judge
+_PREDICTED_SHARE = 0.01  # predicted drop, as a share of χ², beyond which others are fitted too
 _BASES = 3  # single effects to which a second is added
 _SECONDS = 4  # second effects refitted for each
 _POLISH = 1e-7  # drop of χ², as a share of it, below which a polished fit is at its end
 _BENT = 3  # hypotheses whose forms are freed
 _BEND_FROM = 0.02  # share left open from which they are
-_STARTS = {"rod_flexibility": 3, "sensor_clipping": 2, "unsteady_aero_lag": 2, "spring_miscalibration": 2}
 
 Progress = Callable[[str], None]
 
@@ -66,10 +63,10 @@ def rank_singles(
         progress: told each effect's name.
 
     Returns:
-        Fitted hypotheses, best first. Effects whose linear promise is negligible are left out.
+        Fitted hypotheses, best first. Effects from which linear theory expects next to nothing are left out.
     """
     found = []
-    for kind, starts in _promising(nominal, kinds, _ALWAYS_FITTED):
+    for kind, starts in _worth_fitting(nominal, kinds, _ALWAYS_FITTED):
         if progress is not None:
             progress(kind.name)
         best = _best_fit(_tried(kind, starts, nominal), nominal)
@@ -94,7 +91,7 @@ def rank_pairs(
     found: dict[tuple[str, ...], Hypothesis] = {}
     for single in singles[:_BASES]:
         others = [kind for kind in kinds if kind.name not in single.effects]
-        for kind, starts in _promising(single.fit, others, 0)[:_SECONDS]:
+        for kind, starts in _worth_fitting(single.fit, others, 0)[:_SECONDS]:
             if progress is not None:
                 progress(f"{single.effects[0]} + {kind.name}")
             best = _best_fit(_tried(kind, starts, single.fit), single.fit)
@@ -172,30 +169,30 @@ def _within(info: ParameterInfo) -> float:
     return info.default + 0.5 * info.scale if info.default == info.lower else info.default
 
 
-def _promising(
+def _worth_fitting(
     base: Fit, kinds: Iterable[type[Effect]], always: int
-) -> list[tuple[type[Effect], list[Lead]]]:
-    scored = [(kind, starts) for kind in kinds if (starts := leads(base, kind))]
-    scored.sort(key=lambda item: -item[1][0].promise)
-    limit = 0.0 if always == 0 else _PROMISING * base.total
-    return [item for i, item in enumerate(scored) if i < always or item[1][0].promise > limit]
+) -> list[tuple[type[Effect], list[StartingPoint]]]:
+    scored = [(kind, starts) for kind in kinds if (starts := starting_points(base, kind))]
+    scored.sort(key=lambda item: -item[1][0].predicted_drop)
+    limit = 0.0 if always == 0 else _PREDICTED_SHARE * base.total
+    return [item for i, item in enumerate(scored) if i < always or item[1][0].predicted_drop > limit]
 
 
-def _tried(kind: type[Effect], starts: Sequence[Lead], base: Fit) -> Sequence[Lead]:
-    return starts if is_gross(base) else starts[: _STARTS.get(kind.name, 1)]
+def _tried(kind: type[Effect], starts: Sequence[StartingPoint], base: Fit) -> Sequence[StartingPoint]:
+    return starts if is_gross(base) else starts[: kind.tries]
 
 
-def _best_fit(starts: Sequence[Lead], base: Fit) -> Fit | None:
+def _best_fit(starts: Sequence[StartingPoint], base: Fit) -> Fit | None:
     best: Fit | None = None
     if is_gross(base):
-        # linear promise means nothing there: the balance of moments goes first
-        starts = sorted(starts, key=lambda lead: not lead.balanced)[:2]
-    for lead in starts:
+        # linear theory says nothing there: the balance of moments goes first
+        starts = sorted(starts, key=lambda start: not start.balanced)[:2]
+    for start in starts:
         try:
             if is_gross(base):
-                found = fit_growing(lead.problem, lead.point)
+                found = fit_growing(start.problem, start.point)
             else:
-                found = fit(lead.problem, lead.point, base=base)
+                found = fit(start.problem, start.point, base=base)
         except (FitError, np.linalg.LinAlgError):
             continue
         if np.isfinite(found.total) and (best is None or found.total < best.total):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from diagnosis.result import ParameterEstimate
 from tunnel_sim.campaign import Campaign, RigProperties
+from tunnel_sim.effects import effect_class
 
 #: Units of what acts on the yaw axis, and of the same per unit inertia.
 _PER_INERTIA = {
@@ -16,32 +17,31 @@ _PER_INERTIA = {
     "N m s2/rad2": "1/rad",
     "rad/(N m)": "s2",
 }
-#: Coefficients of an aerodynamic moment: they come multiplied by the sizes that are not stated.
-_MOMENT_COEFFICIENTS = frozenset({"buffeting.intensity", "vortex_shedding.amplitude"})
 _AREA = {(True, True): "1", (False, True): "m2", (True, False): "m", (False, False): "m3"}
 _PER_INERTIA_AREA = {"1": "1/(kg m2)", "m2": "1/kg", "m": "1/(kg m)", "m3": "m/kg"}
 
 
-def parameter_unit(name: str, unit: str, campaign: Campaign) -> str:
+def parameter_unit(name: str, campaign: Campaign) -> str:
     """The unit of an effect's parameter as identified.
 
     Args:
         name: ``effect.parameter``.
-        unit: of the parameter where springs and sizes are stated.
         campaign: what is stated.
 
     Returns:
-        The same, or that of the parameter over Izz where any run states no spring, and times the frontal area
+        The parameter's own unit; over that of Izz where any run states no spring, and times the frontal area
         and the reference length where these are not stated.
     """
+    effect, _, parameter = name.partition(".")
+    info = next(info for info in effect_class(effect).parameters() if info.name == parameter)
     normalised = any(run.spring_stiffness is None for run in campaign.runs)
     rig = campaign.rig
-    if name in _MOMENT_COEFFICIENTS:
+    if info.per_pressure:
         sized = _AREA[rig.frontal_area is not None, rig.reference_length is not None]
         return _PER_INERTIA_AREA[sized] if normalised else sized
-    if unit == "l/V" and rig.reference_length is None:
+    if info.unit == "l/V" and rig.reference_length is None:
         return "m/V"
-    return _PER_INERTIA.get(unit, unit) if normalised else unit
+    return _PER_INERTIA.get(info.unit, info.unit) if normalised else info.unit
 
 
 def sized_coefficients(

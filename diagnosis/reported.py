@@ -12,7 +12,7 @@ from diagnosis.gap import FALSE_ALARM_RATE
 from diagnosis.held_out import HeldOut
 from diagnosis.least_squares import Fit
 from diagnosis.result import Confirmation, GapSummary, RunGap
-from diagnosis.study import Study
+from diagnosis.study import COARSE_STEP, Study
 from tunnel_sim.record import Array
 
 
@@ -130,7 +130,7 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     """
     ratio = base.extra + 1.0  # of the estimated noise to the base
     random = study.random_answer(study.fitted)
-    explained = 0.0 if study.coarse and "sensor_quantisation" in study.causes else base.extra
+    explained = 0.0 if study.coarse and COARSE_STEP.name in study.causes else base.extra
     runs, sizes = [], []
     before_out, after_out = [], []
     for run in study.nominal.problem.data.runs:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,10 +13,10 @@ from diagnosis.least_squares import Fit, clip, normal_equations, scaled_residual
 from diagnosis.problem import Point, Problem
 from diagnosis.spectra import Line, mains_line, shedding_line
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.base import Circumstances, Trial
 from tunnel_sim.record import Array
 
 _GROSS = 0.01  # share of the reading's power
-_FAR = 2.0  # rad: where a limit on one side only puts the other
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
@@ -70,42 +71,46 @@ def _frequency(run: RunData) -> float:
 
 
 @dataclass(frozen=True)
-class Lead:
-    """A starting point for an effect, and what its signature promises.
+class StartingPoint:
+    """Where the fit of an effect starts, and what linear theory predicts of it.
 
     Args:
         problem: the fit with the effect added.
         point: where to start.
-        promise: drop of χ² by linear theory, dimensionless.
+        predicted_drop: of χ² by linear theory, dimensionless.
         balanced: whether the point comes from the balance of moments.
     """
 
     problem: Problem
     point: Point
-    promise: float
+    predicted_drop: float
     balanced: bool = False
 
 
-def leads(base: Fit, kind: type[Effect]) -> list[Lead]:
-    """Starting points for adding one effect to a fitted problem, the most promising first.
+#: Where the line of a periodic effect is found, by what sets its frequency.
+_LINES: Mapping[str, Callable[[Fit], Line | None]] = {"mains": mains_line, "shedding": shedding_line}
+
+
+def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
+    """Starting points for adding one effect to a fitted problem, by the drop of χ² predicted, greatest first.
 
     Args:
         base: the fit without it.
         kind: the effect to add.
 
     Returns:
-        One lead per trial value of its further parameters; none where the effect cannot be seen in these runs.
+        One per trial; none where the effect cannot be seen in these runs.
     """
     data = base.problem.data
     if kind.condition == "wind_on" and not data.wind_on:
         return []
-    if kind.name in ("mains_hum", "vortex_shedding"):
-        line = mains_line(base) if kind.name == "mains_hum" else shedding_line(base)
-        return [] if line is None else [_line_lead(base, kind, line)]
-    found = [_lead(base, kind, trial) for trial in (*_trials(data, kind), *_bent_trials(data, kind))]
+    if kind.line:
+        line = _LINES[kind.line](base)
+        return [] if line is None else [_line_start(base, kind, line)]
+    found = [_scaled_start(base, kind, trial) for trial in kind.trials(_circumstances(data))]
     if is_gross(base):
-        found.append(_balance_lead(base, kind))
-    return sorted((lead for lead in found if lead is not None), key=lambda lead: -lead.promise)
+        found.append(_balanced_start(base, kind))
+    return sorted((start for start in found if start is not None), key=lambda start: -start.predicted_drop)
 
 
 def is_gross(fit: Fit) -> bool:
@@ -123,11 +128,9 @@ def is_gross(fit: Fit) -> bool:
     return fit.total > _GROSS * readings
 
 
-def _balance_lead(base: Fit, kind: type[Effect]) -> Lead | None:
-    # where gravity is most of the stiffness, its rest angle and the sensor's zero are one
-    fixed = dict(base.problem.fixed) | (
-        {"gravity_stiffness.rest_angle": 0.0} if kind.name == "gravity_stiffness" else {}
-    )
+def _balanced_start(base: Fit, kind: type[Effect]) -> StartingPoint | None:
+    held = {f"{kind.name}.{name}": value for name, value in kind.regressed_at.items()}
+    fixed = dict(base.problem.fixed) | held
     problem = Problem(
         base.problem.data, (*base.problem.effects, kind), tuple(fixed.items()), base.problem.bent
     )
@@ -136,10 +139,10 @@ def _balance_lead(base: Fit, kind: type[Effect]) -> Lead | None:
         return None
     point = clip(problem, point)
     total = sum(float(r @ r) for r in scaled_residuals(problem, point))
-    return Lead(problem, point, base.total - total, balanced=True) if np.isfinite(total) else None
+    return StartingPoint(problem, point, base.total - total, balanced=True) if np.isfinite(total) else None
 
 
-def _line_lead(base: Fit, kind: type[Effect], line: Line) -> Lead:
+def _line_start(base: Fit, kind: type[Effect], line: Line) -> StartingPoint:
     problem = Problem(base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.bent)
     severity, place = kind.parameters()
     lower, upper = severity.lower, severity.upper
@@ -147,67 +150,25 @@ def _line_lead(base: Fit, kind: type[Effect], line: Line) -> Lead:
         [np.clip(line.amplitude, lower, upper), np.clip(line.parameter, place.lower, place.upper)]
     )
     release = np.column_stack([base.point.release, line.phases])
-    return Lead(problem, Point(np.concatenate([base.point.common, values]), release), line.drop)
+    return StartingPoint(problem, Point(np.concatenate([base.point.common, values]), release), line.drop)
 
 
-def _trials(data: Data, kind: type[Effect]) -> list[dict[str, float]]:
-    """Trial parameters: a severity of typical size, further parameters at values worth trying."""
-    infos = kind.parameters()
-    severity = infos[0]
-    rest: list[dict[str, float]] = [{}]
-    if kind.name == "spring_miscalibration":
-        rest = [{"spring_stiffness": k} for k in data.springs] if len(data.springs) > 1 else []
-    elif kind.name == "rod_flexibility":
-        rest = [{"inertia_share": s} for s in (0.05, 0.2, 0.5)]
-    elif kind.name == "sensor_clipping":
-        return _clipping_trials(data)
-    elif kind.name == "wind_speed_drift" and data.normalised:
-        return []
-    elif kind.name == "unsteady_aero_lag":
-        return [{"lag": severity.scale}, {"lag": -severity.scale}]
-    scale = severity.scale * (_moment_scale(data) if severity.unit.startswith("N m") else 1.0)
-    return [{severity.name: scale, **other} for other in rest]
+def _circumstances(data: Data) -> Circumstances:
+    greatest = max(float(np.max(np.abs(run.reading))) for run in data.runs)
+    return Circumstances(data.springs, greatest, data.normalised)
 
 
-def _bent_trials(data: Data, kind: type[Effect]) -> list[dict[str, float]]:
-    """Trials for forms that open a direction of their own: the last value given is the one that is scaled."""
-    if kind.name == "sensor_nonlinearity":
-        cubic, square = (
-            next(i.scale for i in kind.parameters() if i.name == name)
-            for name in ("coefficient", "quadratic")
-        )
-        return [{"coefficient": 0.01 * cubic, "quadratic": square}]
-    if kind.name == "sensor_clipping":
-        return [
-            {"limit": _FAR, "centre": side * (_FAR - trial["limit"])}
-            for trial in _clipping_trials(data)
-            for side in (-1.0, 1.0)
-        ]
-    return []
-
-
-def _moment_scale(data: Data) -> float:
-    """Moments are per unit inertia in normalised form."""
-    return 10.0 if data.normalised else 1.0
-
-
-def _clipping_trials(data: Data) -> list[dict[str, float]]:
-    top = max(float(np.max(np.abs(run.reading))) for run in data.runs)
-    return [{"limit": top * share} for share in (0.999, 0.99, 0.97, 0.93, 0.87, 0.8)]
-
-
-def _lead(base: Fit, kind: type[Effect], trial: dict[str, float]) -> Lead | None:
-    held = {"spring_stiffness"} if kind.name == "spring_miscalibration" else set()
-    fixed = (*base.problem.fixed, *((f"{kind.name}.{n}", v) for n, v in trial.items() if n in held))
-    bends = any(info.form and info.name in trial for info in kind.parameters())
-    bent = (*base.problem.bent, kind.name) if bends else base.problem.bent
-    problem = Problem(base.problem.data, (*base.problem.effects, kind), fixed, bent)
-    infos = [info for info in kind.parameters() if info.name not in held and (bends or not info.form)]
-    names = [info.name for info in infos]
-    scaled = names.index(list(trial)[-1]) if bends else 0
-    values = np.array([trial.get(info.name, info.default) for info in infos])
-    clipping = kind.name == "sensor_clipping"
-    change = _moderate_change(base, problem, values, scaled if not clipping else None)
+def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint | None:
+    spring = kind.chosen_spring()
+    held = {} if spring is None else {spring: trial.values[spring]}
+    fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
+    freed = any(info.form and info.name in trial.values for info in kind.parameters())
+    with_free_form = (*base.problem.bent, kind.name) if freed else base.problem.bent
+    problem = Problem(base.problem.data, (*base.problem.effects, kind), fixed, with_free_form)
+    infos = [info for info in kind.parameters() if info.name not in held and (freed or not info.form)]
+    scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)
+    values = np.array([trial.values.get(info.name, info.default) for info in infos])
+    change = _moderate_change(base, problem, values, scaled)
     if change is None:
         return None
     left = project_out(base, change)
@@ -215,17 +176,17 @@ def _lead(base: Fit, kind: type[Effect], trial: dict[str, float]) -> Lead | None
     if power <= 0.0:
         return None
     slope = sum(float(c @ r) for c, r in zip(left, base.residuals, strict=True)) / power
-    start = values.copy()
-    promise = slope * slope * power
-    if not clipping:
+    start, drop = values.copy(), slope * slope * power
+    if scaled is not None:
         start[scaled] = np.clip(slope * values[scaled], infos[scaled].lower, infos[scaled].upper)
         if start[scaled] == 0.0:
-            start[scaled], promise = 0.01 * values[scaled], 0.0
-    return Lead(problem, Point(np.concatenate([base.point.common, start]), base.point.release), promise)
+            start[scaled], drop = 0.01 * values[scaled], 0.0
+    point = Point(np.concatenate([base.point.common, start]), base.point.release)
+    return StartingPoint(problem, point, drop)
 
 
 def _moderate_change(base: Fit, problem: Problem, values: Array, scaled: int | None) -> list[Array] | None:
-    """Change of the scaled prediction by an effect, one value lowered until the change is no wild one.
+    """Change of the scaled prediction by an effect, one value lowered until the change is moderate.
 
     ``values`` holds the effect's parameters and is changed in place to those that were used; ``scaled`` is the
     place of the one that is lowered, None where none may be.

@@ -18,14 +18,16 @@ from diagnosis.noise import Noise, NoiseTrend, campaign_noise, noise_trend, read
 from diagnosis.outsiders import Outsider, weigh_outsiders
 from diagnosis.problem import Problem
 from diagnosis.random_moments import RandomAnswer, weigh_random_moments
-from diagnosis.rank import NOT_FITTED, Hypothesis, polish, rank_pairs, rank_singles
+from diagnosis.rank import Hypothesis, polish, rank_pairs, rank_singles
 from diagnosis.start import is_gross, nominal_start
 from tunnel_sim.campaign import Campaign
-from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
 from tunnel_sim.errors import TunnelError
 
 Progress = Callable[[str], None]
 
+#: The effects that are read off the records before any is fitted.
+HUM, COARSE_STEP = the_effect(line="mains"), the_effect(lattice=True)
 #: A reading's step beyond this multiple of the stated resolution is coarser than stated.
 COARSER = 1.5
 #: Power that a coarse step's error may leave outside the noise floor, in step²/12 (at most all of it, and chance).
@@ -75,8 +77,8 @@ class Study:
     @property
     def read_off(self) -> tuple[str, ...]:
         """Causes read off the records before fitting."""
-        names = ["mains_hum"] if self.hum is not None else []
-        return tuple([*names, "sensor_quantisation"] if self.coarse else names)
+        found = {HUM.name: self.hum is not None, COARSE_STEP.name: self.coarse}
+        return tuple(name for name, present in found.items() if present)
 
     @property
     def fitted(self) -> tuple[str, ...]:
@@ -127,11 +129,11 @@ def study(
     with clock.step("noise"):
         noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
-        coarse = "sensor_quantisation" in allowed and stated is not None and step > COARSER * stated
+        coarse = COARSE_STEP.name in allowed and stated is not None and step > COARSER * stated
     with clock.step("nominal fit"):
         nominal = fit_nominal(prepare(campaign, noise.variance))
         cleaned, hum = campaign, None
-        line = find_hum(nominal) if "mains_hum" in allowed else None
+        line = find_hum(nominal) if HUM.name in allowed else None
         if line is not None:
             frequency = refine_frequency(campaign, line)
             cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
@@ -169,7 +171,7 @@ def fit_nominal(data: Data) -> Fit:
 
 
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
-    fitted_kinds = [kind for kind in kinds if kind.name not in NOT_FITTED]
+    fitted_kinds = [kind for kind in kinds if kind.fitted]
     nominal = found.nominal
     with clock.step("single effects"):
         singles = rank_singles(nominal, fitted_kinds, clock.progress)

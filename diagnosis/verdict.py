@@ -70,13 +70,9 @@ def _source(name: str) -> str:
 
 def cnr_note(causes: Sequence[str]) -> str:
     """What the coefficients after mean, where a cause changes their meaning."""
-    if "unsteady_aero_lag" in causes:
-        return (
-            "Cnr after is the derivative of the moment's own damping term; the lag acts besides. Over a slow "
-            "oscillation the two together give the effective Cnr − a Cnβ, which is what the nominal model finds "
-            "(before)."
-        )
-    return ""
+    return " ".join(
+        effect_class(name).caveat for name in causes if name != "unknown" and effect_class(name).caveat
+    )
 
 
 BLIND_SPOTS = (

@@ -81,7 +81,7 @@ def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
                 "name": kind.name,
                 "channel": kind.channel,
                 "condition": kind.condition,
-                "stochastic": kind.stochastic,
+                "stochastic": kind.random == "broad_band",
                 "summary": summary(kind),
                 "equation": kind.equation,
                 "signature": kind.signature,
@@ -147,7 +147,7 @@ def lines(kind: type[Effect]) -> list[str]:
     Returns:
         Lines for the terminal.
     """
-    drawn = ["drawn:      a random moment, another in every run"] if kind.stochastic else []
+    drawn = ["drawn:      a random moment, another in every run"] if kind.random == "broad_band" else []
     return [
         f"{kind.name}: {summary(kind)}",
         "",

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from mujoco import batch as mujoco_batch
 
-from tunnel_sim.effects import Effect
+from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.model import Model, build_model
 from tunnel_sim.motion import Motion, sampling
@@ -72,25 +72,9 @@ def simulate(
     Raises:
         TunnelError: when the integration leaves the finite range or the settings are refused.
     """
-    model = build_model(rig, follow_fastest(rig, apply_effects(settings, effects, rng)))
-    return read_motion(simulate_motion(model, sensor.sample_rate), settings, sensor, rng, effects)
-
-
-def apply_effects(stated: RunSettings, effects: Sequence[Effect], rng: np.random.Generator) -> RunSettings:
-    """The physics of a run with effects added.
-
-    Args:
-        stated: the run as the campaign states it.
-        effects: in the order in which they act.
-        rng: what effects draw comes from generators spawned of it.
-
-    Returns:
-        The changed physics.
-    """
-    run = stated
-    for effect in effects:
-        run = effect.on_run(run, stated, rng.spawn(1)[0])
-    return run
+    chain = EffectChain.draw(settings, effects, rng)
+    motion = simulate_motion(build_model(rig, follow_fastest(rig, chain.physics())), sensor.sample_rate)
+    return read_motion(motion, sensor, rng, chain)
 
 
 def simulate_batch(
@@ -125,11 +109,12 @@ def simulate_batch(
         raise TunnelError(
             f"{len(settings)} runs but {len(rngs)} random generators", remedy="give one generator per run"
         )
-    true = [apply_effects(run, effects, rng) for run, rng in zip(settings, rngs, strict=True)]
+    chains = [EffectChain.draw(run, effects, rng) for run, rng in zip(settings, rngs, strict=True)]
+    true = [chain.physics() for chain in chains]
     motions = simulate_motions(rig, true, sensor.sample_rate, nthread=nthread, progress=progress)
     return [
-        read_motion(motion, run, sensor, rng, effects)
-        for motion, run, rng in zip(motions, settings, rngs, strict=True)
+        read_motion(motion, sensor, rng, chain)
+        for motion, rng, chain in zip(motions, rngs, chains, strict=True)
     ]
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import islice
+from math import isclose
 from typing import Any
 
 import mujoco
@@ -12,15 +12,15 @@ import numpy as np
 
 from tunnel_sim.aero import AeroDerivatives
 from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_from
-from tunnel_sim.effects.spring_miscalibration import SpringMiscalibration
+from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_from
+from tunnel_sim.effects.base import SPRING_TOLERANCE
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.motion import Motion
 from tunnel_sim.plan import CampaignPlan, Condition, EffectSetting, Truth
 from tunnel_sim.rig import Rig, load_rig
 from tunnel_sim.run_settings import RunSettings
 from tunnel_sim.sensor import read_motion
-from tunnel_sim.simulate import Progress, apply_effects, simulate_motions
+from tunnel_sim.simulate import Progress, simulate_motions
 
 
 def simulate_campaign(
@@ -70,36 +70,30 @@ def simulate_campaigns(
     rates = {plan.sensor.sample_rate for plan in plans}
     if len(rates) != 1:
         raise TunnelError(f"plans of {len(rates)} sample rates", remedy="simulate those of one rate together")
-    casts = [_cast(plan) for plan in plans]
-    true = [run for cast in casts for run in cast.true]
+    drawn = [_draw(plan) for plan in plans]
+    true = [chain.physics() for runs in drawn for _, chain in runs]
     motions = iter(simulate_motions(rig, true, *rates, nthread=nthread, progress=progress))
-    return [_campaign(cast, rig, list(islice(motions, len(cast.true)))) for cast in casts]
+    return [
+        _campaign(plan, rig, list(islice(motions, len(runs))), runs)
+        for plan, runs in zip(plans, drawn, strict=True)
+    ]
 
 
-@dataclass(frozen=True)
-class _Cast:
-    """A plan whose dice have been thrown: the stated and the true physics of its runs, in its order."""
-
-    plan: CampaignPlan
-    effects: tuple[Effect, ...]
-    stated: list[RunSettings]
-    true: list[RunSettings]
-    rngs: list[np.random.Generator]
+_Drawn = list[tuple[np.random.Generator, EffectChain]]  # of every run, in the plan's order
 
 
-def _cast(plan: CampaignPlan) -> _Cast:
+def _draw(plan: CampaignPlan) -> _Drawn:
+    """The effects of every run with what they draw, and the generator of its noise."""
     effects = plan_effects(plan)
     stated = [run_settings(plan.truth, condition) for condition in plan.conditions]
     rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(plan.seed).spawn(len(stated))]
-    true = [apply_effects(run, effects, rng) for run, rng in zip(stated, rngs, strict=True)]
-    return _Cast(plan, effects, stated, true, rngs)
+    return [(rng, EffectChain.draw(run, effects, rng)) for run, rng in zip(stated, rngs, strict=True)]
 
 
-def _campaign(cast: _Cast, rig: Rig, motions: Sequence[Motion]) -> Campaign:
-    plan = cast.plan
+def _campaign(plan: CampaignPlan, rig: Rig, motions: Sequence[Motion], drawn: _Drawn) -> Campaign:
     records = [
-        read_motion(motion, run, plan.sensor, rng, cast.effects)
-        for motion, run, rng in zip(motions, cast.stated, cast.rngs, strict=True)
+        read_motion(motion, plan.sensor, rng, chain)
+        for motion, (rng, chain) in zip(motions, drawn, strict=True)
     ]
     runs = tuple(
         Run(
@@ -161,8 +155,8 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         plan: its effects, by name and parameters.
 
     Returns:
-        The effects in the vocabulary's order, whatever the plan's, so that the campaign does not hang on it;
-        but the backlash between rod and sensor ahead of what the sensor itself does.
+        The effects in the vocabulary's order, whatever the plan's; what sits between rod and sensor comes
+        ahead of what the sensor itself does.
 
     Raises:
         TunnelError: when a name is unknown or given twice, a severity missing, a value out of range, or a
@@ -177,12 +171,9 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
                 where=f"effect {effect.name}",
                 remedy="give it once, with all its parameters",
             )
-        if isinstance(effect, SpringMiscalibration):
-            _check_spring(effect, plan)
+        _check_spring(effect, plan)
     return tuple(
-        sorted(
-            effects, key=lambda effect: (effect.name != "sensor_hysteresis", ALL_EFFECTS.index(type(effect)))
-        )
+        sorted(effects, key=lambda effect: (not effect.ahead_of_sensor, ALL_EFFECTS.index(type(effect))))
     )
 
 
@@ -199,12 +190,16 @@ def _stated_effect(setting: EffectSetting) -> Effect:
     return effect
 
 
-def _check_spring(effect: SpringMiscalibration, plan: CampaignPlan) -> None:
+def _check_spring(effect: Effect, plan: CampaignPlan) -> None:
     """A spring that no run has would be injected in name only."""
     springs = sorted({condition.spring_stiffness for condition in plan.conditions})
-    if not effect.is_null and not any(effect.concerns(spring) for spring in springs):
+    parameter = effect.chosen_spring()
+    if parameter is None or effect.is_null:
+        return
+    chosen = getattr(effect, parameter)
+    if not any(isclose(spring, chosen, rel_tol=SPRING_TOLERANCE) for spring in springs):
         raise TunnelError(
-            f"no run has a spring_stiffness of {effect.spring_stiffness:g} N m/rad",
+            f"no run has a spring_stiffness of {chosen:g} N m/rad",
             where=f"effect {effect.name}",
             remedy=f"give one of {', '.join(f'{spring:g}' for spring in springs)}",
         )

@@ -19,7 +19,6 @@ from tunnel_sim.plan import SensorModel
 from tunnel_sim.run_settings import RunSettings
 from tunnel_sim.simulate import simulate_batch, simulate_motion
 
-RNG = np.random.default_rng(0)
 SAMPLE_RATE = 500.0
 
 _DEFLECTION = state_names().index("deflection")
@@ -27,7 +26,7 @@ _DEFLECTION = state_names().index("deflection")
 
 def _with_friction(run: RunSettings, moment: float, reach: float) -> RunSettings:
     effect = effect_from("coulomb_friction", {"friction_moment": moment, "presliding": reach})
-    return effect.on_run(run, run, RNG)
+    return effect.on_run(run, run, None)
 
 
 @pytest.mark.parametrize(
@@ -147,7 +146,7 @@ def test_it_goes_together_with_a_twisting_rod_in_either_order(reverse: bool) -> 
     ]
     run = replace(settings(Setting()), duration=3.0)
     for effect in reversed(effects) if reverse else effects:
-        run = effect.on_run(run, run, RNG)
+        run = effect.on_run(run, run, None)
     finer = replace(run, timestep=run.timestep / 4)
     one, other = (forward_motion(RIG, r, SAMPLE_RATE).angle for r in (run, finer))
     assert np.max(np.abs(one - other)) < 2e-5

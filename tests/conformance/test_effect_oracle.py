@@ -14,13 +14,13 @@ import pytest
 
 from tests.reference.effect_cases import VALUES, VOCABULARY, settings
 from tests.reference.effect_oracle import NOTHING, Setting, buffeted, fitted_phase, reading
-from tunnel_sim.effects import Effect, effect_from
+from tunnel_sim.effects import Effect, EffectChain, effect_from
 from tunnel_sim.forward import forward_motion
 from tunnel_sim.model import build_model
 from tunnel_sim.plan import SensorModel
 from tunnel_sim.rig import load_rig
 from tunnel_sim.sensor import read_motion
-from tunnel_sim.simulate import apply_effects, simulate_motion
+from tunnel_sim.simulate import simulate_motion
 
 RIG = load_rig()
 QUIET = SensorModel(noise_std=0.0, resolution=0.0)
@@ -77,12 +77,17 @@ each_variant = pytest.mark.parametrize(
 def simulated(effects: list[Effect], run: Setting, *, forward: bool = False, seed: int = 3) -> np.ndarray:
     """The reading by MuJoCo, or by the compiled forward integrator."""
     rng = np.random.default_rng(seed)
-    physics = apply_effects(settings(run), effects, rng)
+    chain = EffectChain.draw(settings(run), effects, rng)
+    physics = chain.physics()
     if forward:
         motion = forward_motion(RIG, physics, run.sample_rate)
     else:
         motion = simulate_motion(build_model(RIG, physics), run.sample_rate)
-    return read_motion(motion, settings(run), QUIET, rng, effects).yaw_rad
+    return read_motion(motion, QUIET, rng, chain).yaw_rad
+
+
+def drawn_chain(effect: Effect, run: Setting) -> EffectChain:
+    return EffectChain.draw(settings(run), [effect], np.random.default_rng(3))
 
 
 @cache
@@ -93,8 +98,7 @@ def nominal_reading(run: Setting) -> np.ndarray:
 def phase_of(name: str, effect: Effect, values: dict[str, float], found: np.ndarray, run: Setting) -> float:
     """The phase a periodic effect has drawn: of shedding from the run, of hum from the reading."""
     if name == "vortex_shedding":
-        physics = apply_effects(settings(run), [effect], np.random.default_rng(3))
-        return physics.parameters["shedding_phase"]
+        return drawn_chain(effect, run).physics().parameters["shedding_phase"]
     if name == "mains_hum":
         return fitted_phase(found - nominal_reading(run), values["frequency"], run)[1]
     return 0.0
@@ -139,7 +143,7 @@ def test_a_resolution_finer_than_stated_changes_nothing() -> None:
 
 def test_buffeting_matches_the_linear_rig_under_the_same_moment() -> None:
     effect = effect_from("buffeting", VALUES["buffeting"])
-    series = apply_effects(settings(RUN), [effect], np.random.default_rng(3)).series["forcing"]
+    series = drawn_chain(effect, RUN).physics().series["forcing"]
     expected = buffeted(np.array(series.values), series.interval, RUN)
     for forward in (False, True):
         assert np.max(np.abs(simulated([effect], RUN, forward=forward) - expected)) < SMOOTH
@@ -149,7 +153,8 @@ def test_buffeting_matches_the_linear_rig_under_the_same_moment() -> None:
 def random_moment(intensity: float, bandwidth: float, duration: float, seed: int) -> np.ndarray:
     effect = effect_from("buffeting", {"intensity": intensity, "bandwidth": bandwidth})
     run = replace(settings(RUN), duration=duration)
-    (series,) = effect.on_run(run, run, np.random.default_rng(seed)).series.values()
+    drawn = effect.draw(run, np.random.default_rng(seed))
+    (series,) = effect.on_run(run, run, drawn).series.values()
     assert series.interval == 1e-3
     return np.array(series.values)
 

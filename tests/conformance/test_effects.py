@@ -11,13 +11,13 @@ import pytest
 
 from tests.reference.effect_cases import VALUES, VOCABULARY, settings
 from tests.reference.effect_oracle import Setting
-from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class, effect_from
+from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.plan import SensorModel
 from tunnel_sim.record import Record
 from tunnel_sim.rig import load_rig
 from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.simulate import apply_effects, simulate, simulate_batch
+from tunnel_sim.simulate import simulate, simulate_batch
 
 RIG = load_rig()
 SENSOR = SensorModel(zero=0.003)
@@ -184,7 +184,7 @@ def test_a_rod_too_stiff_for_any_step_is_refused_in_one_line() -> None:
 @pytest.mark.parametrize("share", [0.01, 0.1, 0.5, 0.95])
 def test_a_rod_gets_steps_short_enough_for_its_own_oscillation(compliance: float, share: float) -> None:
     effect = effect_from("rod_flexibility", {"compliance": compliance, "inertia_share": share})
-    run = apply_effects(WIND_ON, [effect], np.random.default_rng(0))
+    run = EffectChain.draw(WIND_ON, [effect], np.random.default_rng(0)).physics()
     own = np.sqrt(
         1.0 / (compliance * WIND_ON.yaw_inertia * share * (1.0 - share))
     )  # of two free masses, rad/s

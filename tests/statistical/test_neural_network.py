@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
+from docs.studies.network_study import CONVENTIONAL, NETWORK, closeness, reference_campaigns, verdict
 from identification import identify
 from tests.reference.free_decays import damped_cosine
-from tunnel_lab.network_study import CONVENTIONAL, NETWORK, closeness, reference_campaigns, verdict
 from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.record import Record
 

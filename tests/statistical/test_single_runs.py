@@ -136,9 +136,8 @@ def random_moment(kind, seed):
             16.12, AeroDerivatives(0.35, -0.7), 0.1014, 0.018, wind_speed=20.0, air_density=1.204,
             release_angle=AMPLITUDE, duration=DURATION,
         )  # fmt: skip
-        moved = Buffeting(intensity=0.003, bandwidth=20.0).on_run(
-            settings, settings, np.random.default_rng(seed)
-        )
+        effect = Buffeting(intensity=0.003, bandwidth=20.0)
+        moved = effect.on_run(settings, settings, effect.draw(settings, np.random.default_rng(seed)))
         return 0.25 / 0.003 * np.array(moved.series["forcing"].values)[:count]
     one = np.ones(1)
     conditions = Conditions(

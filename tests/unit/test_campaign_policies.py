@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from tunnel_lab.envs.campaign import CampaignEnv
-from tunnel_lab.envs.compare import (
+from docs.studies.campaign_policies import (
     CONTESTS,
     SEEDS,
     Row,
@@ -21,6 +20,7 @@ from tunnel_lab.envs.compare import (
     share_interval,
     to_csv,
 )
+from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_lab.envs.policies import best_rivals, expected_gain, greedy, run_campaign, scripted, separating
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -14,7 +14,7 @@ from diagnosis.least_squares import Fit, fit, sensitivities
 from diagnosis.noise import campaign_noise
 from diagnosis.problem import Point, Problem
 from diagnosis.reported import report_fits
-from diagnosis.start import leads
+from diagnosis.start import starting_points
 from tests.unit.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.errors import TunnelError
@@ -136,7 +136,7 @@ def test_a_disagreement_is_a_caution_and_agreement_is_none():
 def fits():
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
     base = nominal(data)
-    lead = leads(base, effect_class("quadratic_damping"))[0]
+    lead = starting_points(base, effect_class("quadratic_damping"))[0]
     return base, fit(lead.problem, lead.point, base=base)
 
 

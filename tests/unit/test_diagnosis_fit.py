@@ -233,9 +233,7 @@ def test_a_stiff_rod_condensed_moves_as_the_two_inertias_do(speed, share):
     truth = Truth()
     common = [truth.yaw_inertia, truth.mechanical_damping, truth.cn_beta, truth.cn_r, 0.0, compliance, share]
     point = Point(np.array(common), np.array([[0.35, 0.0]]))
-    physics = problem.effects_at(point.common)[0].on_run(
-        *[problem.stated(point.common, point.release[0], data.runs[0])] * 2, np.random.default_rng(0)
-    )
+    physics = problem.chain(point.common, point.release[0], data.runs[0]).physics()
     assert held_end(condensed(physics, data)).rod_twist is None
     moved = problem.predict([point])[0][0]
     time = np.arange(1000) / 500.0

@@ -13,7 +13,7 @@ from diagnosis.decide import LAPSE, Weighed
 from diagnosis.held_out import HeldOut, folds, predict_held_out
 from diagnosis.least_squares import fit
 from diagnosis.rank import Hypothesis
-from diagnosis.start import leads
+from diagnosis.start import starting_points
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -68,7 +68,7 @@ def base(data):
 
 @pytest.fixture(scope="module")
 def best(base):
-    lead = leads(base, effect_class(CAUSE))[0]
+    lead = starting_points(base, effect_class(CAUSE))[0]
     return fit(lead.problem, lead.point, base=base)
 
 
@@ -82,7 +82,7 @@ def test_the_right_effect_predicts_runs_it_has_not_seen(base, best):
 
 def test_a_wrong_effect_predicts_worse_than_it_fits(base):
     """What mops up the seen runs does not carry over in full."""
-    lead = leads(base, effect_class("coulomb_friction"))[0]
+    lead = starting_points(base, effect_class("coulomb_friction"))[0]
     wrong = fit(lead.problem, lead.point, base=base)
     assert np.mean(list(predict_held_out(wrong).excess.values())) > wrong.excess
 

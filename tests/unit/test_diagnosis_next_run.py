@@ -8,13 +8,13 @@ import pytest
 from diagnosis.least_squares import fit, normal_equations, sensitivities
 from diagnosis.next_run import planned_run, separating_run, separation
 from diagnosis.problem import Point, Problem
-from diagnosis.start import leads
+from diagnosis.start import starting_points
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 
 
 def fitted(base, name):
-    lead = leads(base, effect_class(name))[0]
+    lead = starting_points(base, effect_class(name))[0]
     return fit(lead.problem, lead.point, base=base)
 
 

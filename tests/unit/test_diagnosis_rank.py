@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.rank import NOT_FITTED, rank_pairs, rank_singles
+from diagnosis.rank import rank_pairs, rank_singles
 from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 
@@ -31,7 +31,7 @@ FEW = tuple(
 def test_the_effect_put_in_fits_best_among_all(name, values):
     base = nominal(campaign(effect_from(name, values)))
     told = []
-    ranked = rank_singles(base, [kind for kind in ALL_EFFECTS if kind.name not in NOT_FITTED], told.append)
+    ranked = rank_singles(base, [kind for kind in ALL_EFFECTS if kind.fitted], told.append)
     assert ranked[0].effects == (name,)
     assert abs(ranked[0].fit.excess) < 6.0 * np.sqrt(2.0 / ranked[0].fit.count)
     totals = [h.fit.total for h in ranked]

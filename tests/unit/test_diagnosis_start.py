@@ -10,7 +10,7 @@ from diagnosis.equation_error import equation_error_start
 from diagnosis.least_squares import fit, fit_growing
 from diagnosis.problem import Point, Problem
 from diagnosis.spectra import residual_spectra, resonance, shedding_line
-from diagnosis.start import is_gross, leads, nominal_start, project_out
+from diagnosis.start import is_gross, nominal_start, project_out, starting_points
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, campaign, nominal
@@ -72,9 +72,9 @@ LINEAR = {
 def test_the_promise_of_a_small_effect_is_the_drop_it_brings(name):
     values = LINEAR[name]
     base = nominal(campaign(effect_from(name, values)))
-    lead = leads(base, effect_class(name))[0]
+    lead = starting_points(base, effect_class(name))[0]
     found = fit(lead.problem, lead.point, base=base)
-    assert lead.promise == pytest.approx(base.total - found.total, rel=0.15)
+    assert lead.predicted_drop == pytest.approx(base.total - found.total, rel=0.15)
     key = f"{name}.{next(iter(values))}"
     severity = lead.point.common[lead.problem.names.index(key)]
     assert severity == pytest.approx(next(iter(values.values())), rel=0.25)
@@ -85,16 +85,16 @@ def test_what_these_runs_cannot_show_has_no_lead():
     still = campaign()
     still = replace(still, runs=tuple(run for run in still.runs if not run.wind_on))
     base = nominal(still)
-    assert leads(base, effect_class("nonlinear_yaw_moment")) == []
-    assert leads(base, effect_class("vortex_shedding")) == []
-    assert leads(base, effect_class("coulomb_friction"))
+    assert starting_points(base, effect_class("nonlinear_yaw_moment")) == []
+    assert starting_points(base, effect_class("vortex_shedding")) == []
+    assert starting_points(base, effect_class("coulomb_friction"))
     one_spring = replace(still, runs=still.runs[:1])
-    assert leads(nominal(one_spring), effect_class("spring_miscalibration")) == []
+    assert starting_points(nominal(one_spring), effect_class("spring_miscalibration")) == []
 
 
 def test_leads_come_the_most_promising_first():
     base = nominal(campaign(effect_from("rod_flexibility", {"compliance": 5e-5, "inertia_share": 0.2})))
-    promises = [lead.promise for lead in leads(base, effect_class("rod_flexibility"))]
+    promises = [lead.predicted_drop for lead in starting_points(base, effect_class("rod_flexibility"))]
     assert promises == sorted(promises, reverse=True)
     assert len(promises) == 3
 
@@ -104,7 +104,7 @@ def test_a_wrong_spring_is_sought_among_the_springs_there_are():
         campaign(effect_from("spring_miscalibration", {"error": 0.002, "spring_stiffness": 44.84}))
     )
     held = {dict(lead.problem.fixed)["spring_miscalibration.spring_stiffness"] for lead in
-            leads(base, effect_class("spring_miscalibration"))}  # fmt: skip
+            starting_points(base, effect_class("spring_miscalibration"))}  # fmt: skip
     assert held == {16.12, 44.84}
 
 
@@ -138,7 +138,7 @@ def test_a_shedding_line_gives_its_strouhal_number_amplitude_and_phase():
     assert line is not None
     assert line.parameter == pytest.approx(0.16, abs=0.002)
     assert line.amplitude == pytest.approx(0.01, rel=0.15)
-    lead = leads(base, effect_class("vortex_shedding"))[0]
+    lead = starting_points(base, effect_class("vortex_shedding"))[0]
     found = fit(lead.problem, lead.point, base=base)
     assert abs(found.excess) < 5.0 * np.sqrt(2.0 / found.count)
     windy = [i for i, run in enumerate(data.runs) if run.wind_on]

@@ -9,19 +9,18 @@ import pytest
 
 from tests.reference.effect_cases import VALUES, settings
 from tests.reference.effect_oracle import Setting
-from tunnel_sim.effects import ALL_EFFECTS, effect_from
+from tunnel_sim.effects import ALL_EFFECTS, EffectChain, effect_from
 
 TIME = np.linspace(0.0, 10.0, 1001)
 ANGLE = 0.3 * np.exp(-0.1 * TIME) * np.cos(9.0 * TIME)
 STATED = dataclasses.replace(settings(Setting(duration=10.0)), wind_speed=25.0)
-RNG = np.random.default_rng(0)
 FORMS = [(kind, info) for kind in ALL_EFFECTS for info in kind.parameters() if info.form]
 
 
 def read(name: str, **parameters: float) -> np.ndarray:
     """What the sensor makes of the angle."""
     effect = effect_from(name, parameters)
-    return effect.on_reading(effect.on_angle(ANGLE, TIME, STATED, RNG))
+    return effect.on_reading(effect.on_angle(ANGLE, TIME, STATED, None))
 
 
 @pytest.mark.parametrize(("kind", "info"), FORMS, ids=[f"{k.name}-{i.name}" for k, i in FORMS])
@@ -35,8 +34,8 @@ def test_a_form_bends_the_effect_and_its_default_is_the_textbooks(kind, info) ->
     assert plain == stated
 
     def act(effect):
-        run = effect.on_run(STATED, STATED, np.random.default_rng(1))
-        reading = effect.on_reading(effect.on_angle(ANGLE, TIME, STATED, np.random.default_rng(2)))
+        chain = EffectChain.draw(STATED, [effect], np.random.default_rng(1))
+        run, reading = chain.physics(), chain.reading(chain.angle(ANGLE, TIME))
         return dataclasses.replace(run, duration=1.0), reading
 
     (run, reading), (bent_run, bent_reading) = act(plain), act(bent)
@@ -56,7 +55,7 @@ def test_a_drift_settles_or_quickens(constant: float) -> None:
 
 def test_a_drifting_wind_settles() -> None:
     effect = effect_from("wind_speed_drift", {"drift": 0.1, "settling": 2.5})
-    series = effect.on_run(STATED, STATED, RNG).series["wind_speed"]
+    series = effect.on_run(STATED, STATED, None).series["wind_speed"]
     place = np.arange(len(series.values)) * series.interval
     assert np.array(series.values) == pytest.approx(
         STATED.wind_speed * (1.0 + 0.1 * settled(place, 4.0)), rel=1e-12
@@ -68,9 +67,9 @@ def test_a_drifting_wind_settles() -> None:
 def test_an_offset_and_a_misaligned_flow_follow_a_power_of_the_speed(speed: float) -> None:
     stated = dataclasses.replace(STATED, wind_speed=speed)
     offset = effect_from("wind_speed_offset", {"offset": 0.5, "exponent": -1.0})
-    assert offset.on_run(stated, stated, RNG).wind_speed == pytest.approx(speed + 0.5 * 20.0 / speed)
+    assert offset.on_run(stated, stated, None).wind_speed == pytest.approx(speed + 0.5 * 20.0 / speed)
     flow = effect_from("flow_misalignment", {"angle": 0.01, "exponent": 0.5})
-    assert flow.on_run(stated, stated, RNG).parameters["flow_angle"] == pytest.approx(
+    assert flow.on_run(stated, stated, None).parameters["flow_angle"] == pytest.approx(
         0.01 * np.sqrt(speed / 20.0)
     )
 

@@ -15,7 +15,7 @@ from diagnosis.localisation.phase_plane import apparent_moment
 from diagnosis.localise import localise, telling_runs
 from diagnosis.problem import Problem
 from diagnosis.spectra import linear_coefficients
-from diagnosis.start import leads, nominal_start
+from diagnosis.start import nominal_start, starting_points
 from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, nominal, with_blow
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -54,7 +54,7 @@ def test_of_two_causes_the_one_that_closes_more_is_named():
     base = nominal(data)
     best = base
     for name in ("quadratic_damping", "sensor_drift"):
-        lead = leads(best, effect_class(name))[0]
+        lead = starting_points(best, effect_class(name))[0]
         best = fit(lead.problem, lead.point, base=best)
     for causes in (("quadratic_damping", "sensor_drift"), ("sensor_drift", "quadratic_damping")):
         where, _ = localise(data, base, best, causes)

@@ -18,7 +18,7 @@ from diagnosis.result import (
     ParameterEstimate,
     RunGap,
 )
-from diagnosis.start import leads
+from diagnosis.start import starting_points
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_lab.diagnosis_plots import diagnosis_figures, save_diagnosis_figures
 from tunnel_lab.report import render_report, write_report
@@ -37,7 +37,7 @@ def data():
 @pytest.fixture(scope="module")
 def document(data):
     base = nominal(data)
-    lead = leads(base, effect_class(CAUSE))[0]
+    lead = starting_points(base, effect_class(CAUSE))[0]
     best = fit(lead.problem, lead.point, base=base)
     where, maps = localise(data, base, best, (CAUSE,))
     ids = [run.id for run in data.runs]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import resources
 from math import isfinite
 from types import MappingProxyType
+from typing import Any
 
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.plan import SensorModel
@@ -37,38 +40,18 @@ class Preset:
     severities: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
 
 
-PRESETS = {
-    # The noise is a hundred times the paper rig's at a tenth of its rate: with the paper's own, any two runs that
-    # separate the coefficients reach the targets, and there is nothing to choose.
-    "identification": Preset(
-        springs=(3, 5, 6, 8),
-        wind_speeds=(0.0, 10.0, 15.0, 20.0),
-        release_angles_deg=(2.5, 5.0, 10.0),
-        durations=(5.0, 10.0, 20.0),
-        noise_std=0.05,
-        sample_rate=100.0,
-        max_runs=24,
-    ),
-    # Two causes that change the damping with the amplitude and two that change the frequency, one of each
-    # mechanical and one aerodynamic, about as severe as those that explain the paper's Table III.
-    "diagnosis": Preset(
-        springs=(5, 8),
-        wind_speeds=(0.0, 10.0, 20.0),
-        release_angles_deg=(10.0, 20.0),
-        durations=(5.0, 10.0),
-        noise_std=0.01,
-        sample_rate=100.0,
-        max_runs=12,
-        severities=MappingProxyType(
-            {
-                "quadratic_damping": (0.003, 0.006),
-                "nonlinear_yaw_damping": (60.0, 120.0),
-                "cubic_stiffness": (0.2, 0.4),
-                "nonlinear_yaw_moment": (4.0, 8.0),
-            }
-        ),
-    ),
-}
+def _load() -> dict[str, Preset]:
+    text = (resources.files("tunnel_lab") / "data" / "campaign-presets.toml").read_text(encoding="utf-8")
+    return {name: _preset(values) for name, values in tomllib.loads(text).items()}
+
+
+def _preset(values: Mapping[str, Any]) -> Preset:
+    severities = {name: (low, high) for name, (low, high) in values.get("severities", {}).items()}
+    plain = {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
+    return Preset(**(plain | {"severities": MappingProxyType(severities)}))
+
+
+PRESETS = _load()
 
 
 def preset_sensor(preset: Preset, noise_std: float | None, sample_rate: float | None) -> SensorModel:

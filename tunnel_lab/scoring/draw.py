@@ -17,7 +17,7 @@ from tunnel_lab.effect_option import parse_effect
 from tunnel_lab.scoring.grid import NO_EFFECT, Cell
 from tunnel_sim.aero import AeroDerivatives
 from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.effects import Effect, effect_from
+from tunnel_sim.effects import Effect, EffectChain, effect_from
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.forward import forward_motion
 from tunnel_sim.plan import SensorModel, Truth
@@ -161,15 +161,13 @@ def _record(
     effects: Sequence[Effect],
     rng: np.random.Generator,
 ) -> Record:
-    run = settings
-    for effect in effects:
-        run = effect.on_run(run, settings, rng.spawn(1)[0])
+    chain = EffectChain.draw(settings, effects, rng)
     try:
-        motion = forward_motion(rig, follow_fastest(rig, run), cell.sample_rate)
+        motion = forward_motion(rig, follow_fastest(rig, chain.physics()), cell.sample_rate)
     except ValueError as error:
         remedy = "choose a stiffer spring or less wind"
         raise TunnelError(str(error), where=cell.label, remedy=remedy) from error
-    return read_motion(motion, settings, sensor, rng, effects)
+    return read_motion(motion, sensor, rng, chain)
 
 
 def _effects(cell: Cell) -> tuple[Effect, ...]:

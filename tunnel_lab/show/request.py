@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import degrees, isfinite, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from tunnel_sim.rig import Rig, load_rig
 from tunnel_sim.run_settings import RunSettings
 
 if TYPE_CHECKING:
+    from tunnel_sim.effects import EffectChain
     from tunnel_sim.record import Record
 
 PAPER = {"cn_beta": 0.4719, "cn_r": -0.1033}
@@ -63,31 +65,34 @@ class ShownRun:
 
     Args:
         rig: what it is made on.
-        stated: its physics as a campaign states it.
-        settings: its physics, effects included.
+        chain: its physics as a campaign states it, and its effects.
         sensor: the potentiometer.
         title: its conditions in a few words.
         request: what was asked for.
     """
 
     rig: Rig
-    stated: RunSettings
-    settings: RunSettings
+    chain: EffectChain
     sensor: SensorModel
     title: str
     request: Request
+
+    @cached_property
+    def settings(self) -> RunSettings:
+        """The run's physics, effects included."""
+        from tunnel_sim.steps import follow_fastest
+
+        return follow_fastest(self.rig, self.chain.physics())
 
     def record(self) -> Record:
         """What the potentiometer reads, simulated anew: the same bits every time."""
         from tunnel_sim.model import build_model
         from tunnel_sim.sensor import read_motion
         from tunnel_sim.simulate import simulate_motion
-        from tunnel_sim.virtual_campaign import plan_effects
 
         plan, _ = _plan_and_condition(self.request, self.rig)
         motion = simulate_motion(build_model(self.rig, self.settings), self.sensor.sample_rate)
-        rng = np.random.default_rng([plan.seed, 1])
-        return read_motion(motion, self.stated, self.sensor, rng, plan_effects(plan))
+        return read_motion(motion, self.sensor, np.random.default_rng([plan.seed, 1]), self.chain)
 
 
 def shown_run(request: Request) -> ShownRun:
@@ -103,22 +108,21 @@ def shown_run(request: Request) -> ShownRun:
         TunnelError: for a plan that cannot be read, an unknown run, spring or effect, or a number that is out
             of range.
     """
-    from tunnel_sim.simulate import apply_effects
-    from tunnel_sim.steps import follow_fastest
+    from tunnel_sim.effects import EffectChain
     from tunnel_sim.virtual_campaign import plan_effects, run_settings
 
     rig = load_rig()
     plan, condition = _plan_and_condition(request, rig)
     stated = run_settings(plan.truth, condition)
     effects = plan_effects(plan)
-    settings = follow_fastest(rig, apply_effects(stated, effects, np.random.default_rng([plan.seed, 0])))
+    chain = EffectChain.draw(stated, effects, np.random.default_rng([plan.seed, 0]))
     wind = f"{condition.wind_speed:g} m/s" if condition.wind_speed > 0.0 else "wind off"
     names = "".join(f", {effect.name.replace('_', ' ')}" for effect in effects if not effect.is_null)
     title = (
         f"{condition.spring_stiffness:g} N m/rad, {wind}, "
         f"released at {degrees(condition.release_angle):.3g}°{names}"
     )
-    return ShownRun(rig, stated, settings, plan.sensor, title, request)
+    return ShownRun(rig, chain, plan.sensor, title, request)
 
 
 def _plan_and_condition(request: Request, rig: Rig) -> tuple[CampaignPlan, Condition]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from tunnel_sim.effects.asymmetric_stiffness import AsymmetricStiffness
 from tunnel_sim.effects.base import Effect, ParameterInfo, make_effect
 from tunnel_sim.effects.buffeting import Buffeting
+from tunnel_sim.effects.chain import EffectChain
 from tunnel_sim.effects.coulomb_friction import CoulombFriction
 from tunnel_sim.effects.cubic_stiffness import CubicStiffness
 from tunnel_sim.effects.flow_misalignment import FlowMisalignment
@@ -78,6 +79,24 @@ def effect_class(name: str) -> type[Effect]:
     )
 
 
+def the_effect(**traits: object) -> type[Effect]:
+    """The one effect of the vocabulary with these traits.
+
+    Args:
+        **traits: as listed in `Effect`.
+
+    Returns:
+        Its class.
+
+    Raises:
+        LookupError: when there is none, or more than one.
+    """
+    found = [kind for kind in ALL_EFFECTS if all(getattr(kind, t) == v for t, v in traits.items())]
+    if len(found) != 1:
+        raise LookupError(f"{len(found)} effects have the traits {traits}")
+    return found[0]
+
+
 def effect_from(name: str, parameters: Mapping[str, float]) -> Effect:
     """An effect by name.
 
@@ -94,4 +113,12 @@ def effect_from(name: str, parameters: Mapping[str, float]) -> Effect:
     return make_effect(effect_class(name), parameters)
 
 
-__all__ = ["ALL_EFFECTS", "Effect", "ParameterInfo", "effect_class", "effect_from"]
+__all__ = [
+    "ALL_EFFECTS",
+    "Effect",
+    "EffectChain",
+    "ParameterInfo",
+    "effect_class",
+    "effect_from",
+    "the_effect",
+]

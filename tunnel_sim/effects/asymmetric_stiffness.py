@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
-from tunnel_sim.effects.base import Effect, exponent, parameter, with_law
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.effects.base import Effect, exponent, parameter
+from tunnel_sim.record import Array
 
 
 @dataclass(frozen=True)
@@ -30,12 +29,23 @@ class AsymmetricStiffness(Effect):
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
 
     coefficient: float = parameter(
-        "κ", "1/rad", "share of the stiffness per angle", scale=0.05, lower=-2.0, upper=2.0
+        "κ",
+        "1/rad",
+        "share of the stiffness per angle",
+        scale=0.05,
+        lower=-2.0,
+        upper=2.0,
+        per_stiffness=True,
     )
 
     exponent: float = exponent("p", "power of the angle in the moment, the same moment at 0.2 rad", 2.0)
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
-        """Set the moment law's term."""
-        del stated, rng
-        return with_law(run, stiffness_quadratic=self.coefficient, stiffness_quadratic_exponent=self.exponent)
+    @classmethod
+    def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
+        """The textbook's term."""
+        del rate
+        return -spring * angle**2
+
+    def law(self) -> Mapping[str, float]:
+        """The term of the moment law."""
+        return {"stiffness_quadratic": self.coefficient, "stiffness_quadratic_exponent": self.exponent}

@@ -8,7 +8,8 @@ from math import exp, pi, sqrt
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.base import Drawn, Effect, parameter
+from tunnel_sim.record import Array
 from tunnel_sim.run_settings import RunSettings, Series
 
 _INTERVAL = 1e-3  # s between samples of the random moment
@@ -35,10 +36,17 @@ class Buffeting(Effect):
         "Dryden & Kuethe, NACA Report 342 (1930)",
         "Gauss–Markov process: Gillespie, Phys. Rev. E 54 (1996) 2084, doi 10.1103/PhysRevE.54.2084",
     )
-    stochastic = True
+    fitted = False
+    random = "broad_band"
 
     intensity: float = parameter(
-        "s", "1", "standard deviation of the moment coefficient", scale=0.003, lower=0.0, upper=1.0
+        "s",
+        "1",
+        "standard deviation of the moment coefficient",
+        scale=0.003,
+        lower=0.0,
+        upper=1.0,
+        per_pressure=True,
     )
     bandwidth: float = parameter(
         "fb",
@@ -50,15 +58,19 @@ class Buffeting(Effect):
         default=20.0,
     )
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+    def draw(self, stated: RunSettings, rng: np.random.Generator) -> Array:
+        """The kicks of the random moment, those of its steady state first."""
+        kicks = rng.standard_normal(int(stated.duration / _INTERVAL) + 2)
+        kicks[0] = rng.standard_normal()
+        return kicks
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Add the random moment as a sampled forcing."""
-        if stated.wind_speed <= 0.0 or self.is_null:
+        if stated.wind_speed <= 0.0 or self.is_null or not isinstance(drawn, np.ndarray):
             return run
         from scipy.signal import lfilter  # here, because it is slow to load
 
-        count = int(run.duration / _INTERVAL) + 2
         decay = exp(-2.0 * pi * self.bandwidth * _INTERVAL)
-        kicks = sqrt(1.0 - decay**2) * rng.standard_normal(count)
-        kicks[0] = rng.standard_normal()  # starts in its steady state
+        kicks = np.concatenate([drawn[:1], sqrt(1.0 - decay**2) * drawn[1:]])
         series = Series(tuple((self.intensity * lfilter([1.0], [1.0, -decay], kicks)).tolist()), _INTERVAL)
         return dataclasses.replace(run, series={**run.series, "forcing": series})

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim import steps
-from tunnel_sim.effects.base import Effect, parameter, with_law
+from tunnel_sim.effects.base import Drawn, Effect, parameter, with_law
+from tunnel_sim.record import Array
 from tunnel_sim.run_settings import RunSettings
 
 
@@ -39,12 +40,25 @@ class CoulombFriction(Effect):
 
     friction_moment: float = parameter("Tc", "N m", "moment of friction", scale=0.004, lower=0.0, upper=1e4)
     presliding: float = parameter(
-        "zs", "rad", "deflection at which the contact slides", scale=0.005, lower=0.0, upper=0.2, form=True
+        "zs",
+        "rad",
+        "deflection at which the contact slides",
+        scale=0.005,
+        lower=0.0,
+        upper=0.2,
+        fit_lower=5e-4,  # below it the contact moves faster than the integrator steps
+        form=True,
     )
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+    @classmethod
+    def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
+        """Friction against the motion."""
+        del angle, spring
+        return -np.sign(rate)
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the moment law's terms, in steps short enough to resolve the contact's give after a reversal."""
-        del stated, rng
+        del stated, drawn
         if self.is_null or self.presliding == 0.0:
             return with_law(run, friction_moment=self.friction_moment)
         return steps.for_contact(

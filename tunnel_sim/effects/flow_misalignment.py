@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from tunnel_sim.effects.base import REFERENCE_SPEED, Effect, parameter, with_law
+from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect, parameter, with_law
 from tunnel_sim.run_settings import RunSettings
 
 
@@ -33,9 +31,9 @@ class FlowMisalignment(Effect):
         "n", "1", "power of the speed with which it grows", scale=0.5, lower=-3.0, upper=3.0, form=True
     )
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the moment law's term."""
-        del rng
+        del drawn
         if stated.wind_speed <= 0.0:
             return with_law(run, flow_angle=self.angle)
         grown = self.angle * (stated.wind_speed / REFERENCE_SPEED) ** self.exponent

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
-from tunnel_sim.effects.base import Effect, parameter, with_law
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.effects.base import Effect, parameter
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,6 @@ class FreePlay(Effect):
         "δ", "rad", "half width of the dead zone", scale=0.002, lower=0.0, upper=0.2
     )
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
-        """Set the moment law's term."""
-        del stated, rng
-        return with_law(run, free_play=self.half_width)
+    def law(self) -> Mapping[str, float]:
+        """The term of the moment law."""
+        return {"free_play": self.half_width}

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, parameter, with_law
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.record import Array
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,7 @@ class GravityStiffness(Effect):
         "slope and leaves the origin; the centre shifts by the spring."
     )
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
+    regressed_at: ClassVar[Mapping[str, float]] = {"rest_angle": 0.0}  # which is the zero there
 
     stiffness: float = parameter(
         "Kg", "N m/rad", "greatest restoring moment", scale=0.3, lower=-1e5, upper=1e5
@@ -36,7 +39,12 @@ class GravityStiffness(Effect):
         "βg", "rad", "angle at which gravity is in balance", scale=0.1, lower=-3.2, upper=3.2
     )
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
-        """Set the moment law's term."""
-        del stated, rng
-        return with_law(run, gravity_stiffness=self.stiffness, gravity_angle=self.rest_angle)
+    @classmethod
+    def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
+        """The pull towards the sensor's zero."""
+        del rate, spring
+        return -np.sin(angle)
+
+    def law(self) -> Mapping[str, float]:
+        """The term of the moment law."""
+        return {"gravity_stiffness": self.stiffness, "gravity_angle": self.rest_angle}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.base import Drawn, Effect, parameter
 from tunnel_sim.record import Array
 from tunnel_sim.run_settings import RunSettings
 
@@ -26,16 +26,17 @@ class MainsHum(Effect):
     equation = "y = β + a sin(2π f t + φ), φ drawn for every run"
     signature = "A spectral line at the mains' frequency in every run, whatever the motion."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+    fitted = False
+    line = "mains"
 
     amplitude: float = parameter("a", "rad", "amplitude of the hum", scale=0.0005, lower=0.0, upper=1.0)
     frequency: float = parameter(
         "f", "Hz", "frequency of the mains", scale=0.05, lower=45.0, upper=65.0, default=50.0
     )
 
-    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, rng: np.random.Generator) -> Array:
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Add the hum at a phase of the run's own."""
         del stated
-        phase = float(rng.uniform(0.0, 2.0 * np.pi))
-        if self.is_null:
+        if self.is_null or not isinstance(drawn, float):
             return angle
-        return angle + self.amplitude * np.sin(2.0 * np.pi * self.frequency * time_s + phase)
+        return angle + self.amplitude * np.sin(2.0 * np.pi * self.frequency * time_s + drawn)

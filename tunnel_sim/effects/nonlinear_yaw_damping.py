@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
-from tunnel_sim.effects.base import Effect, exponent, parameter, with_law
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.effects.base import Effect, exponent, parameter
 
 
 @dataclass(frozen=True)
@@ -32,7 +30,6 @@ class NonlinearYawDamping(Effect):
 
     exponent: float = exponent("p", "power of the angle in the factor, the same factor at 0.2 rad", 2.0)
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
-        """Set the moment law's term."""
-        del stated, rng
-        return with_law(run, damping_quadratic=self.coefficient, damping_quadratic_exponent=self.exponent)
+    def law(self) -> Mapping[str, float]:
+        """The term of the moment law."""
+        return {"damping_quadratic": self.coefficient, "damping_quadratic_exponent": self.exponent}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, exponent, parameter, with_law
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.effects.base import Effect, exponent, parameter
+from tunnel_sim.record import Array
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,12 @@ class QuadraticDamping(Effect):
 
     exponent: float = exponent("n", "power of the rate in the moment, the same moment at 2 rad/s", 2.0)
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
-        """Set the moment law's term."""
-        del stated, rng
-        return with_law(run, quadratic_damping=self.coefficient, quadratic_damping_exponent=self.exponent)
+    @classmethod
+    def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
+        """Drag against the motion."""
+        del angle, spring
+        return -np.abs(rate) * rate
+
+    def law(self) -> Mapping[str, float]:
+        """The term of the moment law."""
+        return {"quadratic_damping": self.coefficient, "quadratic_damping_exponent": self.exponent}

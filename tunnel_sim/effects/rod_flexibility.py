@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from tunnel_sim import steps
-from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.base import Circumstances, Drawn, Effect, Trial, parameter
 from tunnel_sim.run_settings import RodTwist, RunSettings
 
 
@@ -33,9 +32,10 @@ class RodFlexibility(Effect):
         "the spring; the air's stiffness acts on the far end; the rod may ring at the release."
     )
     references = ("Meirovitch, Fundamentals of Vibrations, McGraw-Hill 2001",)
+    tries = 3
 
     compliance: float = parameter(
-        "1/Krod", "rad/(N m)", "twist per moment", scale=0.0005, lower=0.0, upper=1.0
+        "1/Krod", "rad/(N m)", "twist per moment", scale=0.0005, lower=0.0, upper=1.0, fit_upper=0.01
     )
     inertia_share: float = parameter(
         "s",
@@ -44,12 +44,21 @@ class RodFlexibility(Effect):
         scale=0.1,
         lower=0.001,
         upper=0.999,
+        fit_lower=0.02,  # beyond these the rod moves faster than the integrator steps
+        fit_upper=0.9,
         default=0.1,
     )
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """Shares of inertia from a light upper end to an even division."""
+        del campaign
+        scale = cls.parameters()[0].scale
+        return [Trial({"compliance": scale, "inertia_share": s}, "compliance") for s in (0.05, 0.2, 0.5)]
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Let the rod twist, in steps short enough for its own oscillation."""
-        del stated, rng
+        del stated, drawn
         if self.is_null:
             return run
         return steps.for_rod(

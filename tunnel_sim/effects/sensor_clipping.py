@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.base import Circumstances, Effect, Trial, parameter
 from tunnel_sim.record import Array
+
+_FAR = 2.0  # rad: where a limit on one side only puts the other
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,7 @@ class SensorClipping(Effect):
     equation = "|y| ≤ L; bent: |y − c| ≤ L, exponentially within k L of it"
     signature = "The tops of the largest swings are flat, and nothing else is touched."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+    tries = 2
 
     limit: float = parameter(
         "L", "rad", "greatest reading; 0 stands for none", scale=0.3, lower=0.0, upper=10.0
@@ -42,6 +46,18 @@ class SensorClipping(Effect):
         upper=0.9,
         form=True,
     )
+
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """Limits somewhat below the greatest reading: on both sides, then on one with the other far away."""
+        limits = [campaign.greatest_reading * share for share in (0.999, 0.99, 0.97, 0.93, 0.87, 0.8)]
+        both = [Trial({"limit": limit}, None) for limit in limits]
+        one = [
+            Trial({"limit": _FAR, "centre": side * (_FAR - limit)}, None)
+            for limit in limits
+            for side in (-1.0, 1.0)
+        ]
+        return [*both, *one]
 
     def on_reading(self, reading: Array) -> Array:
         """Cut off beyond the limit, or bend over towards it."""

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.base import Drawn, Effect, parameter
 from tunnel_sim.effects.ramp import EQUATION, ramp, settling
 from tunnel_sim.record import Array
 from tunnel_sim.run_settings import RunSettings
@@ -31,9 +29,9 @@ class SensorDrift(Effect):
     drift: float = parameter("d", "rad", "drift over the run", scale=0.002, lower=-1.0, upper=1.0)
     settling: float = settling()
 
-    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, rng: np.random.Generator) -> Array:
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Add the ramp."""
-        del rng
+        del drawn
         if self.is_null:
             return angle
         return angle + self.drift * ramp(time_s / stated.duration, self.settling)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.base import Drawn, Effect, parameter
 from tunnel_sim.forward import backlash
 from tunnel_sim.record import Array
 from tunnel_sim.run_settings import RunSettings
@@ -30,15 +30,17 @@ class SensorHysteresis(Effect):
     references = (
         "Visintin, Differential Models of Hysteresis, Springer 1994, doi 10.1007/978-3-662-11557-2",
     )
+    remembers = True
+    ahead_of_sensor = True
 
     half_width: float = parameter("w", "rad", "half width of the play", scale=0.001, lower=0.0, upper=0.2)
     roundness: float = parameter(
         "k", "1", "share by which two plays differ from it", scale=0.3, lower=0.0, upper=1.0, form=True
     )
 
-    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, rng: np.random.Generator) -> Array:
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Follow when pushed; the release has just pushed it outward."""
-        del time_s, stated, rng
+        del time_s, stated, drawn
         if self.is_null:
             return angle
         widths = {self.half_width * (1.0 + self.roundness), self.half_width * (1.0 - self.roundness)}

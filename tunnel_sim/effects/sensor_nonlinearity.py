@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, exponent, parameter
+from tunnel_sim.effects.base import Circumstances, Drawn, Effect, Trial, exponent, parameter
 from tunnel_sim.record import Array
 from tunnel_sim.run_settings import RunSettings
 
@@ -41,9 +42,16 @@ class SensorNonlinearity(Effect):
         "q", "1/rad", "square of the angle beside it", scale=0.02, lower=-1.0, upper=1.0, form=True
     )
 
-    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, rng: np.random.Generator) -> Array:
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """The cubic error, then one that is mostly quadratic."""
+        scale = {info.name: info.scale for info in cls.parameters()}
+        mostly_square = {"coefficient": 0.01 * scale["coefficient"], "quadratic": scale["quadratic"]}
+        return [*super().trials(campaign), Trial(mostly_square, "quadratic")]
+
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Bend the characteristic."""
-        del time_s, stated, rng
+        del time_s, stated, drawn
         if self.is_null:
             return angle
         if self.exponent == 3.0:

@@ -23,6 +23,8 @@ class SensorQuantisation(Effect):
     equation = "y = q round(y/q); a step finer than the stated resolution does nothing"
     signature = "The reading lies on a lattice coarser than stated, and its error is a sawtooth of the angle."
     references = ("Widrow & Kollár, Quantization Noise, CUP 2008, doi 10.1017/CBO9780511754661",)
+    fitted = False
+    lattice = True
 
     step: float = parameter("q", "rad", "true step of the reading", scale=0.002, lower=0.0, upper=1.0)
 

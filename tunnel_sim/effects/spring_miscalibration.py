@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isclose
 
-import numpy as np
-
-from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.base import SPRING_TOLERANCE, Circumstances, Drawn, Effect, Trial, parameter
 from tunnel_sim.run_settings import RunSettings
 
 
@@ -29,6 +28,8 @@ class SpringMiscalibration(Effect):
         "All runs of one spring leave the line of stiffness against squared frequency by the same share."
     )
     references = ("Paper, Table II: springs 4 and 7 leave the line by −12 % and +10 %",)
+    exact = True
+    tries = 2
 
     error: float = parameter(
         "x",
@@ -39,23 +40,26 @@ class SpringMiscalibration(Effect):
         upper=9.0,
     )
     spring_stiffness: float = parameter(
-        "Kr", "N m/rad", "stated stiffness of the spring in question", scale=16.12, lower=0.0, upper=1000000.0
+        "Kr",
+        "N m/rad",
+        "stated stiffness of the spring in question",
+        scale=16.12,
+        lower=0.0,
+        upper=1e6,
+        chosen_spring=True,
     )
 
-    def concerns(self, spring_stiffness: float) -> bool:
-        """Whether a spring is the one in question.
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """Every spring, where there is another to hold it against."""
+        springs = campaign.springs if len(campaign.springs) > 1 else ()
+        scale = cls.parameters()[0].scale
+        return [Trial({"error": scale, "spring_stiffness": spring}, "error") for spring in springs]
 
-        Args:
-            spring_stiffness: as the campaign states it, N m/rad.
-
-        Returns:
-            Whether it is, to the sixth digit.
-        """
-        return isclose(spring_stiffness, self.spring_stiffness, rel_tol=1e-6)
-
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Correct the stiffness of the spring's runs."""
-        del rng
-        if self.is_null or not self.concerns(stated.spring_stiffness):
+        del drawn
+        concerned = isclose(stated.spring_stiffness, self.spring_stiffness, rel_tol=SPRING_TOLERANCE)
+        if self.is_null or not concerned:
             return run
         return dataclasses.replace(run, spring_stiffness=run.spring_stiffness * (1.0 + self.error))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import log, pi, sqrt
 
-import numpy as np
-
-from tunnel_sim.effects.base import Effect, parameter, with_law
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.effects.base import Effect, WindOnRun, parameter
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,28 @@ class StructuralDamping(Effect):
 
     loss_factor: float = parameter("η", "1", "loss factor", scale=0.005, lower=-1.0, upper=1.0)
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
-        """Set the moment law's term."""
-        del stated, rng
-        return with_law(run, loss_factor=self.loss_factor)
+    def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
+        """Whether the loss goes with the motion's frequency or that of the rig in still air, runs do not show.
+
+        Causality may also stiffen the spring by (2η/π) ln(ω/ωn) (Crandall, J. Sound Vib. 11 (1970) 3). The
+        truth may lie anywhere between the two.
+        """
+        del cn_beta
+        if not runs:
+            return 0.0, 0.0
+        stiffening = [
+            2.0 * self.loss_factor / pi * r.spring_stiffness * log(r.still_omega / r.omega) / r.per_cn_beta
+            for r in runs
+        ]
+        loss = [
+            self.loss_factor
+            * (r.spring_stiffness / r.omega - r.spring_stiffness / r.still_omega)
+            / r.per_cn_r
+            for r in runs
+        ]
+        cn_beta_std, cn_r_std = (abs(sum(s)) / len(s) / sqrt(3.0) for s in (stiffening, loss))
+        return cn_beta_std, cn_r_std
+
+    def law(self) -> Mapping[str, float]:
+        """The term of the moment law."""
+        return {"loss_factor": self.loss_factor}

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from tunnel_sim.effects.base import Effect, parameter, with_law
+from tunnel_sim.effects.base import Drawn, Effect, parameter, with_law
 from tunnel_sim.run_settings import RunSettings
 
 
@@ -25,18 +23,21 @@ class VortexShedding(Effect):
     equation = "c ½ρV²Al sin(2π St V t/width + φ), φ drawn for every run"
     signature = "A spectral line whose frequency grows in proportion to the wind speed."
     references = ("Bearman, Annu. Rev. Fluid Mech. 16 (1984) 195, doi 10.1146/annurev.fl.16.010184.001211",)
+    line = "shedding"
+    random = "narrow_band"
 
-    amplitude: float = parameter("c", "1", "coefficient of the moment", scale=0.01, lower=0.0, upper=5.0)
+    amplitude: float = parameter(
+        "c", "1", "coefficient of the moment", scale=0.01, lower=0.0, upper=5.0, per_pressure=True
+    )
     strouhal_number: float = parameter(
         "St", "1", "Strouhal number on the body's width", scale=0.15, lower=0.001, upper=2.0, default=0.15
     )
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the moment law's term at a phase of the run's own."""
         del stated
-        phase = float(rng.uniform(0.0, 2.0 * np.pi))
-        if self.is_null:
+        if self.is_null or not isinstance(drawn, float):
             return run
         return with_law(
-            run, shedding_amplitude=self.amplitude, strouhal_number=self.strouhal_number, shedding_phase=phase
+            run, shedding_amplitude=self.amplitude, strouhal_number=self.strouhal_number, shedding_phase=drawn
         )

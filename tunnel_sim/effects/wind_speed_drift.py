@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.base import Circumstances, Drawn, Effect, Trial, parameter
 from tunnel_sim.effects.ramp import EQUATION, ramp, settling
 from tunnel_sim.run_settings import RunSettings, Series
 
@@ -35,9 +36,14 @@ class WindSpeedDrift(Effect):
     )
     settling: float = settling()
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """None in normalised form."""
+        return () if campaign.normalised else super().trials(campaign)
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Replace the constant wind by a ramp, sampled where it is bent."""
-        del rng
+        del drawn
         if stated.wind_speed <= 0.0 or self.is_null:
             return run
         part = ramp(np.linspace(0.0, 1.0, 2 if self.settling == 0.0 else _SAMPLES), self.settling)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-import numpy as np
-
-from tunnel_sim.effects.base import REFERENCE_SPEED, Effect, parameter
+from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect, parameter
 from tunnel_sim.run_settings import RunSettings, Series
 
 
@@ -32,9 +30,9 @@ class WindSpeedOffset(Effect):
         "n", "1", "power of the stated speed with which it grows", scale=0.5, lower=-3.0, upper=3.0, form=True
     )
 
-    def on_run(self, run: RunSettings, stated: RunSettings, rng: np.random.Generator) -> RunSettings:
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Blow at the true speed."""
-        del rng
+        del drawn
         if stated.wind_speed <= 0.0 or self.is_null:
             return run
         grown = self.offset * (stated.wind_speed / REFERENCE_SPEED) ** self.exponent

@@ -11,7 +11,6 @@ import numpy as np
 
 from tunnel_sim.campaign import Run
 from tunnel_sim.effects import ALL_EFFECTS, Effect
-from tunnel_sim.effects.spring_miscalibration import SpringMiscalibration
 from tunnel_sim.envs.config import FreeDecayConfig, angle_limit
 from tunnel_sim.envs.errors import EnvError, as_env_error
 from tunnel_sim.errors import TunnelError, did_you_mean
@@ -238,6 +237,7 @@ def _drawn_effect(plan: RunPlan, rng: np.random.Generator) -> EffectSetting:
     severity = kind.parameters()[0]
     value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))
     values = {severity.name: value}
-    if kind is SpringMiscalibration:
-        values["spring_stiffness"] = plan.condition.spring_stiffness
+    spring = kind.chosen_spring()
+    if spring is not None:
+        values[spring] = plan.condition.spring_stiffness
     return EffectSetting(kind.name, values)

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from tunnel_sim.effects import EffectChain
 from tunnel_sim.envs.conditions import RunPlan, plan_run
 from tunnel_sim.envs.config import FreeDecayConfig, angle_limit
 from tunnel_sim.envs.controls import OperatorLog, WindAnswer, check_plain, decode
@@ -17,13 +18,12 @@ from tunnel_sim.envs.engines import Operation
 from tunnel_sim.envs.errors import EnvError, as_env_error
 from tunnel_sim.envs.information import Information, Prior
 from tunnel_sim.envs.readings import Readings
-from tunnel_sim.envs.sensing import SensorChain
+from tunnel_sim.envs.sensing import RunningSensor
 from tunnel_sim.envs.sensitivity import NominalRun
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.record import Array, Record
 from tunnel_sim.rig import Rig
 from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.simulate import apply_effects
 
 Flags = NDArray[np.bool_]
 
@@ -64,7 +64,7 @@ class EpisodeState:
     physics: RunSettings
     mujoco: Array
     arrays: Mapping[str, Any]
-    sensor: SensorChain
+    sensor: RunningSensor
     rng: np.random.Generator
 
 
@@ -129,13 +129,13 @@ class Episodes:
         plan = plan_run(options, self._config, self._rig, rng)
         stated = plan.stated()
         try:
-            physics = apply_effects(stated, plan.effects, rng)
+            chain = EffectChain.draw(stated, plan.effects, rng)
+            physics = chain.physics()
             end_angle = self._engine.start(row, physics)
         except TunnelError as error:
             raise as_env_error(error, "reset options") from error
-        chain = SensorChain(stated, plan.sensor, plan.effects, rng)
         self._plans[row], self._physics[row] = plan, physics
-        self._readings.start(row, chain, rng)
+        self._readings.start(row, RunningSensor(chain, plan.sensor), rng)
         self._information.start(row, self._nominal(plan))
         self._stated_speed[row] = self._speed[row] = plan.condition.wind_speed
         self.step_count[row], self.ended[row] = 0, False

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tunnel_sim.envs.config import FreeDecayConfig
 from tunnel_sim.envs.errors import EnvError
-from tunnel_sim.envs.sensing import SensorChain
+from tunnel_sim.envs.sensing import RunningSensor
 from tunnel_sim.record import Array, Record
 from tunnel_sim.sensor import quantise
 
@@ -27,13 +27,13 @@ class Readings:
         self._steps = config.steps
         self._times = config.sample_times
         self._interval = 1.0 / config.sample_rate
-        self._chains: list[SensorChain | None] = [None] * count
+        self._chains: list[RunningSensor | None] = [None] * count
         self._rngs: list[np.random.Generator] = [np.random.default_rng(0)] * count
-        self._bent: set[int] = set()  # runs whose reading effects bend
+        self._altered: set[int] = set()  # runs whose reading effects alter
         self._sensor = np.zeros((3, count, 1))  # zero, noise, resolution
         self._values = np.zeros((count, config.steps * config.samples_per_step))
 
-    def start(self, row: int, chain: SensorChain, rng: np.random.Generator) -> None:
+    def start(self, row: int, chain: RunningSensor, rng: np.random.Generator) -> None:
         """Begin a run.
 
         Args:
@@ -43,7 +43,7 @@ class Readings:
         """
         self._chains[row], self._rngs[row] = chain, rng
         self._sensor[:, row, 0] = chain.sensor.zero, chain.sensor.noise_std, chain.sensor.resolution
-        (self._bent.discard if chain.is_plain else self._bent.add)(row)
+        (self._altered.discard if chain.is_plain else self._altered.add)(row)
 
     def held(self, row: int, angle: float) -> Array:
         """Readings of the control period before the release; their noise is no part of the run's.
@@ -77,14 +77,14 @@ class Readings:
         for row in np.flatnonzero(running).tolist():
             self._rngs[row].standard_normal(out=noise[row])
         first = np.minimum(step, self._steps - 1) * self._samples
-        if self._bent:
+        if self._altered:
             angle = angle.copy()
-        for row in self._bent:
+        for row in self._altered:
             times = self._times[first[row] : first[row] + self._samples]
             angle[row] = self._chain(row).angle(angle[row], times)
         zero, noise_std, resolution = self._sensor
         readings = angle + zero + noise_std * noise
-        for row in self._bent:
+        for row in self._altered:
             readings[row] = self._chain(row).reading(readings[row])
         size = np.where(resolution > 0.0, resolution, 1.0)
         readings = np.where(resolution > 0.0, np.round(readings / size) * size, readings)
@@ -116,7 +116,7 @@ class Readings:
             raise EnvError("there is no reading yet", where="record", remedy="call step() first")
         return Record(self._times[:count], self._values[row, :count])
 
-    def snapshot(self, row: int) -> tuple[Array, SensorChain, np.random.Generator]:
+    def snapshot(self, row: int) -> tuple[Array, RunningSensor, np.random.Generator]:
         """Copies of what a run carries.
 
         Args:
@@ -128,7 +128,7 @@ class Readings:
         return self._values[row].copy(), self._chain(row).copied(), copy.deepcopy(self._rngs[row])
 
     def restore(
-        self, row: int, values: Array, chain: SensorChain, rng: np.random.Generator
+        self, row: int, values: Array, chain: RunningSensor, rng: np.random.Generator
     ) -> np.random.Generator:
         """Put a run back to where a snapshot was taken.
 
@@ -150,7 +150,7 @@ class Readings:
         self._values[row] = values
         return self._rngs[row]
 
-    def _chain(self, row: int) -> SensorChain:
+    def _chain(self, row: int) -> RunningSensor:
         chain = self._chains[row]
         if chain is None:
             raise EnvError("no episode has begun", remedy="call reset() first")

@@ -1,7 +1,7 @@
 """A table of windows, as the paper's Table III, and the simulation of one.
 
 Such a table holds damping ratio and natural frequency of one wind-on run, three cycles at a time. The linear
-model leaves both columns constant; ``diagnosis.window_rivals`` weighs what makes them drift. The paper does
+model leaves both columns constant; ``docs.studies.window_rivals`` weighs what makes them drift. The paper does
 not name the run behind its table: `RigState` is an inference, see `infer_springs` and `rig_state`.
 """
 
@@ -18,7 +18,7 @@ from identification.damped_oscillation import Decay
 from identification.datasets import WindowRow, paper_derivatives, paper_springs, paper_windows
 from identification.decay_fit import Reading, fit_run
 from tunnel_sim.aero import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
-from tunnel_sim.effects import Effect
+from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.forward import forward_motion
 from tunnel_sim.record import Array
@@ -227,20 +227,12 @@ def base_dynamics(state: RigState, omega_n: float, zeta: float, rig: Rig) -> tup
 
 
 def _read(rig: Rig, stated: RunSettings, effects: Sequence[Effect]) -> tuple[Array, Array]:
-    rng = np.random.default_rng(0)  # nothing is drawn: random effects are not asked
-    run = stated
-    for effect in effects:
-        run = effect.on_run(run, stated, rng)
+    chain = EffectChain(stated, tuple(effects), (None,) * len(effects))  # random effects are not asked
     try:
-        motion = forward_motion(rig, run, _RATE)
+        motion = forward_motion(rig, chain.physics(), _RATE)
     except ValueError:  # grows without bound
         return np.arange(2.0), np.zeros(2)
-    reading = motion.angle
-    for effect in effects:
-        reading = effect.on_angle(reading, motion.time_s, stated, rng)
-    for effect in effects:
-        reading = effect.on_reading(reading)
-    return motion.time_s, reading
+    return motion.time_s, chain.reading(chain.angle(motion.angle, motion.time_s))
 
 
 def _windowed(time: Array, reading: Array, zeta: float, count: int) -> Columns | None:

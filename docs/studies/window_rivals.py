@@ -15,7 +15,7 @@ from math import log
 import numpy as np
 from scipy.optimize import least_squares
 
-from diagnosis.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
+from docs.studies.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
 from identification.datasets import WindowRow, paper_windows
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.errors import TunnelError
@@ -28,8 +28,6 @@ _SCALES = (0.02, 5e-4)  # of the base ωn (rad/s) and ζ
 _SLOWEST, _LEAST_ZETA, _MOST_ZETA = 0.1, 0.05, 0.2  # bounds of the base: a share of ωn, and ζ
 _ADJUSTMENTS = 3  # of the base, which an effect of great severity moves far
 _MOVES = 3.84  # fall of a column's χ² by chance once in twenty: an effect that does more moves the column
-#: What has no trend to show: random, or periodic with a phase nobody knows.
-NO_TREND = ("buffeting", "sensor_quantisation", "vortex_shedding", "mains_hum")
 #: Odds of 20:1 as a difference of BIC; less is "cannot be told apart".
 TOLD_APART = 2.0 * log(20.0)
 
@@ -175,7 +173,7 @@ def diagnose_windows(
         )
     found, singles = [none], []
     for kind in kinds:
-        start = None if kind.name in NO_TREND else task.scan(kind)
+        start = task.scan(kind) if has_trend(kind) else None
         single = None if start is None else task.fit((kind,), start)
         singles += [] if single is None else [single]
     moving = [e for e in singles if _moves_zeta(e, none) or _moves_omega(e, none)]
@@ -187,6 +185,11 @@ def diagnose_windows(
                 found += [] if pair is None else [pair]
     flat = {kind.name for kind in kinds} - {e.name for e in moving}
     return WindowDiagnosis(task.state, measured, std, _weighed(found), tuple(sorted(flat)))
+
+
+def has_trend(kind: type[Effect]) -> bool:
+    """Whether an effect has a trend to show in one run: it is neither random nor periodic nor a mere step."""
+    return kind.fitted and not kind.line
 
 
 def _moves_zeta(e: Explanation, none: Explanation) -> bool:

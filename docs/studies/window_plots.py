@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.window_rivals import Explanation, WindowDiagnosis
+from docs.studies.window_rivals import Explanation, WindowDiagnosis
 from tunnel_lab.plots import COLOURS
 
 if TYPE_CHECKING:

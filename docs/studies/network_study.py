@@ -1,6 +1,6 @@
 """The paper's networks against known truth: Fig. 3, Tables III and IV, Figs 4 to 6, and noise against the bound.
 
-Nothing is printed or drawn here; the page ``the-papers-networks`` and `tunnel_lab.network_plots` show it.
+Nothing is printed or drawn here; the page ``the-papers-networks`` and `docs.studies.network_plots` show it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Policies compared over many seeds: ``python -m tunnel_lab.envs.compare docs`` writes docs/campaign-design.*.
+"""Policies compared over many seeds: ``python -m docs.studies.campaign_policies docs`` writes the page's figures.
 
 Both policies of a preset play the same seeds: the same truth, and in the i-th run the same noise. Medians have
 distribution-free 95 % intervals from order statistics (David & Nagaraja, Order Statistics, 3rd ed. (2003), ch. 7,

@@ -1,0 +1,1 @@
+"""The documentation; only `docs.studies` holds code."""

@@ -1,0 +1,1 @@
+"""Studies behind the tutorials and pages of this documentation; run from the root of a checkout."""

@@ -1,0 +1,54 @@
+"""What is said of an effect is said in its own file: no other code is steered by an effect's name."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from tunnel_sim.effects import ALL_EFFECTS
+
+ROOT = Path(__file__).parents[2]
+NAMES = {kind.name for kind in ALL_EFFECTS}
+PACKAGES = ("tunnel_sim", "identification", "diagnosis", "tunnel_lab")
+#: The effects themselves, and the independent simulator that has forms of its own for them.
+HOMES = (ROOT / "tunnel_sim" / "effects", ROOT / "tunnel_sim" / "reference")
+FILES = [
+    path
+    for package in PACKAGES
+    for path in sorted((ROOT / package).rglob("*.py"))
+    if not any(path.is_relative_to(home) for home in HOMES)
+]
+
+
+def names_in(source: str) -> list[str]:
+    """String constants that are an effect's name or one of its parameters, and imports of an effect's module."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found += [node.value] if node.value.split(".")[0] in NAMES else []
+        if isinstance(node, ast.ImportFrom) and node.module:
+            found += [node.module] if node.module.split(".")[-1] in NAMES else []
+    return found
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_effect_is_named_outside_its_home(path: Path) -> None:
+    assert names_in(path.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        'if name == "mains_hum": pass',
+        'fit.value("unsteady_aero_lag.lag")',
+        "from tunnel_sim.effects.mains_hum import MainsHum",
+    ],
+)
+def test_a_name_would_be_noticed(source: str) -> None:
+    assert names_in(source)
+
+
+def test_examples_in_messages_are_no_names() -> None:
+    assert names_in('remedy = "write --effect coulomb_friction:friction_moment=0.004"') == []

@@ -1,0 +1,103 @@
+"""The effects of one run, applied in their order: the one place where their hooks are called."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.plan import SensorModel
+from tunnel_sim.record import Array
+from tunnel_sim.run_settings import RunSettings
+
+
+@dataclass(frozen=True, eq=False)
+class EffectChain:
+    """What acts in one run beyond the nominal model.
+
+    Args:
+        stated: the run as the campaign states it.
+        effects: in the order in which they act.
+        drawn: what the run drew for each of them.
+    """
+
+    stated: RunSettings
+    effects: tuple[Effect, ...]
+    drawn: tuple[Drawn, ...]
+
+    @classmethod
+    def draw(cls, stated: RunSettings, effects: Sequence[Effect], rng: np.random.Generator) -> EffectChain:
+        """Draw what is random in the run.
+
+        Args:
+            stated: the run as the campaign states it.
+            effects: in the order in which they act.
+            rng: every effect draws from generators spawned of it, one for the motion and one for the sensor, so
+                that an effect at its null leaves all that is drawn from ``rng`` itself as it is.
+
+        Returns:
+            The chain.
+        """
+        motion, sensor = rng.spawn(len(effects)), rng.spawn(len(effects))
+        drawn = tuple(
+            effect.draw(stated, of_sensor if _overrides(effect, "on_angle") else of_motion)
+            for effect, of_motion, of_sensor in zip(effects, motion, sensor, strict=True)
+        )
+        return cls(stated, tuple(effects), drawn)
+
+    def physics(self) -> RunSettings:
+        """The physics of the run with the effects."""
+        run = self.stated
+        for effect, drawn in zip(self.effects, self.drawn, strict=True):
+            run = effect.on_run(run, self.stated, drawn)
+        return run
+
+    def angle(self, angle: Array, time_s: Array) -> Array:
+        """What the sensor sees before its zero and noise.
+
+        Args:
+            angle: of the rod's upper end, rad, shape (n,).
+            time_s: since the release, s, shape (n,).
+
+        Returns:
+            The angle seen, rad, shape (n,).
+        """
+        for effect, drawn in zip(self.effects, self.drawn, strict=True):
+            angle = effect.on_angle(angle, time_s, self.stated, drawn)
+        return angle
+
+    def sensor(self, sensor: SensorModel) -> SensorModel:
+        """The true sensor.
+
+        Args:
+            sensor: as stated.
+        """
+        for effect in self.effects:
+            sensor = effect.on_sensor(sensor)
+        return sensor
+
+    def reading(self, reading: Array) -> Array:
+        """The reading after noise and before conversion.
+
+        Args:
+            reading: zero and noise included, rad, shape (n,).
+
+        Returns:
+            The changed reading, rad, shape (n,).
+        """
+        for effect in self.effects:
+            reading = effect.on_reading(reading)
+        return reading
+
+    @property
+    def reads_plainly(self) -> bool:
+        """Whether no effect touches what the sensor sees or reads."""
+        return not any(
+            _overrides(effect, hook) for effect in self.effects for hook in ("on_angle", "on_reading")
+        )
+
+
+def _overrides(effect: Effect, hook: str) -> bool:
+    return getattr(type(effect), hook) is not getattr(Effect, hook)
