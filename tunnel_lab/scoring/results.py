@@ -17,7 +17,9 @@ from identification.scoring import Outcome, Score, Trials, collect, score
 from tunnel_lab.files import write_whole
 from tunnel_lab.scoring.grid import NO_EFFECT, Cell, Grid
 from tunnel_lab.scoring.work import Row, describe
-from tunnel_sim.errors import TunnelError
+from tunnel_sim import limits
+from tunnel_sim.errors import shown
+from tunnel_sim.reading import as_described, frame_schema, parse_json, read_frame, read_regular
 
 if TYPE_CHECKING:
     import polars as pl
@@ -136,21 +138,30 @@ def read_trials(path: Path) -> Results:
     Raises:
         TunnelError: when there is no such file, or it is no table of trials.
     """
-    import polars as pl
-
-    if not path.is_file():
-        raise TunnelError(
-            "no such file", where=str(path), remedy="write one with tunnel score --write-baseline"
-        )
-    try:
-        frame = pl.read_parquet(path)
-        rows = tuple(frame.select(_COLUMNS).to_dicts())
-        grid = Grid.from_json_dict(json.loads(frame["grid"][0]))
-    except (pl.exceptions.PolarsError, ValueError, KeyError, TypeError, IndexError) as error:
-        raise TunnelError(
-            "is no table of trials", where=str(path), remedy="write one with tunnel score --write-baseline"
-        ) from error
+    where, remedy = shown(path), "write one with tunnel score --write-baseline"
+    content = read_regular(path, limits.DATA_BYTES, missing=remedy, readable=remedy)
+    with as_described("is no table of trials", where, remedy):
+        schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
+        wrong = [name for name, kind in _types().items() if schema.get(name) != kind]
+        if wrong or "grid" not in schema:
+            raise ValueError(", ".join(wrong) or "grid")
+        frame = read_frame(content, where, remedy, _COLUMNS)
+        # Every row carries the same grid; one is enough.
+        text = read_frame(content, where, remedy, ("grid",))["grid"][0]
+        grid = Grid.from_json_dict(parse_json(text, where, remedy))
+        rows = tuple(frame.to_dicts())
+        _check_rows(rows, grid)
     return Results(grid, tuple(dict.fromkeys(row["estimator"] for row in rows)), rows)
+
+
+def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
+    """Refuse rows that nothing can be counted by: each has a cell of the grid, and an estimate is a whole one."""
+    for row in rows:
+        stated = [row[name] for name in ("cell", "trial", "estimator", "quantity", "unit", "truth", "status")]
+        if None in stated or row["quantity"] not in grid.cells[row["cell"]].quantities or row["cell"] < 0:
+            raise ValueError("a row without its cell, truth or status")
+        if (row["value"] is None) != (row["std"] is None):
+            raise ValueError("a value without its standard deviation")
 
 
 def scores_frame(results: Results) -> pl.DataFrame:
