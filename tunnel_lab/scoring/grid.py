@@ -184,6 +184,8 @@ class Grid:
         check_shape(data, where, remedy)
         with as_described("is no grid", where, remedy):
             grid: Grid = _GRID.validate_python(data | {"trials_of": tuple(data["trials_of"].items())})
+            if not grid.cells or grid.trials < _LEAST_TRIALS or not all(map(_is_possible, grid.cells)):
+                raise ValueError("a cell or a number of trials that no grid has")
         check_count(len(grid.cells), limits.SCORE_CELLS, "cells", where, "shorten a list")
         for cell in grid.cells:
             check_size(cell.runs, cell.duration, cell.sample_rate, where)
@@ -191,6 +193,13 @@ class Grid:
 
 
 _GRID = TypeAdapter(Grid)
+_LEAST_TRIALS = 2
+
+
+def _is_possible(cell: Cell) -> bool:
+    """Whether a cell's numbers are such as the tables allow."""
+    positive = (cell.noise, cell.duration, cell.amplitude, cell.sample_rate, *cell.springs)
+    return min(positive) > 0.0 and min(cell.resolution, cell.wind_speed) >= 0.0 and 0.0 <= cell.zeta < 1.0
 
 
 def check_trials(grid: Grid, estimators: Sequence[str], where: str) -> None:

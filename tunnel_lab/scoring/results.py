@@ -155,13 +155,17 @@ def read_trials(path: Path) -> Results:
 
 
 def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
-    """Refuse rows that nothing can be counted by: each has a cell of the grid, and an estimate is a whole one."""
+    """Refuse rows that nothing can be counted by: each estimator has all cells, and an estimate is a whole one."""
+    wanted = {(at, quantity) for at, cell in enumerate(grid.cells) for quantity in cell.quantities}
+    found: dict[str, set[tuple[int, str]]] = {}
     for row in rows:
-        stated = [row[name] for name in ("cell", "trial", "estimator", "quantity", "unit", "truth", "status")]
-        if None in stated or row["quantity"] not in grid.cells[row["cell"]].quantities or row["cell"] < 0:
-            raise ValueError("a row without its cell, truth or status")
+        found.setdefault(row["estimator"], set()).add((row["cell"], row["quantity"]))
+        if None in [row[name] for name in ("trial", "estimator", "unit", "truth", "status")]:
+            raise ValueError("a row without its truth or status")
         if (row["value"] is None) != (row["std"] is None):
             raise ValueError("a value without its standard deviation")
+    if not found or any(cells != wanted for cells in found.values()):
+        raise ValueError("cells that are not those of the grid")
 
 
 def scores_frame(results: Results) -> pl.DataFrame:
