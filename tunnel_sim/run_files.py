@@ -49,7 +49,7 @@ def read_table(
         )
     content = read_regular(
         path,
-        limits.DATA_BYTES,
+        limits.CSV_BYTES if reader is _read_csv else limits.DATA_BYTES,
         where=where,
         missing="put the file there or correct 'file' in campaign.toml",
         readable="name a readable .csv or .parquet file",
@@ -84,7 +84,8 @@ class _Table:
 
 def _read_csv(content: bytes, where: str, most: int) -> _Table:
     """The table as text; rows are counted by lines."""
-    decoded(content, where)
+    if not content.isascii():  # which needs no second copy of a large file
+        decoded(content, where)
     columns = content.partition(b"\n")[0].count(b",") + 1
     check_count(columns, limits.COLUMNS, "columns", where, "leave out columns that nobody reads")
     check_count(content.count(b"\n") - 1, most, "samples", where, "split the file, or thin it out")
