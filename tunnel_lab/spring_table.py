@@ -43,8 +43,8 @@ def read_spring_table(path: Path) -> SpringTable:
         The table, in the file's order.
 
     Raises:
-        TunnelError: when the file cannot be read or is too large, a column is missing or unknown, a value is not a number
-            above zero, or there are fewer than three springs.
+        TunnelError: when the file cannot be read or is too large, a column is missing or unknown, a value is not a
+            number above zero, or there are fewer than three springs.
     """
     text = read_text(path, limits.DOCUMENT_BYTES, missing=REMEDY)
     lines = [
@@ -75,7 +75,8 @@ def _columns(header: list[str], path: Path) -> dict[str, int]:
     known = (NAME, STIFFNESS, FREQUENCY)
     for name in header:
         if name not in known:
-            raise TunnelError(f"unknown column '{one_line(name, 40)}'", where=str(path), remedy=did_you_mean(name, known))
+            what = f"unknown column '{one_line(name, 40)}'"
+            raise TunnelError(what, where=str(path), remedy=did_you_mean(name, known))
     for name in (STIFFNESS, FREQUENCY):
         if header.count(name) != 1:
             raise TunnelError(f"needs one column {name}", where=str(path), remedy=REMEDY)

@@ -41,7 +41,8 @@ def sampling(settings: RunSettings, sample_rate: float) -> tuple[int, int]:
         (samples, steps between samples).
 
     Raises:
-        TunnelError: when the sample rate is beyond all use, or the sample interval is not a whole number of timesteps.
+        TunnelError: when the sample rate is beyond all use, or the sample interval is not a whole number of
+            timesteps.
     """
     if not limits.SLOWEST_RATE <= sample_rate <= limits.FASTEST_RATE:
         raise TunnelError(

@@ -218,7 +218,9 @@ def parse_rig(document: Mapping[str, Any], where: str) -> Rig:
     for key in document:
         if key not in (*_SECTIONS, "springs"):
             raise TunnelError(
-                f"unknown section [{one_line(key)}]", where=where, remedy=did_you_mean(key, [*_SECTIONS, "springs"])
+                f"unknown section [{one_line(key)}]",
+                where=where,
+                remedy=did_you_mean(key, [*_SECTIONS, "springs"]),
             )
     parts = {name: _section(document, name, kind, where) for name, kind in _SECTIONS.items()}
     return Rig(**parts, springs=_springs(document, where))
@@ -233,7 +235,9 @@ def _section(document: Mapping[str, Any], name: str, kind: type, where: str) -> 
         )
     for key in table:
         if key not in fields:
-            raise TunnelError(f"unknown key {name}.{one_line(key)}", where=where, remedy=did_you_mean(key, fields))
+            raise TunnelError(
+                f"unknown key {name}.{one_line(key)}", where=where, remedy=did_you_mean(key, fields)
+            )
     for key in fields:
         if key not in table:
             raise TunnelError(f"key {name}.{key} is missing", where=where, remedy="add it")
@@ -266,7 +270,9 @@ def _springs(document: Mapping[str, Any], where: str) -> Mapping[int, float]:
     for key, value in table.items():
         if not re.fullmatch(r"[0-9]{1,9}", key):
             raise TunnelError(
-                f"spring '{one_line(key, 40)}' is not a number", where=where, remedy="number the springs 1, 2, …"
+                f"spring '{one_line(key, 40)}' is not a number",
+                where=where,
+                remedy="number the springs 1, 2, …",
             )
         _check_number(value, f"springs.{key}", where)
         springs[int(key)] = float(value)

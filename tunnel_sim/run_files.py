@@ -125,8 +125,8 @@ def _read_parquet(content: bytes, where: str, most: int) -> _Table:
     return _Table(read_frame(content, where, remedy, used), tuple(schema), 1)
 
 
-def _columns(found: _Table, where: str, *, timed: bool) -> tuple[Array | None, Array, str]:
-    names, first_line = found.names, found.first_line
+def _columns(held: _Table, where: str, *, timed: bool) -> tuple[Array | None, Array, str]:
+    names, first_line = held.names, held.first_line
     if "yaw_rad" in names and "yaw_deg" in names:
         raise TunnelError("both yaw_rad and yaw_deg", where=where, remedy="leave one of them out")
     column = next((name for name in ("yaw_rad", "yaw_deg") if name in names), None)
@@ -145,7 +145,7 @@ def _columns(found: _Table, where: str, *, timed: bool) -> tuple[Array | None, A
             remedy="did you mean 'time_s' (in seconds)? Otherwise state sample_rate in Hz under [sensor]",
         )
     used = [name for name in ("time_s", column) if name in names]
-    table = found.frame.select(used)
+    table = held.frame.select(used)
     if first_line == 2:
         table = _without_blank_end(table)
     if table.height == 0:

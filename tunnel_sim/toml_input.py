@@ -74,7 +74,9 @@ def load_toml(path: Path, *, missing: str) -> dict[str, Any]:
 def _parsed(text: str, where: str) -> dict[str, Any]:
     if _LONG_KEY.search(text):
         raise TunnelError(
-            f"a key of more than {limits.KEY_PARTS} parts", where=where, remedy="correct the file at that place"
+            f"a key of more than {limits.KEY_PARTS} parts",
+            where=where,
+            remedy="correct the file at that place",
         )
     try:
         # tomllib raises ValueError itself for numbers and dates Python cannot hold.
@@ -93,14 +95,17 @@ def _check_magnitudes(value: object, where: str, key: str = "") -> None:
     elif isinstance(value, list):
         for one in value:
             _check_magnitudes(one, where, key)
-    elif isinstance(value, float) and value and isfinite(value):
-        if not limits.SMALLEST_NUMBER <= abs(value) <= limits.LARGEST_NUMBER:
-            raise TunnelError(
-                f"'{one_line(key)}' = {value:g} is beyond {limits.SMALLEST_NUMBER:g} to "
-                f"{limits.LARGEST_NUMBER:g} in magnitude",
-                where=where,
-                remedy="correct it (SI units)",
-            )
+    elif isinstance(value, float) and value and isfinite(value) and not _is_computable(value):
+        raise TunnelError(
+            f"'{one_line(key)}' = {value:g} is beyond {limits.SMALLEST_NUMBER:g} to "
+            f"{limits.LARGEST_NUMBER:g} in magnitude",
+            where=where,
+            remedy="correct it (SI units)",
+        )
+
+
+def _is_computable(value: float) -> bool:
+    return limits.SMALLEST_NUMBER <= abs(value) <= limits.LARGEST_NUMBER
 
 
 def check_version(document: Mapping[str, Any], path: Path) -> None:

@@ -218,7 +218,9 @@ def score_set(folder: Path, *, excluded: Sequence[str] = (), key: Path | None = 
     answers, answers_sha256 = _checked_answers(folder, campaigns, excluded)
     if (folder / SEAL).exists():
         document, key_sha256 = _checked_key(folder, campaigns, answers, key)
-        with as_described("is no key", shown(folder / KEY if key is None else key), "name the key with --key"):
+        with as_described(
+            "is no key", shown(folder / KEY if key is None else key), "name the key with --key"
+        ):
             truths, made_with = dict(document["truths"]), dict(document["made_with"])
     else:
         open_truth = "seal the set (tunnel blind make) or put a truth.json into every campaign"
@@ -229,7 +231,9 @@ def score_set(folder: Path, *, excluded: Sequence[str] = (), key: Path | None = 
         where, remedy = shown(path), "answer the set again, or name the right key"
         with as_described("truth or answer is malformed", where, remedy):
             cases.append(case(path.name, truths[path.name], answers[path.name], excluded))
-    return Score(tuple(cases), tuple(sorted(set(excluded))), key_sha256, answers_sha256, made_with, bool(key_sha256))
+    return Score(
+        tuple(cases), tuple(sorted(set(excluded))), key_sha256, answers_sha256, made_with, bool(key_sha256)
+    )
 
 
 def _checked_answers(

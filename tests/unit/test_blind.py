@@ -391,8 +391,11 @@ def test_bad_input_is_one_line(blind, capsys, words, part):
 
 
 @pytest.mark.parametrize("name", ["seal.json", "key.json", "answers/seal.json", "answers/c0001.json"])
-@pytest.mark.parametrize("content", ["[" * 100_000, "{}", "[]", '{"answers_sha256": [], "truths": [1]}', "\ud800"])
-def test_a_malformed_document_is_one_line(blind, quick, capsys, name, content):
+@pytest.mark.parametrize(
+    "content", ["[" * 100_000, "{}", "[]", '{"answers_sha256": [], "truths": [1]}', "\ud800"]
+)
+@pytest.mark.usefixtures("quick")
+def test_a_malformed_document_is_one_line(blind, capsys, name, content):
     assert main(["blind", "diagnose", str(blind)]) == 0
     (blind / name).write_text(content, encoding="utf-8", errors="surrogatepass")
     capsys.readouterr()

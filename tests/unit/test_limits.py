@@ -1,4 +1,4 @@
-"""What is too large is refused by its count, before any of it is expanded; the page of limits says the same numbers."""
+"""What is too large is refused by its count before any of it is expanded; the page of limits says the same."""
 
 import ast
 import json
@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import pairwise
 from math import prod
 from pathlib import Path
 
@@ -176,7 +177,7 @@ def test_a_sweep_as_json_is_read_as_strictly(tmp_path: Path) -> None:
         {"document": good["document"] | {"truth": [{"cn_beta": [1.0] * 10**5, "cn_r": [1.0] * 10**3}]},
          "rigs": good["rigs"]},
     ):  # fmt: skip
-        with cheap(), pytest.raises(TunnelError, match="the sweep as JSON|rig"):
+        with cheap(), pytest.raises(TunnelError, match=r"the sweep as JSON|rig"):
             Sweep.from_json(json.dumps(spoilt))
 
 
@@ -231,7 +232,7 @@ def reasons() -> dict[str, str]:
     body = ast.parse(Path(limits.__file__).read_text(encoding="utf-8")).body
     return {
         one.targets[0].id: " ".join(following.value.value.split())
-        for one, following in zip(body, body[1:], strict=False)
+        for one, following in pairwise(body)
         if isinstance(one, ast.Assign) and isinstance(following, ast.Expr)
     }
 

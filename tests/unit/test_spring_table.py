@@ -65,5 +65,5 @@ def test_a_missing_table_is_named(tmp_path: Path) -> None:
 def test_a_folder_or_binary_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "springs.csv").write_bytes(b"\xff\xfe\x00\x81")
     for path in (tmp_path, tmp_path / "springs.csv"):
-        with pytest.raises(TunnelError, match="cannot be read|not UTF-8"):
+        with pytest.raises(TunnelError, match=r"cannot be read|not UTF-8"):
             read_spring_table(path)

@@ -13,7 +13,6 @@ from tunnel_lab.show.request import ShownRun
 from tunnel_lab.tables import say
 from tunnel_sim.errors import TunnelError
 
-
 WARNING = (
     "Listens on all network interfaces, without a password and without a check of the Origin: whoever reaches this "
     "port, and any web page open in a browser of this machine, can watch and steer the view. "

@@ -47,9 +47,7 @@ class TruthAxis(StrictModel):
 class SensorAxis(StrictModel):
     """``[sensor]`` or ``[[sensor]]``: the potentiometer, each key a number or a list."""
 
-    sample_rate: ManyRates | None = Field(
-        default=None, description="a positive number or a list of them, Hz"
-    )
+    sample_rate: ManyRates | None = Field(default=None, description="a positive number or a list of them, Hz")
     noise_std: ManyNotNegative | None = Field(
         default=None, description="a number or a list of them, rad, zero or more"
     )

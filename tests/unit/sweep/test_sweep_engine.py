@@ -215,7 +215,9 @@ def test_checksums_are_those_of_sha256sum(sweep: Sweep, here, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("key", ["sweep", "made_with", "schema_version"])
-@pytest.mark.parametrize("value", [None, [], {}, 1, "x", "gone", {"document": {}}, {"document": {}, "rigs": [[]]}])
+@pytest.mark.parametrize(
+    "value", [None, [], {}, 1, "x", "gone", {"document": {}}, {"document": {}, "rigs": [[]]}]
+)
 def test_a_sweep_json_that_is_incomplete_is_one_line(
     sweep: Sweep, tmp_path: Path, key: str, value: object
 ) -> None:
@@ -230,5 +232,5 @@ def test_a_sweep_json_that_is_incomplete_is_one_line(
         return  # still what a folder may hold
     path.write_text(json.dumps(document), encoding="utf-8")
     for read in (open_store, lambda folder: begin(sweep, folder)):
-        with pytest.raises(TunnelError, match="the sweep as JSON|sweep.json"):
+        with pytest.raises(TunnelError, match=r"the sweep as JSON|sweep\.json"):
             read(tmp_path / "out")
