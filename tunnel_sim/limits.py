@@ -51,8 +51,8 @@ SWEEP_SHARDS = 1_000_000
 """Most shards of a sweep: each is three files in a folder, looked at when the sweep goes on."""
 SWEEP_AXIS = 100_000
 """Most values of one axis of a sweep, lists multiplied out: the axes are held in memory, 1 kB a value."""
-SWEEP_CHECKS = 100_000
-"""Most combinations of rig and conditions with a sensor or an effect: each is checked before the first run."""
+SWEEP_CHECKS = 10_000
+"""Most combinations of rig and conditions with a sensor or an effect: all are checked first, 2000 in a second."""
 SCORE_CELLS = 10_000
 """Most cells of a score grid: each is a row of a table."""
 SCORE_ROWS = 1_000_000

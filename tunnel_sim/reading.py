@@ -243,7 +243,7 @@ def check_count(count: float, limit: int, what: str, where: str, remedy: str) ->
     """Refuse more of something than there may be, with the count and the limit.
 
     Args:
-        count: number there is or would be; computed before anything is expanded.
+        count: the number, known before anything is expanded (a count).
         limit: how many there may be, see `tunnel_sim.limits`.
         what: of what, in the plural.
         where: file or option, for the message.
