@@ -6,14 +6,18 @@ why and what would give it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from identification.status import Status as Status
 from identification.status import by_gravity as by_gravity
+from tunnel_sim.errors import one_line
+from tunnel_sim.reading import as_described, check_shape
 from tunnel_sim.record import Array
 
 PARAMETERS = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
@@ -49,10 +53,14 @@ class Quantity:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> Quantity:
-        """The inverse of `to_json_dict`."""
-        interval = data.get("interval")
-        ends = None if interval is None else (float(interval[0]), float(interval[1]))
-        return cls(float(data["value"]), float(data["std"]), str(data["unit"]), ends)
+        """The inverse of `to_json_dict`; raises `TunnelError` where it is none."""
+        with _taken_apart("quantity"):
+            interval = data.get("interval")
+            ends = None
+            if interval is not None:
+                low, high = interval
+                ends = (_number(low), _number(high))
+            return cls(_number(data["value"]), _number(data["std"]), _text(data["unit"]), ends)
 
 
 @dataclass(frozen=True)
@@ -82,8 +90,16 @@ class NoiseLevel:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> NoiseLevel:
-        """The inverse of `to_json_dict`."""
-        return cls(**data)
+        """The inverse of `to_json_dict`; raises `TunnelError` where it is none."""
+        with _taken_apart("noise level"):
+            return cls(
+                std=_number(data["std"]),
+                source=_text(data["source"]),
+                residual_std=_number(data["residual_std"]),
+                slow_ratio=_number(data["slow_ratio"]),
+                departs=_flag(data["departs"]),
+                disagrees=_flag(data["disagrees"]),
+            )
 
 
 @dataclass(frozen=True)
@@ -119,11 +135,12 @@ class WindowEstimate:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> WindowEstimate:
-        """The inverse of `to_json_dict`."""
-        quantities = {name: Quantity.from_json_dict(data[name]) for name in ("amplitude", "omega_n", "zeta")}
-        return cls(
-            float(data["start_s"]), float(data["duration_s"]), cycles=int(data["cycles"]), **quantities
-        )
+        """The inverse of `to_json_dict`; raises `TunnelError` where it is none."""
+        with _taken_apart("window"):
+            names = ("amplitude", "omega_n", "zeta")
+            quantities = {name: Quantity.from_json_dict(data[name]) for name in names}
+            start, duration = _number(data["start_s"]), _number(data["duration_s"])
+            return cls(start, duration, cycles=int(_number(data["cycles"])), **quantities)
 
 
 _RUN_QUANTITIES = (
@@ -188,14 +205,15 @@ class RunEstimate:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> RunEstimate:
-        """The inverse of `to_json_dict`."""
-        return cls(
-            id=str(data["id"]),
-            statuses=_statuses_from_json(data),
-            noise=NoiseLevel.from_json_dict(data["noise"]) if data["noise"] else None,
-            windows=tuple(WindowEstimate.from_json_dict(window) for window in data["windows"]),
-            **_quantities_from_json(data, _RUN_QUANTITIES),
-        )
+        """The inverse of `to_json_dict`; raises `TunnelError` where it is none."""
+        with _taken_apart("run"):
+            return cls(
+                id=_text(data["id"]),
+                statuses=_statuses_from_json(data),
+                noise=None if data["noise"] is None else NoiseLevel.from_json_dict(data["noise"]),
+                windows=tuple(WindowEstimate.from_json_dict(window) for window in data["windows"]),
+                **_quantities_from_json(data, _RUN_QUANTITIES),
+            )
 
 
 _CAMPAIGN_QUANTITIES = (*PARAMETERS, "sensor_zero", "wind_off_inertia", "wind_off_intercept")
@@ -263,17 +281,29 @@ class Estimate:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> Estimate:
-        """The inverse of `to_json_dict`."""
-        return cls(
-            campaign=str(data["campaign"]),
-            estimator=str(data["estimator"]),
-            runs=tuple(RunEstimate.from_json_dict(run) for run in data["runs"]),
-            statuses=_statuses_from_json(data),
-            parameters=tuple(data["parameters"]),
-            covariance=tuple(tuple(float(value) for value in row) for row in data["covariance"]),
-            noise=NoiseLevel.from_json_dict(data["noise"]) if data["noise"] else None,
-            **_quantities_from_json(data, _CAMPAIGN_QUANTITIES),
-        )
+        """The inverse of `to_json_dict`.
+
+        Args:
+            data: the document; further keys, such as the budget's, are left alone.
+
+        Returns:
+            The estimate.
+
+        Raises:
+            TunnelError: when it is no estimate: a key is missing, or a value is not of its kind or not finite.
+        """
+        check_shape(data, _WHERE, _REMEDY)
+        with _taken_apart("estimate"):
+            return cls(
+                campaign=_text(data["campaign"]),
+                estimator=_text(data["estimator"]),
+                runs=tuple(RunEstimate.from_json_dict(run) for run in data["runs"]),
+                statuses=_statuses_from_json(data),
+                parameters=tuple(_text(name) for name in data["parameters"]),
+                covariance=_covariance(data["covariance"], len(data["parameters"])),
+                noise=None if data["noise"] is None else NoiseLevel.from_json_dict(data["noise"]),
+                **_quantities_from_json(data, _CAMPAIGN_QUANTITIES),
+            )
 
 
 def _statuses_json(statuses: tuple[Status, ...]) -> dict[str, Any]:
@@ -285,7 +315,45 @@ def _statuses_json(statuses: tuple[Status, ...]) -> dict[str, Any]:
 
 
 def _statuses_from_json(data: Mapping[str, Any]) -> tuple[Status, ...]:
-    return tuple(Status[name.upper()] for name in data["statuses"])
+    statuses = tuple(Status[_text(name).upper()] for name in data["statuses"])
+    if not statuses:
+        raise ValueError("no status")
+    return statuses
+
+
+def _covariance(rows: Sequence[Sequence[float]], size: int) -> tuple[tuple[float, ...], ...]:
+    """Rows of a covariance, shape (size, size)."""
+    found = tuple(tuple(_number(value) for value in row) for row in rows)
+    if [len(row) for row in found] != [size] * size:
+        raise ValueError("the covariance is not of the parameters")
+    return found
+
+
+_WHERE = "the estimate as JSON"
+_REMEDY = "write it anew with tunnel identify --json"
+
+
+def _taken_apart(kind: str) -> AbstractContextManager[None]:
+    """Whatever a malformed document does to the code that takes it apart becomes one `TunnelError`."""
+    return as_described(f"is no {kind}", _WHERE, _REMEDY)
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        raise ValueError(f"{one_line(repr(value), 20)} is no finite number")
+    return float(value)
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{one_line(repr(value), 20)} is no text")
+    return value
+
+
+def _flag(value: object) -> bool:
+    if not isinstance(value, bool | np.bool):
+        raise TypeError(f"{one_line(repr(value), 20)} is neither true nor false")
+    return bool(value)
 
 
 def _quantities_json(owner: object, names: tuple[str, ...]) -> dict[str, Any]:

@@ -7,7 +7,9 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim import limits
+from tunnel_sim.errors import TunnelError, did_you_mean, one_line, shown
+from tunnel_sim.reading import check_count, read_text
 
 STIFFNESS = "stiffness_N_m_per_rad"
 FREQUENCY = "frequency_Hz"
@@ -41,20 +43,16 @@ def read_spring_table(path: Path) -> SpringTable:
         The table, in the file's order.
 
     Raises:
-        TunnelError: when the file cannot be read, a column is missing or unknown, a value is not a number
-            above zero, or there are fewer than three springs.
+        TunnelError: when the file cannot be read or is too large, a column is missing or unknown, a value is not a
+            number above zero, or there are fewer than three springs.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise TunnelError("does not exist", where=str(path), remedy=REMEDY) from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise TunnelError("cannot be read as a text file", where=str(path), remedy=REMEDY) from error
+    text = read_text(path, limits.DOCUMENT_BYTES, missing=REMEDY)
     lines = [
         (n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")
     ]
+    check_count(len(lines) - 1, limits.SPRINGS, "springs", shown(path), "leave some out")
     # Line by line: a quoted line feed has no business in such a table.
-    rows = [(number, next(csv.reader([line]))) for number, line in lines]
+    rows = [(number, _values(line, f"{path}, line {number}")) for number, line in lines]
     if not rows:
         raise TunnelError("is empty", where=str(path), remedy=REMEDY)
     columns = _columns([name.strip() for name in rows[0][1]], path)
@@ -65,12 +63,20 @@ def read_spring_table(path: Path) -> SpringTable:
     return SpringTable(names, tuple(row[1] for row in table), tuple(row[2] for row in table))
 
 
+def _values(line: str, where: str) -> list[str]:
+    try:
+        return next(csv.reader([line]))
+    except csv.Error as error:
+        raise TunnelError(f"is no line of CSV ({error})", where=where, remedy=REMEDY) from None
+
+
 def _columns(header: list[str], path: Path) -> dict[str, int]:
     """Where each known column stands."""
     known = (NAME, STIFFNESS, FREQUENCY)
     for name in header:
         if name not in known:
-            raise TunnelError(f"unknown column {name!r}", where=str(path), remedy=did_you_mean(name, known))
+            what = f"unknown column '{one_line(name, 40)}'"
+            raise TunnelError(what, where=str(path), remedy=did_you_mean(name, known))
     for name in (STIFFNESS, FREQUENCY):
         if header.count(name) != 1:
             raise TunnelError(f"needs one column {name}", where=str(path), remedy=REMEDY)
@@ -86,13 +92,13 @@ def _row(row: list[str], columns: dict[str, int], where: str) -> tuple[str, floa
 
 
 def _positive(text: str, where: str) -> float:
-    """A finite number above zero."""
+    """A number above zero that can be computed with."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not 0.0 < value < math.inf:
+    if not limits.SMALLEST_NUMBER <= value <= limits.LARGEST_NUMBER:
         raise TunnelError(
-            f"{text.strip()!r} is not a number above zero", where=where, remedy="correct it (SI units)"
+            f"'{one_line(text, 40)}' is not a number above zero", where=where, remedy="correct it (SI units)"
         )
     return value

@@ -6,17 +6,19 @@ The reader never opens ``truth.json``. The writer writes the whole campaign or n
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tomli_w
 
+from tunnel_sim import limits
 from tunnel_sim.campaign import Campaign, Run
 from tunnel_sim.campaign_schema import (
     CAMPAIGN_FILE,
     NO_CAMPAIGN,
+    CampaignDocument,
     RunTable,
     campaign_document,
     parse_document,
@@ -28,6 +30,7 @@ from tunnel_sim.campaign_schema import (
 from tunnel_sim.errors import TunnelError, did_you_mean
 from tunnel_sim.json_text import json_text
 from tunnel_sim.leftovers import clear_leftovers
+from tunnel_sim.reading import check_count
 from tunnel_sim.record import Record
 from tunnel_sim.run_checks import angle_in_radians, enough_cycles, uniform_times
 from tunnel_sim.run_files import RUN_FORMATS, read_table, table_bytes
@@ -56,13 +59,12 @@ def read_campaign(folder: Path | str) -> Campaign:
     if not folder.is_dir():
         raise TunnelError("no such folder", where=shown(folder), remedy=NO_CAMPAIGN)
     document = read_document(folder / CAMPAIGN_FILE)
-    rate = document.sensor.sample_rate
     return Campaign(
         name=document.campaign.name,
         description=document.campaign.description,
         rig=rig_properties(document.rig),
         sensor=sensor_properties(document.sensor),
-        runs=tuple(_read_run(folder, run, rate) for run in document.runs),
+        runs=tuple(_read_runs(folder, document)),
     )
 
 
@@ -114,6 +116,17 @@ def write_campaign(
             (partial / TRUTH_FILE).write_bytes(truth_text.encode())
         (partial / CAMPAIGN_FILE).write_bytes(tomli_w.dumps(document).encode())
     return folder
+
+
+def _read_runs(folder: Path, document: CampaignDocument) -> Iterator[Run]:
+    """The runs in turn, as long as there is room for their samples."""
+    samples = 0
+    for table in document.runs:
+        run = _read_run(folder, table, document.sensor.sample_rate)
+        yield run
+        samples += run.record.time_s.size
+        remedy = "put the runs into several campaigns"
+        check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", shown(folder), remedy)
 
 
 def _read_run(folder: Path, run: RunTable, sample_rate: float | None) -> Run:

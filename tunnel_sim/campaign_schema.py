@@ -8,9 +8,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
+from tunnel_sim import limits
 from tunnel_sim.campaign import Campaign, RigProperties, SensorProperties
 from tunnel_sim.errors import TunnelError
-from tunnel_sim.toml_input import OneLine, StrictModel, check_version, load_toml, shown, validate
+from tunnel_sim.reading import check_count
+from tunnel_sim.toml_input import OneLine, SampleRate, StrictModel, check_version, load_toml, shown, validate
 
 CAMPAIGN_FILE = "campaign.toml"
 NO_CAMPAIGN = f"name a folder that holds a {CAMPAIGN_FILE}"
@@ -38,7 +40,7 @@ class RigTable(StrictModel):
 class SensorTable(StrictModel):
     """``[sensor]``."""
 
-    sample_rate: Positive | None = Field(default=None, description="a positive number in Hz")
+    sample_rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
     resolution: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
     noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
 
@@ -96,6 +98,8 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
     """
     check_version(document, path)
     parsed = validate(CampaignDocument, document, path)
+    remedy = "put the runs into several campaigns"
+    check_count(len(parsed.runs), limits.CAMPAIGN_RUNS, "runs", shown(path), remedy)
     seen: set[str] = set()
     for run in parsed.runs:
         where = run_place(path, run.id)

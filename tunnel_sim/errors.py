@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
+
+_LONGEST = 4096  # of a part of a message, characters: a path may have that many
 
 
 class TunnelError(Exception):
@@ -14,15 +17,36 @@ class TunnelError(Exception):
         where: the file, run or option it concerns; empty when there is none.
         remedy: what to do about it.
 
-    The text reads ``where: what; remedy``. The command line prints it and exits with status 2.
+    The text reads ``where: what; remedy`` and is one line, whatever the parts hold. The command line prints it and
+    exits with status 2.
     """
 
     def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:
-        self.what = what
-        self.where = where
-        self.remedy = remedy
-        text = f"{where}: {what}" if where else what
-        super().__init__(f"{text}; {remedy}" if remedy else text)
+        self.what = one_line(what, _LONGEST)
+        self.where = one_line(where, _LONGEST)
+        self.remedy = one_line(remedy, _LONGEST)
+        text = f"{self.where}: {self.what}" if self.where else self.what
+        super().__init__(f"{text}; {self.remedy}" if self.remedy else text)
+
+
+def one_line(value: object, limit: int = 120) -> str:
+    """The text of a value without line breaks or control characters.
+
+    Args:
+        value: anything.
+        limit: longest text, characters; what is longer is shortened.
+    """
+    try:
+        whole = str(value)
+    except (RecursionError, ValueError):  # nested too deep, or an integer of thousands of digits
+        whole = f"a {type(value).__name__} too large to show"
+    text = " ".join("".join(c if c.isprintable() else " " for c in whole).split())
+    return text if len(text) <= limit else f"{text[: limit - 1]}…"
+
+
+def shown(path: Path) -> str:
+    """A path for an error message: whole, but on one line."""
+    return one_line(path, limit=_LONGEST)
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from tunnel_sim import limits
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.record import Array, read_only
 from tunnel_sim.run_settings import RunSettings
@@ -40,8 +41,14 @@ def sampling(settings: RunSettings, sample_rate: float) -> tuple[int, int]:
         (samples, steps between samples).
 
     Raises:
-        TunnelError: when the sample interval is not a whole number of timesteps.
+        TunnelError: when the sample rate is beyond all use, or the sample interval is not a whole number of
+            timesteps.
     """
+    if not limits.SLOWEST_RATE <= sample_rate <= limits.FASTEST_RATE:
+        raise TunnelError(
+            f"a sample rate of {sample_rate:g} Hz is beyond {limits.SLOWEST_RATE:g} to {limits.FASTEST_RATE:g} Hz",
+            remedy="give it in Hz",
+        )
     steps = 1.0 / (sample_rate * settings.timestep)
     if abs(steps - round(steps)) > 1e-9 * steps or round(steps) < 1:
         raise TunnelError(

@@ -12,7 +12,7 @@ from math import pi, radians
 from pathlib import Path
 
 from tunnel_sim.errors import TunnelError
-from tunnel_sim.plan_schema import PlanDocument, read_plan
+from tunnel_sim.plan_schema import DEFAULT_SAMPLE_RATE, PlanDocument, read_plan
 from tunnel_sim.rig import Rig, load_rig
 from tunnel_sim.toml_input import shown
 
@@ -69,7 +69,7 @@ class SensorModel:
         zero: added to the angle, rad; common to the campaign and unknown to the estimators.
     """
 
-    sample_rate: float = 1000.0
+    sample_rate: float = DEFAULT_SAMPLE_RATE
     noise_std: float = 0.0005
     resolution: float = POTENTIOMETER_RESOLUTION
     zero: float = 0.0

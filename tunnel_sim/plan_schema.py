@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Iterable
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import Annotated, Protocol, TypeVar
 
 from pydantic import AfterValidator, Field
 
+from tunnel_sim import limits
 from tunnel_sim.errors import TunnelError
-from tunnel_sim.toml_input import OneLine, StrictModel, load_toml, shown, validate
+from tunnel_sim.reading import check_count
+from tunnel_sim.toml_input import OneLine, SampleRate, StrictModel, load_toml, shown, validate
+
+DEFAULT_SAMPLE_RATE = 1000.0
+"""Of the potentiometer, Hz."""
+STEPS_PER_SECOND = 1000.0
+"""Integration steps in a second of a run."""
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -20,6 +28,7 @@ def _release_angle(angle: float) -> float:
     return angle
 
 
+HashableT = TypeVar("HashableT", bound=Hashable)
 ReleaseAngle = Annotated[float, AfterValidator(_release_angle)]
 
 
@@ -37,7 +46,7 @@ class TruthTable(StrictModel):
 class SensorModelTable(StrictModel):
     """``[sensor]``; a key that is left out takes the default of ``SensorModel``."""
 
-    sample_rate: Positive | None = Field(default=None, description="a positive number in Hz")
+    sample_rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
     noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
     resolution: NotNegative | None = Field(default=None, description="a number in rad, zero for none")
     zero: float | None = Field(default=None, description="a number in rad")
@@ -87,6 +96,8 @@ def read_plan(path: Path) -> PlanDocument:
     document = load_toml(path, missing="name a campaign description such as the packaged paper-campaign.toml")
     plan = validate(PlanDocument, document, path)
     check_conditions(plan, shown(path))
+    rate = DEFAULT_SAMPLE_RATE if plan.sensor.sample_rate is None else plan.sensor.sample_rate
+    check_size(run_count(plan), plan.duration, rate, shown(path))
     return plan
 
 
@@ -109,6 +120,60 @@ class ConditionKeys(Protocol):
     def release_angles_deg(self) -> list[float]:
         """Degrees."""
 
+    @property
+    def repeats(self) -> int:
+        """Runs of each combination."""
+
+
+def run_count(keys: ConditionKeys) -> int:
+    """How many runs conditions stand for, counted from the lengths of their lists.
+
+    Args:
+        keys: a campaign description, or a table with the same keys.
+    """
+    springs = len(keys.springs) + len(keys.spring_stiffness)
+    return springs * len(keys.wind_speeds) * len(keys.release_angles_deg) * keys.repeats
+
+
+def check_size(runs: int, duration: float, sample_rate: float, where: str) -> None:
+    """Refuse a campaign that is too large to simulate or to read again, before any of it is expanded.
+
+    Args:
+        runs: how many.
+        duration: of each, s.
+        sample_rate: Hz.
+        where: file or option, for messages.
+
+    Raises:
+        TunnelError: too many runs, samples or integration steps, with their number and the limit.
+    """
+    check_count(runs, limits.CAMPAIGN_RUNS, "runs", where, "shorten a list, or make several campaigns")
+    # A run has two samples at least, however short it is.
+    samples = max(2.0, duration * sample_rate)
+    lower = "give a shorter duration or a lower sample_rate"
+    check_count(samples, limits.RUN_SAMPLES, "samples in a run", where, lower)
+    fewer = "make several campaigns, or give a shorter duration"
+    check_count(runs * samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", where, fewer)
+    steps = runs * samples / sample_rate * STEPS_PER_SECOND
+    check_count(steps, limits.CAMPAIGN_STEPS, "integration steps in the campaign", where, fewer)
+
+
+def first_twice(values: Iterable[HashableT]) -> HashableT | None:
+    """The first value that stands twice.
+
+    Args:
+        values: any.
+
+    Returns:
+        None where all differ.
+    """
+    seen: set[HashableT] = set()
+    for value in values:
+        if value in seen:
+            return value
+        seen.add(value)
+    return None
+
 
 def check_conditions(plan: ConditionKeys, where: str) -> None:
     """Refuse conditions that give no run, or the same one twice.
@@ -125,8 +190,7 @@ def check_conditions(plan: ConditionKeys, where: str) -> None:
             "no spring", where=where, remedy="give springs (numbers) or spring_stiffness (N m/rad)"
         )
     for key in ("springs", "spring_stiffness", "wind_speeds", "release_angles_deg"):
-        values = getattr(plan, key)
-        twice = next((value for value in values if values.count(value) > 1), None)
+        twice = first_twice(getattr(plan, key))
         if twice is not None:
             raise TunnelError(
                 f"{key} holds {twice:g} twice",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -11,7 +11,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim import limits
+from tunnel_sim.errors import TunnelError, did_you_mean, one_line
+from tunnel_sim.toml_input import load_toml
 
 
 @dataclass(frozen=True)
@@ -194,16 +196,10 @@ def rig_document(path: Path | None = None) -> dict[str, Any]:
     Raises:
         TunnelError: when the file cannot be read or is no TOML.
     """
-    source = resources.files("tunnel_sim") / "data" / "rig.toml" if path is None else path
-    where = "rig.toml" if path is None else str(path)
-    try:
-        return tomllib.loads(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise TunnelError(
-            "cannot be read", where=where, remedy="give the path of a rig description"
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise TunnelError(f"is not valid TOML ({error})", where=where, remedy="correct the file") from error
+    if path is not None:
+        return load_toml(path, missing="give the path of a rig description")
+    with resources.as_file(resources.files("tunnel_sim") / "data" / "rig.toml") as packaged:
+        return load_toml(packaged, missing="install the program anew")
 
 
 def parse_rig(document: Mapping[str, Any], where: str) -> Rig:
@@ -222,7 +218,9 @@ def parse_rig(document: Mapping[str, Any], where: str) -> Rig:
     for key in document:
         if key not in (*_SECTIONS, "springs"):
             raise TunnelError(
-                f"unknown section [{key}]", where=where, remedy=did_you_mean(key, [*_SECTIONS, "springs"])
+                f"unknown section [{one_line(key)}]",
+                where=where,
+                remedy=did_you_mean(key, [*_SECTIONS, "springs"]),
             )
     parts = {name: _section(document, name, kind, where) for name, kind in _SECTIONS.items()}
     return Rig(**parts, springs=_springs(document, where))
@@ -237,7 +235,9 @@ def _section(document: Mapping[str, Any], name: str, kind: type, where: str) -> 
         )
     for key in table:
         if key not in fields:
-            raise TunnelError(f"unknown key {name}.{key}", where=where, remedy=did_you_mean(key, fields))
+            raise TunnelError(
+                f"unknown key {name}.{one_line(key)}", where=where, remedy=did_you_mean(key, fields)
+            )
     for key in fields:
         if key not in table:
             raise TunnelError(f"key {name}.{key} is missing", where=where, remedy="add it")
@@ -249,13 +249,14 @@ def _check_number(value: object, key: str, where: str, *, whole: bool = False) -
     kinds = (int,) if whole else (int, float)
     good = isinstance(value, kinds) and not isinstance(value, bool)
     if good:
-        number = float(value)  # type: ignore[arg-type]
-        lowest_reached = number >= 0.0 if key.rsplit(".", 1)[-1] in _MAY_BE_ZERO else number > 0.0
-        good = lowest_reached and number < float("inf")
+        lowest = 0 if key.rsplit(".", 1)[-1] in _MAY_BE_ZERO else limits.SMALLEST_NUMBER
+        good = lowest <= value <= limits.LARGEST_NUMBER  # type: ignore[operator]
     if not good:
         kind = "whole number" if whole else "number"
         raise TunnelError(
-            f"{key} = {value!r} is not a positive {kind}", where=where, remedy="correct it (SI units)"
+            f"{key} = {one_line(repr(value), 40)} is not a positive {kind}",
+            where=where,
+            remedy="correct it (SI units)",
         )
 
 
@@ -267,9 +268,11 @@ def _springs(document: Mapping[str, Any], where: str) -> Mapping[int, float]:
         )
     springs: dict[int, float] = {}
     for key, value in table.items():
-        if not key.isdecimal():
+        if not re.fullmatch(r"[0-9]{1,9}", key):
             raise TunnelError(
-                f"spring {key!r} is not a number", where=where, remedy="number the springs 1, 2, …"
+                f"spring '{one_line(key, 40)}' is not a number",
+                where=where,
+                remedy="number the springs 1, 2, …",
             )
         _check_number(value, f"springs.{key}", where)
         springs[int(key)] = float(value)

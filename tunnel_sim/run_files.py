@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import io
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from tunnel_sim import limits
 from tunnel_sim.errors import TunnelError
+from tunnel_sim.reading import check_count, decoded, frame_schema, read_frame, read_regular
 from tunnel_sim.record import Array, Record
 from tunnel_sim.toml_input import one_line
 from tunnel_sim.writing import encoded
@@ -20,20 +23,24 @@ _USED = ("time_s", "yaw_rad", "yaw_deg")
 _COLUMNS = "a column yaw_rad or yaw_deg, and time_s unless [sensor] sample_rate is given"
 
 
-def read_table(path: Path, where: str, *, timed: bool = False) -> tuple[Array | None, Array, str]:
+def read_table(
+    path: Path, where: str, *, timed: bool = False, most: int = limits.RUN_SAMPLES
+) -> tuple[Array | None, Array, str]:
     """Read the columns of a run file; others than those of the format are left alone.
 
     Args:
         path: a ``.csv`` or ``.parquet`` file.
         where: file and run, for messages.
         timed: whether times are needed, as no ``sample_rate`` is stated.
+        most: how many samples it may hold.
 
     Returns:
         Times in s (None without a column time_s), the reading as written, and the name of its column:
         ``yaw_rad`` or ``yaw_deg``. All values are finite.
 
     Raises:
-        TunnelError: no such file, not a table, a column missing or twice, a value missing or not a number.
+        TunnelError: no such file, not a regular one, too large, not a table, a column missing or twice, a value
+            missing or not a number.
     """
     readers = {".csv": _read_csv, ".parquet": _read_parquet}
     reader = readers.get(path.suffix.lower())
@@ -41,23 +48,16 @@ def read_table(path: Path, where: str, *, timed: bool = False) -> tuple[Array | 
         raise TunnelError(
             f"unsupported file type '{one_line(path.suffix)}'", where=where, remedy="use .csv or .parquet"
         )
-    try:
-        content = path.read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
-        raise TunnelError(
-            "no such file", where=where, remedy="put the file there or correct 'file' in campaign.toml"
-        ) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise TunnelError(
-            f"cannot be read ({one_line(reason)})",
-            where=where,
-            remedy="name a readable .csv or .parquet file",
-        ) from None
+    content = read_regular(
+        path,
+        limits.CSV_BYTES if reader is _read_csv else limits.DATA_BYTES,
+        where=where,
+        missing="put the file there or correct 'file' in campaign.toml",
+        readable="name a readable .csv or .parquet file",
+    )
     if not content.strip():
         raise TunnelError("the file is empty", where=where, remedy=f"give it {_COLUMNS}")
-    table, first_line = reader(content, where)
-    return _columns(table, first_line, where, timed=timed)
+    return _columns(reader(content, where, most), where, timed=timed)
 
 
 def table_bytes(record: Record, path: Path) -> bytes:
@@ -75,15 +75,22 @@ def table_bytes(record: Record, path: Path) -> bytes:
     return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
 
 
-def _read_csv(content: bytes, where: str) -> tuple[pl.DataFrame, int]:
-    """The table as text, and the line number of its first row."""
-    try:
-        content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise TunnelError(
-            f"not UTF-8 text (line {line})", where=where, remedy="save the file as UTF-8"
-        ) from None
+@dataclass(frozen=True)
+class _Table:
+    """What a run file holds: at least the columns that are used, the names of all, and the first row's number."""
+
+    frame: pl.DataFrame
+    names: Sequence[str]
+    first_line: int
+
+
+def _read_csv(content: bytes, where: str, most: int) -> _Table:
+    """The table as text; rows are counted by lines."""
+    if not content.isascii():  # which needs no second copy of a large file
+        decoded(content, where)
+    columns = content.partition(b"\n")[0].count(b",") + 1
+    check_count(columns, limits.COLUMNS, "columns", where, "leave out columns that nobody reads")
+    check_count(content.count(b"\n") - 1, most, "samples", where, "split the file, or thin it out")
     try:
         rows = pl.read_csv(content, has_header=False, infer_schema=False, quote_char=None)
     except pl.exceptions.PolarsError as error:
@@ -106,26 +113,22 @@ def _read_csv(content: bytes, where: str) -> tuple[pl.DataFrame, int]:
     rows.columns = [
         name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)
     ]
-    return rows.slice(1), 2
+    return _Table(rows.slice(1), rows.columns, 2)
 
 
-def _read_parquet(content: bytes, where: str) -> tuple[pl.DataFrame, int]:
-    """The table, and the number of its first row."""
-    try:
-        return pl.read_parquet(io.BytesIO(content)), 1
-    # Some broken files make the decoder panic, which is no subclass of Exception.
-    except (Exception, pl.exceptions.PanicException) as error:
-        raise TunnelError(
-            f"not a readable Parquet file ({one_line(error, 60)})",
-            where=where,
-            remedy="write the file again, as Parquet or as CSV",
-        ) from None
+def _read_parquet(content: bytes, where: str, most: int) -> _Table:
+    """The columns that are used; rows are counted from 1."""
+    remedy = "write the file again, as Parquet or as CSV"
+    schema = frame_schema(content, where, remedy, rows=most, counted="samples")
+    used = [name for name in schema if name in _USED]
+    for name in used:
+        if not schema[name].is_numeric():
+            raise _not_numbers(name, schema[name], where)
+    return _Table(read_frame(content, where, remedy, used), tuple(schema), 1)
 
 
-def _columns(
-    table: pl.DataFrame, first_line: int, where: str, *, timed: bool
-) -> tuple[Array | None, Array, str]:
-    names = table.columns
+def _columns(held: _Table, where: str, *, timed: bool) -> tuple[Array | None, Array, str]:
+    names, first_line = held.names, held.first_line
     if "yaw_rad" in names and "yaw_deg" in names:
         raise TunnelError("both yaw_rad and yaw_deg", where=where, remedy="leave one of them out")
     column = next((name for name in ("yaw_rad", "yaw_deg") if name in names), None)
@@ -144,7 +147,7 @@ def _columns(
             remedy="did you mean 'time_s' (in seconds)? Otherwise state sample_rate in Hz under [sensor]",
         )
     used = [name for name in ("time_s", column) if name in names]
-    table = table.select(used)
+    table = held.frame.select(used)
     if first_line == 2:
         table = _without_blank_end(table)
     if table.height == 0:
@@ -166,16 +169,10 @@ def _numbers(series: pl.Series, first_line: int, where: str) -> Array:
     """The values of a column as finite floats, or a message naming the first that is not."""
     if series.dtype == pl.String and first_line == 2:
         numbers = series.str.strip_chars(' \t\r"').cast(pl.Float64, strict=False)
-    elif series.dtype.is_numeric():
-        numbers = series.cast(pl.Float64)
     else:
-        raise TunnelError(
-            f"the column {series.name} holds {one_line(series.dtype, 30)}, not numbers",
-            where=where,
-            remedy=f"write {series.name} as floating-point numbers",
-        )
+        numbers = series.cast(pl.Float64)
     values: NDArray[np.float64] = numbers.fill_null(np.nan).to_numpy()
-    bad = np.flatnonzero(~np.isfinite(values))
+    bad = np.flatnonzero(~(np.abs(values) <= limits.LARGEST_NUMBER))  # NaN is bad, too
     if bad.size:
         at = int(bad[0])
         cell = series[at]
@@ -187,6 +184,14 @@ def _numbers(series: pl.Series, first_line: int, where: str) -> Array:
             remedy="cut the record before it, or leave the run out",
         )
     return values
+
+
+def _not_numbers(name: str, dtype: pl.DataType, where: str) -> TunnelError:
+    return TunnelError(
+        f"the column {name} holds {one_line(dtype, 30)}, not numbers",
+        where=where,
+        remedy=f"write {name} as floating-point numbers",
+    )
 
 
 def _is_number(text: str) -> bool:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from tunnel_sim import limits
 from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim.errors import one_line as one_line
+from tunnel_sim.errors import shown as shown
+from tunnel_sim.reading import check_shape, read_text
 
 SCHEMA_VERSION = 1
 
@@ -26,22 +32,6 @@ class StrictModel(BaseModel):
 ModelT = TypeVar("ModelT", bound=StrictModel)
 
 
-def one_line(value: object, limit: int = 120) -> str:
-    """The text of a value without line breaks or control characters.
-
-    Args:
-        value: anything.
-        limit: longest text, characters; what is longer is shortened.
-    """
-    text = " ".join("".join(c if c.isprintable() else " " for c in str(value)).split())
-    return text if len(text) <= limit else f"{text[: limit - 1]}…"
-
-
-def shown(path: Path) -> str:
-    """A path for an error message: whole, but on one line."""
-    return one_line(path, limit=4096)
-
-
 def _printable(text: str) -> str:
     if not text.strip() or not text.isprintable():
         raise ValueError("is blank or has line breaks or control characters")
@@ -50,6 +40,11 @@ def _printable(text: str) -> str:
 
 OneLine = Annotated[str, AfterValidator(_printable)]
 """A text that can stand in a message of one line."""
+SampleRate = Annotated[float, Field(ge=limits.SLOWEST_RATE, le=limits.FASTEST_RATE)]
+"""Hz."""
+
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{limits.KEY_PARTS},}}", re.ASCII)
 
 
 def load_toml(path: Path, *, missing: str) -> dict[str, Any]:
@@ -63,23 +58,26 @@ def load_toml(path: Path, *, missing: str) -> dict[str, Any]:
         The document, not yet validated.
 
     Raises:
-        TunnelError: no file, not readable, not UTF-8, or not TOML.
+        TunnelError: no file, not a regular one, not readable, too large, not UTF-8, not TOML, nested too deep, or
+            a number beyond what can be computed with.
     """
     where = shown(path)
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise TunnelError("no such file", where=where, remedy=missing) from None
-    except UnicodeDecodeError as error:
-        raise TunnelError(
-            f"not UTF-8 text (byte {error.start})", where=where, remedy="save the file as UTF-8"
-        ) from None
-    except (OSError, ValueError) as error:
-        raise TunnelError(
-            f"cannot be read ({one_line(error)})", where=where, remedy="check the path and its permissions"
-        ) from None
+    text = read_text(path, limits.DOCUMENT_BYTES, missing=missing)
     if not text.strip():
         raise TunnelError("the file is empty", where=where, remedy=missing)
+    document = _parsed(text, where)
+    check_shape(document, where, "correct the file at that place")
+    _check_magnitudes(document, where)
+    return document
+
+
+def _parsed(text: str, where: str) -> dict[str, Any]:
+    if _LONG_KEY.search(text):
+        raise TunnelError(
+            f"a key of more than {limits.KEY_PARTS} parts",
+            where=where,
+            remedy="correct the file at that place",
+        )
     try:
         # tomllib raises ValueError itself for numbers and dates Python cannot hold.
         return tomllib.loads(text)
@@ -87,6 +85,27 @@ def load_toml(path: Path, *, missing: str) -> dict[str, Any]:
         raise TunnelError(
             f"not valid TOML: {one_line(error)}", where=where, remedy="correct the file at that place"
         ) from None
+
+
+def _check_magnitudes(value: object, where: str, key: str = "") -> None:
+    """Refuse numbers whose powers no float can hold; NaN and infinities are the schema's to refuse."""
+    if isinstance(value, Mapping):
+        for name, one in value.items():
+            _check_magnitudes(one, where, name)
+    elif isinstance(value, list):
+        for one in value:
+            _check_magnitudes(one, where, key)
+    elif isinstance(value, float) and value and isfinite(value) and not _is_computable(value):
+        raise TunnelError(
+            f"'{one_line(key)}' = {value:g} is beyond {limits.SMALLEST_NUMBER:g} to "
+            f"{limits.LARGEST_NUMBER:g} in magnitude",
+            where=where,
+            remedy="correct it (SI units)",
+        )
+
+
+def _is_computable(value: float) -> bool:
+    return limits.SMALLEST_NUMBER <= abs(value) <= limits.LARGEST_NUMBER
 
 
 def check_version(document: Mapping[str, Any], path: Path) -> None:

@@ -16,7 +16,7 @@ from diagnosis.blind.files import (
     campaign_folders,
     file_hash,
     folder_hash,
-    read_document,
+    read_hashes,
     write_document,
 )
 from diagnosis.diagnose import diagnose, vocabulary
@@ -81,12 +81,10 @@ def _answered(target: Path) -> dict[str, str]:
     """Hashes of the answers there are, after a look at their files."""
     if not (target / SEAL).exists():
         return {}
-    hashes: dict[str, str] = read_document(target / SEAL, "remove the folder and answer again")[
-        "answers_sha256"
-    ]
+    hashes = read_hashes(target / SEAL, "answers_sha256", "remove the folder and answer again")
     for name, known in hashes.items():
         path = target / f"{name}.json"
-        if not path.exists() or file_hash(path) != known:
+        if not path.is_file() or file_hash(path) != known:
             raise TunnelError(
                 "is not the answer that was given",
                 where=str(path),

@@ -6,9 +6,58 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic import BaseModel, ConfigDict, model_validator
+
 NAMES = ("cn_beta", "cn_r")
 MODERATE = (1.0, 10.0)
 """Excess of a moderate gap: 1 to 10 times the noise power."""
+
+
+class _Read(BaseModel):
+    """What is scored of a document; what else it holds is left alone."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+
+class _Truth(_Read):
+    effects: list[str]
+    severity: float | None = None
+    cn_beta: float = 1.0
+    cn_r: float = 1.0
+
+
+class _Candidate(_Read):
+    effect: str
+    probability: float
+
+
+class _Coefficient(_Read):
+    value: float
+    std: float
+
+
+class _Coefficients(_Read):
+    before: dict[str, _Coefficient | None] = {}
+    after: dict[str, _Coefficient | None] = {}
+
+
+class _Gap(_Read):
+    closed: float | None = None
+
+
+class _Answer(_Read):
+    causes: list[str] | None
+    ambiguous_with: list[str] = []
+    candidates: list[_Candidate] = []
+    coefficients: _Coefficients = _Coefficients()
+    gap: _Gap | None = None
+    wall_s: float = 0.0
+
+    @model_validator(mode="after")
+    def _closed_where_named(self) -> _Answer:
+        if self.causes and self.causes != ["unknown"] and (self.gap is None or self.gap.closed is None):
+            raise ValueError("causes without the share of the gap that they close")
+        return self
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,14 +161,19 @@ def case(
 
     Returns:
         The case; its truth is ``unknown`` where one of its effects was withheld.
+
+    Raises:
+        ValueError: when truth or answer is malformed (pydantic's, which says where).
     """
-    effects = tuple(sorted(truth["effects"]))
+    stated = _Truth.model_validate(truth)
+    _Answer.model_validate(answer)
+    effects = tuple(sorted(stated.effects))
     withheld = bool(set(effects) & set(excluded))
     return Case(
         name=name,
         truth=("unknown",) if withheld else effects,
         withheld=withheld,
-        severity=truth.get("severity"),
+        severity=stated.severity,
         coefficients={key: float(truth[key]) for key in NAMES if key in truth},
         answer=answer,
     )

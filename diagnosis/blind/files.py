@@ -7,13 +7,14 @@ A set is a folder: a folder for each campaign, ``seal.json`` (published: hashes 
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tunnel_sim.errors import TunnelError
+from tunnel_sim import limits
+from tunnel_sim.errors import TunnelError, shown
 from tunnel_sim.json_text import json_text
+from tunnel_sim.reading import read_json, read_regular
 from tunnel_sim.writing import write_whole
 
 SCHEMA_VERSION = 1
@@ -52,22 +53,34 @@ def read_document(path: Path, remedy: str) -> dict[str, Any]:
         Its content.
 
     Raises:
-        TunnelError: when it is missing or no JSON object.
+        TunnelError: when it is missing, cannot be read or is no JSON object.
     """
-    try:
-        found = json.loads(path.read_bytes())
-    except FileNotFoundError as error:
-        raise TunnelError("does not exist", where=str(path), remedy=remedy) from error
-    except (ValueError, UnicodeDecodeError) as error:
-        raise TunnelError("is no JSON", where=str(path), remedy=remedy) from error
-    if not isinstance(found, dict):
-        raise TunnelError("is no JSON object", where=str(path), remedy=remedy)
+    return read_json(path, remedy=remedy)
+
+
+def read_hashes(path: Path, key: str, remedy: str) -> dict[str, str]:
+    """Read hashes by name from a seal.
+
+    Args:
+        path: of the ``seal.json``.
+        key: under which they stand.
+        remedy: what to do when the file is missing or broken.
+
+    Returns:
+        The hashes by the names of campaigns.
+
+    Raises:
+        TunnelError: when the file is missing or malformed.
+    """
+    found = read_document(path, remedy).get(key)
+    if not isinstance(found, dict) or not all(isinstance(value, str) for value in found.values()):
+        raise TunnelError(f"has no hashes under '{key}'", where=shown(path), remedy=remedy)
     return found
 
 
 def file_hash(path: Path) -> str:
     """SHA-256 of a file, in hexadecimal."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hashlib.sha256(read_regular(path, limits.DATA_BYTES)).hexdigest()
 
 
 def folder_hash(folder: Path) -> str:

@@ -11,9 +11,18 @@ import numpy as np
 
 from diagnosis.blind.answer import answers_folder
 from diagnosis.blind.cases import NAMES, Case, case, label
-from diagnosis.blind.files import KEY, SEAL, campaign_folders, file_hash, folder_hash, read_document
+from diagnosis.blind.files import (
+    KEY,
+    SEAL,
+    campaign_folders,
+    file_hash,
+    folder_hash,
+    read_document,
+    read_hashes,
+)
 from diagnosis.blind.statistics import CalibrationBin, Share, calibration, share_of
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.errors import TunnelError, shown
+from tunnel_sim.reading import as_described
 
 CLOSED = 0.95
 WITHIN = 3.0
@@ -202,19 +211,29 @@ def score_set(folder: Path, *, excluded: Sequence[str] = (), key: Path | None = 
         The score.
 
     Raises:
-        TunnelError: when a campaign is not answered, or key, campaign or answer is not what its hash says.
+        TunnelError: when a campaign is not answered, key, campaign or answer is not what its hash says, or one of
+            them is malformed.
     """
     campaigns = campaign_folders(folder)
     answers, answers_sha256 = _checked_answers(folder, campaigns, excluded)
     if (folder / SEAL).exists():
         document, key_sha256 = _checked_key(folder, campaigns, answers, key)
-        truths, made_with = document["truths"], document["made_with"]
+        with as_described(
+            "is no key", shown(folder / KEY if key is None else key), "name the key with --key"
+        ):
+            truths, made_with = dict(document["truths"]), dict(document["made_with"])
     else:
         open_truth = "seal the set (tunnel blind make) or put a truth.json into every campaign"
         truths = {path.name: read_document(path / "truth.json", open_truth) for path in campaigns}
         key_sha256, made_with = "", {}
-    cases = tuple(case(p.name, truths[p.name], answers[p.name], excluded) for p in campaigns)
-    return Score(cases, tuple(sorted(set(excluded))), key_sha256, answers_sha256, made_with, bool(key_sha256))
+    cases = []
+    for path in campaigns:
+        where, remedy = shown(path), "answer the set again, or name the right key"
+        with as_described("truth or answer is malformed", where, remedy):
+            cases.append(case(path.name, truths[path.name], answers[path.name], excluded))
+    return Score(
+        tuple(cases), tuple(sorted(set(excluded))), key_sha256, answers_sha256, made_with, bool(key_sha256)
+    )
 
 
 def _checked_answers(
@@ -225,7 +244,7 @@ def _checked_answers(
     again = f"answer the set first: tunnel blind diagnose {folder}" + "".join(
         f" --exclude {e}" for e in excluded
     )
-    hashes = read_document(target / SEAL, again)["answers_sha256"]
+    hashes = read_hashes(target / SEAL, "answers_sha256", again)
     left = [path.name for path in campaigns if path.name not in hashes]
     if left:
         raise TunnelError(
@@ -244,8 +263,8 @@ def _checked_key(
     folder: Path, campaigns: Sequence[Path], answers: dict[str, dict[str, Any]], key: Path | None
 ) -> tuple[dict[str, Any], str]:
     """The key, once everything is what it was when it was sealed."""
-    seal = read_document(folder / SEAL, "restore it")
-    hashes = seal["campaigns_sha256"]
+    hashes = read_hashes(folder / SEAL, "campaigns_sha256", "restore it")
+    key_sha256 = read_document(folder / SEAL, "restore it").get("key_sha256")
     if set(hashes) != {path.name for path in campaigns}:
         raise TunnelError("campaigns were added or taken away", where=str(folder), remedy="restore the set")
     for path in campaigns:
@@ -257,11 +276,11 @@ def _checked_key(
             )
     source = folder / KEY if key is None else key
     document = read_document(source, "name the key with --key")
-    if file_hash(source) != seal["key_sha256"]:
+    if file_hash(source) != key_sha256:
         raise TunnelError(
             "is not the key that was sealed", where=str(source), remedy="name the right one: --key"
         )
-    return document, seal["key_sha256"]
+    return document, key_sha256
 
 
 def _pair_outcome(c: Case) -> str:

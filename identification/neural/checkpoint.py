@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,13 @@ from safetensors.numpy import load, save
 
 from identification.neural.evidence import Hyperparameters
 from identification.neural.levenberg import Progress
+from identification.neural.network import parameter_count
+from identification.neural.training_set import SIZES
+from tunnel_sim import limits
+from tunnel_sim.errors import TunnelError
 from tunnel_sim.json_text import json_line
+from tunnel_sim.reading import parse_json, read_regular
+from tunnel_sim.record import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,21 +62,31 @@ class Checkpoint:
         """
         try:
             # A safetensors file is the length of its header, the header as JSON, and the tensors.
-            header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
-            document = json.loads(header["__metadata__"]["training"])
+            header = parse_json(content[8 : 8 + int.from_bytes(content[:8], "little")], "header", "")
+            document = parse_json(header["__metadata__"]["training"], "training", "")
             if document["spec"] != json.loads(json_line(spec)):
                 return None
             tensors = load(content)
-            told = [
-                Progress(
-                    tensors[f"weights.{number}"], Hyperparameters(alpha, beta), damping, iteration, finished
-                )
-                for number, (alpha, beta, damping, iteration, finished) in enumerate(document["state"])
-            ]
-        except (SafetensorError, ValueError, KeyError, TypeError):
+            told = [_progress(tensors[f"weights.{at}"], one) for at, one in enumerate(document["state"])]
+            ended = document["ended"]
+            if not isinstance(ended, int) or not max(0, len(told) - 1) <= ended <= len(told):
+                return None
+        except (SafetensorError, TunnelError, ValueError, LookupError, TypeError, AttributeError):
             return None
-        ended = int(document["ended"])
         return cls(tuple(told[:ended]), told[ended] if len(told) > ended else None)
+
+
+def _progress(weights: Array, state: Sequence[float]) -> Progress:
+    """Where one training stood; raises ValueError or TypeError where the file does not say."""
+    alpha, beta, damping, iteration, finished = state
+    numbers = np.array([alpha, beta, damping], dtype=np.float64)
+    if weights.size not in map(parameter_count, SIZES.values()) or weights.dtype != np.float64:
+        raise ValueError("weights of another network")
+    if not (np.isfinite(weights).all() and np.isfinite(numbers).all() and min(alpha, beta, damping) >= 0.0):
+        raise ValueError("not finite")
+    if not isinstance(iteration, int) or iteration < 0 or not isinstance(finished, bool | int):
+        raise TypeError("no number of steps")
+    return Progress(weights, Hyperparameters(alpha, beta), damping, iteration, bool(finished))
 
 
 def read_checkpoint(path: Path, spec: dict[str, Any]) -> Checkpoint | None:
@@ -81,5 +98,8 @@ def read_checkpoint(path: Path, spec: dict[str, Any]) -> Checkpoint | None:
 
     Returns:
         None where there is none, or it belongs to another training.
+
+    Raises:
+        TunnelError: when there is something that cannot be read.
     """
-    return Checkpoint.from_bytes(path.read_bytes(), spec) if path.is_file() else None
+    return Checkpoint.from_bytes(read_regular(path, limits.WEIGHTS_BYTES), spec) if path.exists() else None

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -20,7 +21,9 @@ from safetensors.numpy import load, save
 from identification.neural.network import Network, Scaling, parameter_count
 from identification.neural.networks import Errors, Networks
 from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec
+from tunnel_sim import limits
 from tunnel_sim.errors import TunnelError
+from tunnel_sim.reading import as_described, parse_json, read_regular
 from tunnel_sim.record import Array
 
 SHIPPED = "paper"
@@ -60,12 +63,10 @@ def read_networks(weights: Path) -> Networks:
     Raises:
         TunnelError: when either file is missing, is not what it should be, or the two do not belong together.
     """
-    record = weights.with_suffix(".json")
-    for path in (weights, record):
-        if not path.is_file():
-            remedy = "name the .safetensors file that tunnel train wrote, with its .json beside it"
-            raise TunnelError("no such file", where=str(path), remedy=remedy)
-    return networks_of(weights.read_bytes(), record.read_text(encoding="utf-8"), str(weights))
+    remedy = "name the .safetensors file that tunnel train wrote, with its .json beside it"
+    content = read_regular(weights, limits.WEIGHTS_BYTES, missing=remedy, readable=remedy)
+    record = read_regular(weights.with_suffix(".json"), limits.JSON_BYTES, missing=remedy, readable=remedy)
+    return networks_of(content, record, str(weights))
 
 
 @cache
@@ -83,7 +84,7 @@ def shipped_record() -> dict[str, Any]:
     return found
 
 
-def networks_of(weights: bytes, record: str, where: str) -> Networks:
+def networks_of(weights: bytes, record: bytes | str, where: str) -> Networks:
     """Networks from the contents of their two files.
 
     Args:
@@ -98,8 +99,8 @@ def networks_of(weights: bytes, record: str, where: str) -> Networks:
         TunnelError: when they are not what they should be, or do not belong together.
     """
     remedy = "train them anew with tunnel train"
-    try:
-        document = json.loads(record)
+    document = parse_json(record, where, remedy)
+    with as_described("not weights with their training record", where, remedy), _as_value_error():
         if document["weights_sha256"] != hashlib.sha256(weights).hexdigest():
             raise TunnelError(
                 "weights and training record do not belong together", where=where, remedy=remedy
@@ -107,8 +108,15 @@ def networks_of(weights: bytes, record: str, where: str) -> Networks:
         spec, errors = DataSpec.from_json_dict(document["data"]), Errors.from_json_dict(document["errors"])
         tensors = load(weights)
         return Networks(_network(tensors, DAMPING), _network(tensors, FREQUENCY), spec, errors)
-    except (SafetensorError, ValueError, KeyError, TypeError) as error:
-        raise TunnelError("not weights with their training record", where=where, remedy=remedy) from error
+
+
+@contextmanager
+def _as_value_error() -> Iterator[None]:
+    """The error of safetensors has no base but Exception."""
+    try:
+        yield
+    except SafetensorError as error:
+        raise ValueError(error) from None
 
 
 def _network(tensors: Mapping[str, Array], name: str) -> Network:
@@ -117,6 +125,12 @@ def _network(tensors: Mapping[str, Array], name: str) -> Network:
     if values["weights"].shape != (count,) or values["directions"].shape != (values["precision"].size, count):
         raise ValueError(name)
     if not all(np.all(np.isfinite(value)) for value in values.values()):
+        raise ValueError(name)
+    ends = {"inputs": (2, SIZES[name][0]), "output": (2, 1), "prior_precision": (1,)}
+    if any(values[field].shape != shape for field, shape in ends.items()):
+        raise ValueError(name)
+    scales = (values["inputs"][1], values["output"][1], values["precision"], values["prior_precision"])
+    if not all(np.all(scale > 0.0) for scale in scales):
         raise ValueError(name)
     inputs, output = (
         Scaling(tuple(values[end][0].tolist()), tuple(values[end][1].tolist()))

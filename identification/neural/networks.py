@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,9 @@ class Errors:
 
     @classmethod
     def from_json_dict(cls, data: dict[str, Any]) -> Errors:
-        """The inverse of `to_json_dict`."""
+        """The inverse of `to_json_dict`; raises ValueError or TypeError where it is none."""
+        if not all(isinstance(value, float | int) and isfinite(value) for value in data.values()):
+            raise ValueError("an error that is no finite number")
         return cls(**data)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -42,8 +43,13 @@ class DataSpec:
 
     @classmethod
     def from_json_dict(cls, data: dict[str, Any]) -> DataSpec:
-        """The inverse of `to_json_dict`."""
+        """The inverse of `to_json_dict`; raises ValueError, TypeError or KeyError where it is none."""
         pairs = {name: tuple(data[name]) for name in ("zeta_range", "omega_range", "grid")}
+        for low, high in (pairs["zeta_range"], pairs["omega_range"], pairs["grid"]):
+            if not (0.0 < float(low) < inf and 0.0 < float(high) < inf):
+                raise ValueError("a range that is none")
+        if data["frequency_scale"] not in (LOGARITHMIC, LINEAR):
+            raise ValueError("a scale that is not known")
         return cls(**{**data, **pairs})
 
     def to_network(self, values: Array) -> Array:

@@ -299,7 +299,7 @@ def test_truncated_parquet(folder: Path) -> None:
 def test_a_decoder_that_panics_is_reported_like_any_broken_file(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def panic(_: object) -> pl.DataFrame:
+    def panic(*_: object, **__: object) -> pl.DataFrame:
         raise pl.exceptions.PanicException("assertion failed")
 
     monkeypatch.setattr(pl, "read_parquet", panic)

@@ -392,3 +392,33 @@ def test_bad_input_is_one_line(blind, capsys, words, part):
     captured = capsys.readouterr()
     assert captured.err.count("\n") == 1
     assert part in captured.err
+
+
+@pytest.mark.parametrize("name", ["seal.json", "key.json", "answers/seal.json", "answers/c0001.json"])
+@pytest.mark.parametrize(
+    "content", ["[" * 100_000, "{}", "[]", '{"answers_sha256": [], "truths": [1]}', "\ud800"]
+)
+@pytest.mark.usefixtures("quick")
+def test_a_malformed_document_is_one_line(blind, capsys, name, content):
+    assert main(["blind", "diagnose", str(blind)]) == 0
+    (blind / name).write_text(content, encoding="utf-8", errors="surrogatepass")
+    capsys.readouterr()
+    assert main(["blind", "score", str(blind)]) == 2
+    assert capsys.readouterr().err.startswith("tunnel: ")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("causes", 3), ("causes", [1]), ("causes", ...), ("candidates", [{"effect": "x"}]), ("candidates", 1),
+     ("coefficients", {"before": {"cn_beta": {"value": "x", "std": 1.0}}}), ("coefficients", []), ("gap", None),
+     ("gap", {"closed": "1"}), ("wall_s", "x"), ("ambiguous_with", None)],
+)  # fmt: skip
+def test_an_answer_of_another_kind_is_refused_where_it_is_read(key, value):
+    good = document(["free_play"])
+    spoilt = {name: one for name, one in good.items() if name != key} | ({} if value is ... else {key: value})
+    case("c", {**TRUTH, "effects": ["free_play"]}, good)
+    with pytest.raises(ValueError, match="validation error"):
+        case("c", {**TRUTH, "effects": ["free_play"]}, spoilt)
+    for truth in ({}, {"effects": 1}, {"effects": ["x"], "severity": "y"}, {"effects": [], "cn_r": []}):
+        with pytest.raises(ValueError, match="validation error"):
+            case("c", truth, good)

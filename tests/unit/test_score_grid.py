@@ -147,7 +147,7 @@ def test_trials_survive_the_disk(small, tmp_path):
 def test_a_file_that_is_no_baseline_is_refused(tmp_path, content):
     path = tmp_path / "b.parquet"
     path.write_bytes(content)
-    with pytest.raises(TunnelError, match="no table of trials"):
+    with pytest.raises(TunnelError, match="not a readable Parquet file"):
         read_trials(path)
     with pytest.raises(TunnelError, match="no such file"):
         read_trials(tmp_path / "none.parquet")

@@ -58,12 +58,12 @@ def test_a_bad_table_is_refused_in_one_line(tmp_path: Path, text: str, message: 
 
 
 def test_a_missing_table_is_named(tmp_path: Path) -> None:
-    with pytest.raises(TunnelError, match="does not exist"):
+    with pytest.raises(TunnelError, match="no such file"):
         read_spring_table(tmp_path / "springs.csv")
 
 
 def test_a_folder_or_binary_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "springs.csv").write_bytes(b"\xff\xfe\x00\x81")
     for path in (tmp_path, tmp_path / "springs.csv"):
-        with pytest.raises(TunnelError, match="cannot be read as a text file"):
+        with pytest.raises(TunnelError, match=r"cannot be read|not UTF-8"):
             read_spring_table(path)

@@ -44,6 +44,9 @@ def run(
     to FOLDER/results, a Parquet dataset in the order of the cases. Interrupted
     or killed, the same command does what is left.
 
+    A Dask scheduler has no password: who reaches its port can run any code on
+    its workers and here. Use --scheduler in a network that you trust.
+
     [bold]A sweep file[/bold]
       name = "noise-and-friction"
       seed = 1

@@ -42,7 +42,8 @@ def run(
 
     --web serves the same to a browser (MuJoCo Studio's web viewer, WebGL 2), with
     pause, speed and reset there. It needs no display, listens on all network
-    interfaces and asks for no password: use it in a network that you trust.
+    interfaces, asks for no password and does not check the Origin of a page:
+    use it in a network that you trust.
 
     [bold]Examples[/bold]
       tunnel view

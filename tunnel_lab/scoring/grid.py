@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, TypeAdapter
 
 from tunnel_lab.effect_option import parse_effect
+from tunnel_sim import limits
 from tunnel_sim.effects import effect_from
 from tunnel_sim.errors import TunnelError
-from tunnel_sim.toml_input import OneLine, StrictModel, check_version, load_toml, shown, validate
+from tunnel_sim.plan_schema import check_size, first_twice
+from tunnel_sim.reading import as_described, check_count, check_shape
+from tunnel_sim.toml_input import OneLine, SampleRate, StrictModel, check_version, load_toml, shown, validate
 
 NO_EFFECT = "none"
 DECAY_QUANTITIES = ("zeta", "omega_n")
 CAMPAIGN_QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
-_MAX_CELLS = 10_000
 
 Positive = Annotated[float, Field(gt=0.0)]
 
@@ -37,7 +40,7 @@ class DecaysTable(StrictModel):
     )
     duration: list[Positive] = Field(min_length=1, description="a list of record lengths in s, such as [20]")
     amplitude: Positive = Field(default=0.35, description="the release angle, a positive number in rad")
-    sample_rate: Positive = Field(default=1000.0, description="a positive number in Hz")
+    sample_rate: SampleRate = Field(default=1000.0, description="a positive number in Hz")
     resolution: Annotated[float, Field(ge=0.0)] = Field(
         default=0.0, description="a number in rad, zero for none"
     )
@@ -58,7 +61,7 @@ class CampaignsTable(StrictModel):
         description='a list such as ["none", "coulomb_friction:friction_moment=0.004"]',
     )
     amplitude: Positive = Field(default=0.35, description="the release angle, a positive number in rad")
-    sample_rate: Positive = Field(default=1000.0, description="a positive number in Hz")
+    sample_rate: SampleRate = Field(default=1000.0, description="a positive number in Hz")
     resolution: Annotated[float, Field(ge=0.0)] = Field(
         default=0.0, description="a number in rad, zero for none"
     )
@@ -166,9 +169,54 @@ class Grid:
 
     @classmethod
     def from_json_dict(cls, data: dict[str, Any]) -> Grid:
-        """The inverse of `to_json_dict`."""
-        cells = tuple(Cell(**(cell | {"springs": tuple(cell["springs"])})) for cell in data["cells"])
-        return cls(data["name"], data["seed"], data["trials"], tuple(data["trials_of"].items()), cells)
+        """The inverse of `to_json_dict`.
+
+        Args:
+            data: of one grid.
+
+        Returns:
+            The grid.
+
+        Raises:
+            TunnelError: when it is no grid, or one that is too large.
+        """
+        where, remedy = "the grid as JSON", "write it anew"
+        check_shape(data, where, remedy)
+        with as_described("is no grid", where, remedy):
+            grid: Grid = _GRID.validate_python(data | {"trials_of": tuple(data["trials_of"].items())})
+            if not grid.cells or grid.trials < _LEAST_TRIALS or not all(map(_is_possible, grid.cells)):
+                raise ValueError("a cell or a number of trials that no grid has")
+        check_count(len(grid.cells), limits.SCORE_CELLS, "cells", where, "shorten a list")
+        for cell in grid.cells:
+            check_size(cell.runs, cell.duration, cell.sample_rate, where)
+        return grid
+
+
+_GRID = TypeAdapter(Grid)
+_LEAST_TRIALS = 2
+
+
+def _is_possible(cell: Cell) -> bool:
+    """Whether a cell's numbers are such as the tables allow."""
+    positive = (cell.noise, cell.duration, cell.amplitude, cell.sample_rate, *cell.springs)
+    return min(positive) > 0.0 and min(cell.resolution, cell.wind_speed) >= 0.0 and 0.0 <= cell.zeta < 1.0
+
+
+def check_trials(grid: Grid, estimators: Sequence[str], where: str) -> None:
+    """Refuse more trials than a table can hold, before any is drawn.
+
+    Args:
+        grid: the conditions.
+        estimators: names in the registry.
+        where: file or option, for messages.
+
+    Raises:
+        TunnelError: with the number of rows and the limit.
+    """
+    quantities = sum(len(cell.quantities) for cell in grid.cells)
+    rows = quantities * sum(grid.trials_for(name) for name in estimators)
+    what = "rows (trials × estimators × quantities)"
+    check_count(rows, limits.SCORE_ROWS, what, where, "give fewer trials, cells or estimators")
 
 
 def load_grid(path: Path) -> Grid:
@@ -188,17 +236,14 @@ def load_grid(path: Path) -> Grid:
     document = validate(GridDocument, raw, path)
     where = shown(path)
     _check_effects(document, where)
+    _check_sizes(document, where)
     cells = [cell for table in document.decays for cell in _decays(table)]
     cells += [cell for table in document.campaigns for cell in _campaigns(table)]
     if not cells:
         raise TunnelError("no cells", where=where, remedy="add a [[decays]] or [[campaigns]] table")
-    if len(cells) > _MAX_CELLS:
-        raise TunnelError(
-            f"{len(cells)} cells are more than {_MAX_CELLS}", where=where, remedy="shorten a list"
-        )
-    twice = next((cell.label for cell in cells if cells.count(cell) > 1), None)
+    twice = first_twice(cells)
     if twice is not None:
-        raise TunnelError(f"the cell {twice!r} is there twice", where=where, remedy="leave one out")
+        raise TunnelError(f"the cell {twice.label!r} is there twice", where=where, remedy="leave one out")
     _check_names(document, where)
     trials_of = tuple(document.trials_of.items())
     return Grid(document.name, document.seed, document.trials, trials_of, tuple(cells))
@@ -218,6 +263,18 @@ def _check_names(document: GridDocument, where: str) -> None:
         if name not in ALL_ESTIMATORS:
             remedy = did_you_mean(name, ALL_ESTIMATORS)
             raise TunnelError(f"no estimator {name!r}", where=f"{where}, [trials_of]", remedy=remedy)
+
+
+def _check_sizes(document: GridDocument, where: str) -> None:
+    """Count cells, runs and samples from the lengths of the lists, before any cell is made."""
+    cells = 0
+    for decay in document.decays:
+        cells += len(decay.zeta) * len(decay.frequency) * len(decay.noise) * len(decay.duration)
+        check_size(1, max(decay.duration), decay.sample_rate, f"{where}, decays")
+    for one in document.campaigns:
+        cells += len(one.wind_speeds) * len(one.noise) * len(one.duration) * len(one.effects)
+        check_size(2 * len(one.springs), max(one.duration), one.sample_rate, f"{where}, campaigns")
+    check_count(cells, limits.SCORE_CELLS, "cells", where, "shorten a list")
 
 
 def _check_effects(document: GridDocument, where: str) -> None:

@@ -6,7 +6,6 @@ The table of trials is what a baseline is: it carries its grid, so that it can b
 from __future__ import annotations
 
 import io
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +15,10 @@ from identification.estimate import Quantity
 from identification.scoring import Outcome, Score, Trials, collect, score
 from tunnel_lab.scoring.grid import NO_EFFECT, Cell, Grid
 from tunnel_lab.scoring.work import Row, describe
-from tunnel_sim.errors import TunnelError
+from tunnel_sim import limits
+from tunnel_sim.errors import shown
 from tunnel_sim.json_text import json_line
+from tunnel_sim.reading import as_described, frame_schema, parse_json, read_frame, read_regular
 from tunnel_sim.writing import write_whole
 
 if TYPE_CHECKING:
@@ -137,21 +138,34 @@ def read_trials(path: Path) -> Results:
     Raises:
         TunnelError: when there is no such file, or it is no table of trials.
     """
-    import polars as pl
-
-    if not path.is_file():
-        raise TunnelError(
-            "no such file", where=str(path), remedy="write one with tunnel score --write-baseline"
-        )
-    try:
-        frame = pl.read_parquet(path)
-        rows = tuple(frame.select(_COLUMNS).to_dicts())
-        grid = Grid.from_json_dict(json.loads(frame["grid"][0]))
-    except (pl.exceptions.PolarsError, ValueError, KeyError, TypeError, IndexError) as error:
-        raise TunnelError(
-            "is no table of trials", where=str(path), remedy="write one with tunnel score --write-baseline"
-        ) from error
+    where, remedy = shown(path), "write one with tunnel score --write-baseline"
+    content = read_regular(path, limits.DATA_BYTES, missing=remedy, readable=remedy)
+    with as_described("is no table of trials", where, remedy):
+        schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
+        wrong = [name for name, kind in _types().items() if schema.get(name) != kind]
+        if wrong or "grid" not in schema:
+            raise ValueError(", ".join(wrong) or "grid")
+        frame = read_frame(content, where, remedy, _COLUMNS)
+        # Every row carries the same grid; one is enough.
+        text = read_frame(content, where, remedy, ("grid",))["grid"][0]
+        grid = Grid.from_json_dict(parse_json(text, where, remedy))
+        rows = tuple(frame.to_dicts())
+        _check_rows(rows, grid)
     return Results(grid, tuple(dict.fromkeys(row["estimator"] for row in rows)), rows)
+
+
+def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
+    """Refuse rows that nothing can be counted by: each estimator has all cells, and an estimate is a whole one."""
+    wanted = {(at, quantity) for at, cell in enumerate(grid.cells) for quantity in cell.quantities}
+    found: dict[str, set[tuple[int, str]]] = {}
+    for row in rows:
+        found.setdefault(row["estimator"], set()).add((row["cell"], row["quantity"]))
+        if None in [row[name] for name in ("trial", "estimator", "unit", "truth", "status")]:
+            raise ValueError("a row without its truth or status")
+        if (row["value"] is None) != (row["std"] is None):
+            raise ValueError("a value without its standard deviation")
+    if not found or any(cells != wanted for cells in found.values()):
+        raise ValueError("cells that are not those of the grid")
 
 
 def scores_frame(results: Results) -> pl.DataFrame:

@@ -16,7 +16,9 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from tunnel_lab.scoring.grid import Cell, Grid
+from tunnel_lab.scoring.grid import Cell, Grid, check_trials
+from tunnel_sim.errors import TunnelError
+from tunnel_sim.reading import read_json
 from tunnel_sim.writing import output_folder, write_json
 
 if TYPE_CHECKING:
@@ -163,7 +165,11 @@ def score_grid(
 
     Returns:
         The rows, in the order of cells, trials and estimators.
+
+    Raises:
+        TunnelError: more trials than a table can hold.
     """
+    check_trials(grid, estimators, "score")
     units = units_of(grid)
     mark = fingerprint(grid.to_json_dict(), estimators)
     sizes = {unit.name: unit.stop - unit.first for unit in units}
@@ -288,11 +294,12 @@ def _code() -> str:
 def _kept(parts: Path, name: str, mark: str) -> list[Row] | None:
     """Rows of a unit done before; None where there are none, or other ones."""
     try:
-        document = json.loads((parts / f"{name}.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        document = read_json(parts / f"{name}.json", remedy="score it again")
+    except TunnelError:
         return None
-    matches = isinstance(document, dict) and document.get("fingerprint") == mark
-    return document["rows"] if matches else None
+    rows = document.get("rows")
+    whole = isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
+    return rows if whole and document.get("fingerprint") == mark else None
 
 
 @contextmanager

@@ -10,7 +10,15 @@ import time
 
 from tunnel_lab.show.live import LiveRun, Puppet
 from tunnel_lab.show.request import ShownRun
+from tunnel_lab.tables import say
 from tunnel_sim.errors import TunnelError
+
+WARNING = (
+    "Listens on all network interfaces, without a password and without a check of the Origin: whoever reaches this "
+    "port, and any web page open in a browser of this machine, can watch and steer the view. "
+    "Use it in a network that you trust."
+)
+"""MuJoCo 4.0 has no option that binds the loopback only; see docs/reference/limits.md."""
 
 
 def view_in_browser(run: ShownRun, *, port: int, open_browser: bool, seconds: float | None = None) -> None:
@@ -32,6 +40,7 @@ def view_in_browser(run: ShownRun, *, port: int, open_browser: bool, seconds: fl
         raise TunnelError("MuJoCo Studio is missing", where="tunnel view --web", remedy=remedy) from error
     from tunnel_lab.show.stepper import puppet_master
 
+    say(WARNING, stderr=True)
     live = LiveRun(run)
     puppet = Puppet(live)
     config = viewer_protocol.ViewerConfig(

@@ -13,14 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from tunnel_lab.sweep.schema import SweepDocument
+from tunnel_lab.sweep.schema import ConditionsTable, SweepDocument
+from tunnel_sim import limits
 from tunnel_sim.plan import CampaignPlan, plan_from
-from tunnel_sim.plan_schema import PlanDocument
+from tunnel_sim.plan_schema import DEFAULT_SAMPLE_RATE, STEPS_PER_SECOND, PlanDocument, check_size, run_count
+from tunnel_sim.reading import as_described, check_count, parse_json
 from tunnel_sim.rig import Rig, parse_rig
 
 STEPS_PER_SHARD = 500_000
 """Integration steps of one shard: about two seconds of one core, and the most a killed sweep loses per worker."""
-STEPS_PER_SECOND = 1000.0
 NO_EFFECT = "none"
 
 
@@ -69,9 +70,25 @@ class Sweep:
 
     @classmethod
     def from_json(cls, text: str) -> Sweep:
-        """The inverse of `to_json`."""
-        found = json.loads(text)
-        return cls(SweepDocument.model_validate(found["document"]), tuple(found["rigs"]))
+        """The inverse of `to_json`.
+
+        Args:
+            text: of one sweep.
+
+        Returns:
+            The sweep, its rigs parsed.
+
+        Raises:
+            TunnelError: when it is no sweep, or one that is too large.
+        """
+        where, remedy = "the sweep as JSON", "begin the sweep anew"
+        found = parse_json(text, where, remedy)
+        with as_described("is no sweep", where, remedy):
+            sweep = cls(SweepDocument.model_validate(found["document"]), tuple(found["rigs"]))
+            check_sweep_size(sweep.document, where)
+            if len(sweep._parsed) != len(sweep.document.rig):
+                raise ValueError("rigs")
+        return sweep
 
     @cached_property
     def axes(self) -> tuple[Sequence[Any], ...]:
@@ -88,18 +105,19 @@ class Sweep:
     @property
     def size(self) -> int:
         """Number of cases."""
-        return prod(map(len, self.axes)) * self.document.replicates
+        return prod(axis_lengths(self.document).values()) * self.document.replicates
 
     @property
     def runs(self) -> int:
         """Number of runs."""
-        return sum(_run_count(one) for one in self.axes[1]) * (self.size // len(self.axes[1]))
+        tables = self.document.conditions
+        runs = sum(run_count(table) * len(table.duration) for table in tables)
+        return runs * (self.size // axis_lengths(self.document)["conditions"])
 
     @property
     def cases_per_shard(self) -> int:
         """Cases done and kept together; it hangs on the file alone, never on the workers."""
-        longest = max(_run_count(one) * one["duration"] * STEPS_PER_SECOND for one in self.axes[1])
-        return self.document.cases_per_shard or max(1, int(STEPS_PER_SHARD // longest))
+        return _cases_per_shard(self.document)
 
     @property
     def shards(self) -> int:
@@ -194,14 +212,69 @@ def _effects(entry: Mapping[str, Any]) -> list[list[dict[str, Any]]]:
     return [[{"name": entry["name"], "parameters": one}, *others] for one in _spread(entry["parameters"])]
 
 
-def _run_count(conditions: Mapping[str, Any]) -> int:
-    springs = len(conditions["springs"]) + len(conditions["spring_stiffness"])
-    return (
-        springs
-        * len(conditions["wind_speeds"])
-        * len(conditions["release_angles_deg"])
-        * int(conditions["repeats"])
-    )
+def axis_lengths(document: SweepDocument) -> dict[str, int]:
+    """Number of values of every axis by its name, counted from the lengths of the lists.
+
+    Args:
+        document: the sweep file.
+    """
+    effects = (1 if one.name == NO_EFFECT else _points(one.parameters) for one in document.effects)
+    return {
+        "rig": len(document.rig),
+        "conditions": sum(len(table.duration) for table in document.conditions),
+        "sensor": sum(_points(table.model_dump(exclude_none=True)) for table in document.sensor),
+        "truth": sum(_points(table.model_dump(exclude_none=True)) for table in document.truth),
+        "effects": sum(effects),
+    }
+
+
+def check_sweep_size(document: SweepDocument, where: str) -> None:
+    """Refuse a sweep that is too large, before any of it is expanded.
+
+    Args:
+        document: the sweep file.
+        where: the file, for messages.
+
+    Raises:
+        TunnelError: too many values of an axis, cases, shards, runs or samples, with their number and the limit.
+    """
+    lengths = axis_lengths(document)
+    for name, length in lengths.items():
+        check_count(length, limits.SWEEP_AXIS, "values", f"{where}, {name}", "shorten a list")
+    cases = prod(lengths.values()) * document.replicates
+    check_count(cases, limits.SWEEP_CASES, "cases", where, "shorten a list, or make several sweeps")
+    checks = lengths["rig"] * lengths["conditions"] * (lengths["sensor"] + lengths["effects"])
+    combinations = "combinations of rig and conditions with a sensor or an effect"
+    check_count(checks, limits.SWEEP_CHECKS, combinations, where, "shorten a list, or make several sweeps")
+    rates = [rate for table in document.sensor for rate in table.sample_rate or [DEFAULT_SAMPLE_RATE]]
+    for table in document.conditions:
+        place = f"{where}, conditions '{table.name}'"
+        for rate in (min(rates), max(rates)):
+            check_size(run_count(table), max(table.duration), rate, place)
+    _check_shards(document, cases, max(rates), where)
+
+
+def _check_shards(document: SweepDocument, cases: int, rate: float, where: str) -> None:
+    together = min(cases, _cases_per_shard(document))
+    shards = -(-cases // together)
+    check_count(shards, limits.SWEEP_SHARDS, "shards", where, "raise cases_per_shard, or make several sweeps")
+    samples = together * max(_samples(table, rate) for table in document.conditions)
+    check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in a shard", where, "lower cases_per_shard")
+
+
+def _cases_per_shard(document: SweepDocument) -> int:
+    longest = max(_samples(table, STEPS_PER_SECOND) for table in document.conditions)
+    return document.cases_per_shard or max(1, int(STEPS_PER_SHARD // longest))
+
+
+def _samples(table: ConditionsTable, rate: float) -> float:
+    """Of the longest case of some conditions, at a rate in Hz."""
+    return run_count(table) * max(table.duration) * rate
+
+
+def _points(lists: Mapping[str, Sequence[float]]) -> int:
+    """How many combinations `_spread` makes."""
+    return prod(map(len, lists.values()))
 
 
 def _numbered(sections: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,16 +11,15 @@ from typing import Any
 import numpy as np
 
 from identification.estimators import ALL_ESTIMATORS
-from tunnel_lab.sweep.product import NO_EFFECT, Case, Sweep
+from tunnel_lab.sweep.product import NO_EFFECT, Case, Sweep, check_sweep_size
 from tunnel_lab.sweep.schema import SweepDocument
 from tunnel_sim.effects import effect_class
 from tunnel_sim.errors import TunnelError, did_you_mean
 from tunnel_sim.motion import sampling
-from tunnel_sim.plan_schema import check_conditions
+from tunnel_sim.plan_schema import check_conditions, first_twice
 from tunnel_sim.rig import parse_rig, rig_document
 from tunnel_sim.toml_input import load_toml, shown, validate
 
-MOST_CASES = 100_000_000
 _AXES = ("rig", "conditions", "sensor", "truth", "effects")
 
 
@@ -40,11 +39,12 @@ def read_sweep(path: Path) -> Sweep:
     where = shown(path)
     document = _named(validate(SweepDocument, content, path))
     _check_names(document, where)
+    for one in document.conditions:
+        check_conditions(one, f"{where}, conditions '{one.name}'")
+    check_sweep_size(document, where)
     rigs = tuple(_rig(table.file, table.changes, path.parent) for table in document.rig)
     for table, sections in zip(document.rig, rigs, strict=True):
         parse_rig(sections, f"{where}, rig '{table.name}'")
-    for one in document.conditions:
-        check_conditions(one, f"{where}, conditions '{one.name}'")
     sweep = Sweep(_without_sources(document), rigs)
     _check_axes(sweep, where)
     _check_cases(sweep, where)
@@ -84,7 +84,7 @@ def _check_names(document: SweepDocument, where: str) -> None:
         ("rig", [one.name for one in document.rig]),
         ("conditions", [str(one.name) for one in document.conditions]),
     ):
-        twice = next((name for name in names if names.count(name) > 1), None)
+        twice = first_twice(names)
         if twice is not None:
             raise TunnelError(f"{key} has '{twice}' twice", where=where, remedy="give each another name")
     for entry in document.effects:
@@ -104,7 +104,9 @@ def _rig(file: str | None, changes: Mapping[str, Mapping[str, Any]], folder: Pat
     """Sections of a rig, changed ones replaced key by key."""
     sections = rig_document(None if file is None else folder / file)
     for name, table in changes.items():
-        sections[name] = {**sections.get(name, {}), **table}
+        old = sections.get(name, {})
+        # What is no table stays, for the rig's own check to refuse.
+        sections[name] = {**old, **table} if isinstance(old, dict) else old
     return sections
 
 
@@ -123,12 +125,6 @@ def _check_axes(sweep: Sweep, where: str) -> None:
                     remedy="leave one out, and use replicates for more runs",
                 )
             seen.add(text)
-    if sweep.size > MOST_CASES:
-        raise TunnelError(
-            f"the product holds {sweep.size:,} cases",
-            where=where,
-            remedy=f"keep it below {MOST_CASES:,}, in several sweeps",
-        )
 
 
 def _check_cases(sweep: Sweep, where: str) -> None:

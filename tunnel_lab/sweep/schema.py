@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from tunnel_sim.plan_schema import EffectTable, NotNegative, Positive, ReleaseAngle
-from tunnel_sim.toml_input import OneLine, StrictModel
+from tunnel_sim.toml_input import OneLine, SampleRate, StrictModel
 
 
 def _listed(value: object) -> object:
@@ -17,6 +17,7 @@ def _listed(value: object) -> object:
 
 Many = Annotated[list[float], BeforeValidator(_listed), Field(min_length=1)]
 ManyPositive = Annotated[list[Positive], BeforeValidator(_listed), Field(min_length=1)]
+ManyRates = Annotated[list[SampleRate], BeforeValidator(_listed), Field(min_length=1)]
 ManyNotNegative = Annotated[list[NotNegative], BeforeValidator(_listed), Field(min_length=1)]
 
 
@@ -46,9 +47,7 @@ class TruthAxis(StrictModel):
 class SensorAxis(StrictModel):
     """``[sensor]`` or ``[[sensor]]``: the potentiometer, each key a number or a list."""
 
-    sample_rate: ManyPositive | None = Field(
-        default=None, description="a positive number or a list of them, Hz"
-    )
+    sample_rate: ManyRates | None = Field(default=None, description="a positive number or a list of them, Hz")
     noise_std: ManyNotNegative | None = Field(
         default=None, description="a number or a list of them, rad, zero or more"
     )

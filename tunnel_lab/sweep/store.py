@@ -1,12 +1,14 @@
 """The folder of a sweep: what it is, and which of its shards are finished.
 
 ``sweep.json`` says what the folder holds. Every shard is a file in ``results``, and one in ``records`` where they
-are kept, written under a temporary name and renamed, the results last: then the shard is finished. ``timings``
-stand apart, because no two runs of a shard take the same time.
+are kept, written under a temporary name and renamed, the results last: then the shard is finished. ``checksums``
+holds a file for each shard as ``sha256sum --check`` reads it; a part that is not what its checksum says is done
+again. ``timings`` stand apart, because no two runs of a shard take the same time.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,8 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tunnel_lab.sweep.product import Sweep
+from tunnel_sim import limits
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.leftovers import clear_leftovers
+from tunnel_sim.reading import as_described, read_json, read_regular
 from tunnel_sim.toml_input import shown
 from tunnel_sim.writing import output_folder, write_json, write_whole
 
@@ -26,8 +30,7 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION = 1
 MANIFEST = "sweep.json"
-RESULTS, RECORDS, TIMINGS = "results", "records", "timings"
-_PARQUET = b"PAR1"  # a whole Parquet file begins and ends with it
+RESULTS, RECORDS, TIMINGS, CHECKSUMS = "results", "records", "timings", "checksums"
 _ELSEWHERE = "name another --out"
 
 
@@ -46,8 +49,8 @@ class Store:
     made_with: Mapping[str, str]
 
     def finished(self) -> list[int]:
-        """Shards whose results are there, whole, in ascending order."""
-        return [index for index in range(self.sweep.shards) if _is_whole(self._part(RESULTS, index))]
+        """Shards whose parts are there and are what their checksums say, in ascending order."""
+        return [index for index in range(self.sweep.shards) if self._is_whole(index)]
 
     def keep(self, shard: Finished) -> None:
         """Write a finished shard.
@@ -66,14 +69,17 @@ class Store:
                 where=shown(self.folder),
                 remedy="give every worker the same environment (threads: OMP_NUM_THREADS=1)",
             )
+        lines = self._line(RESULTS, shard.index, shard.results)
         if shard.records is not None:
             write_whole(self._part(RECORDS, shard.index), shard.records)
+            lines += self._line(RECORDS, shard.index, shard.records)
         write_whole(self._part(TIMINGS, shard.index), shard.timings)
+        write_whole(self._checksum(shard.index), lines.encode())
         write_whole(self._part(RESULTS, shard.index), shard.results)
 
     def tidy(self) -> None:
         """Remove what a killed run left half written."""
-        for name in (RESULTS, RECORDS, TIMINGS):
+        for name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS):
             clear_leftovers(self.folder / name)
 
     def scan(self, dataset: str = RESULTS) -> pl.LazyFrame:
@@ -100,8 +106,29 @@ class Store:
         return pl.scan_parquet(parts)
 
     def _part(self, dataset: str, index: int) -> Path:
+        return self.folder / dataset / f"{self._name(index)}.parquet"
+
+    def _checksum(self, index: int) -> Path:
+        return self.folder / CHECKSUMS / f"{self._name(index)}.sha256"
+
+    def _name(self, index: int) -> str:
         width = max(5, len(str(self.sweep.shards - 1)))
-        return self.folder / dataset / f"part-{index:0{width}d}.parquet"
+        return f"part-{index:0{width}d}"
+
+    def _line(self, dataset: str, index: int, content: bytes) -> str:
+        """What ``sha256sum`` says of a part."""
+        name = self._part(dataset, index).relative_to(self.folder).as_posix()
+        return f"{hashlib.sha256(content).hexdigest()}  {name}\n"
+
+    def _is_whole(self, index: int) -> bool:
+        """Whether a shard's parts are there, to the bit."""
+        kept = (RESULTS, RECORDS) if self.sweep.document.records else (RESULTS,)
+        try:
+            known = read_regular(self._checksum(index), limits.DOCUMENT_BYTES)
+            parts = {name: read_regular(self._part(name, index), limits.DATA_BYTES) for name in kept}
+        except TunnelError:
+            return False
+        return known == "".join(self._line(name, index, part) for name, part in parts.items()).encode()
 
 
 def begin(sweep: Sweep, folder: Path) -> Store:
@@ -122,12 +149,13 @@ def begin(sweep: Sweep, folder: Path) -> Store:
     if (folder / MANIFEST).is_file():
         store = open_store(folder)
         _check_same(store, sweep, made_with())
+        output_folder(folder / CHECKSUMS)  # a folder of an earlier version has none
         return store
     clear_leftovers(folder)
     if folder.is_dir() and any(not path.name.startswith(f".{MANIFEST}.") for path in folder.iterdir()):
         raise TunnelError("the folder holds something else", where=shown(folder), remedy=_ELSEWHERE)
     output_folder(folder)
-    for name in (RESULTS, TIMINGS, *([RECORDS] if sweep.document.records else [])):
+    for name in (RESULTS, TIMINGS, CHECKSUMS, *([RECORDS] if sweep.document.records else [])):
         output_folder(folder / name)
     write_json(
         folder / MANIFEST,
@@ -154,22 +182,17 @@ def open_store(folder: Path) -> Store:
         The store.
 
     Raises:
-        TunnelError: when it holds none, or one of another version of the format.
+        TunnelError: when it holds none, one of another version of the format, or one that is malformed.
     """
     path = folder / MANIFEST
-    try:
-        document = json.loads(path.read_bytes())
-    except OSError:
-        raise TunnelError(
-            f"no {MANIFEST} here", where=shown(folder), remedy="name the folder of a sweep"
-        ) from None
-    except ValueError:
-        document = None
-    if not isinstance(document, dict) or document.get("schema_version") != SCHEMA_VERSION:
+    document = read_json(path, remedy="name the folder of a sweep")
+    if document.get("schema_version") != SCHEMA_VERSION:
         raise TunnelError(
             f"this program reads version {SCHEMA_VERSION} only", where=shown(path), remedy=_ELSEWHERE
         )
-    return Store(folder, Sweep.from_json(json.dumps(document["sweep"])), document["made_with"])
+    with as_described("is no sweep", shown(path), _ELSEWHERE):
+        made_with = {str(name): str(value) for name, value in document["made_with"].items()}
+        return Store(folder, Sweep.from_json(json.dumps(document["sweep"])), made_with)
 
 
 def _check_same(store: Store, sweep: Sweep, versions: Mapping[str, str]) -> None:
@@ -195,13 +218,3 @@ def _check_same(store: Store, sweep: Sweep, versions: Mapping[str, str]) -> None
 
 def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     return next((key for key in {**old, **new} if old.get(key) != new.get(key)), "")
-
-
-def _is_whole(path: Path) -> bool:
-    """Whether a part is there and was written to its end."""
-    try:
-        with path.open("rb") as stream:
-            stream.seek(-len(_PARQUET), 2)
-            return stream.read() == _PARQUET
-    except OSError:
-        return False

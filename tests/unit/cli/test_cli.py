@@ -64,7 +64,7 @@ def test_the_version_is_the_distributions(tunnel: Tunnel) -> None:
         (["simulate", "plan.toml", "--out", "x", "--seed", "-1"], ["--seed"]),
         (["simulate", "plan.toml", "--out", "x", "--seed", "one"], ["--seed"]),
         (["springs", "one.csv", "two.csv"], ["two.csv"]),
-        (["springs", "missing.csv"], ["missing.csv", "does not exist"]),
+        (["springs", "missing.csv"], ["missing.csv", "no such file"]),
         (["identify", "missing"], ["missing", "no such folder"]),
         (["plot", "missing"], ["missing", "no such folder"]),
         (["simulate", "missing.toml", "--out", "x"], ["missing.toml"]),

@@ -72,7 +72,7 @@ def test_a_broken_file_is_one_line_and_leaves_nothing(
         (["--out", "OUT"], "FILE is missing"),
         (["no.toml", "--out", "OUT"], "no such file"),
         (["FILE", "--out", "OUT", "--summary", "OUT"], "takes no FILE"),
-        (["--summary", "OUT"], "no sweep.json here"),
+        (["--summary", "OUT"], "sweep.json: no such file; name the folder of a sweep"),
         (["FILE", "--out", "TAKEN"], "the folder holds something else"),
         (["FILE", "--out", "FILE"], "cannot be written"),
         (["FILE", "--out", "OUT", "--workers", "0"], "--workers"),

@@ -3,11 +3,13 @@ is not the point."""
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import polars as pl
@@ -20,7 +22,7 @@ from tunnel_lab.sweep.engine import run_sweep
 from tunnel_lab.sweep.processes import in_processes
 from tunnel_lab.sweep.product import Sweep
 from tunnel_lab.sweep.reading import read_sweep
-from tunnel_lab.sweep.store import open_store
+from tunnel_lab.sweep.store import begin, open_store
 from tunnel_sim.errors import TunnelError
 
 ROOT = Path(__file__).parents[3]
@@ -178,3 +180,58 @@ def test_an_estimator_that_crashes_is_a_status(
     rows = outcome.store.scan().collect()
     assert set(rows["status"]) == {"raised"}
     assert set(rows["message"]) == {"ZeroDivisionError: planted"}
+
+
+def damages(first: Path, second: Path) -> Iterator[None]:
+    """A part damaged in its middle, swapped for another, and gone."""
+    content = bytearray(first.read_bytes())
+    content[len(content) // 2] ^= 1
+    first.write_bytes(bytes(content))
+    yield
+    first.write_bytes(second.read_bytes())
+    yield
+    first.unlink()
+    yield
+
+
+def test_a_part_damaged_anywhere_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
+    """Not only where its end is missing: a disk may lose a block in the middle."""
+    store = run_sweep(sweep, tmp_path / "out", here).store
+    whole = contents(tmp_path / "out")
+    for dataset in ("results", "records", "checksums"):
+        for _ in damages(*sorted((tmp_path / "out" / dataset).iterdir())[:2]):
+            assert store.finished() == list(range(1, sweep.shards))
+            assert run_sweep(sweep, tmp_path / "out", here).found == sweep.shards - 1
+            assert contents(tmp_path / "out") == whole
+
+
+def test_checksums_are_those_of_sha256sum(sweep: Sweep, here, tmp_path: Path) -> None:
+    run_sweep(sweep, tmp_path / "out", here)
+    names = [f"checksums/{path.name}" for path in (tmp_path / "out" / "checksums").iterdir()]
+    done = subprocess.run(
+        ["sha256sum", "--check", *names], cwd=tmp_path / "out", capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0
+    assert done.stdout.count("OK") == 2 * sweep.shards
+
+
+@pytest.mark.parametrize("key", ["sweep", "made_with", "schema_version"])
+@pytest.mark.parametrize(
+    "value", [None, [], {}, 1, "x", "gone", {"document": {}}, {"document": {}, "rigs": [[]]}]
+)
+def test_a_sweep_json_that_is_incomplete_is_one_line(
+    sweep: Sweep, tmp_path: Path, key: str, value: object
+) -> None:
+    begin(sweep, tmp_path / "out")
+    path = tmp_path / "out" / "sweep.json"
+    document = json.loads(path.read_text(encoding="utf-8"))
+    if value == "gone":
+        del document[key]
+    else:
+        document[key] = value
+    if (key, value) == ("schema_version", 1) or (key == "made_with" and isinstance(value, dict)):
+        return  # still what a folder may hold
+    path.write_text(json.dumps(document), encoding="utf-8")
+    for read in (open_store, lambda folder: begin(sweep, folder)):
+        with pytest.raises(TunnelError, match=r"the sweep as JSON|sweep\.json"):
+            read(tmp_path / "out")
