@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.examination.remark import Remark
 from identification.status import Status as Status
 from identification.status import by_gravity as by_gravity
 from tunnel_sim.record import Array
@@ -220,6 +221,7 @@ class Estimate:
         parameters: names of the covariance's rows and columns.
         covariance: of the parameters, in the products of their units; shape (p, p).
         noise: what the covariance rests on; None where the method does not use it.
+        remarks: of the examination before the estimation, on runs left out, cut or to look at.
     """
 
     campaign: str
@@ -236,6 +238,7 @@ class Estimate:
     parameters: tuple[str, ...] = ()
     covariance: tuple[tuple[float, ...], ...] = ()
     noise: NoiseLevel | None = None
+    remarks: tuple[Remark, ...] = ()
 
     @property
     def status(self) -> Status:
@@ -254,6 +257,7 @@ class Estimate:
             "campaign": self.campaign,
             "estimator": self.estimator,
             **_statuses_json(self.statuses),
+            "remarks": [remark.to_json_dict() for remark in self.remarks],
             **_quantities_json(self, _CAMPAIGN_QUANTITIES),
             "parameters": list(self.parameters),
             "covariance": [list(row) for row in self.covariance],
@@ -272,6 +276,7 @@ class Estimate:
             parameters=tuple(data["parameters"]),
             covariance=tuple(tuple(float(value) for value in row) for row in data["covariance"]),
             noise=NoiseLevel.from_json_dict(data["noise"]) if data["noise"] else None,
+            remarks=tuple(Remark.from_json_dict(remark) for remark in data.get("remarks", ())),
             **_quantities_from_json(data, _CAMPAIGN_QUANTITIES),
         )
 

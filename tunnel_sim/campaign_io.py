@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from tunnel_sim.campaign import Campaign, Run
+from tunnel_sim.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.campaign_schema import (
     CAMPAIGN_FILE,
     NO_CAMPAIGN,
@@ -30,6 +30,7 @@ from tunnel_sim.campaign_schema import (
     sensor_properties,
 )
 from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim.plausible import plausible_run
 from tunnel_sim.record import Record
 from tunnel_sim.run_checks import angle_in_radians, enough_cycles, uniform_times
 from tunnel_sim.run_files import RUN_FORMATS, read_table, write_table
@@ -57,13 +58,13 @@ def read_campaign(folder: Path | str) -> Campaign:
     if not folder.is_dir():
         raise TunnelError("no such folder", where=shown(folder), remedy=NO_CAMPAIGN)
     document = read_document(folder / CAMPAIGN_FILE)
-    rate = document.sensor.sample_rate
+    sensor = sensor_properties(document.sensor)
     return Campaign(
         name=document.campaign.name,
         description=document.campaign.description,
         rig=rig_properties(document.rig),
-        sensor=sensor_properties(document.sensor),
-        runs=tuple(_read_run(folder, run, rate) for run in document.runs),
+        sensor=sensor,
+        runs=tuple(_read_run(folder, run, sensor) for run in document.runs),
     )
 
 
@@ -123,7 +124,8 @@ def write_campaign(
     return folder
 
 
-def _read_run(folder: Path, run: RunTable, sample_rate: float | None) -> Run:
+def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
+    sample_rate = sensor.sample_rate
     path = folder / run.file
     where = run_place(path, run.id)
     _check_inside(folder, path, where)
@@ -138,7 +140,9 @@ def _read_run(folder: Path, run: RunTable, sample_rate: float | None) -> Run:
         time_s = np.arange(reading.size) / sample_rate
     uniform_times(time_s, sample_rate, where)
     record = Record(time_s, angle_in_radians(reading, column, run.release_angle, where))
-    enough_cycles(record, where)
+    cycles = enough_cycles(record, where)
+    if sensor.plausible is not False:
+        plausible_run(record, cycles, where)
     return Run(
         id=run.id,
         record=record,
@@ -175,7 +179,9 @@ def _check_campaign(campaign: Campaign, document: dict[str, Any], folder: Path) 
             )
         uniform_times(time_s, campaign.sensor.sample_rate, where)
         angle_in_radians(yaw, "yaw_rad", run.release_angle, where)
-        enough_cycles(run.record, where)
+        cycles = enough_cycles(run.record, where)
+        if campaign.sensor.plausible is not False:
+            plausible_run(run.record, cycles, where)
 
 
 def _run_files(campaign: Campaign, run_format: str) -> dict[str, str]:

@@ -82,9 +82,10 @@ def run(
             write_json(json, document)
         show(document)
     if report is not None:
+        from identification.examination.examine import examine
         from tunnel_lab.report import write_report
 
-        write_report(document, data, report)
+        write_report(document, examine(data).campaign, report)
     if not to_stdout:
         for path in (json, report):
             if path is not None:
