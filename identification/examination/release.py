@@ -25,7 +25,7 @@ _WIDEST_BAND = 0.3
 # A half cycle may be longer than the next ones by its amplitude alone: a pendulum let go at 160 degrees takes twice
 # the time of its small swings.
 _LONGER = 2.0
-_GROWTH = 0.1  # e-folds of growth over those half cycles: a motion that builds up has no release
+_GROWTH = 0.02  # e-folds of growth over those half cycles: a motion that builds up has no release
 _CARRIED_BACK = (
     0.75  # of a half cycle: beyond a quarter cycle, where the release lies, short of the one before
 )
@@ -59,7 +59,8 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
 def _surely_free(record: Record) -> int:
     yaw = record.yaw_rad
     away = np.abs(yaw - np.median(yaw[yaw.size // 2 :]))
-    return int(np.flatnonzero(away >= _NEAR_LARGEST * away.max())[-1])
+    # Where next to nothing decays, a large swing comes last: half the record is enough to know the motion by.
+    return min(int(np.flatnonzero(away >= _NEAR_LARGEST * away.max())[-1]), yaw.size // 2)
 
 
 def _crossings(
