@@ -72,11 +72,6 @@ RANGES: Mapping[str, Range] = {
 }  # fmt: skip
 """By the key of ``campaign.toml``; of a run file, the step of ``time_s`` and the period of the swing."""
 
-#: Frontal area over the square of the reference length: a wire's profile up to a sheet across the wind.
-AREA_RATIO = Range(
-    1e-3, 30.0, "", "frontal_area in cm2 or mm2", "reference_length in cm or mm", "a body's slenderness"
-)
-
 
 def plausible_values(values: Mapping[str, Any], where: str) -> None:
     """Refuse stated values that look like a slip of units.
@@ -92,10 +87,6 @@ def plausible_values(values: Mapping[str, Any], where: str) -> None:
         allowed = RANGES.get(key)
         if allowed is not None and value is not None:
             _check(f"{key} = {value:g} {allowed.unit}", value, allowed, where)
-    area, length = values.get("frontal_area"), values.get("reference_length")
-    if area is not None and length is not None:
-        ratio = area / length**2
-        _check(f"frontal_area is {ratio:.3g} times reference_length squared", ratio, AREA_RATIO, where)
 
 
 def plausible_run(record: Record, cycles: float, where: str) -> None:
@@ -125,5 +116,4 @@ def _check(said: str, value: float, allowed: Range, where: str) -> None:
     if allowed.low <= value <= allowed.high:
         return
     slip = allowed.above if value > allowed.high else allowed.below
-    mend = f"give it in {allowed.unit}" if allowed.unit else "correct one of them"
-    raise TunnelError(f"{said}: {_LOOKS} {slip}", where=where, remedy=f"{mend}; {KEEP}")
+    raise TunnelError(f"{said}: {_LOOKS} {slip}", where=where, remedy=f"give it in {allowed.unit}; {KEEP}")

@@ -14,7 +14,6 @@ SLIPS = {
     "density in g/cm3": ("air_density = 1.2", "air_density = 0.0012", "g/cm3"),
     "area in mm2": ("frontal_area = 0.036", "frontal_area = 36000", "mm2"),
     "area in cm2": ("frontal_area = 0.036", "frontal_area = 360", "cm2"),
-    "small area in cm2": ("frontal_area = 0.036", "frontal_area = 15", "cm2"),
     "length in mm": ("reference_length = 0.625", "reference_length = 625", "mm"),
     "length in cm": ("reference_length = 0.625", "reference_length = 62.5", "cm"),
     "width in mm": ("width = 0.225", "width = 225", "mm"),
