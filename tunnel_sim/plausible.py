@@ -94,7 +94,7 @@ def plausible_run(record: Record, cycles: float, where: str) -> None:
 
     Args:
         record: the run's reading.
-        cycles: of its oscillation in it.
+        cycles: how many periods of its oscillation it holds (a count).
         where: file and run, for messages.
 
     Raises:

@@ -60,6 +60,6 @@ def _from_release(run: Run, sensor: SensorProperties) -> tuple[Run, Remark | Non
         Outcome.CUT,
         (run.id,),
         f"release found at {record.time_s[first]:.3f} s, and what lies before it left out",
-        "start the record there if that is wrong",
+        "cut the record by hand where that is wrong",
     )
     return replace(run, record=Record(record.time_s[first:], record.yaw_rad[first:])), remark

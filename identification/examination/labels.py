@@ -31,13 +31,13 @@ _LEAST_STD = 1e-5  # of k, as a ratio: no clock and no fit is trusted further
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """What is stated and what is seen of the runs, run by run, shape (n,) each.
+    """What is stated and what is seen of the runs, run by run.
 
     Args:
-        spring: stated Kr, N m/rad.
-        pressure: stated ½ρV², Pa.
-        seen: k = ωn², 1/s².
-        std: standard deviation of k, 1/s².
+        spring: stated Kr, shape (n,), N m/rad.
+        pressure: stated ½ρV², shape (n,), Pa.
+        seen: k = ωn², shape (n,), 1/s².
+        std: standard deviation of k, shape (n,), 1/s².
     """
 
     spring: Array
