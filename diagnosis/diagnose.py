@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from diagnosis.assemble import assemble, chosen_fit
 from diagnosis.comparable import comparable_runs
 from diagnosis.localise import localise
 from diagnosis.result import Diagnosis
 from diagnosis.study import Progress, study
+from identification.examination.examine import examine
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
 from tunnel_sim.errors import TunnelError
@@ -28,15 +30,16 @@ def diagnose(
         The answer, for the runs that one model can be fitted to; its cautions name any others.
 
     Raises:
-        TunnelError: when the nominal model cannot be fitted to the runs.
+        TunnelError: when the examination refuses the records, or the nominal model cannot be fitted to them.
     """
-    campaign, left_out = comparable_runs(campaign)
+    examined = examine(campaign).accepted()
+    campaign, left_out = comparable_runs(examined.campaign)
     found = study(campaign, kinds, progress)
     if progress is not None:
         progress("where, and how far it closes")
     best = chosen_fit(found)
     where, maps = localise(campaign, found.nominal, None if best is found.nominal else best, found.causes)
-    return assemble(found, where, maps, left_out)
+    return replace(assemble(found, where, maps, left_out), remarks=examined.remarks)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

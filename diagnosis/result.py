@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from identification.examination.remark import Remark
+
 SCHEMA_VERSION = 1
 
 
@@ -200,6 +202,7 @@ class Diagnosis:
         cautions: what the answer rests on less firmly than its figures look, in sentences.
         maps: the pictures' data in JSON's types.
         provenance: versions.
+        remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
     """
 
     campaign: str
@@ -218,6 +221,7 @@ class Diagnosis:
     cautions: tuple[str, ...] = ()
     maps: Mapping[str, Any] | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    remarks: tuple[Remark, ...] = ()
 
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""
@@ -274,6 +278,7 @@ class Diagnosis:
             },
             "blind_spots": list(self.blind_spots),
             "cautions": list(self.cautions),
+            "remarks": [remark.to_json_dict() for remark in self.remarks],
             "seconds": dict(self.seconds),
             "maps": None if self.maps is None else dict(self.maps),
             "provenance": dict(self.provenance),

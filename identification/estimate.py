@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.examination.remark import Remark
 from identification.status import Status as Status
 from identification.status import by_gravity as by_gravity
 from tunnel_sim.errors import one_line
@@ -238,6 +239,7 @@ class Estimate:
         parameters: names of the covariance's rows and columns.
         covariance: of the parameters, in the products of their units; shape (p, p).
         noise: what the covariance rests on; None where the method does not use it.
+        remarks: of the examination before the estimation, on runs left out, cut or to look at.
     """
 
     campaign: str
@@ -254,6 +256,7 @@ class Estimate:
     parameters: tuple[str, ...] = ()
     covariance: tuple[tuple[float, ...], ...] = ()
     noise: NoiseLevel | None = None
+    remarks: tuple[Remark, ...] = ()
 
     @property
     def status(self) -> Status:
@@ -272,6 +275,7 @@ class Estimate:
             "campaign": self.campaign,
             "estimator": self.estimator,
             **_statuses_json(self.statuses),
+            "remarks": [remark.to_json_dict() for remark in self.remarks],
             **_quantities_json(self, _CAMPAIGN_QUANTITIES),
             "parameters": list(self.parameters),
             "covariance": [list(row) for row in self.covariance],
@@ -302,6 +306,7 @@ class Estimate:
                 parameters=tuple(_text(name) for name in data["parameters"]),
                 covariance=_covariance(data["covariance"], len(data["parameters"])),
                 noise=None if data["noise"] is None else NoiseLevel.from_json_dict(data["noise"]),
+                remarks=tuple(Remark.from_json_dict(remark) for remark in data.get("remarks", ())),
                 **_quantities_from_json(data, _CAMPAIGN_QUANTITIES),
             )
 

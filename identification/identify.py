@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from identification.estimate import Estimate
+from dataclasses import replace
+
+from identification.estimate import Estimate, RunEstimate, Status, by_gravity
 from identification.estimators import Estimator, make_estimator
+from identification.examination.examine import examine
+from identification.examination.remark import Examined
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.errors import TunnelError
 
@@ -12,6 +16,9 @@ def identify(
     campaign: Campaign, estimator: str | Estimator = "output_error", *, throw: bool = True
 ) -> Estimate:
     """Identify a campaign's coefficients and each of its runs.
+
+    The campaign is examined first (`identification.examination.examine`): the estimate's remarks say what was
+    left out or cut.
 
     Args:
         campaign: the runs of one rig; angles in rad, stiffness in N m/rad, speed in m/s.
@@ -24,13 +31,29 @@ def identify(
 
     Raises:
         TunnelError: for an unknown estimator, a campaign without runs, a wind-on run without air density,
-            and, with ``throw``, when no run could be identified.
+            records that the examination refuses, and, with ``throw``, when no run could be identified.
     """
     chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator
     if not campaign.runs:
         raise TunnelError("campaign without runs", where=campaign.name, remedy="add at least one run")
-    estimate = chosen.estimate(campaign)
+    examined = examine(campaign).accepted()
+    estimate = _of_all_runs(campaign, examined, chosen.estimate(examined.campaign))
     if throw and estimate.status.failed:
         what, _, remedy = estimate.status.value.partition(": ")
         raise TunnelError(what, where=campaign.name, remedy=remedy)
     return estimate
+
+
+def _of_all_runs(campaign: Campaign, examined: Examined, estimate: Estimate) -> Estimate:
+    """The estimate with the examination's remarks and a line for every run of the campaign, in its order."""
+    if not examined.remarks:
+        return estimate
+    found = {run.id: run for run in estimate.runs}
+    runs = tuple(found.get(run.id, RunEstimate(run.id, (Status.REPEATED_RUN,))) for run in campaign.runs)
+    statuses = {Status.REPEATED_RUN} if len(found) < len(runs) else set()
+    return replace(
+        estimate,
+        runs=runs,
+        statuses=by_gravity({*estimate.statuses, *statuses}),
+        remarks=examined.remarks,
+    )

@@ -21,6 +21,7 @@ class Status(Enum):
         "damping or frequency outside the networks' training range: use output_error, or train others"
     )
     RUN_LEFT_OUT = "a run could not be identified and was left out: see the status of the runs"
+    REPEATED_RUN = "the same samples as another run, counted once: leave the run out, or name its own file"
     MODEL_DEPARTS = "model departs from the data: run the diagnosis; the intervals are widened meanwhile"
     NOISE_DISAGREES = (
         "the noise is not what noise_std states: correct noise_std or leave it out; the residual's is used"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
 
+from identification.examination.remark import Remark
 from tunnel_lab.formatting import coefficient_label, significant, unit_mark, with_std
 
 if TYPE_CHECKING:
@@ -213,6 +214,7 @@ def closing_lines(document: Document) -> list[str]:
         lines.append(f"Excesses are the MuJoCo model's, which lies within {apart} of the fits")
     if note:
         lines.append(f"Note: {note}")
+    lines += [f"Caution: {Remark.from_json_dict(remark)}" for remark in document.get("remarks", ())]
     lines += [f"Caution: {text}" for text in document["cautions"]]
     if document["blind_spots"]:
         lines.append("These runs cannot show:")

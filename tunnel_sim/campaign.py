@@ -32,11 +32,13 @@ class SensorProperties:
         sample_rate: Hz.
         resolution: step of the reading, rad.
         noise_std: standard deviation of the reading's noise, rad.
+        plausible: False keeps what looks like a slip of units or a sampling too slow.
     """
 
     sample_rate: float | None = None
     resolution: float | None = None
     noise_std: float | None = None
+    plausible: bool | None = None
 
 
 @dataclass(frozen=True)

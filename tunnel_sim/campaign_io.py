@@ -14,7 +14,7 @@ import numpy as np
 import tomli_w
 
 from tunnel_sim import limits
-from tunnel_sim.campaign import Campaign, Run
+from tunnel_sim.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.campaign_schema import (
     CAMPAIGN_FILE,
     NO_CAMPAIGN,
@@ -30,6 +30,7 @@ from tunnel_sim.campaign_schema import (
 from tunnel_sim.errors import TunnelError, did_you_mean
 from tunnel_sim.json_text import json_text
 from tunnel_sim.leftovers import clear_leftovers
+from tunnel_sim.plausible import plausible_run
 from tunnel_sim.reading import check_count
 from tunnel_sim.record import Record
 from tunnel_sim.run_checks import angle_in_radians, enough_cycles, uniform_times
@@ -59,12 +60,13 @@ def read_campaign(folder: Path | str) -> Campaign:
     if not folder.is_dir():
         raise TunnelError("no such folder", where=shown(folder), remedy=NO_CAMPAIGN)
     document = read_document(folder / CAMPAIGN_FILE)
+    sensor = sensor_properties(document.sensor)
     return Campaign(
         name=document.campaign.name,
         description=document.campaign.description,
         rig=rig_properties(document.rig),
-        sensor=sensor_properties(document.sensor),
-        runs=tuple(_read_runs(folder, document)),
+        sensor=sensor,
+        runs=tuple(_read_runs(folder, document, sensor)),
     )
 
 
@@ -118,18 +120,19 @@ def write_campaign(
     return folder
 
 
-def _read_runs(folder: Path, document: CampaignDocument) -> Iterator[Run]:
+def _read_runs(folder: Path, document: CampaignDocument, sensor: SensorProperties) -> Iterator[Run]:
     """The runs in turn, as long as there is room for their samples."""
     samples = 0
     for table in document.runs:
-        run = _read_run(folder, table, document.sensor.sample_rate)
+        run = _read_run(folder, table, sensor)
         yield run
         samples += run.record.time_s.size
         remedy = "put the runs into several campaigns"
         check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", shown(folder), remedy)
 
 
-def _read_run(folder: Path, run: RunTable, sample_rate: float | None) -> Run:
+def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
+    sample_rate = sensor.sample_rate
     path = folder / run.file
     where = run_place(path, run.id)
     _check_inside(folder, path, where)
@@ -144,7 +147,9 @@ def _read_run(folder: Path, run: RunTable, sample_rate: float | None) -> Run:
         time_s = np.arange(reading.size) / sample_rate
     uniform_times(time_s, sample_rate, where)
     record = Record(time_s, angle_in_radians(reading, column, run.release_angle, where))
-    enough_cycles(record, where)
+    cycles = enough_cycles(record, where)
+    if sensor.plausible is not False:
+        plausible_run(record, cycles, where)
     return Run(
         id=run.id,
         record=record,
@@ -181,7 +186,9 @@ def _check_campaign(campaign: Campaign, document: dict[str, Any], folder: Path) 
             )
         uniform_times(time_s, campaign.sensor.sample_rate, where)
         angle_in_radians(yaw, "yaw_rad", run.release_angle, where)
-        enough_cycles(run.record, where)
+        cycles = enough_cycles(run.record, where)
+        if campaign.sensor.plausible is not False:
+            plausible_run(run.record, cycles, where)
 
 
 def _run_files(campaign: Campaign, run_format: str) -> dict[str, str]:

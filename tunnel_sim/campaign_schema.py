@@ -11,6 +11,7 @@ from pydantic import Field
 from tunnel_sim import limits
 from tunnel_sim.campaign import Campaign, RigProperties, SensorProperties
 from tunnel_sim.errors import TunnelError
+from tunnel_sim.plausible import plausible_values
 from tunnel_sim.reading import check_count
 from tunnel_sim.toml_input import OneLine, SampleRate, StrictModel, check_version, load_toml, shown, validate
 
@@ -43,6 +44,9 @@ class SensorTable(StrictModel):
     sample_rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
     resolution: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
     noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
+    plausible: bool | None = Field(
+        default=None, description="false to keep what looks like a slip of units, or leave it out"
+    )
 
 
 class RunTable(StrictModel):
@@ -109,6 +113,8 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
             )
         seen.add(run.id)
         _check_run(run, where)
+    if parsed.sensor.plausible is not False:
+        _check_sizes(parsed, path)
     return parsed
 
 
@@ -120,6 +126,12 @@ def run_place(path: Path, run_id: str) -> str:
         run_id: the run's.
     """
     return f"{shown(path)}, run '{run_id}'"
+
+
+def _check_sizes(document: CampaignDocument, path: Path) -> None:
+    plausible_values(document.rig.model_dump(), f"{shown(path)}, [rig]")
+    for run in document.runs:
+        plausible_values(run.model_dump(), run_place(path, run.id))
 
 
 def _check_run(run: RunTable, where: str) -> None:

@@ -120,19 +120,22 @@ def angle_in_radians(yaw: Array, column: str, release_angle: float | None, where
     return angle
 
 
-def enough_cycles(record: Record, where: str) -> None:
+def enough_cycles(record: Record, where: str) -> float:
     """Refuse a record with fewer than three cycles of oscillation.
 
     Args:
         record: the run's record.
         where: file and run, for messages.
 
+    Returns:
+        How many cycles the record holds.
+
     Raises:
         TunnelError: fewer than three cycles, or nothing that oscillates.
     """
     cycles = count_cycles(record)
     if cycles >= MINIMUM_CYCLES - CYCLE_TOLERANCE:
-        return
+        return cycles
     what = (
         f"about {cycles:.1f} cycles of oscillation, fewer than three"
         if cycles > 0.0

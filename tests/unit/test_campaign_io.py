@@ -102,7 +102,7 @@ def test_any_statement_survives_the_campaign_file(
     tmp_path: Path, name, description, ids, rig, stiffness, speed, density, angle, noise
 ) -> None:
     runs = tuple(Run(i, decay(), speed, stiffness, density, angle) for i in ids)
-    one = Campaign(name, rig, SensorProperties(noise_std=noise), runs, description)
+    one = Campaign(name, rig, SensorProperties(noise_std=noise, plausible=False), runs, description)
     assert_same(read_campaign(write_campaign(one, tmp_path / "c", run_format="csv", overwrite=True)), one)
 
 

@@ -80,9 +80,10 @@ def run(
     if json is not None and not to_stdout:
         write_json(json, document)
     if report is not None:
+        from identification.examination.examine import examine
         from tunnel_lab.report import write_report
 
-        write_report(document, data, report)
+        write_report(document, examine(data).campaign, report)
     if to_stdout:
         typer.echo(json_text(document), nl=False)
         return

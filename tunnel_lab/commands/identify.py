@@ -241,5 +241,7 @@ def show(campaign: Campaign, estimate: Estimate, *, windows: bool) -> None:
     if windows:
         tables.show_tables(*map(tables.windows_table, estimate.runs))
     tables.say(tables.BRACKETS)
+    for remark in estimate.remarks:
+        tables.say(f"Note: {remark}")
     for line in tables.status_lines(estimate):
         tables.say(f"Note: {line}")

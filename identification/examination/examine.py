@@ -1,0 +1,65 @@
+"""One examination of a campaign, for every command alike, before anything is estimated from it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from identification.examination.growth import growing_runs
+from identification.examination.labels import exchanged_labels
+from identification.examination.release import find_release
+from identification.examination.remark import Examined, Outcome, Remark
+from identification.examination.repeated import without_repeats
+from identification.examination.spring_line import springs_off_the_line
+from identification.examination.swings import swing_of
+from tunnel_sim.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.record import Record
+
+
+def examine(campaign: Campaign) -> Examined:
+    """Check a campaign's records against one another and against what is stated of them.
+
+    Repeated records are counted once, what lies before a release is cut off, motion that grows with the wind
+    off and springs or winds at the wrong runs are refused, and springs that do not fit the frequencies are
+    noted.
+
+    Args:
+        campaign: measured or simulated runs.
+
+    Returns:
+        The campaign to go on with and the remarks; the very campaign given where nothing is wrong.
+    """
+    kept, repeats = without_repeats(campaign)
+    if any(remark.outcome is Outcome.REFUSED for remark in repeats):
+        return Examined(campaign, repeats)
+    kept, releases = from_releases(kept)
+    swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
+    faults = growing_runs(swings) or exchanged_labels(swings) or springs_off_the_line(swings)
+    return Examined(kept, (*repeats, *releases, *faults))
+
+
+def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
+    """Let every record begin at its release.
+
+    Args:
+        campaign: the runs.
+
+    Returns:
+        The campaign, itself where every record does so already, and a remark for each run that was cut.
+    """
+    found = [_from_release(run, campaign.sensor) for run in campaign.runs]
+    remarks = tuple(remark for _, remark in found if remark is not None)
+    return (replace(campaign, runs=tuple(run for run, _ in found)) if remarks else campaign), remarks
+
+
+def _from_release(run: Run, sensor: SensorProperties) -> tuple[Run, Remark | None]:
+    first = find_release(run.record, sensor)
+    if first == 0:
+        return run, None
+    record = run.record
+    remark = Remark(
+        Outcome.CUT,
+        (run.id,),
+        f"release found at {record.time_s[first]:.3f} s, and what lies before it left out",
+        "cut the record by hand where that is wrong",
+    )
+    return replace(run, record=Record(record.time_s[first:], record.yaw_rad[first:])), remark

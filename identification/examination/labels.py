@@ -1,0 +1,193 @@
+"""Whether the stated springs and wind speeds can belong to the frequencies, and which two may be exchanged.
+
+Every run has Kr = Izz ωn² + Ka with one Izz, and Ka in proportion to ½ρV²; within one spring that is a straight
+line of ωn² over ½ρV², whatever the spring's own error. Where the statements contradict the frequencies beyond
+chance and exchanging those of two runs brings them to agree, they were exchanged.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, f
+
+from identification.examination.remark import Outcome, Remark
+from identification.examination.swings import Swing
+from tunnel_sim.record import Array
+
+#: How well a stated stiffness is usually known, as a ratio: weights and arm of a static calibration.
+SPRING_TOLERANCE = 0.01
+# Contradicted by chance once in 1e6 campaigns, and in agreement but for one in a thousand.
+_CONTRADICTION = 1e-6
+_AGREEMENT = 1e-3
+_CANDIDATES = 12  # runs that fit worst, each tried against all others
+_LEAST_RUNS = 2
+_LEAST_STD = 1e-5  # of k, as a ratio: no clock and no fit is trusted further
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """What is stated and what is seen of the runs, run by run.
+
+    Args:
+        spring: stated Kr, shape (n,), N m/rad.
+        pressure: stated ½ρV², shape (n,), Pa.
+        seen: k = ωn², shape (n,), 1/s².
+        std: standard deviation of k, shape (n,), 1/s².
+    """
+
+    spring: Array
+    pressure: Array
+    seen: Array
+    std: Array
+
+    @classmethod
+    def of(cls, swings: Sequence[Swing]) -> Labels:
+        """Of runs that all state their spring."""
+        runs = [swing.run for swing in swings]
+        seen = np.array([swing.stiffness for swing in swings])
+        std = np.array([swing.stiffness_std for swing in swings])
+        return cls(
+            np.array([float(run.spring_stiffness or 0.0) for run in runs]),
+            np.array([0.5 * (run.air_density or 0.0) * run.wind_speed**2 for run in runs]),
+            seen,
+            np.maximum(std, _LEAST_STD * seen),
+        )
+
+
+@dataclass(frozen=True)
+class _Misfit:
+    """Weighted squares that the statements leave, and their degrees of freedom."""
+
+    squares: float
+    freedom: int
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether that is beyond chance."""
+        return self.freedom > 0 and self.squares > float(chi2.isf(_CONTRADICTION, self.freedom))
+
+    def mends(self, before: _Misfit, trials: int) -> bool:
+        """Whether the statements agree, or agree so much better than before that chance cannot be why."""
+        if self.squares <= float(chi2.isf(_AGREEMENT, self.freedom)):
+            return True
+        ratio = before.squares / max(self.squares, 1e-300)
+        return ratio > float(f.isf(_CONTRADICTION / max(trials, 1), self.freedom, self.freedom))
+
+
+def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
+    """Refuse springs or wind speeds that stand at the wrong runs.
+
+    Args:
+        swings: of the runs; those without a stated spring are passed over.
+
+    Returns:
+        One remark that refuses, with the runs to look at; none where the statements may be right.
+    """
+    known = [swing for swing in swings if swing.run.spring_stiffness is not None]
+    if len(known) < _LEAST_RUNS:
+        return ()
+    labels = Labels.of(known)
+    for what, misfit, exchange in (
+        ("spring_stiffness", _of_springs, _springs_exchanged),
+        ("wind_speed", _of_winds, _winds_exchanged),
+    ):
+        found = _best_exchanges(labels, misfit, exchange)
+        if found:
+            return (_remark(what, [tuple(known[i].run.id for i in places) for places in found]),)
+    return ()
+
+
+def _remark(what: str, places: Sequence[tuple[str, ...]]) -> Remark:
+    ids = tuple(dict.fromkeys(itertools.chain.from_iterable(places)))
+    pairs = ", or ".join(" and ".join(pair) for pair in places)
+    return Remark(
+        Outcome.REFUSED,
+        ids,
+        f"the stated {what} contradicts the frequencies, and agrees once that of {pairs} is exchanged",
+        f"correct {what} of these runs, or their files",
+    )
+
+
+def _best_exchanges(
+    labels: Labels,
+    misfit: Callable[[Labels], tuple[_Misfit, Array]],
+    exchange: Callable[[Labels, Array], Iterator[tuple[tuple[int, ...], Labels]]],
+) -> list[tuple[int, ...]]:
+    stated, away = misfit(labels)
+    if not stated.contradicts:
+        return []
+    trials = [(places, misfit(other)[0]) for places, other in exchange(labels, away)]
+    mended = [(places, found) for places, found in trials if found.mends(stated, len(trials))]
+    if not mended:
+        return []
+    least = min(found.squares for _, found in mended)
+    # Exchanges that leave as little as the best one cannot be told apart.
+    limit = least + float(chi2.isf(_AGREEMENT, 1))
+    return [places for places, found in mended if found.squares <= limit]
+
+
+def _of_springs(labels: Labels) -> tuple[_Misfit, Array]:
+    """How far Kr = Izz k + C ½ρV² is from all runs, each good to its frequency and its spring's tolerance.
+
+    The runs of one spring share its error, so together they count once.
+    """
+    columns = labels.seen[:, None]
+    if np.any(labels.pressure > 0.0):
+        columns = np.column_stack((columns, labels.pressure))
+    springs, place, count = np.unique(labels.spring, return_inverse=True, return_counts=True)
+    std = labels.spring * np.hypot(SPRING_TOLERANCE, labels.std / labels.seen) * np.sqrt(count[place])
+    away = _left(columns / std[:, None], labels.spring / std)
+    return _Misfit(float(away @ away), springs.size - 1), np.abs(away)
+
+
+def _of_winds(labels: Labels) -> tuple[_Misfit, Array]:
+    """How far k = k0(spring) - c ½ρV² is from all runs."""
+    springs, place = np.unique(labels.spring, return_inverse=True)
+    columns = np.zeros((labels.seen.size, springs.size + 1))
+    columns[np.arange(labels.seen.size), place] = 1.0
+    columns[:, -1] = labels.pressure
+    freedom = labels.seen.size - int(np.linalg.matrix_rank(columns / np.maximum(columns.max(axis=0), 1e-300)))
+    away = _left(columns / labels.std[:, None], labels.seen / labels.std)
+    return _Misfit(float(away @ away), freedom), np.abs(away)
+
+
+def _left(columns: Array, target: Array) -> Array:
+    scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    solution = np.linalg.lstsq(columns / scale, target, rcond=1e-10)[0]
+    return np.asarray(target - columns / scale @ solution)
+
+
+def _springs_exchanged(labels: Labels, away: Array) -> Iterator[tuple[tuple[int, ...], Labels]]:
+    """The springs of two runs exchanged, and those of all runs of two springs."""
+    for i, j in _pairs(away):
+        if labels.spring[i] != labels.spring[j]:
+            yield (i, j), replace(labels, spring=_swapped(labels.spring, i, j))
+    for a, b in itertools.combinations(np.unique(labels.spring).tolist(), 2):
+        places = np.flatnonzero((labels.spring == a) | (labels.spring == b))
+        if places.size > 2:
+            other = labels.spring.copy()
+            other[places] = a + b - other[places]
+            yield tuple(places.tolist()), replace(labels, spring=other)
+
+
+def _winds_exchanged(labels: Labels, away: Array) -> Iterator[tuple[tuple[int, ...], Labels]]:
+    for i, j in _pairs(away):
+        if labels.pressure[i] != labels.pressure[j]:
+            yield (i, j), replace(labels, pressure=_swapped(labels.pressure, i, j))
+
+
+def _pairs(away: Array) -> list[tuple[int, int]]:
+    """Pairs of runs, one of which fits badly."""
+    worst: NDArray[np.intp] = np.argsort(-away)[:_CANDIDATES]
+    return sorted({(min(i, j), max(i, j)) for i in worst.tolist() for j in range(away.size) if i != j})
+
+
+def _swapped(values: Array, i: int, j: int) -> Array:
+    other = values.copy()
+    other[[i, j]] = other[[j, i]]
+    return other

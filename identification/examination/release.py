@@ -1,0 +1,127 @@
+"""Where the free motion of a record begins, after a hand, a latch or a sensor at rest.
+
+Free motion crosses its centre every half cycle, whatever phase it starts in. A stretch between two crossings (or
+from the record's start to the first) that lasts longer is no free motion: the body was held, or moved by hand, or
+hung at rest. The release is then where the motion that follows, carried back, stands still. A hold shorter than
+about three quarters of a cycle leaves no such stretch and is not looked for.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.decay_fit import Reading, RunFit, fit_run
+from identification.noise import white_noise
+from identification.start import starting_decay, starting_frequency
+from tunnel_sim.campaign import SensorProperties
+from tunnel_sim.record import Array, Record
+
+_NEAR_LARGEST = 0.9  # the last swing of this share of the largest comes after the release
+_LEAST_SAMPLES = 16
+_SMOOTHED = 0.125  # of a cycle, as a moving average: noise and hum fall, the swing hardly
+_BAND = 0.1  # of the largest swing: how far beyond the centre a crossing must lead
+_NOISE_MARGIN = 5.0  # standard deviations of the smoothed noise, where that is more: no crossing by chance
+_WIDEST_BAND = 0.3
+# A half cycle may be longer than the next ones by its amplitude alone: a pendulum let go at 160 degrees takes twice
+# the time of its small swings.
+_LONGER = 2.0
+_GROWTH = 0.02  # e-folds of growth over those half cycles: a motion that builds up has no release
+_CARRIED_BACK = (
+    0.75  # of a half cycle: beyond a quarter cycle, where the release lies, short of the one before
+)
+_FITTED_HALVES = 4.0  # half cycles after the release that are carried back
+_REGULAR = 2  # half cycles of about the usual length before a release; more are a free motion of their own
+
+
+def find_release(record: Record, sensor: SensorProperties) -> int:
+    """The sample at which the body is let go.
+
+    Args:
+        record: one run's reading.
+        sensor: what is stated of its noise.
+
+    Returns:
+        Index of the first sample of the free motion; 0 where the record starts in it, or where no oscillation
+        stands out.
+    """
+    free = _surely_free(record)
+    if record.yaw_rad.size - free < _LEAST_SAMPLES:
+        return 0
+    later = Record(record.time_s[free:], record.yaw_rad[free:])
+    frequency = starting_frequency(later)
+    if frequency is None:
+        return 0
+    crossings, largest = _crossings(record, sensor, float(np.median(later.yaw_rad)), frequency)
+    held = _last_long_stretch(crossings, largest)
+    return 0 if held is None else _standstill(record, crossings, held)
+
+
+def _surely_free(record: Record) -> int:
+    yaw = record.yaw_rad
+    away = np.abs(yaw - np.median(yaw[yaw.size // 2 :]))
+    # Where next to nothing decays, a large swing comes last: half the record is enough to know the motion by.
+    return min(int(np.flatnonzero(away >= _NEAR_LARGEST * away.max())[-1]), yaw.size // 2)
+
+
+def _crossings(
+    record: Record, sensor: SensorProperties, centre: float, frequency: float
+) -> tuple[Array, int]:
+    """Where the smoothed reading passes its centre, in samples from the record's start, which is the first of them.
+
+    The second value is the place of the first crossing after the largest excursion.
+    """
+    yaw = record.yaw_rad
+    width = max(1, min(round(_SMOOTHED * record.sample_rate / frequency), yaw.size // 4))
+    total = np.concatenate([[0.0], np.cumsum(yaw - centre)])
+    smooth = (total[width:] - total[:-width]) / width
+    away = np.abs(smooth)
+    noise = white_noise(yaw, sensor) / np.sqrt(width)
+    band = max(_BAND, min(_NOISE_MARGIN * noise / float(away.max()), _WIDEST_BAND)) * float(away.max())
+    outside = np.flatnonzero(away > band)
+    change = np.flatnonzero(np.diff(np.sign(smooth[outside])) != 0.0)
+    middles = 0.5 * (outside[change] + outside[change + 1]) + 0.5 * width
+    crossings = np.concatenate([[0.0], middles])
+    return crossings, int(np.searchsorted(crossings, np.argmax(away) + 0.5 * width))
+
+
+def _last_long_stretch(crossings: Array, largest: int) -> int | None:
+    """Which stretch up to the largest excursion lasts longer than free motion can; None where none does."""
+    lengths = np.diff(crossings)
+    for place in range(min(largest, lengths.size - 1) - 1, -1, -1):
+        usual = float(lengths[place + 1 : place + 3].max())
+        if lengths[place] > _LONGER * usual:
+            before = lengths[:place]
+            regular = int(np.sum((before > usual / _LONGER) & (before < usual * _LONGER)))
+            return place if regular <= _REGULAR else None
+    return None
+
+
+def _standstill(record: Record, crossings: Array, held: int) -> int:
+    """The sample where the motion after a held stretch, carried back, stands still."""
+    usual = float(np.diff(crossings)[held + 1 : held + 3].max())
+    end = crossings[held + 1]
+    # The end of the stretch is a crossing of the free motion, or a jump to where it begins: fit after the next one.
+    first = int(crossings[min(held + 2, crossings.size - 1)])
+    last = min(record.yaw_rad.size, first + round(_FITTED_HALVES * usual))
+    if last - first < _LEAST_SAMPLES:
+        return int(end)
+    part = Record(record.time_s[first:last], record.yaw_rad[first:last])
+    start = starting_decay(part)
+    fit = None if start is None else fit_run(Reading.from_record(part), start)
+    if fit is None or not fit.runs or fit.runs[0].decay.omega_d == 0.0:
+        return int(end)
+    if fit.runs[0].decay.rate * part.duration < -_GROWTH:
+        return 0
+    back = _turning_points(fit.runs[0], record.sample_rate)
+    earliest = end - _CARRIED_BACK * usual
+    after = back[back + first > earliest - 0.5]
+    return int(min(max(round(float(after[0]) + first), 0), first)) if after.size else int(end)
+
+
+def _turning_points(run: RunFit, sample_rate: float) -> Array:
+    """Turning points of a fitted decay from two cycles before its first sample to one after, in samples."""
+    decay = run.decay
+    # β = e^{-at}(C cos ωt + S sin ωt) stands still where (Sω - aC) cos ωt = (Cω + aS) sin ωt.
+    cosine, sine = run.angle, (run.rate + decay.rate * run.angle) / decay.omega_d
+    phase = np.arctan2(sine * decay.omega_d - decay.rate * cosine, cosine * decay.omega_d + decay.rate * sine)
+    return np.asarray((phase + np.pi * np.arange(-4, 3)) / decay.omega_d * sample_rate)
