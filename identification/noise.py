@@ -26,6 +26,7 @@ _ORDER = 6
 # Σ (C(12, 6+j)/C(12, 6))² = C(24, 12)/C(12, 6)².
 _DIFFERENCE_GAIN = 924.0
 _SAMPLES_PER_DEGREE = 2704156.0 / 924.0**2
+_LONGEST_BLOCK = 1e9  # samples: longer than any record
 _CHANCE = 3.29  # two-sided 1e-3
 
 
@@ -53,7 +54,7 @@ def eighth_of_a_cycle(omega_n: float, sample_interval: float) -> int:
         omega_n: natural angular frequency, rad/s.
         sample_interval: s.
     """
-    return max(1, round(2.0 * np.pi / (8.0 * omega_n * sample_interval)))
+    return max(1, round(min(2.0 * np.pi / (8.0 * omega_n * sample_interval), _LONGEST_BLOCK)))
 
 
 def stated_noise(sensor: SensorProperties) -> float | None:

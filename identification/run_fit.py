@@ -26,7 +26,7 @@ from identification.estimate import (
     WindowEstimate,
     by_gravity,
 )
-from identification.information import inverse
+from identification.information import determined, inverse
 from identification.noise import Residual, eighth_of_a_cycle, noise_level
 from identification.start import starting_decay, thinned_reading
 from identification.windows import fit_windows, modal_quantities
@@ -88,7 +88,8 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     estimate = describe_run(
         run, reading, fitted, fit.zero, covariance, variance, noise=noise, windows=windows
     )
-    return FittedRun(reading, fitted, noise, estimate)
+    found = None if estimate.omega_n is None else fitted
+    return FittedRun(reading, found, noise, estimate)
 
 
 def _near(run: Run, start: Decay) -> Decay:
@@ -144,7 +145,7 @@ def decay_covariance_of(fitted: RunFit) -> Array:
 def judge(
     reading: Reading, fitted: RunFit, zero: float, sensor: SensorProperties
 ) -> tuple[NoiseLevel, Status | None]:
-    """What the residual of one run's fit says of the noise, and whether there is a decay above it at all.
+    """What the residual of one run's fit says of the noise, and whether it shows a decay at all.
 
     Args:
         reading: what was fitted.
@@ -159,7 +160,7 @@ def judge(
     motion = reading.yaw - zero - fitted.residual
     if float(motion @ motion) < _LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
         return noise, Status.NO_OSCILLATION
-    return noise, None
+    return noise, None if determined(fitted.information) else Status.NOT_DETERMINED
 
 
 def describe_run(
@@ -189,8 +190,11 @@ def describe_run(
         windows: of the run.
 
     Returns:
-        The estimate with the statuses that its noise, its length and its spring call for.
+        The estimate with the statuses that its noise, its length and its spring call for; NOT_DETERMINED alone
+        where the method's covariance is none.
     """
+    if not determined(covariance):
+        return RunEstimate(run.id, (Status.NOT_DETERMINED,))
     rest, decay = [ZERO, ANGLE, ANGULAR_RATE], [RATE, STIFFNESS]
     own = inverse(fitted.information[np.ix_(rest, rest)])
     move = own @ fitted.information[np.ix_(rest, decay)]

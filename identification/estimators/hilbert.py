@@ -73,6 +73,8 @@ class Hilbert:
             projected = project_run(reading, decay) if decay.omega_d > 0.0 else None
             if projected is None:
                 return RunDecay.failed(run, Status.NOT_CONVERGED)
+            if decay.omega_d * float(reading.time[-1]) < np.pi * _LEAST_POINTS:
+                break  # fewer half cycles than a line needs
             seen = envelope(reading, *projected)
             lines = _lines(seen, decay, noise_std)
             if lines is None:
@@ -93,6 +95,8 @@ class Hilbert:
 def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array] | None:
     # The decay and the covariance of (a, k). Weights follow the line, not the noisy envelope itself.
     deviation = noise_std * np.sqrt(2.0 / seen.samples)
+    if not seen.amplitude.min() > 0.0:
+        return None
     scale = float(np.exp(np.mean(np.log(seen.amplitude[:4]) + decay.rate * seen.time[:4])))
     expected = scale * np.exp(-decay.rate * seen.time)
     found = None

@@ -31,6 +31,7 @@ from identification.neural.shape import CYCLES, network_inputs, normalise, respo
 from identification.neural.three_cycles import ThreeCycles, find_windows
 from identification.noise import FALSE_ALARM_RATE, white_noise
 from identification.pairing import PairedRun, paired_estimate
+from identification.readable import holds_motion
 from tunnel_sim.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.record import Array
 
@@ -130,6 +131,8 @@ def read_windows(run: Run, sensor: SensorProperties, networks: Networks) -> tupl
     Returns:
         The readings, and how many cycles the record holds from its first crossing on; 0 where nothing oscillates.
     """
+    if not holds_motion(run.record):
+        return [], 0.0
     windows, cycles = find_windows(run.record, white_noise(run.record.yaw_rad, sensor))
     readings = []
     for window in windows:
