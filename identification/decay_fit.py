@@ -152,14 +152,15 @@ def fit_decays(
         if iteration == _MAX_ITERATIONS:
             converged = converged or promised <= _SETTLED * best.cost / samples
         damping = _next_damping(damping, gain)
-        if trial.cost <= best.cost:
+        if trial.runs and trial.cost <= best.cost:
             best = trial
+    nothing = DecayFit(best.parameters, best.zero, (), np.zeros((0, 0)), False, iteration)
+    if not best.runs:
+        return nothing
     try:
         normal, _ = _shared_system(best, links, zero is None, prior)
     except np.linalg.LinAlgError:
-        best = _Point(best.parameters, best.zero, ())
-    if not best.runs:
-        return DecayFit(best.parameters, best.zero, (), np.zeros((0, 0)), False, iteration)
+        return nothing
     return DecayFit(best.parameters, best.zero, best.runs, normal, converged, iteration)
 
 

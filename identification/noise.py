@@ -20,7 +20,7 @@ from tunnel_sim.record import Array
 
 FALSE_ALARM_RATE = 1e-3
 _STATEMENT_TOLERANCE = 0.05  # a stated or measured standard deviation is taken to be good to 5 %
-_FLOOR = 1e-7  # of the largest reading: no sensor and no integrator is better, so no smaller noise is claimed
+FLOOR = 1e-7  # of the largest reading: no sensor and no integrator is better, so no smaller noise is claimed
 _ORDER = 6
 # Variance of one sixth difference of unit white noise, and how many samples count as one independent one:
 # Σ (C(12, 6+j)/C(12, 6))² = C(24, 12)/C(12, 6)².
@@ -80,7 +80,7 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
     Returns:
         The level, with the verdicts on the model (``departs``) and on the statement (``disagrees``).
     """
-    floor = _FLOOR * max(residual.peak for residual in residuals)
+    floor = FLOOR * max(residual.peak for residual in residuals)
     unknowns = sum(residual.unknowns for residual in residuals)
     count = sum(residual.values.size for residual in residuals)
     squares = sum(float(residual.values @ residual.values) for residual in residuals)
@@ -116,7 +116,7 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
         Standard deviation of one sample, rad, quantisation included.
     """
     peak = 0.5 * float(np.ptp(reading))
-    floor = max(_FLOOR * peak, 1e-300)
+    floor = max(FLOOR * peak, 1e-300)
     fast, degrees = _fast_part([Residual(reading, 1, 0, peak)], floor)
     fast = max(fast, floor, (sensor.resolution or 0.0) / np.sqrt(12.0))
     stated = stated_noise(sensor)
@@ -152,5 +152,5 @@ def _slow_part(
         return 1.0, False
     ratio = power / degrees / reference**2
     chance = float(fdtri(degrees, min(reference_degrees, 1e9), 1.0 - FALSE_ALARM_RATE))
-    departs = ratio > chance * (1.0 + _STATEMENT_TOLERANCE) ** 2
+    departs = bool(ratio > chance * (1.0 + _STATEMENT_TOLERANCE) ** 2)
     return max(ratio, 1.0), departs

@@ -14,6 +14,7 @@ from identification.decay_fit import (
     RATE,
     STIFFNESS,
     ZERO,
+    DecayFit,
     Reading,
     RunFit,
     fit_run,
@@ -75,8 +76,8 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     start = starting_decay(run.record)
     if start is None:
         return _failed(run, reading, Status.NO_OSCILLATION)
-    fit = fit_run(reading, _near(run, start))
-    if not fit.converged or fit.runs[0].decay.stiffness <= 0.0:
+    fit = fit_from(run, reading, start)
+    if fit is None:
         return _failed(run, reading, Status.NOT_CONVERGED)
     fitted = fit.runs[0]
     noise, failure = judge(reading, fitted, fit.zero, sensor)
@@ -90,6 +91,21 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     )
     found = None if estimate.omega_n is None else fitted
     return FittedRun(reading, found, noise, estimate)
+
+
+def fit_from(run: Run, reading: Reading, start: Decay) -> DecayFit | None:
+    """The least-squares fit of a run by itself.
+
+    Args:
+        run: the run.
+        reading: all of its record.
+        start: decay to start from.
+
+    Returns:
+        The fit; None where it does not converge to a decay of positive stiffness.
+    """
+    fit = fit_run(reading, _near(run, start))
+    return fit if fit.converged and fit.runs[0].decay.stiffness > 0.0 else None
 
 
 def _near(run: Run, start: Decay) -> Decay:

@@ -24,6 +24,7 @@ from identification.decay_fit import Reading, project_run
 from identification.envelope import Envelope, envelope
 from identification.estimate import Estimate, Quantity, Status, WindowEstimate
 from identification.noise import white_noise
+from identification.residual_check import residual_check
 from identification.run_fit import describe_run, judge
 from identification.start import starting_decay
 from identification.weighted_line import WeightedFit, decay_covariance, weighted_fit
@@ -88,7 +89,12 @@ class Hilbert:
         if failure is not None or covariance is None:
             return RunDecay.failed(run, failure or Status.NOT_CONVERGED)
         windows = _backbone(seen, noise_std, self.cycles_per_window)
-        estimate = describe_run(run, reading, fitted, zero, covariance, noise_std**2, windows=windows)
+        check = residual_check(run, decay, sensor)
+        noise = None if check is None else check.noise
+        covariance = covariance if check is None else check.widened(covariance)
+        estimate = describe_run(
+            run, reading, fitted, zero, covariance, noise_std**2, noise=noise, windows=windows
+        )
         return RunDecay(estimate, decay, covariance)
 
 

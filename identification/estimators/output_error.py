@@ -88,9 +88,11 @@ def _joint_estimate(
     covariance = fisher_covariance(fit.normal, noise)
     found = derivatives(design, fit.parameters)
     own = found.jacobian @ covariance[:-1, :-1] @ found.jacobian.T
-    if noise.departs and found.names:
+    statuses = (
+        statuses | departures([noise, *(item.noise for _, item in pairs)]) | limits(design, fit.parameters)
+    )
+    if Status.MODEL_DEPARTS in statuses and found.names:
         own = widened_covariance(own, jackknife_std(fit.runs, design.links, found.jacobian))
-    statuses = statuses | departures([noise]) | limits(design, fit.parameters)
     air = air_of_runs(design, found, own, runs)
     return replace(
         estimate,
