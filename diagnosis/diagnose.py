@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from diagnosis.assemble import assemble, chosen_fit
 from diagnosis.comparable import comparable_runs
 from diagnosis.localise import localise
+from diagnosis.refusal import refuse_hopeless
 from diagnosis.result import Diagnosis
 from diagnosis.study import Progress, study
 from tunnel_sim.campaign import Campaign
@@ -28,8 +29,9 @@ def diagnose(
         The answer, for the runs that one model can be fitted to; its cautions name any others.
 
     Raises:
-        TunnelError: when the nominal model cannot be fitted to the runs.
+        TunnelError: when a run shows no decaying motion, or the nominal model cannot be fitted to the runs.
     """
+    refuse_hopeless(campaign)
     campaign, left_out = comparable_runs(campaign)
     found = study(campaign, kinds, progress)
     if progress is not None:
