@@ -35,7 +35,7 @@ def test_a_parameter_at_the_end_of_its_range_says_so():
 def test_a_bound_is_shown_and_written_without_a_deviation():
     data = ParameterEstimate(0.5, None, "N m", "upper").to_json_dict()
     assert data == {"value": 0.5, "std": None, "unit": "N m", "bound": "upper"}
-    assert parameter_lines({"friction_moment": data})[-1] == "  0.5 N m (at its upper bound)"
+    assert parameter_lines({"friction_moment": data})[-1] == "  0.5000 N m (at its upper bound)"
 
 
 def test_the_frequency_of_a_hum_scatters_as_stated():
@@ -43,7 +43,7 @@ def test_the_frequency_of_a_hum_scatters_as_stated():
     time = np.arange(2500) * INTERVAL
     errors, stds = [], []
     sound = campaign()
-    for _ in range(40):
+    for _ in range(12):
         runs = tuple(
             replace(
                 run,
@@ -60,4 +60,4 @@ def test_the_frequency_of_a_hum_scatters_as_stated():
         errors.append(found - 50.003)
         stds.append(remove_hum(humming, found, NOISE**2)[1].frequency_std)
     ratio = float(np.std(errors)) / float(np.median(stds))
-    assert ratio == pytest.approx(1.0, abs=0.4)  # 40 draws know it to a ninth; 3.5 of these
+    assert ratio == pytest.approx(1.0, abs=0.7)  # 12 draws know it to a fifth; 3.5 of these
