@@ -7,13 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.decide import Weighed
+from diagnosis.decide import LAPSE, Weighed
 from diagnosis.gap import FALSE_ALARM_RATE
+from diagnosis.process_noise import LONGEST_BANDWIDTH
 from diagnosis.random_moments import RandomAnswer
 from diagnosis.reference_sizes import parameter_unit
 from diagnosis.reported import Base
 from diagnosis.result import Candidate, ParameterEstimate
 from diagnosis.study import COARSE_STEP, HUM, Study
+
+_AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends there was stopped
 
 
 def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
@@ -48,9 +51,11 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         left = study.nominal.excess / _block(study)
         closed = 1.0 - max(left, 0.0) / max(left + base.hum + base.extra, 1e-9)
         found.append(
-            Candidate(name, 0.99, left, float(np.clip(closed, 0.0, 1.0)), _short(_read_parameters(study)))
+            Candidate(
+                name, 1.0 - LAPSE, left, float(np.clip(closed, 0.0, 1.0)), _short(_read_parameters(study))
+            )
         )
-        found.append(Candidate("unknown", 0.01, left + base.hum + base.extra, 0.0))
+        found.append(Candidate("unknown", LAPSE, left + base.hum + base.extra, 0.0))
     none = 0.0 if study.read_off else min(study.test.p_value, FALSE_ALARM_RATE)
     found.append(Candidate("none", none, before / _block(study), 0.0))
     return _normalised(found)
@@ -80,7 +85,9 @@ def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
         inflate = float(np.sqrt(1.0 + max(hypothesis.fit.excess, 0.0)))
         for name in problem.effect_names:
             fit = hypothesis.fit
-            found[name] = ParameterEstimate(fit.value(name), fit.std(name) * inflate, units[name])
+            bound = fit.bound(name)
+            std = None if bound else fit.std(name) * inflate
+            found[name] = ParameterEstimate(fit.value(name), std, units[name], bound)
         for name, value in problem.fixed:
             found[name] = ParameterEstimate(value, 0.0, units[name])
     if random is not None:
@@ -110,7 +117,12 @@ def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
         f"{kind.name}.{severity.name}": ParameterEstimate(
             spectrum.intensity, spectrum.intensity * relative, "1"
         ),
-        f"{kind.name}.{place.name}": ParameterEstimate(spectrum.bandwidth, spectrum.bandwidth, "Hz"),
+        f"{kind.name}.{place.name}": ParameterEstimate(
+            spectrum.bandwidth,
+            None,
+            "Hz",
+            "upper" if spectrum.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None,
+        ),
     }
 
 
@@ -119,10 +131,10 @@ def _read_parameters(study: Study) -> dict[str, ParameterEstimate]:
     if study.hum is not None:
         amplitude, frequency = (f"{HUM.name}.{info.name}" for info in HUM.parameters())
         found[amplitude] = ParameterEstimate(study.hum.amplitude, study.hum.std, "rad")
-        found[frequency] = ParameterEstimate(study.hum.frequency, 1e-3, "Hz")
+        found[frequency] = ParameterEstimate(study.hum.frequency, study.hum.frequency_std, "Hz")
     if study.coarse:
         found[f"{COARSE_STEP.name}.{COARSE_STEP.parameters()[0].name}"] = ParameterEstimate(
-            study.step, 1e-7, "rad"
+            study.step, None, "rad"
         )
     return found
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from diagnosis.assemble import assemble, chosen_fit
 from diagnosis.comparable import comparable_runs
 from diagnosis.localise import localise
+from diagnosis.refusal import refuse_hopeless
 from diagnosis.result import Diagnosis
 from diagnosis.study import Progress, study
 from identification.examination.examine import examine
@@ -30,9 +31,11 @@ def diagnose(
         The answer, for the runs that one model can be fitted to; its cautions name any others.
 
     Raises:
-        TunnelError: when the examination refuses the records, or the nominal model cannot be fitted to them.
+        TunnelError: when the examination refuses the records, a run shows no decaying motion, or the nominal model
+            cannot be fitted to them.
     """
     examined = examine(campaign).accepted()
+    refuse_hopeless(examined.campaign)
     campaign, left_out = comparable_runs(examined.campaign)
     found = study(campaign, kinds, progress)
     if progress is not None:

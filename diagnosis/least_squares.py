@@ -11,6 +11,7 @@ from diagnosis.problem import Point, Problem
 from tunnel_sim.record import Array
 
 _MAX_ITERATIONS = 25
+_AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
 _TRIES = 9  # dampings tried in a step, each ten times the last
 
 
@@ -66,6 +67,17 @@ class Fit:
         """Its standard deviation, were the model right."""
         i = self.problem.names.index(name)
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+    def bound(self, name: str) -> str | None:
+        """``lower`` or ``upper`` where a common parameter lies at that end of its range; None inside it."""
+        i = self.problem.names.index(name)
+        value = self.point.common[i]
+        for end, limits in zip(("lower", "upper"), self.problem.bounds, strict=True):
+            if np.isfinite(limits[i]) and abs(value - limits[i]) <= _AT_BOUND * max(
+                abs(limits[i]), abs(value)
+            ):
+                return end
+        return None
 
 
 def fit(

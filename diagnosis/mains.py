@@ -36,12 +36,14 @@ class Hum:
         frequency: Hz.
         amplitude: of the fundamental, rad, root mean square over the runs.
         std: its standard deviation, rad.
+        frequency_std: standard deviation of the frequency, Hz; None where no amplitude stands out.
         excess: what it adds to the mean squared residual over the noise variance, a ratio.
     """
 
     frequency: float
     amplitude: float
     std: float
+    frequency_std: float | None
     excess: float
 
 
@@ -104,8 +106,27 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
     noise = 4.0 * variance / count  # of a squared amplitude
     amplitude = float(np.sqrt(max(sum(squares) / len(squares) - noise, 0.0)))
     std = float(np.sqrt(2.0 * variance / (count * len(squares))))
-    hum = Hum(frequency, amplitude, std, float(np.mean(powers)) / variance)
+    frequency_std = _frequency_std([run.record for run in campaign.runs], amplitude, variance)
+    hum = Hum(frequency, amplitude, std, frequency_std, float(np.mean(powers)) / variance)
     return dataclasses.replace(campaign, runs=tuple(cleaned)), hum
+
+
+def _frequency_std(records: list[Record], amplitude: float, variance: float) -> float | None:
+    """Of the peak of the windowed spectra of all records, Hz, by what white noise moves it, harmonics left out.
+
+    Of one record of window w the variance of ω is 2 S² Σw²τ²/(a Σwτ²)², τ from its middle: with a flat window that
+    is the bound 24 S²/(a² n T²) (Rife & Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591,
+    doi 10.1109/TIT.1974.1055282).
+    """
+    if not amplitude > 0.0:
+        return None
+    curvature, scatter = 0.0, 0.0
+    for record in records:
+        time = record.time_s - record.time_s.mean()
+        window = np.hanning(time.size)
+        curvature += float(window.sum() * (window @ time**2))
+        scatter += float(window.sum() ** 2 * (window**2 @ time**2))
+    return float(np.sqrt(2.0 * variance * scatter) / (amplitude * curvature * 2.0 * np.pi))
 
 
 def _line_power(record: Record, frequency: float) -> float:

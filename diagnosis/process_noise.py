@@ -22,7 +22,7 @@ from tunnel_sim.record import Array
 
 _INTERVAL = 0.012  # s between the residuals the filter sees: well above the rig's frequencies
 _SETTLE = 1.0  # s at the start left out: the filter's own transient
-_LONGEST_BANDWIDTH = 20.0  # Hz: the rig cannot tell a broader spectrum from white
+LONGEST_BANDWIDTH = 20.0  # Hz: the rig cannot tell a broader spectrum from white
 _LEAST_STROUHAL = 0.05  # bluff bodies shed at 0.1 to 0.3
 _LINE_SPACING = 0.3  # Hz, in the search for a line
 _WIDEST_LINE = 0.5  # Hz: beyond it a wandering line is turbulence
@@ -98,10 +98,10 @@ def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
     """
     if not centred:
         grid = [(s, b) for s in (3e-4, 1e-3, 3e-3, 1e-2, 3e-2) for b in (0.3, 3.0, 20.0)]
-        bounds = ((1e-7, 1.0), (0.03, _LONGEST_BANDWIDTH))
+        bounds = ((1e-7, 1.0), (0.03, LONGEST_BANDWIDTH))
         return _fit(fit, lambda x: Spectrum(x[0], x[1]), grid, bounds)
     about = [(s, b, f) for s in (1e-3, 3e-3, 1e-2) for b in (0.5, 2.0) for f in (1.5, 3.0, 4.5, 6.5, 9.0)]
-    limits = ((1e-7, 1.0), (0.1, _LONGEST_BANDWIDTH), (0.3, 20.0))
+    limits = ((1e-7, 1.0), (0.1, LONGEST_BANDWIDTH), (0.3, 20.0))
     return _fit(fit, lambda x: Spectrum(x[0], x[1], x[2]), about, limits)
 
 

@@ -17,17 +17,21 @@ class ParameterEstimate:
 
     Args:
         value: estimate, in the unit given.
-        std: standard deviation, in the unit given.
+        std: standard deviation, in the unit given; 0 where the value was given, not fitted; None where it is not
+            known.
         unit: of both.
+        bound: ``lower`` or ``upper`` where the fit stopped at that end of the range allowed; ``std`` is then None.
     """
 
     value: float
-    std: float
+    std: float | None
     unit: str
+    bound: str | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Value, std and unit."""
-        return {"value": self.value, "std": self.std, "unit": self.unit}
+        """Value, std and unit, and the bound where there is one."""
+        data: dict[str, Any] = {"value": self.value, "std": self.std, "unit": self.unit}
+        return data if self.bound is None else data | {"bound": self.bound}
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from diagnosis.outsiders import Outsider, weigh_outsiders
 from diagnosis.problem import Problem
 from diagnosis.random_moments import RandomAnswer, weigh_random_moments
 from diagnosis.rank import Hypothesis, polish, rank_pairs, rank_singles
+from diagnosis.refusal import refuse_indefinite
 from diagnosis.start import is_gross, nominal_start
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
@@ -162,12 +163,14 @@ def fit_nominal(data: Data) -> Fit:
         TunnelError: when no nominal model can be fitted.
     """
     try:
-        return fit(Problem(data), nominal_start(data))
+        found = fit(Problem(data), nominal_start(data))
     except (FitError, np.linalg.LinAlgError) as error:
         raise TunnelError(
             "the nominal model cannot be fitted",
             remedy="check spring stiffness, wind speed and that the runs are free decays of three cycles or more",
         ) from error
+    refuse_indefinite(found)
+    return found
 
 
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:

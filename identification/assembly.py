@@ -13,7 +13,15 @@ import numpy as np
 from scipy.stats import chi2
 
 from identification.damped_oscillation import Decay
-from identification.derivatives import Derivatives, Design, build_design, combine, derivatives, loads
+from identification.derivatives import (
+    Derivatives,
+    Design,
+    build_design,
+    combine,
+    derivatives,
+    loads,
+    positive_inertia,
+)
 from identification.estimate import (
     UNITS,
     Estimate,
@@ -23,7 +31,7 @@ from identification.estimate import (
     Status,
     by_gravity,
 )
-from identification.information import inverse
+from identification.information import determined, inverse
 from identification.springs import wind_off_line
 from tunnel_sim.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.record import Array
@@ -101,7 +109,10 @@ def combined_estimate(
     pairs = [
         (place, run, item.decay, item.covariance)
         for place, (run, item) in enumerate(zip(campaign.runs, found, strict=True))
-        if item.decay is not None and item.covariance is not None and run.spring_stiffness is not None
+        if item.decay is not None
+        and item.covariance is not None
+        and item.estimate.omega_n is not None
+        and run.spring_stiffness is not None
     ]
     statuses |= departures([run.noise for run in estimate.runs])
     if not pairs:
@@ -110,7 +121,10 @@ def combined_estimate(
     design = build_design(runs, campaign.rig)
     decays = np.array([[decay.rate, decay.stiffness] for _, _, decay, _ in pairs])
     informations = [inverse(covariance) for _, _, _, covariance in pairs]
-    parameters, covariance = combine(design, decays, informations)
+    combined = combine(design, decays, informations)
+    if combined is None:
+        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
+    parameters, covariance = combined
     ratio = _birge_ratio(design, parameters, decays, informations)
     if together is not None:
         parameters, covariance = together(design, [place for place, *_ in pairs], parameters, covariance)
@@ -143,10 +157,12 @@ def campaign_estimate(
     """
     found = derivatives(design, parameters)
     own = found.jacobian @ covariance @ found.jacobian.T
+    if found.names and not determined(own):
+        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
     air = air_of_runs(design, found, own, runs)
     return replace(
         estimate,
-        statuses=by_gravity(statuses | limits(design)),
+        statuses=by_gravity(statuses | limits(design, parameters)),
         runs=tuple(replace(run, **air.get(run.id, {})) for run in estimate.runs),
         **wind_off(estimate.runs, campaign.runs),
         **quantities(found, own, has_size=design.has_size),
@@ -203,11 +219,12 @@ def departures(levels: Sequence[NoiseLevel | None]) -> set[Status]:
     return statuses
 
 
-def limits(design: Design) -> set[Status]:
-    """What a campaign's conditions cannot show.
+def limits(design: Design, parameters: Array) -> set[Status]:
+    """What a campaign's conditions cannot show, and what they contradict.
 
     Args:
         design: of the campaign.
+        parameters: φ as found, shape (p,).
 
     Returns:
         The statuses that say so.
@@ -219,6 +236,8 @@ def limits(design: Design) -> set[Status]:
         statuses.add(Status.NO_REFERENCE_SIZE)
     if "g" not in design.columns:
         statuses.add(Status.STIFFNESS_NOT_SEPARABLE)
+    elif not positive_inertia(design, parameters):
+        statuses.add(Status.INERTIA_NOT_POSITIVE)
     if "d" not in design.columns:
         statuses.add(Status.DAMPING_NOT_SEPARABLE)
     return statuses

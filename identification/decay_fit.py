@@ -132,15 +132,15 @@ def fit_decays(
 
     Returns:
         The fit; ``converged`` is False where the iteration stalled: the values are then the best met, and
-        ``runs`` is empty where even the start was out of range.
+        ``runs`` is empty where even the start was out of range, or holds no motion.
     """
     best = _project(readings, links, np.asarray(start, dtype=np.float64), zero, prior)
     samples = sum(reading.time.size for reading in readings)
     damping, converged, iteration = 0.0, False, 0
     while best.runs and not converged and iteration < _MAX_ITERATIONS:
         iteration += 1
-        normal, gradient = _shared_system(best, links, zero is None, prior)
         try:
+            normal, gradient = _shared_system(best, links, zero is None, prior)
             step = scaled_solve(normal + damping * np.diag(np.diag(normal)), gradient)
         except np.linalg.LinAlgError:  # no motion in a run: nothing to identify there
             break
@@ -152,11 +152,15 @@ def fit_decays(
         if iteration == _MAX_ITERATIONS:
             converged = converged or promised <= _SETTLED * best.cost / samples
         damping = _next_damping(damping, gain)
-        if trial.cost <= best.cost:
+        if trial.runs and trial.cost <= best.cost:
             best = trial
+    nothing = DecayFit(best.parameters, best.zero, (), np.zeros((0, 0)), False, iteration)
     if not best.runs:
-        return DecayFit(best.parameters, best.zero, (), np.zeros((0, 0)), False, iteration)
-    normal, _ = _shared_system(best, links, zero is None, prior)
+        return nothing
+    try:
+        normal, _ = _shared_system(best, links, zero is None, prior)
+    except np.linalg.LinAlgError:
+        return nothing
     return DecayFit(best.parameters, best.zero, best.runs, normal, converged, iteration)
 
 

@@ -16,13 +16,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.estimate import PARAMETERS
-from identification.information import inverse, scaled_solve
+from identification.information import determined, inverse, scaled_solve
+from identification.springs import LEAST_SPREAD
 from tunnel_sim.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.campaign import RigProperties, Run
 from tunnel_sim.errors import TunnelError
 from tunnel_sim.record import Array
 
-_RANK_TOLERANCE = 1e-6  # of columns scaled to unit length; uncertain zero parameters are far above it
+# Smallest singular value of two columns scaled to unit length: that of two runs whose springs, or speeds, differ by
+# the least spread that counts.
+_RANK_TOLERANCE = LEAST_SPREAD / np.sqrt(8.0)
+_GREATEST = (
+    1e60  # of a stiffness or a moment in SI units, and its inverse the least: fourth powers are formed
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +82,10 @@ def loads(run: Run, rig: RigProperties) -> tuple[float, float]:
         rig: the rig's size.
 
     Raises:
-        TunnelError: when a wind-on run states no air density.
+        TunnelError: when a wind-on run states no air density, and when a stated value is so large or small that
+            computing with it is beyond the double precision.
     """
+    _within_range("spring_stiffness", run.spring_stiffness or 1.0, "N m/rad", run)
     if not run.wind_on:
         return 0.0, 0.0
     if run.air_density is None:
@@ -91,7 +99,19 @@ def loads(run: Run, rig: RigProperties) -> tuple[float, float]:
         "frontal_area": rig.frontal_area if known and rig.frontal_area is not None else 1.0,
         "reference_length": rig.reference_length if known and rig.reference_length is not None else 1.0,
     }
-    return aerodynamic_stiffness(1.0, **conditions), aerodynamic_damping(1.0, **conditions)
+    found = aerodynamic_stiffness(1.0, **conditions), aerodynamic_damping(1.0, **conditions)
+    for load, unit in zip(found, ("N m", "N m s"), strict=True):
+        _within_range("wind_speed, air_density and the sizes: their product", load, unit, run)
+    return found
+
+
+def _within_range(name: str, value: float, unit: str, run: Run) -> None:
+    if not 1.0 / _GREATEST < abs(value) < _GREATEST:
+        raise TunnelError(
+            f"{name} = {value:g} {unit} cannot be computed with",
+            where=f"run {run.id}",
+            remedy="correct its unit",
+        )
 
 
 def has_size(rig: RigProperties) -> bool:
@@ -132,7 +152,7 @@ def build_design(runs: Sequence[Run], rig: RigProperties) -> Design:
     return Design(tuple(links), columns, pairs[:, 0], pairs[:, 1], has_size(rig))
 
 
-def combine(design: Design, decays: Array, informations: Sequence[Array]) -> tuple[Array, Array]:
+def combine(design: Design, decays: Array, informations: Sequence[Array]) -> tuple[Array, Array] | None:
     """The shared parameters that fit the runs' own decays best, by generalised least squares.
 
     Args:
@@ -141,7 +161,7 @@ def combine(design: Design, decays: Array, informations: Sequence[Array]) -> tup
         informations: inverse covariance of each (a, k), shape (2, 2).
 
     Returns:
-        φ, shape (p,), and its covariance, shape (p, p).
+        φ, shape (p,), and its covariance, shape (p, p); None where the runs do not determine it.
     """
     pairs = list(zip(design.links, informations, strict=True))
     normal = sum((link.T @ weight @ link for link, weight in pairs), np.zeros((design.size, design.size)))
@@ -149,7 +169,7 @@ def combine(design: Design, decays: Array, informations: Sequence[Array]) -> tup
         (link.T @ weight @ decay for (link, weight), decay in zip(pairs, decays, strict=True)),
         np.zeros(design.size),
     )
-    return scaled_solve(normal, right), inverse(normal)
+    return (scaled_solve(normal, right), inverse(normal)) if determined(normal) else None
 
 
 def derivatives(design: Design, parameters: Array) -> Derivatives:
@@ -160,9 +180,9 @@ def derivatives(design: Design, parameters: Array) -> Derivatives:
         parameters: φ, shape (p,).
 
     Returns:
-        The parameters the design separates; none where it does not give Izz.
+        The parameters the design separates; none where it does not give Izz, or gives one that is not positive.
     """
-    if "g" not in design.columns:
+    if not positive_inertia(design, parameters):
         return Derivatives((), np.zeros(0), np.zeros((0, design.size)))
     inertia = 1.0 / float(parameters[design.columns["g"]])
     sources = {"cn_beta": "n", "cn_r": "m", "yaw_inertia": "g", "mechanical_damping": "d"}
@@ -182,8 +202,21 @@ def derivatives(design: Design, parameters: Array) -> Derivatives:
     return Derivatives(tuple(names), np.array(values), np.array(rows))
 
 
+def positive_inertia(design: Design, parameters: Array) -> bool:
+    """Whether the design gives Izz at all, and a positive one.
+
+    Args:
+        design: the campaign's design.
+        parameters: φ, shape (p,).
+    """
+    return "g" in design.columns and bool(parameters[design.columns["g"]] > 0.0)
+
+
 def _full_rank(block: Array) -> bool:
-    scaled = block / np.linalg.norm(block, axis=0)
+    lengths = np.linalg.norm(block, axis=0)
+    if not lengths.min() > 0.0:
+        return False
+    scaled = block / lengths
     return (
         bool(np.linalg.svd(scaled, compute_uv=False)[-1] > _RANK_TOLERANCE)
         and block.shape[0] >= block.shape[1]

@@ -6,6 +6,9 @@ import numpy as np
 
 from tunnel_sim.record import Array
 
+_WORST_CONDITION = 1e13
+_SMALLEST = 1e-290  # of a variance or an information: its square root and its inverse keep all their digits
+
 
 def eliminate(information: Array, score: Array, keep: int) -> tuple[Array, Array]:
     """The information and score of the first unknowns with the others eliminated (Schur complement).
@@ -36,9 +39,10 @@ def scaled_solve(matrix: Array, right: Array) -> Array:
     Raises:
         numpy.linalg.LinAlgError: when the matrix is singular.
     """
-    scale = np.sqrt(matrix.diagonal())
-    if not scale.min() > 0.0:
+    diagonal = matrix.diagonal()
+    if not diagonal.min() > 0.0:
         raise np.linalg.LinAlgError("an unknown has no influence on the reading")
+    scale = np.sqrt(diagonal)
     unit = scale if right.ndim == 1 else scale[:, None]
     if scale.size == 2:
         return _solve_two(float(matrix[0, 1] / (scale[0] * scale[1])), right / unit) / unit
@@ -56,9 +60,40 @@ def _solve_two(correlation: float, right: Array) -> Array:
 
 
 def inverse(information: Array) -> Array:
-    """The inverse of an information matrix, symmetric to the last bit."""
+    """The inverse of an information matrix that `determined` has passed, symmetric to the last bit.
+
+    Args:
+        information: shape (m, m).
+
+    Returns:
+        Shape (m, m).
+
+    Raises:
+        numpy.linalg.LinAlgError: when the matrix is singular.
+    """
     result = scaled_solve(information, np.eye(information.shape[0]))
     return np.asarray(0.5 * (result + result.T))
+
+
+def determined(matrix: Array) -> bool:
+    """Whether a symmetric matrix is positive definite to working precision, whatever the units of its unknowns.
+
+    This is asked of an information matrix before it is inverted, and of a covariance before it is used: where the
+    answer is no, the data do not tell the unknowns apart, and a status says so in place of a number.
+
+    Args:
+        matrix: shape (m, m).
+
+    Returns:
+        False where an element is not finite, a diagonal one is not positive, or the matrix scaled to a unit
+        diagonal has a condition number above 1e13: its inverse then holds less than three correct digits.
+    """
+    diagonal = matrix.diagonal()
+    if not (np.isfinite(matrix).all() and diagonal.min() > _SMALLEST and diagonal.max() < 1.0 / _SMALLEST):
+        return False
+    scale = np.sqrt(diagonal)
+    sizes = np.linalg.eigvalsh(matrix / scale[:, None] / scale)
+    return bool(sizes[0] * _WORST_CONDITION > sizes[-1])
 
 
 def embed(link: Array, *, with_zero: bool) -> Array:

@@ -25,6 +25,8 @@ from scipy.signal import lfilter
 from identification.damped_oscillation import Decay, response_rows
 from tunnel_sim.record import Array
 
+_GREATEST = 1e60  # of a growth or a variance over one interval: beyond it there is no filter
+
 
 @dataclass(frozen=True)
 class Driven:
@@ -88,7 +90,10 @@ def innovations(values: Array, interval: float, model: Driven, noise_variance: f
             return None
         motion_polynomial, filter_polynomial, variance = factors
         columns = lfilter(motion_polynomial, filter_polynomial, columns, axis=1)
-    regressors = columns[1:] / np.linalg.norm(columns[1:], axis=1, keepdims=True)
+    lengths = np.linalg.norm(columns[1:], axis=1, keepdims=True)
+    if not (np.isfinite(columns[0]).all() and lengths.min() > 0.0 and lengths.max() < np.inf):
+        return None
+    regressors = columns[1:] / lengths
     gram = regressors @ regressors.T
     try:
         solution = np.linalg.solve(gram, regressors @ columns[0])
@@ -109,6 +114,8 @@ def _started_by_moment(time: Array, model: Driven) -> tuple[Array, ...]:
 def _factored(interval: float, model: Driven, noise_variance: float) -> tuple[Array, Array, float] | None:
     # D, C and the innovations' variance.
     transition, disturbance = _discrete(interval, model)
+    if not max(np.abs(transition).max(), np.abs(disturbance).max()) < _GREATEST:
+        return None
     size = transition.shape[0]
     characteristic = np.real(np.poly(transition))
     # D(z) y = Σ mᵢ w(t−1−i) with mᵢ the first row of Φⁱ + d₁Φⁱ⁻¹ + … + dᵢ (Faddeev and LeVerrier).

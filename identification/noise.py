@@ -21,12 +21,13 @@ from tunnel_sim.record import Array
 
 FALSE_ALARM_RATE = 1e-3
 _STATEMENT_TOLERANCE = 0.05  # a stated or measured standard deviation is taken to be good to 5 %
-_FLOOR = 1e-7  # of the largest reading: no sensor and no integrator is better, so no smaller noise is claimed
+FLOOR = 1e-7  # of the largest reading: no sensor and no integrator is better, so no smaller noise is claimed
 _ORDER = 6
 # Variance of one sixth difference of unit white noise, and how many samples count as one independent one:
 # Σ (C(12, 6+j)/C(12, 6))² = C(24, 12)/C(12, 6)².
 _DIFFERENCE_GAIN = 924.0
 _SAMPLES_PER_DEGREE = 2704156.0 / 924.0**2
+_LONGEST_BLOCK = 1e9  # samples: longer than any record
 _CHANCE = 3.29  # two-sided 1e-3
 
 
@@ -54,7 +55,7 @@ def eighth_of_a_cycle(omega_n: float, sample_interval: float) -> int:
         omega_n: natural angular frequency, rad/s.
         sample_interval: s.
     """
-    return max(1, round(2.0 * np.pi / (8.0 * omega_n * sample_interval)))
+    return max(1, round(min(2.0 * np.pi / (8.0 * omega_n * sample_interval), _LONGEST_BLOCK)))
 
 
 def stated_noise(sensor: SensorProperties) -> float | None:
@@ -80,7 +81,7 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
     Returns:
         The level, with the verdicts on the model (``departs``) and on the statement (``disagrees``).
     """
-    floor = _FLOOR * max(residual.peak for residual in residuals)
+    floor = FLOOR * max(residual.peak for residual in residuals)
     unknowns = sum(residual.unknowns for residual in residuals)
     count = sum(residual.values.size for residual in residuals)
     squares = sum(float(residual.values @ residual.values) for residual in residuals)
@@ -116,7 +117,7 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
         Standard deviation of one sample, rad, quantisation included.
     """
     peak = 0.5 * float(np.ptp(reading))
-    floor = max(_FLOOR * peak, 1e-300)
+    floor = max(FLOOR * peak, 1e-300)
     fast, degrees = _fast_part([Residual(reading, 1, 0, peak)], floor)
     fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
     stated = stated_noise(sensor)

@@ -17,13 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from identification.derivatives import has_size
 from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, Status, by_gravity
-from identification.springs import wind_off_line
+from identification.springs import inertia_of_springs, wind_off_line
 from identification.uncertainty import widened_covariance
 from tunnel_sim.campaign import Campaign, Run
 from tunnel_sim.record import Array
@@ -103,11 +104,11 @@ def normalised_derivatives(
     return n_beta, -2.0 * LN2 * (1.0 / half_time - 1.0 / half_time_off)
 
 
-def _outcome(pairing: _Pairing, frequency: Array, rate: Array) -> Array:
+def _outcome(pairing: _Pairing, frequency: Array, rate: Array, *, with_line: bool) -> Array:
     # Izz and Cr, then Ka of each paired run, then Ca of each: all that is propagated.
     off = pairing.off
     omega = np.hypot(2.0 * np.pi * frequency[off], rate[off])
-    inertia = wind_off_line(pairing.stiffness[off], omega, np.zeros(len(off)))[0].value
+    inertia = inertia_of_springs(pairing.stiffness[off], omega**2, with_line=with_line)
     damping = 2.0 * inertia * float(rate[off].mean())
     moments = np.zeros((2, len(pairing.on)))
     for place, (i, partners) in enumerate(zip(pairing.on, pairing.partners, strict=True)):
@@ -155,8 +156,10 @@ def paired_estimate(
     if not pairing.off:
         return replace(estimate, statuses=by_gravity(statuses))
     seen = [one for one, _ in sprung]
-    centre, moves = _propagated(pairing, seen)
     line = _wind_off(pairing, seen)
+    if line["wind_off_inertia"] is None:
+        return replace(estimate, statuses=by_gravity(statuses | {Status.INERTIA_NOT_POSITIVE}))
+    centre, moves = _propagated(pairing, seen, with_line=line["wind_off_intercept"] is not None)
     air = _air_of_runs(pairing, seen, centre, np.linalg.norm(moves, axis=1))
     return replace(
         estimate,
@@ -174,16 +177,17 @@ def paired_estimate(
     )
 
 
-def _propagated(pairing: _Pairing, seen: Sequence[PairedRun]) -> tuple[Array, Array]:
+def _propagated(pairing: _Pairing, seen: Sequence[PairedRun], *, with_line: bool) -> tuple[Array, Array]:
     # The outcome, and its move per input moved by one standard deviation: shapes (q,) and (q, inputs).
     frequency = np.array([one.frequency for one in seen])
     rate = np.array([one.rate for one in seen])
-    centre = _outcome(pairing, frequency, rate)
+    outcome = partial(_outcome, pairing, with_line=with_line)
+    centre = outcome(frequency, rate)
     moves = []
     for i, one in enumerate(seen):
         unit = np.eye(len(seen))[i]
-        moves.append(_outcome(pairing, frequency + unit * one.frequency_std, rate) - centre)
-        moves.append(_outcome(pairing, frequency, rate + unit * one.rate_std) - centre)
+        moves.append(outcome(frequency + unit * one.frequency_std, rate) - centre)
+        moves.append(outcome(frequency, rate + unit * one.rate_std) - centre)
     return centre, np.array(moves).T
 
 

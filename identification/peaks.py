@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.noise import FLOOR as ROUNDING
 from tunnel_sim.record import Array, Record
 
 PEAK_HALF_WIDTH = 1.0 / 12.0  # of a period, either side of a peak, that its parabola is fitted to
@@ -61,10 +62,10 @@ def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
     period_half, period_std = _line(np.arange(count, dtype=np.float64), times[:count])
     return PeakDecay(
         rate=-slope,
-        rate_std=slope_std,
-        frequency_std=0.5 * period_std / period_half**2,
+        rate_std=max(slope_std, ROUNDING * frequency),
+        frequency_std=max(0.5 * period_std / period_half**2, ROUNDING * frequency),
         zero=zero,
-        zero_std=float(centres.std(ddof=1)) / np.sqrt(centres.size),
+        zero_std=max(float(centres.std(ddof=1) / np.sqrt(centres.size)), ROUNDING * float(sizes[0])),
     )
 
 

@@ -14,6 +14,7 @@ from identification.decay_fit import (
     RATE,
     STIFFNESS,
     ZERO,
+    DecayFit,
     Reading,
     RunFit,
     fit_run,
@@ -26,7 +27,7 @@ from identification.estimate import (
     WindowEstimate,
     by_gravity,
 )
-from identification.information import inverse
+from identification.information import determined, inverse
 from identification.noise import Residual, eighth_of_a_cycle, noise_level
 from identification.start import starting_decay, thinned_reading
 from identification.windows import fit_windows, modal_quantities
@@ -75,8 +76,8 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     start = starting_decay(run.record)
     if start is None:
         return _failed(run, reading, Status.NO_OSCILLATION)
-    fit = fit_run(reading, _near(run, start))
-    if not fit.converged or fit.runs[0].decay.stiffness <= 0.0:
+    fit = fit_from(run, reading, start)
+    if fit is None:
         return _failed(run, reading, Status.NOT_CONVERGED)
     fitted = fit.runs[0]
     noise, failure = judge(reading, fitted, fit.zero, sensor)
@@ -88,7 +89,23 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     estimate = describe_run(
         run, reading, fitted, fit.zero, covariance, variance, noise=noise, windows=windows
     )
-    return FittedRun(reading, fitted, noise, estimate)
+    found = None if estimate.omega_n is None else fitted
+    return FittedRun(reading, found, noise, estimate)
+
+
+def fit_from(run: Run, reading: Reading, start: Decay) -> DecayFit | None:
+    """The least-squares fit of a run by itself.
+
+    Args:
+        run: the run.
+        reading: all of its record.
+        start: decay to start from.
+
+    Returns:
+        The fit; None where it does not converge to a decay of positive stiffness.
+    """
+    fit = fit_run(reading, _near(run, start))
+    return fit if fit.converged and fit.runs[0].decay.stiffness > 0.0 else None
 
 
 def _near(run: Run, start: Decay) -> Decay:
@@ -144,7 +161,7 @@ def decay_covariance_of(fitted: RunFit) -> Array:
 def judge(
     reading: Reading, fitted: RunFit, zero: float, sensor: SensorProperties
 ) -> tuple[NoiseLevel, Status | None]:
-    """What the residual of one run's fit says of the noise, and whether there is a decay above it at all.
+    """What the residual of one run's fit says of the noise, and whether it shows a decay at all.
 
     Args:
         reading: what was fitted.
@@ -159,7 +176,7 @@ def judge(
     motion = reading.yaw - zero - fitted.residual
     if float(motion @ motion) < _LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
         return noise, Status.NO_OSCILLATION
-    return noise, None
+    return noise, None if determined(fitted.information) else Status.NOT_DETERMINED
 
 
 def describe_run(
@@ -189,8 +206,11 @@ def describe_run(
         windows: of the run.
 
     Returns:
-        The estimate with the statuses that its noise, its length and its spring call for.
+        The estimate with the statuses that its noise, its length and its spring call for; NOT_DETERMINED alone
+        where the method's covariance is none.
     """
+    if not determined(covariance):
+        return RunEstimate(run.id, (Status.NOT_DETERMINED,))
     rest, decay = [ZERO, ANGLE, ANGULAR_RATE], [RATE, STIFFNESS]
     own = inverse(fitted.information[np.ix_(rest, rest)])
     move = own @ fitted.information[np.ix_(rest, decay)]

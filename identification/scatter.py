@@ -80,15 +80,16 @@ def side_scatter(
     if not pairs:
         return nothing, nothing
     design = build_design(runs, campaign.rig)
-    fit, shared = _fit(design, [found for _, found in pairs])
-    if not fit.names:
+    fitted = _fit(design, [estimate for _, estimate in pairs])
+    if fitted is None or not fitted[0].names:
         return nothing, nothing
+    fit, shared = fitted
     covariance = fit.noise + _input_covariance(runs, campaign.rig, design, shared, individual)
     windy = np.repeat([run.wind_on for run in runs], 2)
     return _side(fit, covariance, ~windy), _side(fit, covariance, windy)
 
 
-def _fit(design: Design, estimates: Sequence[RunEstimate]) -> tuple[_Fit, Array]:
+def _fit(design: Design, estimates: Sequence[RunEstimate]) -> tuple[_Fit, Array] | None:
     decays, blocks = [], []
     for found in estimates:
         assert found.omega_n is not None
@@ -99,7 +100,10 @@ def _fit(design: Design, estimates: Sequence[RunEstimate]) -> tuple[_Fit, Array]
         jacobian = np.array([[zeta.value, omega.value], [2.0 * omega.value, 0.0]])
         blocks.append(jacobian @ np.diag([omega.std**2, zeta.std**2]) @ jacobian.T)
     informations = [inverse(block) for block in blocks]
-    shared, inverse_normal = combine(design, np.array(decays), informations)
+    combined = combine(design, np.array(decays), informations)
+    if combined is None:
+        return None
+    shared, inverse_normal = combined
     links = np.concatenate(design.links)
     weight = _diagonal(informations)
     gain = inverse_normal @ links.T @ weight

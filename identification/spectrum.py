@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from identification.readable import holds_motion
 from tunnel_sim.record import Array, Record, read_only
 
 _PADDING = 8  # zero padding: eight times the record, so the interpolated peak sits within 1/16 of a bin
@@ -17,7 +18,7 @@ class SpectralPeak:
     """The highest peak of a power spectral density.
 
     Args:
-        frequency: of the peak, Hz; 0 where the record is constant.
+        frequency: of the peak, Hz; 0 where the record holds no motion (`readable.holds_motion`).
         prominence: its power over the median's; white noise alone reaches 40 less than once in 1e6 records.
     """
 
@@ -42,6 +43,8 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
     Returns:
         The peak.
     """
+    if not holds_motion(record):
+        return SpectralPeak(0.0, 0.0)
     centred = record.yaw_rad - record.yaw_rad.mean()
     size = 1 << int(np.ceil(np.log2(padding * centred.size)))
     power = np.abs(np.fft.rfft(centred * _window(centred.size, falling), size)) ** 2

@@ -19,6 +19,11 @@ from tunnel_sim.record import Array
 # One set in ten, not in twenty: a flag costs only a look at a spring. The choice was made with Table II
 # in view, whose p-value is 0.06: its springs 4 and 7 are flagged at this rate and would not be at 5 %.
 FALSE_ALARM_RATE = 0.10
+# Of stiffnesses that count as different: a spring is hardly known to better than some per mille.
+LEAST_SPREAD = 0.01
+# Rise of ωn² over the springs in its standard deviations. The attenuation of the gradient is the inverse square,
+# here 1 %, a tenth of its standard deviation.
+_RESOLVED = 10.0
 _TRIALS = 9999  # sets of good springs the rule is calibrated on
 
 
@@ -89,11 +94,15 @@ def fit_springs(
     )
 
 
-def wind_off_line(stiffness: Array, omega_n: Array, omega_n_std: Array) -> tuple[Quantity, Quantity | None]:
+def wind_off_line(
+    stiffness: Array, omega_n: Array, omega_n_std: Array
+) -> tuple[Quantity | None, Quantity | None]:
     """Izz from wind-off runs: the gradient of Kr against ωn², or Kr/ωn² where there is one spring only.
 
     The standard deviation is the larger of what the scatter about the line gives and what the frequencies'
-    own standard deviations propagate to.
+    own standard deviations propagate to. Springs whose stated stiffnesses lie within 1 %, or that the frequencies
+    do not tell apart, count as one: a gradient over them would be that of their errors, and small for that (the
+    attenuation of Fuller, Measurement Error Models (1987), doi 10.1002/9780470316665, § 1.1).
 
     Args:
         stiffness: Kr per run, N m/rad, shape (n,).
@@ -101,14 +110,20 @@ def wind_off_line(stiffness: Array, omega_n: Array, omega_n_std: Array) -> tuple
         omega_n_std: its standard deviation, rad/s, shape (n,).
 
     Returns:
-        Izz in kg m², and the intercept in N m/rad; None with one spring.
+        Izz in kg m², and the intercept in N m/rad. The intercept is None with one spring; both are None where the
+        frequencies fall as the springs get stiffer.
     """
     squared, squared_std = omega_n**2, 2.0 * omega_n * omega_n_std
-    if np.unique(stiffness).size < 2:
+    away = stiffness - stiffness.mean()
+    apart = float(np.ptp(stiffness)) > LEAST_SPREAD * float(stiffness.max())
+    rise, rise_std = float(away @ squared), float(np.linalg.norm(away * squared_std))
+    if apart and rise < -_RESOLVED * rise_std:
+        return None, None
+    if not apart or rise < _RESOLVED * rise_std:
         inertias = stiffness / squared
         propagated = inertias * squared_std / squared / stiffness.size
         scatter = float(np.std(inertias, ddof=1)) / np.sqrt(stiffness.size) if stiffness.size > 1 else 0.0
-        std = max(float(np.linalg.norm(propagated)), scatter)
+        std = max(float(np.linalg.norm(propagated)), float(scatter))
         return Quantity(float(inertias.mean()), std, "kg m2"), None
     columns = np.column_stack((squared, np.ones_like(squared)))
     line, covariance = _least_squares(columns, stiffness)
@@ -119,6 +134,22 @@ def wind_off_line(stiffness: Array, omega_n: Array, omega_n_std: Array) -> tuple
     return Quantity(float(line[0]), float(std[0]), "kg m2"), Quantity(
         float(line[1]), float(std[1]), "N m/rad"
     )
+
+
+def inertia_of_springs(stiffness: Array, squared: Array, *, with_line: bool) -> float:
+    """Izz alone, as by `wind_off_line`, for other frequencies of the same springs.
+
+    Args:
+        stiffness: Kr per run, N m/rad, shape (n,).
+        squared: ωn² per run, rad²/s², shape (n,).
+        with_line: whether it is the gradient of a line; else the mean of Kr/ωn².
+
+    Returns:
+        Izz, kg m².
+    """
+    if not with_line:
+        return float(np.mean(stiffness / squared))
+    return float(_least_squares(np.column_stack((squared, np.ones_like(squared))), stiffness)[0][0])
 
 
 def _check(springs: Array, omega_squared: Array) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from identification.damped_oscillation import Decay
 from identification.decay_fit import Reading, projected_cost
+from identification.readable import holds_motion
 from identification.spectrum import psd_peak
 from identification.thinning import mean_of_blocks
 from tunnel_sim.record import Array, Record
@@ -26,7 +27,7 @@ def starting_decay(record: Record) -> Decay | None:
         record: the reading of one run.
 
     Returns:
-        The start; None where the record is constant.
+        The start; None where the record holds no motion, or no decay fits it at all.
     """
     frequency = starting_frequency(record)
     if frequency is None:
@@ -38,7 +39,8 @@ def starting_decay(record: Record) -> Decay | None:
     if integrated.stiffness > 0.0:
         candidates.append(integrated)
     costs = [projected_cost(thin, candidate) for candidate in candidates]
-    return candidates[int(np.argmin(costs))]
+    best = int(np.argmin(costs))
+    return candidates[best] if np.isfinite(costs[best]) else None
 
 
 def starting_frequency(record: Record) -> float | None:
@@ -48,14 +50,16 @@ def starting_frequency(record: Record) -> float | None:
         record: the reading of one run.
 
     Returns:
-        Hz; None where the record is constant.
+        Hz; None where the record holds no motion.
     """
+    if not holds_motion(record):
+        return None
     # A block mean hides what has two samples to the cycle or fewer: a record of some two thousand cycles.
     factor = max(1, record.time_s.size // _LONG)
     if factor > 1:
         record = Record(mean_of_blocks(record.time_s, factor), mean_of_blocks(record.yaw_rad, factor))
     frequency = psd_peak(record, padding=8 if factor == 1 else 1, falling=True).frequency
-    return None if frequency == 0.0 or np.ptp(record.yaw_rad) == 0.0 else frequency
+    return None if frequency == 0.0 else frequency
 
 
 def thinned_reading(record: Record, frequency: float) -> Reading:

@@ -13,6 +13,7 @@ class Status(Enum):
     NO_OSCILLATION = (
         "no decaying motion above the noise: check the sensor, or let the record start at the release"
     )
+    NOT_DETERMINED = "the record does not determine frequency and damping: lengthen it, or sample it faster"
     TOO_FEW_CYCLES = (
         "fewer than the three cycles the networks need after the first zero crossing: lengthen the record, or use "
         "output_error"
@@ -28,6 +29,10 @@ class Status(Enum):
     )
     FEW_CYCLES = "fewer than three cycles: lengthen the record for windows and a firm damping"
     NO_STIFFNESS = "no spring_stiffness, so normalised form only (omega_n, zeta): state it in campaign.toml"
+    INERTIA_NOT_POSITIVE = (
+        "the frequencies contradict the stated springs, so no inertia: check which spring and wind speed each run "
+        "states"
+    )
     NO_WIND_ON = "no wind-on runs, so no cn_beta and cn_r: add runs with the wind on"
     NO_WIND_OFF_PAIR = (
         "a wind-on run has no wind-off run of its spring: record one with the wind off, or use output_error"
@@ -54,6 +59,7 @@ _FAILED = (
     Status.NO_RUN_IDENTIFIED,
     Status.NOT_CONVERGED,
     Status.NO_OSCILLATION,
+    Status.NOT_DETERMINED,
     Status.TOO_FEW_CYCLES,
     Status.OUTSIDE_TRAINING,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.decay_fit import Reading
+from identification.readable import LEAST_SAMPLES
 from tunnel_sim.record import Array
 
 
@@ -14,13 +15,13 @@ def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[R
     Args:
         reading: the whole record.
         frequency: of its oscillation, Hz.
-        per_cycle: least number of blocks per period.
+        per_cycle: least number of blocks per period; the record itself gives eight at the least.
 
     Returns:
         The thinned reading, its clock that of the blocks' middles, and how many samples a block holds.
     """
     rate = (reading.time.size - 1) / float(reading.time[-1])
-    factor = max(1, int(rate / (per_cycle * frequency)))
+    factor = max(1, int(min(rate / (per_cycle * frequency), reading.time.size / LEAST_SAMPLES)))
     return Reading(mean_of_blocks(reading.time, factor), mean_of_blocks(reading.yaw, factor)), factor
 
 

@@ -63,3 +63,18 @@ def decay_covariance(rate: float, omega_d: float, rate_variance: float, omega_va
     """
     slope = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega_d]])
     return np.asarray(slope @ np.diag([rate_variance, omega_variance]) @ slope.T)
+
+
+def deviations(rate: float, omega_d: float, covariance: Array) -> tuple[float, float]:
+    """Standard deviations of decay rate and damped frequency, the inverse of `decay_covariance`.
+
+    Args:
+        rate: a, 1/s.
+        omega_d: damped angular frequency, rad/s, above 0.
+        covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
+
+    Returns:
+        Of a in 1/s and of ωd in rad/s.
+    """
+    slope = np.array([-rate, 0.5]) / omega_d
+    return float(np.sqrt(covariance[0, 0])), float(np.sqrt(slope @ covariance @ slope))

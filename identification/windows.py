@@ -21,7 +21,7 @@ from identification.decay_fit import (
     fit_run,
 )
 from identification.estimate import NoiseLevel, Quantity, WindowEstimate
-from identification.information import inverse
+from identification.information import determined, inverse
 from identification.noise import eighth_of_a_cycle
 from identification.start import starting_decay
 from tunnel_sim.record import Array, Record
@@ -130,7 +130,10 @@ def _window_estimate(
     if not np.isfinite(amplitude) or 0.5 * count * amplitude**2 < _LEAST_ENERGY * variance:
         return None
     order = [RATE, STIFFNESS, ANGLE, ANGULAR_RATE]
-    covariance = inverse(run.information[np.ix_(order, order)]) * variance
+    information = run.information[np.ix_(order, order)]
+    if not determined(information):
+        return None
+    covariance = inverse(information) * variance
     omega_n, zeta = modal_quantities(decay, covariance[:2, :2])
     # The middle of the window is where the amplitude hardly hangs on the damping: white noise gives A √(2/N).
     return WindowEstimate(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rich.text import Text
 
 from identification.examination.remark import Remark
-from tunnel_lab.formatting import coefficient_label, significant, unit_mark, with_std
+from tunnel_lab.formatting import at_bound, coefficient_label, significant, unit_mark, with_std
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -60,7 +60,8 @@ def parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Fitted parameters, name and value on a line each: a terminal of 80 columns holds no more beside an answer.
 
     Args:
-        parameters: value, std and unit by name; a std of zero means that the value was given, not fitted.
+        parameters: value, std and unit by name; a std of zero means that the value was given, not fitted, and
+            none that it is not known.
 
     Returns:
         Lines such as ``friction_moment =`` and ``  0.003991 ± 0.000006 N m``; of a pair, each effect's
@@ -73,10 +74,9 @@ def parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
         if owner != effect:
             effect = owner
             lines.append(f"{owner}:")
-        fixed = given["std"] == 0.0
-        value = significant(given["value"]) if fixed else with_std(given["value"], given["std"])
+        value = with_std(given["value"], given["std"]) if given["std"] else significant(given["value"])
         mark = "" if given["unit"] == "1" else " " + unit_mark(given["unit"])
-        lines += [f"{name} =", f"  {value}{mark}"]
+        lines += [f"{name} =", f"  {value}{mark}{at_bound(given)}"]
     return lines
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from typing import Any
 
 COEFFICIENTS: Mapping[str, str] = {
     "cn_beta": "Cnβ",
@@ -177,3 +178,15 @@ def _fixed(value: float, std: float, decimals: int) -> bool:
 def _exponent(value: float, digits: int) -> int:
     """Decimal exponent of ``value`` once rounded to ``digits`` significant digits."""
     return int(f"{value:.{digits - 1}e}".partition("e")[2]) if value != 0.0 else -300
+
+
+def at_bound(given: Mapping[str, Any]) -> str:
+    """What is said beside a parameter that stopped at the end of its range.
+
+    Args:
+        given: value, std and unit, and ``bound`` where there is one.
+
+    Returns:
+        Text such as `` (at its upper bound)``; empty inside the range.
+    """
+    return f" (at its {given['bound']} bound)" if given.get("bound") else ""

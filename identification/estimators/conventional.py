@@ -13,12 +13,16 @@ from typing import ClassVar
 
 import numpy as np
 
+from identification.assembly import departures
+from identification.damped_oscillation import Decay
 from identification.derivatives import loads
-from identification.estimate import Estimate, Quantity, RunEstimate, Status
+from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_gravity
 from identification.pairing import PairedRun, paired_estimate
 from identification.peaks import PeakDecay, peak_decay
+from identification.residual_check import residual_check
 from identification.spectrum import psd_peak
-from tunnel_sim.campaign import Campaign, Run
+from identification.weighted_line import decay_covariance, deviations
+from tunnel_sim.campaign import Campaign, Run, SensorProperties
 
 _LEAST_PROMINENCE = 40.0  # of the spectral peak; less may be noise
 
@@ -42,12 +46,13 @@ class Conventional:
             TunnelError: when a wind-on run states no air density.
         """
         pairs = [loads(run, campaign.rig) for run in campaign.runs]
-        seen = [_see(run) for run in campaign.runs]
+        seen = [_see(run, campaign.sensor) for run in campaign.runs]
         estimate = Estimate(campaign.name, self.name, tuple(_run_estimate(s) for s in seen))
         known = [(one, load) for one, load in zip(seen, pairs, strict=True) if one.peaks is not None]
         if not known:
             return replace(estimate, statuses=(Status.NO_RUN_IDENTIFIED,))
         statuses = {Status.RUN_LEFT_OUT} if len(known) < len(seen) else set()
+        statuses |= departures([one.noise for one in seen])
         return paired_estimate(campaign, estimate, [(_paired(one), load) for one, load in known], statuses)
 
 
@@ -58,12 +63,24 @@ class _Seen:
     run: Run
     frequency: float
     peaks: PeakDecay | None
+    noise: NoiseLevel | None = None
 
 
-def _see(run: Run) -> _Seen:
+def _see(run: Run, sensor: SensorProperties) -> _Seen:
     peak = psd_peak(run.record)
     peaks = peak_decay(run.record, peak.frequency) if peak.prominence > _LEAST_PROMINENCE else None
-    return _Seen(run, peak.frequency, peaks)
+    if peaks is None:
+        return _Seen(run, peak.frequency, None)
+    omega_d = 2.0 * np.pi * peak.frequency
+    check = residual_check(run, Decay(peaks.rate, omega_d**2 + peaks.rate**2), sensor)
+    if check is None:
+        return _Seen(run, peak.frequency, peaks)
+    own = decay_covariance(peaks.rate, omega_d, peaks.rate_std**2, (2.0 * np.pi * peaks.frequency_std) ** 2)
+    widened = check.widened(own)
+    if check.noise.departs:
+        rate_std, omega_std = deviations(peaks.rate, omega_d, widened)
+        peaks = replace(peaks, rate_std=rate_std, frequency_std=omega_std / (2.0 * np.pi))
+    return _Seen(run, peak.frequency, peaks, check.noise)
 
 
 def _run_estimate(seen: _Seen) -> RunEstimate:
@@ -74,12 +91,16 @@ def _run_estimate(seen: _Seen) -> RunEstimate:
     omega = float(np.hypot(omega_d, peaks.rate))
     omega_std = float(np.hypot(omega_d * omega_d_std, peaks.rate * peaks.rate_std)) / omega
     zeta_std = float(np.hypot(omega_d * peaks.rate_std, peaks.rate * omega_d_std)) * omega_d / omega**3
+    statuses = departures([seen.noise])
+    if seen.run.spring_stiffness is None:
+        statuses.add(Status.NO_STIFFNESS)
     return RunEstimate(
         id=seen.run.id,
-        statuses=(Status.NO_STIFFNESS,) if seen.run.spring_stiffness is None else (Status.OK,),
+        statuses=by_gravity(statuses),
         omega_n=Quantity(omega, omega_std, "rad/s"),
         zeta=Quantity(peaks.rate / omega, zeta_std, "1"),
         sensor_zero=Quantity(peaks.zero, peaks.zero_std, "rad"),
+        noise=seen.noise,
     )
 
 

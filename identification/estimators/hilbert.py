@@ -24,6 +24,7 @@ from identification.decay_fit import Reading, project_run
 from identification.envelope import Envelope, envelope
 from identification.estimate import Estimate, Quantity, Status, WindowEstimate
 from identification.noise import white_noise
+from identification.residual_check import residual_check
 from identification.run_fit import describe_run, judge
 from identification.start import starting_decay
 from identification.weighted_line import WeightedFit, decay_covariance, weighted_fit
@@ -73,6 +74,8 @@ class Hilbert:
             projected = project_run(reading, decay) if decay.omega_d > 0.0 else None
             if projected is None:
                 return RunDecay.failed(run, Status.NOT_CONVERGED)
+            if decay.omega_d * float(reading.time[-1]) < np.pi * _LEAST_POINTS:
+                break  # fewer half cycles than a line needs
             seen = envelope(reading, *projected)
             lines = _lines(seen, decay, noise_std)
             if lines is None:
@@ -86,13 +89,20 @@ class Hilbert:
         if failure is not None or covariance is None:
             return RunDecay.failed(run, failure or Status.NOT_CONVERGED)
         windows = _backbone(seen, noise_std, self.cycles_per_window)
-        estimate = describe_run(run, reading, fitted, zero, covariance, noise_std**2, windows=windows)
+        check = residual_check(run, decay, sensor)
+        noise = None if check is None else check.noise
+        covariance = covariance if check is None else check.widened(covariance)
+        estimate = describe_run(
+            run, reading, fitted, zero, covariance, noise_std**2, noise=noise, windows=windows
+        )
         return RunDecay(estimate, decay, covariance)
 
 
 def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array] | None:
     # The decay and the covariance of (a, k). Weights follow the line, not the noisy envelope itself.
     deviation = noise_std * np.sqrt(2.0 / seen.samples)
+    if not seen.amplitude.min() > 0.0:
+        return None
     scale = float(np.exp(np.mean(np.log(seen.amplitude[:4]) + decay.rate * seen.time[:4])))
     expected = scale * np.exp(-decay.rate * seen.time)
     found = None

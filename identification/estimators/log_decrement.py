@@ -25,6 +25,7 @@ from identification.decay_fit import Reading, project_run
 from identification.estimate import Estimate, Status
 from identification.noise import white_noise
 from identification.peaks import PEAK_HALF_WIDTH, follow_peaks
+from identification.residual_check import residual_check
 from identification.run_fit import describe_run, judge
 from identification.start import starting_frequency
 from identification.weighted_line import decay_covariance, weighted_fit
@@ -76,8 +77,11 @@ def _identify(run: Run, sensor: SensorProperties) -> RunDecay:
     _, failure = judge(reading, fitted, zero, sensor)
     if failure is not None:
         return RunDecay.failed(run, failure)
-    estimate = describe_run(run, reading, fitted, zero, found[1], noise_std**2)
-    return RunDecay(estimate, found[0], found[1])
+    check = residual_check(run, found[0], sensor)
+    noise = None if check is None else check.noise
+    covariance = found[1] if check is None else check.widened(found[1])
+    estimate = describe_run(run, reading, fitted, zero, covariance, noise_std**2, noise=noise)
+    return RunDecay(estimate, found[0], covariance)
 
 
 def _decay_of_peaks(

@@ -23,6 +23,8 @@ from typing import ClassVar
 import numpy as np
 from scipy.stats import chi2
 
+from identification.assembly import departures
+from identification.damped_oscillation import Decay
 from identification.derivatives import loads
 from identification.estimate import Estimate, Quantity, RunEstimate, Status, WindowEstimate, by_gravity
 from identification.neural.files import read_networks, shipped_networks
@@ -31,6 +33,9 @@ from identification.neural.shape import CYCLES, network_inputs, normalise, respo
 from identification.neural.three_cycles import ThreeCycles, find_windows
 from identification.noise import FALSE_ALARM_RATE, white_noise
 from identification.pairing import PairedRun, paired_estimate
+from identification.readable import holds_motion
+from identification.residual_check import residual_check
+from identification.windows import modal_quantities
 from tunnel_sim.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.record import Array
 
@@ -71,8 +76,9 @@ class NeuralNetwork:
         if not known:
             return replace(estimate, statuses=(Status.NO_RUN_IDENTIFIED,))
         statuses = {Status.RUN_LEFT_OUT} if len(known) < len(seen) else set()
-        if any(Status.MODEL_DEPARTS in found.statuses for found, _ in seen):
-            statuses.add(Status.MODEL_DEPARTS)
+        for status in (Status.MODEL_DEPARTS, Status.NOISE_DISAGREES):
+            if any(status in found.statuses for found, _ in seen):
+                statuses.add(status)
         return paired_estimate(campaign, estimate, known, statuses)
 
 
@@ -130,6 +136,8 @@ def read_windows(run: Run, sensor: SensorProperties, networks: Networks) -> tupl
     Returns:
         The readings, and how many cycles the record holds from its first crossing on; 0 where nothing oscillates.
     """
+    if not holds_motion(run.record):
+        return [], 0.0
     windows, cycles = find_windows(run.record, white_noise(run.record.yaw_rad, sensor))
     readings = []
     for window in windows:
@@ -153,7 +161,13 @@ def _identified(
         return RunEstimate(run.id, (Status.OUTSIDE_TRAINING,)), None
     own_zeta, own_omega = networks.own_stds(zeta, readings[0].window.t3)
     zeta_std, omega_std = float(np.hypot(zeta_std, own_zeta)), float(np.hypot(omega_std, own_omega * omega))
+    check = residual_check(run, Decay.from_modal(omega, zeta), sensor)
     statuses = {Status.MODEL_DEPARTS} if departs or drifts else set()
+    if check is not None:
+        statuses |= departures([check.noise])
+    if check is not None and check.noise.departs:
+        least_omega, least_zeta = modal_quantities(Decay.from_modal(omega, zeta), check.covariance)
+        zeta_std, omega_std = max(zeta_std, least_zeta.std), max(omega_std, least_omega.std)
     if run.spring_stiffness is None:
         statuses.add(Status.NO_STIFFNESS)
     omega_n = Quantity(omega, omega_std, "rad/s")
@@ -162,6 +176,7 @@ def _identified(
         statuses=by_gravity(statuses),
         omega_n=omega_n,
         zeta=Quantity(zeta, zeta_std, "1"),
+        noise=None if check is None else check.noise,
         windows=tuple(
             _shown(one, networks) for one in readings if networks.trained_for(one.zeta, one.omega_n)
         ),

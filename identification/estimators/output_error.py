@@ -19,7 +19,7 @@ from identification.assembly import air_of_runs, departures, limits, quantities,
 from identification.decay_fit import DecayFit, fit_decays
 from identification.derivatives import Design, build_design, combine, derivatives, loads
 from identification.estimate import Estimate, Quantity, Status, by_gravity
-from identification.information import eliminate
+from identification.information import determined, eliminate
 from identification.noise import noise_level
 from identification.run_fit import FittedRun, identify_run, residuals_of
 from identification.uncertainty import fisher_covariance, jackknife_std, widened_covariance
@@ -79,16 +79,20 @@ def _joint_estimate(
     runs = [run for run, _ in pairs]
     design = build_design(runs, campaign.rig)
     fit = _joint_fit(design, [item for _, item in pairs])
-    if not fit.converged:
+    if fit is not None and not fit.converged:
         return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_CONVERGED}))
+    if fit is None or not determined(fit.normal):
+        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
     readings = [item.reading for _, item in pairs]
     noise = noise_level(residuals_of(readings, fit.runs, fit.zero, _JOINT_UNKNOWNS), campaign.sensor)
     covariance = fisher_covariance(fit.normal, noise)
     found = derivatives(design, fit.parameters)
     own = found.jacobian @ covariance[:-1, :-1] @ found.jacobian.T
-    if noise.departs and found.names:
+    statuses = (
+        statuses | departures([noise, *(item.noise for _, item in pairs)]) | limits(design, fit.parameters)
+    )
+    if Status.MODEL_DEPARTS in statuses and found.names:
         own = widened_covariance(own, jackknife_std(fit.runs, design.links, found.jacobian))
-    statuses = statuses | departures([noise]) | limits(design)
     air = air_of_runs(design, found, own, runs)
     return replace(
         estimate,
@@ -101,10 +105,10 @@ def _joint_estimate(
     )
 
 
-def _joint_fit(design: Design, items: Sequence[FittedRun]) -> DecayFit:
+def _joint_fit(design: Design, items: Sequence[FittedRun]) -> DecayFit | None:
     # The runs' own (a, k), weighed by what each knows of them, are within a few deviations of the optimum.
     own = [item.fit for item in items if item.fit is not None]
     decays = np.array([[fit.decay.rate, fit.decay.stiffness] for fit in own])
     informations = [eliminate(fit.information, fit.score, 2)[0] for fit in own]
-    start, _ = combine(design, decays, informations)
-    return fit_decays([item.reading for item in items], design.links, start)
+    start = combine(design, decays, informations)
+    return None if start is None else fit_decays([item.reading for item in items], design.links, start[0])

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from identification.neural.shape import CYCLES, POINTS, Shape, normalise
+from identification.readable import LEAST_SAMPLES
 from identification.start import starting_decay
 from tunnel_sim.record import Array, Record
 
@@ -149,8 +150,9 @@ def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, .
 
 
 def _thinned(record: Record, period: float, noise_std: float) -> _Trace:
-    block = max(1, int(period / record.sample_interval / _SAMPLES_PER_CYCLE))
-    kept = record.time_s.size // block * block
+    samples = record.time_s.size
+    block = max(1, int(min(period / record.sample_interval / _SAMPLES_PER_CYCLE, samples / LEAST_SAMPLES)))
+    kept = samples // block * block
     time = (record.time_s[:kept] - record.time_s[0]).reshape(-1, block).mean(axis=1)
     yaw = record.yaw_rad[:kept].reshape(-1, block).mean(axis=1)
     spline = CubicSpline(time, yaw)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tunnel_lab.formatting import COEFFICIENTS, significant, unit_mark, with_std
+from tunnel_lab.formatting import COEFFICIENTS, at_bound, significant, unit_mark, with_std
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 
@@ -184,9 +184,9 @@ def estimate(values: Document) -> str:
     """
     unit = str(values.get("unit", ""))
     number = (
-        significant(values["value"], 5) + " (held)"
-        if not values["std"]
-        else with_std(values["value"], values["std"])
+        with_std(values["value"], values["std"])
+        if values["std"]
+        else significant(values["value"], 5) + (" (held)" if values["std"] == 0.0 else at_bound(values))
     )
     return _minus(f"{number} {'' if unit == '1' else unit_mark(unit)}".strip()).replace(" ", "\u00a0")
 
