@@ -46,7 +46,7 @@ def test_inputs_left_as_they_are_are_accepted(name, tmp_path, monkeypatch):
     target(tmp_path, np.random.default_rng(2))
 
 
-def test_a_trial_hangs_on_seed_and_number_alone():
+def test_seed_and_number_alone_decide_a_trial():
     first = [run_trial(7, index) for index in range(5)]
     assert [run_trial(7, index).verdict for index in reversed(range(5))] == [o.verdict for o in first][::-1]
     assert [trials.chosen(7, index)[1] for index in range(5)] == [o.target for o in first]

@@ -20,7 +20,7 @@ from tests.fuzz.readers import READERS, Target
 from tests.fuzz.verbs import diagnose_campaign, identify_campaign
 from tunnel_sim.errors import TunnelError
 
-SHARES = {"readers": 0.9685, "identify": 0.03, "diagnose": 0.0015}
+SHARES = {"readers": 0.966, "identify": 0.03, "diagnose": 0.004}
 """Which part of the trials goes where; a diagnosis takes seconds, a reader milliseconds."""
 LIMIT_S = {"readers": 5.0, "identify": 5.0, "diagnose": 60.0}
 """Processor time after which a trial hangs; a legitimate diagnosis of a small campaign takes up to a minute."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import resource
+import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -22,6 +23,7 @@ LATE = 2.0
 IDLE_S = 30.0
 """Likewise one that has nothing to do for so long, s."""
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS")
+_READY, _RETIRED = "ready", "retired"
 Shares = dict[str, float] | None
 Trial = Callable[[int, int, Shares], Outcome]
 _CONTEXT = multiprocessing.get_context("spawn")
@@ -32,6 +34,8 @@ class _Worker:
     process: BaseProcess
     pipe: Connection
     ready: bool = False
+    retired: bool = False  # grown too large; its trials are for another
+    ended: bool = False  # its pipe is closed and all it said is read
     left: list[int] = field(default_factory=list)
     begun: float = 0.0  # processor time when it last answered, s
     looked: tuple[float, float] = (0.0, 0.0)  # clock and processor time when it was last seen at work, s
@@ -72,7 +76,10 @@ def _outcomes(seed: int, indices: list[int], workers: int, shares: Shares, trial
     try:
         while todo or any(worker.left for worker in crew):
             for place, worker in enumerate(crew):
-                if worker.ready and not worker.left and todo:
+                if worker.retired and worker.left:
+                    todo.append(worker.left)
+                    worker.left = []
+                if worker.ready and not worker.retired and not worker.left and todo:
                     worker.left = todo.pop()
                     worker.pipe.send(worker.left)
                 lost = _lost(worker, seed, shares)
@@ -81,7 +88,7 @@ def _outcomes(seed: int, indices: list[int], workers: int, shares: Shares, trial
                     yield lost
                 if lost is not None or _has_retired(worker):
                     crew[place] = _started(seed, shares, trial)
-            ready = set(wait([worker.pipe for worker in crew], timeout=0.5))
+            ready = set(wait([worker.pipe for worker in crew if not worker.ended], timeout=0.5))
             for worker in crew:
                 if worker.pipe in ready:
                     yield from _received(worker)
@@ -92,16 +99,18 @@ def _outcomes(seed: int, indices: list[int], workers: int, shares: Shares, trial
 
 
 def _received(worker: _Worker) -> Iterator[Outcome]:
-    """An outcome, or None where the worker says that it is ready."""
+    """The outcome of a trial, where the worker does not speak of itself."""
     try:
-        outcome: Outcome | None = worker.pipe.recv()
+        outcome: Outcome | str = worker.pipe.recv()
     except (EOFError, OSError):
-        worker.process.join(1.0)
+        worker.ended = True
+        worker.process.join()
         return
     worker.ready = True
+    worker.retired = outcome == _RETIRED
     worker.begun = _processor_time(worker)
     worker.looked = (time.monotonic(), worker.begun)
-    if outcome is not None:
+    if isinstance(outcome, Outcome):
         worker.left.remove(outcome.index)
         yield outcome
 
@@ -112,8 +121,8 @@ def _lost(worker: _Worker, seed: int, shares: Shares) -> Outcome | None:
         return None
     index = worker.left[0]
     group, name, _ = chosen(seed, index, shares)
-    late = worker.process.is_alive() and _is_late(worker, LATE * LIMIT_S[group])
-    if worker.pipe.poll() or (worker.process.is_alive() and not late):
+    late = not worker.ended and _is_late(worker, LATE * LIMIT_S[group])
+    if not (worker.ended or late):
         return None
     said = "does not answer" if late else f"the process ended with {worker.process.exitcode}"
     worker.process.kill()
@@ -123,12 +132,12 @@ def _lost(worker: _Worker, seed: int, shares: Shares) -> Outcome | None:
 
 
 def _has_retired(worker: _Worker) -> bool:
-    """Whether a worker has ended between two trials, as one does that has grown too large.
+    """Whether a worker has ended between two trials, because it had grown too large.
 
     Raises:
         RuntimeError: when it never got so far.
     """
-    if worker.process.is_alive() or worker.left or worker.pipe.poll():
+    if worker.left or not worker.ended:
         return False
     if not worker.ready:
         raise RuntimeError(f"a worker ended before its first trial, with {worker.process.exitcode}")
@@ -168,14 +177,16 @@ def _started(seed: int, shares: Shares, trial: Trial) -> _Worker:
 
 def _work(pipe: Connection, seed: int, shares: Shares, trial: Trial) -> None:
     """What a worker does: trials, one outcome after the other, until it is ended or has grown too large."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends its workers
     if trial is run_trial:
         _prepare()
-    pipe.send(None)
+    pipe.send(_READY)
     while True:
         for index in pipe.recv():
             outcome = trial(seed, index, shares)
             pipe.send(outcome)
             if _peak() > MEMORY:  # a peak never goes down: a fresh process must judge the next trial
+                pipe.send(_RETIRED)
                 return
 
 
