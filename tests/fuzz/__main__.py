@@ -1,7 +1,7 @@
 """Mutated files and degenerate campaigns against every reader, ``identify`` and ``diagnose``.
 
 Allowed is a `TunnelError` of one line. Findings are any other exception, a warning, a trial of more than 5 s of
-the processor (60 s for a diagnosis), more than 2 GiB, or a process that dies. Seed and number
+the processor (60 s for a diagnosis) or one that waits, more than 2 GiB, and a process that dies. Seed and number
 alone decide a trial: --trial N repeats it in this process, with its traceback.
 """
 

@@ -240,11 +240,9 @@ def score_baseline(folder: Path, rng: Rng) -> None:
 
 
 def weights(folder: Path, rng: Rng) -> None:
-    """The networks' file, or its record, changed; the hash mostly agrees. Accepted ones read a window."""
+    """The networks' file, or its record, changed; the hash mostly agrees."""
     from identification.neural.files import read_networks
-    from identification.neural.three_cycles import ThreeCycles
 
-    del ThreeCycles
     content, record = seeds.weights()
     if rng.random() < 0.6:
         content = _changed_tensors(content, rng)

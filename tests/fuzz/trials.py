@@ -7,6 +7,7 @@ import io
 import resource
 import shutil
 import signal
+import sys
 import tempfile
 import traceback
 import warnings
@@ -195,9 +196,7 @@ def _processor_time() -> float:
 
 
 def _close_figures() -> None:
-    """Figures belong to no window manager here; this is for those that do."""
-    import sys
-
+    """Close what a failed trial has left open."""
     pyplot = sys.modules.get("matplotlib.pyplot")
     if pyplot is not None:
         pyplot.close("all")
