@@ -1,0 +1,339 @@
+"""Every reader of the project, each given a mutated input.
+
+A target takes an empty folder and a generator. It may raise `TunnelError` and nothing else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.fuzz import seeds
+from tests.fuzz.places import estranged
+from tests.fuzz.tables import changed_csv, changed_parquet
+from tests.fuzz.texts import as_json, as_toml, changed_bytes, changed_line, nested
+from tests.fuzz.values import Rng, mutated
+
+Target = Callable[[Path, Rng], None]
+STRANGE = 0.02
+"""Share of the trials in which a file becomes something other than a file."""
+
+
+def _toml(seed: bytes | dict[str, Any], rng: Rng) -> bytes:
+    tree = seeds.tree(seed) if isinstance(seed, bytes) else seed
+    if rng.random() < 0.75:
+        return as_toml(mutated(tree, rng), rng)
+    return changed_bytes(seed if isinstance(seed, bytes) else as_toml(tree, rng), rng)
+
+
+def _json(tree: Any, rng: Rng) -> bytes:
+    if rng.random() < 0.75:
+        return as_json(mutated(tree, rng), rng)
+    return changed_bytes(as_json(tree, rng), rng)
+
+
+def _written(path: Path, content: bytes, rng: Rng) -> Path:
+    """Write a file; now and then something that is no file stands there in the end."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+    if rng.random() < STRANGE:
+        estranged(path, rng)
+    return path
+
+
+def campaign_toml(folder: Path, rng: Rng) -> None:
+    """``campaign.toml`` changed, its runs whole."""
+    from tunnel_sim.campaign_io import read_campaign
+
+    for name in ("r1.csv", "r2.parquet"):
+        (folder / name).write_bytes(seeds.run_file(name))
+    _written(folder / "campaign.toml", _toml(seeds.campaign_document(), rng), rng)
+    read_campaign(folder)
+
+
+def _campaign_of(folder: Path, name: str, content: bytes, rng: Rng) -> None:
+    from tunnel_sim.campaign_io import read_campaign
+
+    document = seeds.campaign_document()
+    run = next(one for one in document["runs"] if one["file"] == name)
+    sensor = {key: value for key, value in document["sensor"].items() if rng.random() < 0.5}
+    (folder / "campaign.toml").write_bytes(as_toml(document | {"sensor": sensor, "runs": [run]}, rng))
+    _written(folder / name, content, rng)
+    read_campaign(folder)
+
+
+def run_csv(folder: Path, rng: Rng) -> None:
+    """A run's CSV file changed."""
+    _campaign_of(folder, "r1.csv", changed_csv(seeds.run_file("r1.csv"), rng), rng)
+
+
+def run_parquet(folder: Path, rng: Rng) -> None:
+    """A run's Parquet file changed."""
+    _campaign_of(folder, "r2.parquet", changed_parquet(seeds.run_frame(), rng), rng)
+
+
+def plan(folder: Path, rng: Rng) -> None:
+    """A campaign description changed, and its effects made."""
+    from tunnel_sim.plan import load_plan
+    from tunnel_sim.virtual_campaign import plan_effects
+
+    plan_effects(load_plan(_written(folder / "plan.toml", _toml(seeds.PLAN, rng), rng)))
+
+
+def rig(folder: Path, rng: Rng) -> None:
+    """A rig description changed."""
+    from tunnel_sim.rig import load_rig
+
+    load_rig(_written(folder / "rig.toml", _toml(seeds.packaged("rig.toml"), rng), rng))
+
+
+def spring_table(folder: Path, rng: Rng) -> None:
+    """A table of springs changed, and fitted and shown where it is accepted."""
+    import typer
+
+    from tunnel_lab.commands.springs import show
+    from tunnel_lab.spring_table import read_spring_table
+
+    table = read_spring_table(_written(folder / "springs.csv", changed_csv(seeds.springs_csv(), rng), rng))
+    try:
+        show(table, "springs.csv")
+    except typer.Exit:  # how the command says that there is no inertia
+        return
+
+
+def effect_option(_folder: Path, rng: Rng) -> None:
+    """The value of ``--effect`` changed, and the effect made."""
+    from tunnel_lab.effect_option import parse_effect
+    from tunnel_sim.effects import effect_from
+
+    setting = parse_effect(changed_line(seeds.EFFECT, rng))
+    effect_from(setting.name, setting.parameters)
+
+
+def kinds_option(_folder: Path, rng: Rng) -> None:
+    """The value of ``--kinds`` of ``tunnel blind make`` changed."""
+    from tunnel_sim.reference.make import parse_shares
+
+    parse_shares(changed_line(seeds.KINDS, rng))
+
+
+def uncertainties(folder: Path, rng: Rng) -> None:
+    """A file of uncertainties changed."""
+    from identification.input_uncertainty import load_uncertainties
+
+    load_uncertainties(_written(folder / "known.toml", _toml(seeds.UNCERTAINTIES, rng), rng))
+
+
+def estimate(_folder: Path, rng: Rng) -> None:
+    """An estimate's document changed; where it is accepted, it is written again."""
+    from identification.estimate import Estimate
+
+    Estimate.from_json_dict(nested(mutated(seeds.estimate_document(), rng), rng)).to_json_dict()
+
+
+def blind_answers(folder: Path, rng: Rng) -> None:
+    """Truth, answer, key or seal of a blind set changed; the hashes mostly agree."""
+    from diagnosis.blind import score_set
+    from tunnel_lab import blind_page
+
+    changed = ("truth", "answer", "seal")[rng.choice(3, p=(0.4, 0.4, 0.2))]
+    (folder / "c1").mkdir()
+    (folder / "c1" / "campaign.toml").write_bytes(b"")
+    sealed = rng.random() < 0.5
+    truth = {"truths": {"c1": seeds.TRUTH}, "made_with": seeds.MADE_WITH} if sealed else seeds.TRUTH
+    key = _json(truth, rng) if changed == "truth" else as_json(truth, rng)
+    _written(folder / ("key.json" if sealed else "c1/truth.json"), key, rng)
+    if sealed:
+        _seal_of_key(folder, key, changed, rng)
+    _answer(folder, changed, rng)
+    found = score_set(folder)
+    found.to_json_dict()
+    blind_page.markdown(found, "set")
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _seal_of_key(folder: Path, key: bytes, changed: str, rng: Rng) -> None:
+    from diagnosis.blind.files import folder_hash
+
+    seal = {"key_sha256": _digest(key), "campaigns_sha256": {"c1": folder_hash(folder / "c1")}}
+    content = _json(seal, rng) if changed == "seal" and rng.random() < 0.5 else as_json(seal, rng)
+    _written(folder / "seal.json", content, rng)
+
+
+def _answer(folder: Path, changed: str, rng: Rng) -> None:
+    from diagnosis.blind.files import folder_hash
+
+    document = seeds.answer_document() | {"data_sha256": folder_hash(folder / "c1")}
+    content = _json(document, rng) if changed == "answer" else as_json(document, rng)
+    _written(folder / "answers" / "c1.json", content, rng)
+    seal = {"answers_sha256": {"c1": _digest(content)}}
+    content = _json(seal, rng) if changed == "seal" else as_json(seal, rng)
+    _written(folder / "answers" / "seal.json", content, rng)
+
+
+def sweep_file(folder: Path, rng: Rng) -> None:
+    """A sweep file changed, and its folder begun where it is accepted."""
+    from tunnel_lab.sweep.reading import read_sweep
+    from tunnel_lab.sweep.store import begin
+
+    sweep = read_sweep(_written(folder / "sweep.toml", _toml(seeds.SMALL.encode(), rng), rng))
+    begin(sweep, folder / "out")
+
+
+def sweep_folder(folder: Path, rng: Rng) -> None:
+    """``sweep.json`` or a part of the results changed, as a sweep that goes on or is summed up meets it."""
+    from tunnel_lab.sweep.figures import overall_table, pace_table
+    from tunnel_lab.sweep.store import open_store
+    from tunnel_lab.sweep.summary import paces, summarise
+
+    files = dict(seeds.sweep_folder())
+    names = [name for name in files if name.startswith(("results", "timings"))]
+    changed = "sweep.json" if rng.random() < 0.4 else names[rng.integers(len(names))]
+    if changed == "sweep.json":
+        files[changed] = _json(json.loads(files[changed]), rng)
+    else:
+        files[changed] = changed_parquet(seeds.frame_of(files[changed]), rng)
+    for name, content in files.items():
+        if name == changed:
+            _written(folder / name, content, rng)
+        else:
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_bytes(content)
+    store = open_store(folder)
+    store.finished()
+    overall_table(summarise(store))
+    pace_table(paces(store))
+
+
+def score_grid(folder: Path, rng: Rng) -> None:
+    """A score grid changed."""
+    from tunnel_lab.scoring.grid import load_grid
+
+    load_grid(
+        _written(folder / "grid.toml", _toml(seeds.regression("score-grid.toml").read_bytes(), rng), rng)
+    )
+
+
+def score_baseline(folder: Path, rng: Rng) -> None:
+    """A baseline's table, or the grid in it, changed; where it is accepted, it is compared with itself."""
+    import polars as pl
+
+    from tunnel_lab.scoring.check import check
+    from tunnel_lab.scoring.results import read_trials
+
+    frame = seeds.baseline_frame()
+    if rng.random() < 0.5:
+        grid = _json(json.loads(frame["grid"][0]), rng).decode("utf-8", "replace")
+        content = seeds.parquet(frame.with_columns(pl.lit(grid).alias("grid")))
+    else:
+        content = changed_parquet(frame, rng)
+    found = read_trials(_written(folder / "baseline.parquet", content, rng))
+    check(found, found)
+
+
+def weights(folder: Path, rng: Rng) -> None:
+    """The networks' file, or its record, changed; the hash mostly agrees."""
+    from identification.neural.files import read_networks
+
+    content, record = seeds.weights()
+    if rng.random() < 0.6:
+        content = _changed_tensors(content, rng)
+    else:
+        record = mutated(record, rng)
+    if isinstance(record, dict) and rng.random() < 0.95:
+        record = record | {"weights_sha256": _digest(content)}
+    text = changed_bytes(as_json(record, rng), rng) if rng.random() < 0.1 else as_json(record, rng)
+    _written(folder / "w.json", text, rng)
+    read_networks(_written(folder / "w.safetensors", content, rng))
+
+
+def _changed_tensors(content: bytes, rng: Rng) -> bytes:
+    from safetensors.numpy import load, save
+
+    length = int.from_bytes(content[:8], "little")
+    kind = rng.integers(4)
+    if kind == 0:
+        return changed_bytes(content, rng, 0, 8 + length)
+    if kind == 1:
+        header = as_json(mutated(json.loads(content[8 : 8 + length]), rng), rng)
+        return len(header).to_bytes(8, "little") + header + content[8 + length :]
+    tensors = dict(load(content))
+    for _ in range(int(rng.integers(1, 3))):
+        name = list(tensors)[rng.integers(len(tensors))]
+        tensors[name] = _changed_array(tensors[name], rng)
+        if rng.random() < 0.1:
+            del tensors[name]
+    return bytes(save(tensors or {"none": np.zeros(1)}))
+
+
+def _changed_array(values: np.ndarray, rng: Rng) -> np.ndarray:
+    kind = rng.integers(6)
+    if kind == 0:
+        return np.ascontiguousarray(values.reshape(-1)[: rng.integers(values.size + 1)])
+    if kind == 1:
+        return values.reshape(1, -1)
+    if kind == 2:
+        return values.astype((np.float32, np.int64, np.bool_, np.float16)[rng.integers(4)])
+    changed = np.array(values, dtype=np.float64)
+    odd = float(rng.choice((0.0, -1.0, 1e-300, 1e300, 1e30, float("nan"), float("inf"))))
+    changed.reshape(-1)[rng.integers(changed.size) if kind == 3 and changed.size else slice(None)] = odd
+    return changed
+
+
+def checkpoint(folder: Path, rng: Rng) -> None:
+    """A training's checkpoint changed; the training goes on from what is accepted."""
+    from identification.neural.checkpoint import read_checkpoint
+    from identification.neural.train import train
+
+    spec, content = seeds.checkpoint()
+    kind = rng.integers(3)
+    if kind == 0:
+        content = changed_bytes(content, rng)
+    else:
+        content = _changed_tensors(content, rng) if kind == 1 else _changed_state(content, rng)
+    found = read_checkpoint(_written(folder / "w.partial", content, rng), spec.to_json_dict())
+    if found is not None:
+        train(spec, resume=found)
+
+
+def _changed_state(content: bytes, rng: Rng) -> bytes:
+    """The same tensors with the text beside them changed."""
+    length = int.from_bytes(content[:8], "little")
+    header = json.loads(content[8 : 8 + length])
+    document = json.loads(header["__metadata__"]["training"])
+    keep = {"spec": document["spec"]} if rng.random() < 0.8 else {}
+    changed = mutated({k: v for k, v in document.items() if k not in keep}, rng)
+    text = as_json(changed | keep if isinstance(changed, dict) else changed, rng).decode("utf-8", "replace")
+    header["__metadata__"]["training"] = text
+    raw = json.dumps(header).encode()
+    return len(raw).to_bytes(8, "little") + raw + content[8 + length :]
+
+
+READERS: dict[str, tuple[Target, float]] = {
+    "campaign_toml": (campaign_toml, 3.0),
+    "run_csv": (run_csv, 2.0),
+    "run_parquet": (run_parquet, 2.0),
+    "plan": (plan, 2.0),
+    "rig": (rig, 1.0),
+    "spring_table": (spring_table, 1.0),
+    "effect_option": (effect_option, 1.0),
+    "kinds_option": (kinds_option, 0.2),
+    "uncertainties": (uncertainties, 1.0),
+    "estimate": (estimate, 2.0),
+    "blind_answers": (blind_answers, 2.0),
+    "sweep_file": (sweep_file, 1.0),
+    "sweep_folder": (sweep_folder, 1.0),
+    "score_grid": (score_grid, 1.0),
+    "score_baseline": (score_baseline, 1.0),
+    "weights": (weights, 1.0),
+    "checkpoint": (checkpoint, 0.5),
+}
+"""Every reader with its weight among the readers."""

@@ -1,0 +1,203 @@
+"""Valid inputs, made once in each process: what is mutated starts from these."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import tempfile
+import tomllib
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import polars as pl
+
+from tests.fuzz.campaigns import free_decays
+from tests.fuzz.tables import parquet
+from tests.unit.sweep.small_sweep import SMALL
+
+_TESTS = Path(__file__).parents[1]
+PLAN = b"""
+name = "seed"
+seed = 1
+springs = [5, 8]
+spring_stiffness = [20.0]
+wind_speeds = [0.0, 15.0]
+release_angles_deg = [20.0]
+repeats = 2
+duration = 5.0
+air_density = 1.2
+truth = { cn_beta = 0.495, cn_r = -0.114, yaw_inertia = 0.1, mechanical_damping = 0.01 }
+sensor = { sample_rate = 500.0, noise_std = 0.001, resolution = 0.0, zero = 0.01 }
+
+[[effects]]
+name = "coulomb_friction"
+parameters = { friction_moment = 0.002 }
+
+[[effects]]
+name = "mains_hum"
+parameters = { amplitude = 1e-4 }
+"""
+UNCERTAINTIES = b"""
+schema_version = 1
+common = { spring_stiffness = 0.005, wind_speed = 0.01, air_density = 0.003, clock = 0.001 }
+individual = { spring_stiffness = 0.002, wind_speed = 0.005 }
+correlations = [{ between = ["wind_speed", "air_density"], coefficient = -0.5 }]
+"""
+EFFECT = "rod_flexibility:compliance=1e-4,inertia_share=0.3"
+KINDS = "single:2.0,pair:1.0,none:0.5,outside:0.5"
+
+
+@cache
+def campaign_document() -> dict[str, Any]:
+    """The tables of a campaign of two runs, one CSV and one Parquet."""
+    common = {"spring_stiffness": 16.12, "air_density": 1.2, "release_angle": 0.35}
+    return {
+        "schema_version": 1,
+        "campaign": {"name": "seed", "description": "two runs"},
+        "rig": {"yaw_inertia": 0.1, "frontal_area": 0.036, "reference_length": 0.625, "width": 0.225},
+        "sensor": {"sample_rate": 50.0, "resolution": 0.0005, "noise_std": 0.0005},
+        "runs": [
+            {"id": "r1", "file": "r1.csv", "wind_speed": 0.0, **common},
+            {"id": "r2", "file": "r2.parquet", "wind_speed": 15.0, **common},
+        ],
+    }
+
+
+@cache
+def run_frame() -> pl.DataFrame:
+    """Times and angles of a run."""
+    record = free_decays(np.random.default_rng(1)).runs[0].record
+    return pl.DataFrame({"time_s": record.time_s, "yaw_rad": record.yaw_rad})
+
+
+def tree(content: bytes | str) -> dict[str, Any]:
+    """TOML as a tree."""
+    return tomllib.loads(content if isinstance(content, str) else content.decode())
+
+
+def packaged(name: str) -> bytes:
+    """The bytes of a file under ``tunnel_sim/data``."""
+    return (resources.files("tunnel_sim") / "data" / name).read_bytes()
+
+
+def regression(name: str) -> Path:
+    """A file of the quick suite's score."""
+    return _TESTS / "regression" / name
+
+
+@cache
+def springs_csv() -> bytes:
+    """The paper's springs as a table a user would write."""
+    from tunnel_lab.commands.springs import paper_table
+
+    table = paper_table()
+    rows = zip(table.names, table.stiffness, table.frequency_hz, strict=True)
+    return "\n".join(
+        ["spring,stiffness_N_m_per_rad,frequency_Hz", *(f"{n},{k},{f}" for n, k, f in rows)]
+    ).encode()
+
+
+@cache
+def sweep_folder() -> dict[str, bytes]:
+    """The files of a sweep of which three shards of twelve are finished."""
+    from tunnel_lab.sweep.product import Sweep
+    from tunnel_lab.sweep.reading import read_sweep
+    from tunnel_lab.sweep.shard import run_shard
+    from tunnel_lab.sweep.store import begin
+
+    with tempfile.TemporaryDirectory() as name:
+        file = Path(name) / "sweep.toml"
+        file.write_text(SMALL.replace("records = true", "records = false"), encoding="utf-8")
+        sweep: Sweep = read_sweep(file)
+        store = begin(sweep, Path(name) / "out")
+        with patch.dict(os.environ, OMP_NUM_THREADS="1"):  # a store takes no shard of several threads
+            for index in range(3):
+                store.keep(run_shard(sweep.to_json(), index))
+        return {
+            str(path.relative_to(store.folder)): path.read_bytes()
+            for path in sorted(store.folder.rglob("*"))
+            if path.is_file()
+        }
+
+
+@cache
+def estimate_document() -> dict[str, Any]:
+    """The estimate of a small campaign, as JSON's types."""
+    from identification import identify
+
+    found: dict[str, Any] = identify(free_decays(np.random.default_rng(1)), "output_error").to_json_dict()
+    return json.loads(json.dumps(found, default=bool))
+
+
+@cache
+def weights() -> tuple[bytes, dict[str, Any]]:
+    """The networks that ship: their file and its record."""
+    folder = resources.files("identification") / "neural" / "weights"
+    return (folder / "paper.safetensors").read_bytes(), json.loads((folder / "paper.json").read_text("utf-8"))
+
+
+@cache
+def checkpoint() -> tuple[Any, bytes]:
+    """A training of a few steps, and the checkpoint it had after half of them."""
+    from identification.neural.train import TrainingSpec, train
+    from identification.neural.training_set import DataSpec
+
+    data = DataSpec(zeta_count=8, grid=(3, 4), test_count=4)
+    spec = TrainingSpec(seed=5, data=data, starts=1, damping_steps=2, frequency_steps=2)
+    kept: list[bytes] = []
+    train(spec, keep=lambda state: kept.append(state.to_bytes(spec.to_json_dict())))
+    return spec, kept[2]
+
+
+@cache
+def answer_document() -> dict[str, Any]:
+    """A diagnosis of one cause, as JSON's types."""
+    from diagnosis.result import (
+        Candidate,
+        Coefficients,
+        Confirmation,
+        Diagnosis,
+        GapSummary,
+        NoiseSummary,
+        ParameterEstimate,
+        RunGap,
+        Where,
+    )
+
+    values = {
+        "cn_beta": ParameterEstimate(0.45, 0.01, "1/rad"),
+        "cn_r": ParameterEstimate(-0.1, 0.01, "1/rad"),
+    }
+    friction = {"friction_moment": ParameterEstimate(0.004, 1e-5, "N m")}
+    gap = GapSummary(True, 2.0, 0.1, 0.99, (RunGap("r1", 2.0, 0.1),), 1e-3, 1e-9, {"lag": 1e-9})
+    return Diagnosis(
+        "c1", ("coulomb_friction",), "words", gap, Where("damping", "always", ("r1",), (0.0, 1.0), (0.0, 0.1)),
+        (Candidate("coulomb_friction", 0.9, 0.1, 0.99, friction), Candidate("none", 0.1, 2.0, 0.0)),
+        ("quadratic_damping",), None, Coefficients(values, values), Confirmation(True, 0.0, "r1", 0.0, 1e-5),
+        NoiseSummary(5e-4, None, "estimated", ""),
+    ).to_json_dict() | {"wall_s": 3.0}  # fmt: skip
+
+
+TRUTH: dict[str, Any] = {"effects": ["coulomb_friction"], "severity": 3.0, "cn_beta": 0.45, "cn_r": -0.1}
+MADE_WITH: dict[str, Any] = {"count": 1, "seed": 1, "kinds": {"single": 1.0}, "textbook": 0.5, "rare": 0.5}
+
+
+@cache
+def baseline_frame() -> pl.DataFrame:
+    """The quick suite's score baseline."""
+    return pl.read_parquet(regression("score-baseline.parquet"))
+
+
+def frame_of(content: bytes) -> pl.DataFrame:
+    """A Parquet file's table."""
+    return pl.read_parquet(io.BytesIO(content))
+
+
+def run_file(name: str) -> bytes:
+    """The seed run as a file of the kind its name says."""
+    return run_frame().write_csv().encode() if name.endswith(".csv") else parquet(run_frame())

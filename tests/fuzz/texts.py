@@ -1,0 +1,120 @@
+"""Trees as TOML and JSON, and bytes with some of them changed."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import tomli_w
+
+from tests.fuzz.values import DEEP, HOSTILE, NUMBERS, Rng, Tree
+
+_WORDS = (
+    b"nan", b"inf", b"1e999", b"9" * 5000, b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\r", b"\n", b'"', b"'", b"#",
+    b"[" * 5000, b"{" * 5000, b"]", b"}", b"=", b",", b";", b"\\", b"\xc3", b"PAR1", b"-", b".", b"\xd9\xa3", b"0x",
+    b"_1",
+)  # fmt: skip
+
+
+def as_toml(tree: Tree, rng: Rng) -> bytes:
+    """A tree as TOML; where TOML cannot say it, the text of a simpler one with bytes changed.
+
+    Args:
+        tree: a dictionary, if TOML is to hold it.
+        rng: decides how deep `DEEP` is.
+    """
+    try:
+        text = tomli_w.dumps(_without_none(tree)).encode("utf-8", "surrogatepass")
+    except (AttributeError, TypeError, ValueError):
+        text = repr(tree)[:100_000].encode("utf-8", "surrogatepass")
+    return _deepened(text, rng, b"[", b"]")
+
+
+def as_json(tree: Tree, rng: Rng) -> bytes:
+    """A tree as JSON, NaN and infinities with it, as Python writes them.
+
+    Args:
+        tree: any.
+        rng: decides how deep `DEEP` is.
+    """
+    text = json.dumps(tree, default=str).encode("utf-8", "surrogatepass")
+    return _deepened(text, rng, *((b"[", b"]") if rng.random() < 0.5 else (b'{"a":', b"}")))
+
+
+def nested(tree: Tree, rng: Rng) -> Tree:
+    """The tree with `DEEP` written out as lists in lists.
+
+    Args:
+        tree: any.
+        rng: decides how deep.
+    """
+    if isinstance(tree, dict):
+        return {key: nested(value, rng) for key, value in tree.items()}
+    if isinstance(tree, list):
+        return [nested(value, rng) for value in tree]
+    if not isinstance(tree, str) or tree != DEEP:
+        return tree
+    deep: Tree = 0.0
+    for _ in range(int(rng.integers(1, 2000))):
+        deep = [deep]
+    return deep
+
+
+def changed_bytes(content: bytes, rng: Rng, start: int = 0, end: int | None = None) -> bytes:
+    """Bytes with a few places changed.
+
+    Args:
+        content: any.
+        rng: decides what is changed.
+        start: first place that may change (a count of bytes).
+        end: past the last one; None for all.
+    """
+    data = bytearray(content)
+    end = len(data) if end is None else end
+    for _ in range(int(rng.integers(1, 6))):
+        place = int(rng.integers(start, max(start + 1, min(end, len(data) + 1))))
+        kind = rng.integers(6)
+        if kind == 0:
+            data[place : place + 1] = bytes([rng.integers(256)])
+        elif kind == 1:
+            del data[place : place + int(rng.integers(1, 40))]
+        elif kind == 2:
+            data[place:place] = _WORDS[rng.integers(len(_WORDS))]
+        elif kind == 3:
+            other = int(rng.integers(len(data) + 1))
+            data[place:place] = data[other : other + int(rng.integers(1, 40))]
+        elif kind == 4 and place < len(data):
+            data[place] ^= 1 << int(rng.integers(8))
+        elif kind == 5 and rng.random() < 0.2:
+            del data[place:]
+    return bytes(data)
+
+
+def changed_line(text: str, rng: Rng) -> str:
+    """A text with one word of it exchanged for an odd one; words end at ``:``, ``,``, ``=`` and line ends.
+
+    Args:
+        text: any.
+        rng: decides which.
+    """
+    cuts = [0, *(i for i, c in enumerate(text) if c in ":,=\n"), len(text)]
+    at = int(rng.integers(len(cuts) - 1))
+    odd = HOSTILE[rng.integers(len(HOSTILE))] if rng.random() < 0.5 else _number(rng)
+    return text[: cuts[at] + (at > 0)] + odd + text[cuts[at + 1] :]
+
+
+def _number(rng: Rng) -> str:
+    return str(NUMBERS[rng.integers(len(NUMBERS))])
+
+
+def _deepened(text: bytes, rng: Rng, opening: bytes, closing: bytes) -> bytes:
+    depth = int(np.exp(rng.uniform(0.0, np.log(20_000))))
+    return text.replace(f'"{DEEP}"'.encode(), opening * depth + b"0" + closing * depth)
+
+
+def _without_none(tree: Tree) -> Tree:
+    if isinstance(tree, dict):
+        return {str(key): _without_none(value) for key, value in tree.items() if value is not None}
+    if isinstance(tree, list):
+        return [_without_none(value) for value in tree if value is not None]
+    return tree
