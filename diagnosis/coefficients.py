@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from decimal import Decimal
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as student
 
 from diagnosis.decide import LAPSE, Weighed
 from diagnosis.held_out import HeldOut
@@ -16,6 +14,7 @@ from diagnosis.least_squares import Fit
 from diagnosis.rank import Hypothesis
 from diagnosis.result import ParameterEstimate
 from diagnosis.spectra import linear_coefficients
+from identification.uncertainty import scatter_of_runs
 from tunnel_sim.campaign import Campaign
 from tunnel_sim.effects.base import WindOnRun
 
@@ -133,11 +132,7 @@ def _value(fit: Fit, held_out: HeldOut, name: str) -> tuple[float | None, float]
 
 
 def _scatter_of_runs(fit: Fit, name: str) -> float:
-    """Standard deviation of a common parameter from the runs' own scores, whatever colours their residuals.
-
-    The sandwich estimator with a run as the cluster (Liang & Zeger, Biometrika 73 (1986) 13,
-    doi 10.1093/biomet/73.1.13), widened by Student's t for the few runs with wind that speak for Cnβ and Cnr.
-    """
+    """Standard deviation of a common parameter from the scatter of the runs."""
     count = len(fit.problem.names)
     information, scores = np.zeros((count, count)), []
     for (common, release), residual in zip(fit.jacobian, fit.residuals, strict=True):
@@ -146,11 +141,10 @@ def _scatter_of_runs(fit: Fit, name: str) -> float:
         scores.append(left.T @ residual)
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12, hermitian=True)
-    influence = np.array(scores) / scale @ inverse / scale
+    influences = np.array(scores) / scale @ inverse / scale
+    place = fit.problem.names.index(name)
     speaking = sum(run.wind_on or not name.startswith("cn_") for run in fit.problem.data.runs)
-    free = max(speaking - 2, 1)
-    variance = float(np.sum(influence[:, fit.problem.names.index(name)] ** 2)) * speaking / free
-    return math.sqrt(variance) * float(student.ppf(0.975, free) / norm.ppf(0.975))
+    return float(scatter_of_runs(influences[:, place : place + 1], np.array([speaking]))[0])
 
 
 def _value_only(fit: Fit, name: str) -> float | None:

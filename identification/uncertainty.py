@@ -1,9 +1,8 @@
 """Standard deviations that stay honest when the model does not explain the data.
 
 Where it does, the covariance is the inverse of Fisher's information. Where it does not, the residual is not
-white: the variances are widened by its power in the band of the oscillation, and by how much the answer moves
-when one run after the other is left out (delete-one jackknife, linearised; Efron & Stein, Ann. Statist. 9
-(1981) 586–596, doi 10.1214/aos/1176345462), whichever is more.
+white: the variances are widened by its power in the band of the oscillation, or to the scatter of the runs,
+whichever is more. The diagnosis widens by the same scatter.
 """
 
 from __future__ import annotations
@@ -11,29 +10,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from identification.decay_fit import RunFit
 from identification.estimate import NoiseLevel
 from identification.information import embed, inverse, scaled_solve
 from tunnel_sim.record import Array
 
-_LEAST_RUNS = 3
-_WORST_CONDITION = 1e10
 
-
-def widened_covariance(covariance: Array, jackknife_std: Array | None) -> Array:
-    """Raise the standard deviations that fall short of the jackknife's, keeping the correlations.
+def widened_covariance(covariance: Array, least_std: Array) -> Array:
+    """Raise the standard deviations that fall short, keeping the correlations.
 
     Args:
         covariance: shape (p, p).
-        jackknife_std: shape (p,); None where there is none.
+        least_std: shape (p,).
 
     Returns:
         Shape (p, p).
     """
-    if jackknife_std is None:
-        return covariance
-    factor = np.maximum(1.0, jackknife_std / np.sqrt(np.diag(covariance)))
+    factor = np.maximum(1.0, least_std / np.sqrt(np.diag(covariance)))
     return np.asarray(covariance * np.outer(factor, factor))
 
 
@@ -50,8 +47,26 @@ def fisher_covariance(normal: Array, noise: NoiseLevel) -> Array:
     return inverse(normal) * (noise.std**2 * noise.slow_ratio)
 
 
-def jackknife_std(runs: Sequence[RunFit], links: Sequence[Array], jacobian: Array) -> Array | None:
-    """How much parameters move when one run is left out, as standard deviations.
+def scatter_of_runs(influences: Array, speaking: NDArray[np.int64]) -> Array:
+    """How far the runs move parameters about their joint estimate, whatever colours the residuals.
+
+    The sandwich estimator with a run as the cluster (Liang & Zeger, Biometrika 73 (1986) 13,
+    doi 10.1093/biomet/73.1.13), widened by Student's t for the few runs that bear on a parameter.
+
+    Args:
+        influences: of every run, what its residual contributes to the parameters, shape (runs, q).
+        speaking: how many runs bear on each parameter, shape (q,).
+
+    Returns:
+        Standard deviations, shape (q,): 1.96 of them on either side are a 95 % interval.
+    """
+    free = np.maximum(speaking - 2, 1)
+    spread = np.sqrt(np.sum(influences**2, axis=0) * speaking / free)
+    return np.asarray(spread * student.ppf(0.975, free) / norm.ppf(0.975))
+
+
+def run_influences(runs: Sequence[RunFit], links: Sequence[Array], jacobian: Array) -> Array:
+    """What each run's residual contributes to parameters fitted to all runs.
 
     Args:
         runs: of the joint fit, with the zero common to them.
@@ -59,23 +74,12 @@ def jackknife_std(runs: Sequence[RunFit], links: Sequence[Array], jacobian: Arra
         jacobian: of the wanted parameters to φ, shape (q, p).
 
     Returns:
-        Shape (q,); None where the campaign cannot spare a run.
+        Shape (runs, q).
     """
-    if len(runs) < _LEAST_RUNS:
-        return None
-    informations, scores = [], []
+    total, scores = np.zeros((links[0].shape[1] + 1,) * 2), []
     for run, link in zip(runs, links, strict=True):
         information, score = run.reduced()
         extended = embed(link, with_zero=True)
-        informations.append(extended.T @ information @ extended)
+        total += extended.T @ information @ extended
         scores.append(extended.T @ score)
-    total = np.sum(informations, axis=0)
-    moves = []
-    for information, score in zip(informations, scores, strict=True):
-        rest = total - information
-        scale = np.sqrt(np.diag(total))
-        if np.linalg.cond(rest / np.outer(scale, scale)) > _WORST_CONDITION:
-            return None
-        moves.append(jacobian @ -scaled_solve(rest, score)[:-1])
-    spread = np.array(moves) - np.mean(moves, axis=0)
-    return np.asarray(np.sqrt((len(runs) - 1) / len(runs) * np.sum(spread**2, axis=0)))
+    return np.asarray((jacobian @ scaled_solve(total, np.array(scores).T)[:-1]).T)

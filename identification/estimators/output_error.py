@@ -22,7 +22,7 @@ from identification.estimate import Estimate, Quantity, Status, by_gravity
 from identification.information import determined, eliminate
 from identification.noise import noise_level
 from identification.run_fit import FittedRun, identify_run, residuals_of
-from identification.uncertainty import fisher_covariance, jackknife_std, widened_covariance
+from identification.uncertainty import fisher_covariance, run_influences, scatter_of_runs, widened_covariance
 from tunnel_sim.campaign import Campaign, Run
 
 _JOINT_UNKNOWNS = 2  # of a run's own in the joint fit: its initial angle and rate
@@ -92,7 +92,10 @@ def _joint_estimate(
         statuses | departures([noise, *(item.noise for _, item in pairs)]) | limits(design, fit.parameters)
     )
     if Status.MODEL_DEPARTS in statuses and found.names:
-        own = widened_covariance(own, jackknife_std(fit.runs, design.links, found.jacobian))
+        windy = sum(run.wind_speed > 0.0 for run in runs)
+        speaking = np.array([windy if name.startswith("cn_") else len(runs) for name in found.names])
+        influences = run_influences(fit.runs, design.links, found.jacobian)
+        own = widened_covariance(own, scatter_of_runs(influences, speaking))
     air = air_of_runs(design, found, own, runs)
     return replace(
         estimate,
