@@ -56,6 +56,7 @@ def _cover(tests: list[str]) -> int:
 def _run(options: argparse.Namespace) -> int:
     chooser = Chooser(ROOT, WORK, options.budget)
     mutants = draw(ROOT, options.count, options.seed)
+    numbers = {mutant: number for number, mutant in enumerate(mutants)}
     if options.only:
         mutants = [mutants[number] for number in options.only]
     with tempfile.TemporaryDirectory() as scratch:
@@ -77,7 +78,7 @@ def _run(options: argparse.Namespace) -> int:
             trials = []
             for done in as_completed([pool.submit(one, mutant) for mutant in mutants]):
                 trials.append(done.result())
-                _tell(mutants.index(trials[-1].mutant), trials[-1])
+                _tell(numbers[trials[-1].mutant], trials[-1])
     _summary(trials)
     return 0
 
@@ -95,6 +96,8 @@ def _control(chooser: Chooser, mutants: list[Mutant], copies: queue.Queue[Path])
 def _tell(number: int, trial: Trial) -> None:
     cost = f"{trial.tests:5} tests {trial.seconds:6.1f} s"
     print(f"{number:3} {trial.outcome:9}{cost}  {trial.mutant.words(ROOT)}", flush=True)
+    killer = next((line for line in trial.log.splitlines() if line.startswith(("FAILED", "ERROR"))), "")
+    print(f"    by {killer}"[:200] if killer else "", flush=True)
 
 
 def _summary(trials: list[Trial]) -> None:

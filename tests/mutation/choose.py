@@ -41,7 +41,7 @@ class Chooser:
         if not whole:
             whole = self._tests(self._importers(mutant.path))
         head = self._cheapest(first)
-        return head, _importing_tests(self._root, mutant.path), self._cheapest(whole - set(head))
+        return head, self._importing(mutant.path, set(head)), self._cheapest(whole - set(head))
 
     def _tests(self, contexts: Iterable[str]) -> set[str]:
         """Tests of some contexts; what a fixture ran belongs to every test of its file."""
@@ -53,6 +53,12 @@ class Chooser:
             elif name:
                 found.update(self._by_file[name.partition("::")[0]])
         return {name for name in found if name in self._seconds}
+
+    def _importing(self, path: str, done: set[str]) -> list[str]:
+        """Tests of the files that import a module; of a file without a record all, unseen."""
+        files = _importing_tests(self._root, path)
+        known = self._tests(f"{name}|run" for file in files for name in self._by_file.get(file, ()))
+        return [*(file for file in files if file not in self._by_file), *self._cheapest(known - done)]
 
     def _importers(self, path: str) -> Iterable[str]:
         """Contexts of the modules that import a module none of whose lines ran inside a test."""
