@@ -15,7 +15,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from tests.mutation.choose import Chooser
-from tests.mutation.draw import Mutant, draw
+from tests.mutation.draw import PACKAGES, Mutant, draw
 from tests.mutation.trial import Trial, attempt, copy_of_tree, run
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,6 +31,7 @@ def main() -> int:
     trials = commands.add_parser("run", help="draw mutants and run their tests")
     trials.add_argument("--count", type=int, default=100, help="mutants")
     trials.add_argument("--seed", type=int, default=1, help="of the draw")
+    trials.add_argument("--under", nargs="+", default=PACKAGES, help="only modules in these folders")
     trials.add_argument("--only", type=int, nargs="+", help="numbers of the mutants of the draw to try")
     trials.add_argument("--jobs", type=int, default=os.cpu_count(), help="mutants at a time")
     trials.add_argument("--budget", type=float, default=60.0, help="seconds of tests for a mutant and round")
@@ -55,7 +56,7 @@ def _cover(tests: list[str]) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     chooser = Chooser(ROOT, WORK, options.budget)
-    mutants = draw(ROOT, options.count, options.seed)
+    mutants = draw(ROOT, options.count, options.seed, options.under)
     numbers = {mutant: number for number, mutant in enumerate(mutants)}
     if options.only:
         mutants = [mutants[number] for number in options.only]

@@ -9,7 +9,7 @@ import random
 import re
 import tokenize
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -60,19 +60,20 @@ class Mutant:
         return f"{self.path}:{line}: {old.strip()}  ->  {new.strip()}"
 
 
-def draw(root: Path, count: int, seed: int) -> list[Mutant]:
+def draw(root: Path, count: int, seed: int, under: Sequence[str] = PACKAGES) -> list[Mutant]:
     """Mutants that compile and that no rule below calls equivalent.
 
     Args:
         root: of the project.
         count: how many.
         seed: of the draw.
+        under: folders whose modules take part.
 
     Returns:
         Mutants in the order drawn; no place twice.
     """
     rng = random.Random(seed)
-    paths = [p for name in PACKAGES for p in sorted((root / name).rglob("*.py"))]
+    paths = [p for name in under for p in sorted((root / name).rglob("*.py"))]
     weights = [_weight(path) for path in paths]
     found: dict[tuple[Path, Span], Mutant] = {}
     while len(found) < count:
