@@ -109,7 +109,7 @@ def _summary(trials: list[Trial]) -> None:
     low, high = _wilson(caught, len(trials))
     print(f"\n{dict(counts)}")
     print(
-        f"caught {caught} of {len(trials)}: {caught / len(trials):.1%} (95 % Wilson {low:.1%} to {high:.1%})"
+        f"killed {caught} of {len(trials)}: {caught / len(trials):.1%} (95 % Wilson {low:.1%} to {high:.1%})"
     )
     for trial in trials:
         if trial.outcome != "killed":

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
+from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
 from tunnel_lab.report import render_report, view
 
@@ -247,3 +247,14 @@ def test_the_kind_of_the_answer(given: Document, changes: Document, kind: str) -
     facts = [fact.value for fact in view.facts(given | changes)]
     assert ("98.8 %" in facts) == (kind in ("open", "found"))
     assert ("damping" in facts) == (kind != "none")
+
+
+def test_a_value_that_was_held_has_five_digits() -> None:
+    text = view.estimate({"value": -0.123456789, "std": 0.0, "unit": "1"})
+    assert "0.12346" in text
+    assert "0.123457" not in text
+
+
+def test_what_is_known_is_told_of_the_vocabulary_only(given: Document) -> None:
+    named = view.cause_paragraphs(given | {"causes": [CAUSE], "ambiguous_with": ["unknown", RIVAL]})
+    assert [cause["name"] for cause in named] == [CAUSE.replace("_", " "), RIVAL.replace("_", " ")]
