@@ -106,8 +106,8 @@ def run(tests: Sequence[str], copy: Path, limit: float) -> tuple[str, str]:
             os.killpg(child.pid, signal.SIGKILL)
     child.join()
     end = "\n".join(log.read_text("utf-8", errors="replace").splitlines()[-12:]) if log.exists() else ""
-    if late:
-        return "timeout", end
+    if late:  # a test may have failed before something hung at the end
+        return ("killed" if "\nFAILED " in f"\n{end}" else "timeout"), end
     return _MEANING.get(child.exitcode or 0, "killed" if (child.exitcode or 0) < 0 else "broken"), end
 
 
