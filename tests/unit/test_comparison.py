@@ -1,11 +1,12 @@
 """The tests behind ``--check``: nothing where nothing changed, and every planted change."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identification.comparison import ASPECTS, changes, holm
+from identification.comparison import ASPECTS, _rank_sum, changes, holm
 from identification.scoring import Trials
 
 CELLS, COUNT = 6, 60
@@ -123,3 +124,18 @@ def test_nothing_identified_is_a_matter_of_failures_only():
     found = {change.aspect: change.p_value for change in changes(several(1)[:1], [none])}
     assert found.pop("failures") < 1e-6
     assert set(found.values()) == {1.0}
+
+
+def test_ranks_of_several_cells_are_weighed_as_van_elteren_does():
+    """The published statistic for data without ties, cells of different sizes weighed by 1/(n + m + 1)."""
+    rng = np.random.default_rng(31)
+    cells = [(rng.normal(size=n), rng.normal(0.4, size=m)) for n, m in ((5, 9), (20, 8), (3, 4))]
+    excess = variance = 0.0
+    for old, new in cells:
+        n, m = old.size, new.size
+        wins = sum(float(b > a) for a in old for b in new)  # Mann and Whitney's U of the new values
+        excess += (wins - 0.5 * n * m) / (n + m + 1)
+        variance += n * m / (12.0 * (n + m + 1))
+    expected = 0.5 * math.erfc(excess / math.sqrt(2.0 * variance))
+    assert _rank_sum(cells) == pytest.approx(expected, rel=1e-9)
+    assert _rank_sum([(np.zeros(0), np.ones(3))]) == 1.0

@@ -114,3 +114,15 @@ def test_a_further_run_sets_apart_only_what_differs() -> None:
         for angle in (0.1, 0.5)
     ]
     assert apart[0] < apart[1]
+
+
+def test_the_scatter_is_what_a_quadratic_leaves_over_its_degrees_of_freedom() -> None:
+    rng = np.random.default_rng(12)
+    number = np.arange(9.0)
+    zeta = 0.006 + 1e-4 * number - 2e-5 * number**2 + 3e-5 * rng.standard_normal(9)
+    omega = 12.6 + 0.01 * number + 0.002 * rng.standard_normal(9)
+    _, std = read_table([WindowRow(i + 1, z, w) for i, (z, w) in enumerate(zip(zeta, omega, strict=True))])
+    model = np.stack([number**0, number, number**2], axis=1)
+    for found, column in ((std.zeta, zeta), (std.omega_n, omega)):
+        left = np.linalg.lstsq(model, column)[1][0]
+        assert found == pytest.approx(np.full(9, np.sqrt(left / (9 - 3))))

@@ -1,0 +1,175 @@
+"""A diagnosis written by hand: every number differs from every other, so that none can stand in for another."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.record import Record
+
+CAUSE, RIVAL = "quadratic_damping", "coulomb_friction"
+IDS = ("alpha", "beta", "gamma")
+CONDITIONS = ((16.25, 0.0, 7.31, 400.0), (44.75, 13.5, 8.42, 500.0), (None, 21.5, 9.53, 625.0))
+
+
+def campaign() -> Campaign:
+    """Three runs of different springs, speeds, durations and rates; the last one states no spring."""
+    runs = []
+    for name, (spring, speed, duration, rate) in zip(IDS, CONDITIONS, strict=True):
+        time = np.arange(round(duration * rate) + 1) / rate
+        runs.append(Run(name, Record(time, 0.3 * np.cos(11.0 * time)), speed, spring, 1.2, 0.3))
+    return Campaign(
+        "by hand", RigProperties(0.11, 0.036, 0.625, 0.225), SensorProperties(500.0, None, 4e-4), tuple(runs)
+    )
+
+
+def document() -> dict[str, Any]:
+    """The answer, in JSON's types."""
+    return {
+        "schema_version": 1,
+        "campaign": "by hand",
+        "causes": [CAUSE],
+        "verdict": "",
+        "gap": {
+            "detected": True,
+            "excess_before": 27.35,
+            "excess_after": 0.1234,
+            "closed": 0.9876,
+            "runs": [
+                {"id": "alpha", "before": 31.72, "after": -0.0567, "held_out": True},
+                {"id": "beta", "before": 4.583, "after": 0.2345, "held_out": False},
+                {"id": "gamma", "before": 0.6789, "after": 0.3456, "held_out": True},
+            ],
+            "false_alarm_rate": 0.013,
+            "p_value": 2.9e-9,
+            "tests": {"white": 3.7e-8, "lines": 0.0042},
+        },
+        "where": {
+            "channel": "damping",
+            "condition": "always",
+            "runs": ["alpha", "gamma"],
+            "time_s": [0.125, 3.375],
+            "amplitude_rad": [0.1725, 0.3375],
+            "frequency_hz": [1.875, 2.625],
+            "words": "",
+        },
+        "candidates": [
+            _candidate(CAUSE, 0.9123, 0.1478, 0.9754, coefficient=(0.003125, 1.7e-5, "N m s2/rad2")),
+            _candidate(RIVAL, 0.0512, 1.567, 0.5151, friction_moment=(0.0081, 2.3e-4, "N m"),
+                       shift=(-0.27, 0.0, "s")),
+            _candidate("unknown", 0.0213, 27.95, 0.0),
+            _candidate("sensor_drift", 0.0147, 26.15, 0.0331),
+            _candidate("none", 0.0004, 28.25, 0.0),
+            _candidate("mains_hum", 0.00005, 27.05, 0.0123),
+            _candidate("sensor_delay", 0.00003, 27.15, 0.0134),
+        ],
+        "ambiguous_with": [RIVAL],
+        "next_run": {
+            "spring_stiffness": 81.5,
+            "wind_speed": 18.25,
+            "release_angle": 0.415,
+            "duration": 33.5,
+            "separation": 52.0,
+        },
+        "coefficients": {
+            "before": {"cn_beta": _value(0.4513, 0.0024, "1/rad"), "cn_r": _value(-0.3132, 0.0225, "1/rad")},
+            "after": {"cn_beta": _value(0.4789, 0.0013, "1/rad"), "cn_r": _value(-0.2574, 0.0118, "1/rad")},
+            "note": "",
+        },
+        "confirmation": {
+            "model": "mujoco",
+            "agrees": True,
+            "largest_difference_rad": 1.3e-5,
+            "run": "beta",
+            "rms_difference_rad": 6.1e-6,
+            "tolerance_rad": 4.7e-5,
+            "failure": "",
+        },
+        "noise": {"std": 4.123e-4, "stated_std": 3.987e-4, "source": "estimated", "reason": "from the records"},
+        "blind_spots": [],
+        "cautions": [],
+        "seconds": {"fit": 12.3, "rank": 45.6},
+        "maps": maps(),
+        "provenance": {},
+    }  # fmt: skip
+
+
+def maps() -> dict[str, Any]:
+    """The pictures' data."""
+    return {
+        "runs": [
+            {"id": name, "spring_stiffness": spring, "wind_speed": speed, "excess": excess, "std": std}
+            for name, (spring, speed, *_), excess, std in zip(
+                IDS, CONDITIONS, (31.5, 4.5, 0.65), (0.021, 0.019, 0.017), strict=True
+            )
+        ],
+        "time": {
+            "edges_s": [0.0, 2.0, 5.0, 9.0],
+            "excess": [30.0, 12.0, 3.0],
+            "std": [0.031, 0.032, 0.033],
+            "by_run": [[60.0, 21.0, 0.01], [9.0, 0.02, 1.5], [2.0, 0.5, None]],
+            "moment_share": [0.55, 0.34, 0.11],
+        },
+        "amplitude": {"edges_rad": [0.0, 0.1, 0.3], "excess": [1.5, 25.0], "std": [0.041, 0.042]},
+        "frequency": {
+            "edges_hz": [0.0, 1.0, 4.0, 16.0],
+            "excess": [1.25, 80.0, -0.9],
+            "std": [0.051, 0.052, 0.4],
+            "after": [0.15, 0.75, 0.05],
+            "resonance_hz": [1.9, 2.6],
+        },
+        "lines": [
+            {"run": "alpha", "frequency_hz": 50.13, "share": 0.1357, "amplitude_rad": 2.4e-4},
+            {"run": "beta", "frequency_hz": 99.87, "share": 0.2468, "amplitude_rad": 8.3e-4},
+        ],
+        "backbones": [_backbone("alpha", 1.95), _backbone("beta", 2.45), _backbone("gamma", 2.55)],
+        "phase_plane": {
+            "edges_rad": [-0.4, 0.0, 0.4],
+            "moment": [[0.012, -0.025], [None, 0.001]],
+            "std": [[0.001, 0.002], [None, 0.003]],
+            "by_angle": [0.014, -0.016],
+            "by_angle_std": [0.0011, 0.0012],
+            "by_rate": [0.017, 0.019],
+            "by_rate_std": [0.0013, 0.0014],
+            "unit": "N m",
+            "runs": ["alpha", "gamma"],
+        },
+        "traces": [
+            {"id": "alpha", "time_s": [0.0, 1.0, 2.0], "before_rad": [0.004, -0.003, 0.002],
+             "after_rad": [0.0004, -0.0005, 0.0006], "noise_std_rad": 1e-4},
+            {"id": "gamma", "time_s": [0.0, 1.5, 3.0], "before_rad": [0.007, -0.006, 0.005],
+             "after_rad": None, "noise_std_rad": 1e-4},
+        ],
+    }  # fmt: skip
+
+
+def _candidate(
+    effect: str, probability: float, excess: float, closed: float, **parameters: tuple[float, float, str]
+) -> dict[str, Any]:
+    return {
+        "effect": effect,
+        "probability": probability,
+        "excess_after": excess,
+        "closed": closed,
+        "parameters": {name: _value(*given) for name, given in parameters.items()},
+    }
+
+
+def _value(value: float, std: float, unit: str) -> dict[str, Any]:
+    return {"value": value, "std": std, "unit": unit}
+
+
+def _backbone(name: str, nominal: float) -> dict[str, Any]:
+    return {
+        "id": name,
+        "time_s": [1.0, 2.0, 3.0],
+        "amplitude_rad": [0.3, 0.2, 0.1],
+        "frequency_hz": [1.01 * nominal, 1.02 * nominal, 1.04 * nominal],
+        "frequency_std": [0.001, 0.002, 0.003],
+        "zeta": [0.012, 0.013, 0.015],
+        "zeta_std": [0.0001, 0.0002, 0.0003],
+        "nominal_frequency_hz": nominal,
+        "nominal_zeta": 0.011,
+    }

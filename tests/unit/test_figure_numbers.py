@@ -1,0 +1,293 @@
+"""What the figures of a diagnosis draw is what its document says: bars, curves, bands and axes read back.
+
+Truth: a document written by hand.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
+from tests.unit.shown_numbers import assert_shows, numbers
+from tunnel_lab.diagnosis_figures import answer, where
+from tunnel_lab.diagnosis_figures.common import run_label
+
+Document = dict[str, Any]
+
+
+@pytest.fixture
+def given() -> Document:
+    return copy.deepcopy(document())
+
+
+def curve(line: Any) -> list[tuple[float, float]]:
+    return list(zip(*(np.asarray(data, float).tolist() for data in line.get_data()), strict=True))
+
+
+def band(area: Any) -> np.ndarray:
+    """Corners of a filled band, in order of x and then of y."""
+    corners = np.unique(np.concatenate([path.vertices for path in area.get_paths()]), axis=0)
+    return corners[np.lexsort((corners[:, 1], corners[:, 0]))]
+
+
+def test_bars_of_the_answers(given: Document) -> None:
+    given["candidates"] += [given["candidates"][-1]] * 4
+    axes = answer.candidates_figure(given).axes[0]
+    shown = given["candidates"][:8]
+    assert [bar.get_width() for bar in axes.patches] == [c["probability"] for c in shown]
+    words = [text for text in axes.texts if text.get_text()]
+    assert [round(text.get_position()[1]) for text in words] == list(range(8))
+    for text, candidate in list(zip(words, shown, strict=True))[:4]:
+        assert_shows(text.get_text(), [100.0 * candidate["probability"]])
+    assert [text.get_text() for text in words[4:]] == ["< 0.1 %"] * 4
+    labels = [label.get_text() for label in axes.get_yticklabels()]
+    assert labels == [c["effect"].replace("_", " ") for c in shown]
+    ticks = zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+    assert all(label.get_text() == f"{100 * tick:.0f}%" for tick, label in ticks)
+    colours = [bar.get_facecolor() for bar in axes.patches]
+    assert colours[0] != colours[1]
+    assert len(set(colours[1:])) == 1
+    low, high = axes.get_xlim()
+    assert low == 0.0
+    assert 1.0 < high < 1.5
+
+
+def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
+    given["candidates"][0]["probability"] = 0.9996
+    assert answer.candidates_figure(given).axes[0].texts[0].get_text() == "> 99.9 %"
+
+
+def test_points_of_the_closure(given: Document) -> None:
+    fig = answer.closure_figure(given)
+    axes, runs = fig.axes[0], given["gap"]["runs"]
+    before, after = axes.lines[:2]
+    assert curve(before) == [(run["before"], row) for row, run in enumerate(runs)]
+    assert curve(after) == [(run["after"], row) for row, run in enumerate(runs)]
+    assert [label.get_text() for label in axes.get_yticklabels()] == list(IDS)
+    ends = [sorted(segment[:, 0]) for segment in axes.collections[0].get_segments()]
+    assert ends == [sorted((run["before"], run["after"])) for run in runs]
+    noise = axes.patches[0].get_extents().transformed(axes.transData.inverted())
+    assert (noise.x0, noise.x1) == pytest.approx((-0.063, 0.063))
+    assert axes.get_xscale() == "symlog"
+    assert list(axes.lines[2].get_xdata()) == [0.0, 0.0]
+
+
+def test_closure_without_maps_and_without_causes(given: Document) -> None:
+    given["maps"] = None
+    for run in given["gap"]["runs"]:
+        run["after"] = run["before"]
+    axes = answer.closure_figure(given).axes[0]
+    assert not axes.patches
+    assert len(axes.lines) == 2
+
+
+def test_traces(given: Document) -> None:
+    given["maps"]["traces"].append(given["maps"]["traces"][0] | {"id": "not there"})
+    fig = answer.traces_figure(given, campaign())
+    assert fig is not None
+    top, bottom = fig.axes[:2], fig.axes[2:]
+    runs = {run.id: run.record for run in campaign().runs}
+    for reading, residual, trace in zip(top, bottom, given["maps"]["traces"][:2], strict=True):
+        assert trace["id"] in reading.get_title(loc="left")
+        record, (line,) = runs[trace["id"]], reading.lines
+        shown = np.array(curve(line))
+        assert 700 < len(shown) <= 3000
+        assert np.allclose(np.interp(shown[:, 0], record.time_s, record.yaw_rad), shown[:, 1])
+        drawn = [np.array(curve(line)) for line in residual.lines]
+        wanted = [trace[key] for key in ("before_rad", "after_rad") if trace[key] is not None]
+        assert len(drawn) == len(wanted)
+        for values, rows in zip(wanted, drawn, strict=True):
+            assert rows[:, 0].tolist() == trace["time_s"]
+            assert rows[:, 1] == pytest.approx([1e3 * value for value in values])
+    given["maps"]["traces"] = []
+    assert answer.traces_figure(given, campaign()) is None
+
+
+def test_a_trace_starts_at_zero(given: Document) -> None:
+    data = campaign()
+    object.__setattr__(data.runs[0].record, "time_s", data.runs[0].record.time_s + 5.0)
+    fig = answer.traces_figure(given, data)
+    assert fig is not None
+    assert fig.axes[0].lines[0].get_xdata()[0] == 0.0
+
+
+def test_intervals_of_the_coefficients(given: Document) -> None:
+    fig = answer.coefficients_figure(given)
+    assert fig is not None
+    for axes, name in zip(fig.axes, ("cn_beta", "cn_r"), strict=True):
+        for row, (key, container) in enumerate(zip(("before", "after"), axes.containers, strict=True)):
+            values = given["coefficients"][key][name]
+            line, _, (bar,) = container.lines
+            assert curve(line) == [(values["value"], row)]
+            reach = 1.96 * values["std"]
+            (ends,) = bar.get_segments()
+            assert ends[:, 0] == pytest.approx([values["value"] - reach, values["value"] + reach])
+        bottom, top = axes.get_ylim()
+        assert bottom > 1 > 0 > top  # before above after
+    given["coefficients"]["after"] = {}
+    assert answer.coefficients_figure(given) is None
+
+
+def test_the_map_of_runs(given: Document) -> None:
+    grid, bars = where.runs_figure(given).axes[:2]
+    image = np.ma.filled(grid.images[0].get_array().astype(float), np.nan)
+    wanted = np.array([[60.0, 21.0, np.nan], [9.0, np.nan, 1.5], [2.0, 0.5, np.nan]])
+    assert np.array_equal(image, wanted, equal_nan=True)  # cells below three times 0.017 √3 stay white
+    assert grid.images[0].get_extent() == [0.0, 9.0, 2.5, -0.5]
+    assert [label.get_text() for label in grid.get_yticklabels()] == [
+        "alpha · 16.25 N m/rad · wind off", "beta · 44.75 N m/rad · 13.5 m/s", "gamma",
+    ]  # fmt: skip
+    assert [bar.get_width() for bar in bars.patches] == [31.5, 4.5, 0.65]
+    assert [round(bar.get_y() + bar.get_height() / 2, 9) for bar in bars.patches] == [0, 1, 2]
+    colours = [bar.get_facecolor() for bar in bars.patches]
+    assert colours[0] == colours[2] != colours[1]
+    low, high = bars.get_xlim()
+    assert low == 0.0
+    assert 31.5 < high < 100.0
+    ticks = bars.get_xticks()
+    assert ticks[0] == 0.0
+    assert all(0.063 <= tick <= 31.5 for tick in ticks[1:])
+    assert len(ticks) >= 3
+
+
+def test_a_map_within_the_noise_says_so(given: Document) -> None:
+    given["maps"]["time"]["by_run"] = [[0.01, -0.02, None]] * 3
+    for run in given["maps"]["runs"]:
+        run["excess"] = -0.01
+    grid, bars = where.runs_figure(given).axes[:2]
+    assert [text.get_text() for text in grid.texts] == ["every cell within the noise"]
+    assert [bar.get_width() for bar in bars.patches] == [0.0] * 3
+    assert not where.runs_figure(document()).axes[0].texts
+
+
+@pytest.mark.parametrize(("place", "key", "edges"), [(0, "time", "edges_s"), (1, "amplitude", "edges_rad")])
+def test_profiles(given: Document, place: int, key: str, edges: str) -> None:
+    axes = where.profiles_figure(given).axes[place]
+    values, interval = given["maps"][key], given["where"][key + ("_s" if key == "time" else "_rad")]
+    shade, noise, mean = axes.patches
+    box = shade.get_extents().transformed(axes.transData.inverted())
+    assert (box.x0, box.x1) == pytest.approx(interval)
+    drawn = mean.get_data()
+    assert drawn.values.tolist() == values["excess"]
+    assert drawn.edges.tolist() == values[edges]
+    spread = noise.get_data()
+    assert spread.values.tolist() == pytest.approx([3.0 * s for s in values["std"]])
+    assert np.asarray(spread.baseline).tolist() == pytest.approx([-3.0 * s for s in values["std"]])
+    assert axes.get_xlim() == (0.0, values[edges][-1])
+    low, high = axes.get_ylim()
+    assert low <= min(-3.0 * min(values["std"]), *values["excess"])
+    assert high >= max(values["excess"])
+
+
+def test_the_share_of_the_missing_moment(given: Document) -> None:
+    fig = where.profiles_figure(given)
+    (beside,) = (axes for axes in fig.axes if "%" in axes.get_ylabel())
+    drawn = beside.patches[0].get_data()
+    assert drawn.values == pytest.approx([55.0, 34.0, 11.0])
+    assert drawn.edges.tolist() == given["maps"]["time"]["edges_s"]
+    low, high = beside.get_ylim()
+    assert low == 0.0
+    assert 55.0 < high < 60.0
+
+
+def test_no_interval_no_shade(given: Document) -> None:
+    given["where"]["time_s"] = None
+    assert len(where.profiles_figure(given).axes[0].patches) == 2
+
+
+def test_the_spectrum(given: Document) -> None:
+    axes = where.profiles_figure(given).axes[2]
+    values = given["maps"]["frequency"]
+    before, after = (np.array(curve(line)) for line in axes.lines)
+    centres = [np.sqrt(0.5 * 1.0), np.sqrt(1.0 * 4.0), np.sqrt(4.0 * 16.0)]
+    assert before[:, 0] == pytest.approx(centres)
+    assert before[:, 1] == pytest.approx([2.25, 81.0, 0.3])  # the last is below the axis and drawn on it
+    assert after[:, 1] == pytest.approx([1.0 + a for a in values["after"]])
+    corners = band(axes.collections[0])
+    for x, std, low in zip(centres, values["std"], (0.847, 0.844, 0.3), strict=True):
+        column = corners[np.isclose(corners[:, 0], x), 1]
+        assert (column.min(), column.max()) == pytest.approx((low, 1.0 + 3.0 * std))
+    boxes = [patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches]
+    assert (boxes[0].x0, boxes[0].x1) == pytest.approx(given["where"]["frequency_hz"])
+    assert 1.8 < boxes[1].x0 < 1.9
+    assert 2.6 < boxes[1].x1 < 2.7
+    assert axes.get_xlim() == pytest.approx((0.5, 16.0))
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+
+
+def test_a_spectrum_without_causes_has_one_curve(given: Document) -> None:
+    given["maps"]["frequency"]["after"] = None
+    assert len(where.profiles_figure(given).axes[2].lines) == 1
+
+
+def test_backbones(given: Document) -> None:
+    given["maps"]["backbones"][1]["time_s"] = [1.0]  # one window makes no curve
+    fig = where.backbone_figure(given)
+    frequency, damping = fig.axes
+    for axes, values, stds in (
+        (frequency, [4.0, 2.0, 1.0], lambda nominal: [0.3 / nominal, 0.2 / nominal, 0.1 / nominal]),
+        (damping, [4.0, 2.0, 1.0], lambda _: [0.3, 0.2, 0.1]),
+    ):
+        assert len(axes.lines) == 3  # two curves and the level line
+        for line, area, nominal in zip(axes.lines, axes.collections, (1.95, 2.55), strict=False):
+            assert np.array(curve(line)) == pytest.approx(
+                np.array(list(zip([0.1, 0.2, 0.3], values, strict=True)))
+            )
+            corners = band(area)
+            for x, y, std in zip([0.1, 0.2, 0.3], values, stds(nominal), strict=True):
+                column = corners[np.isclose(corners[:, 0], x), 1]
+                assert (column.min(), column.max()) == pytest.approx((y - 1.96 * std, y + 1.96 * std))
+        assert list(axes.lines[-1].get_ydata()) == [0.0, 0.0]
+    colours = {line.get_color() if isinstance(line.get_color(), str) else tuple(line.get_color())
+               for line in damping.lines}  # fmt: skip
+    assert len(colours) == 3
+    labels = [line.get_label() for line in damping.lines[:2]]
+    assert labels == [run_label(given["maps"]["runs"][0]), run_label(given["maps"]["runs"][2])]
+
+
+def test_the_runs_that_carry_the_gap_are_drawn_first(given: Document) -> None:
+    labels = [line.get_label() for line in where.backbone_figure(given).axes[1].lines[:3]]
+    assert [label.split(" ")[0] for label in labels] == ["alpha", "gamma", "beta"]
+
+
+@pytest.mark.parametrize(("size", "factor", "unit"), [(1.0, 1e3, "10⁻³ N m"), (100.0, 1.0, "N m")])
+def test_the_phase_plane(given: Document, size: float, factor: float, unit: str) -> None:
+    plane = given["maps"]["phase_plane"]
+    for name in ("moment", "std"):
+        plane[name] = [[None if v is None else size * v for v in row] for row in plane[name]]
+    fig = where.phase_plane_figure(given)
+    assert fig is not None
+    field, angle, rate = fig.axes[:3]
+    image = np.ma.filled(field.images[0].get_array().astype(float), np.nan)
+    wanted = factor * size * np.array([[0.012, -0.025], [np.nan, np.nan]])
+    assert np.allclose(image, wanted, equal_nan=True)  # the last cell is within three standard deviations
+    low, high = field.images[0].get_clim()
+    assert low == -high
+    assert high == pytest.approx(factor * size * np.quantile([0.012, 0.025, 0.001], 0.98))
+    assert field.images[0].get_extent() == [-0.4, 0.4, -0.4, 0.4]
+    assert any(f"[{unit}]" in axes.get_xlabel() for axes in fig.axes)
+    for axes, name in ((angle, "by_angle"), (rate, "by_rate")):
+        assert np.array(curve(axes.lines[1])) == pytest.approx(
+            np.array(list(zip([-0.2, 0.2], [factor * v for v in plane[name]], strict=True)))
+        )
+        corners = band(axes.collections[0])
+        for x, y, std in zip([-0.2, 0.2], plane[name], plane[name + "_std"], strict=True):
+            column = corners[np.isclose(corners[:, 0], x), 1] / factor
+            assert (column.min(), column.max()) == pytest.approx((y - 1.96 * std, y + 1.96 * std))
+
+
+def test_no_phase_plane_no_figure(given: Document) -> None:
+    given["maps"]["phase_plane"] = None
+    assert where.phase_plane_figure(given) is None
+
+
+def test_the_label_of_a_run_holds_its_conditions() -> None:
+    for name, (spring, speed, *_) in zip(IDS, CONDITIONS, strict=True):
+        found = [
+            n.value for n in numbers(run_label({"id": name, "spring_stiffness": spring, "wind_speed": speed}))
+        ]
+        assert found == ([] if spring is None else [v for v in (spring, speed) if v])

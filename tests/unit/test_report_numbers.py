@@ -1,0 +1,260 @@
+"""Every number of the report is the one of the document, in its own cell; the words are tested elsewhere.
+
+Truth: a document written by hand. Numbers are read back from the page as a person reads them.
+"""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from typing import Any
+
+import pytest
+
+from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
+from tests.unit.shown_numbers import assert_known, assert_shows
+from tunnel_lab.report import render_report, view
+
+Document = dict[str, Any]
+
+
+class Sections(HTMLParser):
+    """Rows of the tables and lists of a page by the id of their section; pictures are left out."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.rows: dict[str, list[list[str]]] = {}
+        self.texts: dict[str, str] = {}
+        self._section, self._cell, self._hidden = "", False, 0
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._hidden += tag in ("svg", "style")
+        if tag == "section":
+            self._section = str(dict(attrs)["id"])
+            self.rows[self._section], self.texts[self._section] = [], ""
+        if tag == "tr" or (tag == "div" and self._section):
+            self.rows.setdefault(self._section, []).append([])
+        if tag in ("td", "th", "dt", "dd", "span"):
+            self.rows[self._section][-1].append("")
+            self._cell = True
+
+    def handle_endtag(self, tag: str) -> None:
+        self._hidden -= tag in ("svg", "style")
+        self._cell = self._cell and tag not in ("td", "th", "dt", "dd", "span")
+
+    def handle_data(self, data: str) -> None:
+        if self._hidden or not self._section:
+            return
+        self.texts[self._section] += " " + data
+        if self._cell:
+            self.rows[self._section][-1][-1] += data
+
+    def row(self, section: str, label: str) -> str:
+        """What stands beside a label in a section."""
+        found = [row for row in self.rows[section] if row and row[0].strip() == label]
+        assert len(found) == 1, (section, label, self.rows[section])
+        return " ; ".join(found[0][1:])
+
+
+@pytest.fixture(scope="module")
+def given() -> Document:
+    return document()
+
+
+@pytest.fixture(scope="module")
+def page(given: Document) -> Sections:
+    return Sections(render_report(given, campaign()))
+
+
+def test_the_head_of_the_page(given: Document) -> None:
+    gap = given["gap"]
+    texts = [fact.value for fact in view.facts(given)]
+    shown = [text for text in texts if re.search(r"\d", text)]
+    wanted = [gap["excess_before"], gap["excess_after"], 100 * gap["closed"], 91.23]
+    assert len(shown) == len(wanted)
+    for text, value in zip(shown, wanted, strict=True):
+        assert_shows(text, [value])
+
+
+def test_the_head_is_on_the_page(given: Document, page: Sections) -> None:
+    cells = [cell for row in page.rows["verdict"] for cell in row]
+    assert all(fact.value in cells for fact in view.facts(given))
+
+
+def test_where_the_gap_is(given: Document) -> None:
+    rows = [value for _, value in view.place_rows(given) if re.search(r"\d", value)]
+    where = given["where"]
+    for text, key in zip(rows, ("time_s", "amplitude_rad", "frequency_hz"), strict=True):
+        assert_shows(text, where[key])
+    assert ", ".join(where["runs"]) in [value for _, value in view.place_rows(given)]
+
+
+def test_narrow_lines(given: Document, page: Sections) -> None:
+    for line in given["maps"]["lines"]:
+        wanted = [line["frequency_hz"], 1e3 * line["amplitude_rad"], 100 * line["share"]]
+        assert_shows(page.row("where", line["run"]), wanted)
+
+
+def test_answers_weighed(given: Document, page: Sections) -> None:
+    for candidate in given["candidates"][:4]:
+        text = page.row("which", candidate["effect"].replace("_", " "))
+        wanted = [100 * candidate["probability"]]
+        wanted += [] if candidate["effect"] in ("none", "unknown") else [100 * candidate["closed"]]
+        wanted += [candidate["excess_after"]]
+        for estimate in candidate["parameters"].values():
+            wanted += [estimate["value"], estimate["std"]] if estimate["std"] else [estimate["value"]]
+        assert_shows(re.sub(r"rad²|s²", "", text), wanted)
+
+
+def test_answers_left_out_are_counted(given: Document) -> None:
+    rows, more = view.candidate_rows(given)
+    assert (len(rows), more) == (4, 3)
+    few = given | {"candidates": given["candidates"][:2]}
+    assert view.candidate_rows(few)[1] == 0
+    assert len(view.candidate_rows(few)[0]) == 2
+    improbable = given | {"candidates": [c | {"probability": 0.001} for c in given["candidates"]]}
+    assert len(view.candidate_rows(improbable)[0]) == 3
+    even = given | {"candidates": [c | {"probability": 0.01} for c in given["candidates"]]}
+    assert view.candidate_rows(even)[1] == 0
+
+
+def test_the_count_of_answers_left_out_is_on_the_page(page: Sections) -> None:
+    assert re.search(r"\b3 more\b", page.texts["which"])
+
+
+def test_every_run(given: Document, page: Sections) -> None:
+    for name, (spring, speed, duration, rate), gap in zip(IDS, CONDITIONS, given["gap"]["runs"], strict=True):
+        wanted = [value for value in (spring, speed or None, duration, rate) if value is not None]
+        text = page.row("how-far-section", name)
+        assert_shows(text, [*wanted, gap["before"], gap["after"]])
+        assert ("yes" in text) == (name in given["where"]["runs"])
+
+
+def test_a_run_that_the_gap_leaves_out_has_no_excess(given: Document) -> None:
+    fewer = given | {"gap": given["gap"] | {"runs": given["gap"]["runs"][1:]}}
+    first, second, _ = view.run_rows(fewer, campaign())
+    assert (first["before"], first["after"]) == ("–", "–")
+    assert_shows(f"{second['before']} ; {second['after']}", [4.583, 0.2345])
+
+
+def test_coefficients(given: Document, page: Sections) -> None:
+    before, after = given["coefficients"]["before"], given["coefficients"]["after"]
+    for name, label in (("cn_beta", "Cnβ"), ("cn_r", "Cnr")):
+        old, new = before[name], after[name]
+        reach = 1.96 * new["std"]
+        wanted = [
+            old["value"],
+            old["std"],
+            new["value"],
+            new["std"],
+            new["value"] - reach,
+            new["value"] + reach,
+        ]
+        text = page.row("coefficients-section", label).replace("1/rad", "")
+        assert_shows(text, wanted)
+
+
+def test_the_interval_is_that_of_the_nominal_model_where_it_stands_alone(given: Document) -> None:
+    alone = given | {"coefficients": given["coefficients"] | {"after": {}}}
+    rows = view.coefficient_rows(alone)
+    assert [row["after"] for row in rows] == ["–", "–"]
+    assert_shows(rows[0]["interval"], [0.4513 - 1.96 * 0.0024, 0.4513 + 1.96 * 0.0024])
+    new = given | {"coefficients": given["coefficients"] | {"before": {}}}
+    assert [row["before"] for row in view.coefficient_rows(new)] == ["–", "–"]
+
+
+def test_the_next_run(given: Document, page: Sections) -> None:
+    for key, value in given["next_run"].items():
+        text = page.row("which", key.replace("_", " ").capitalize())
+        assert_shows(text, [value])
+    assert view.next_run_rows(given | {"next_run": None}) == []
+
+
+def test_noise_and_confirmation(given: Document, page: Sections) -> None:
+    noise, checked = given["noise"], given["confirmation"]
+    rows = [" ; ".join(row[1:]) for row in page.rows["provenance"] if len(row) == 2]
+    assert_shows(rows[0], [1e3 * noise["std"]])
+    assert_shows(rows[1], [1e3 * noise["stated_std"]])
+    departs = next(row for row in rows if checked["run"] in row)
+    keys = ("largest_difference_rad", "rms_difference_rad", "tolerance_rad")
+    assert_shows(departs, [checked[key] for key in keys])
+
+
+def test_tests_and_times(given: Document, page: Sections) -> None:
+    for name, value in given["gap"]["tests"].items():
+        assert_shows(page.row("provenance", name), [value])
+    for name, value in given["seconds"].items():
+        assert_shows(page.row("provenance", name), [value])
+    assert_shows(page.row("provenance", "Runs"), [len(IDS)])
+    assert_known(page.texts["provenance"], _all(given) | {len(IDS), 412.3e-3, 398.7e-3})
+
+
+def test_no_number_of_the_page_comes_from_elsewhere(given: Document, page: Sections) -> None:
+    """A number in any sentence is one of the document's, or of the records', in per cent or thousandths."""
+    values = _all(given) | {float(x) for row in CONDITIONS for x in row if x is not None}
+    ends = {e["value"] + s * e["std"] for e in given["coefficients"]["after"].values() for s in (-1.96, 1.96)}
+    counts = {2.0, 3.0, 4.0}  # lines, runs and answers
+    known = values | {1e2 * v for v in values} | {1e3 * v for v in values} | ends | counts
+    for section in ("verdict", "how-far-section", "provenance"):
+        text = re.sub(r"95 %|10⁻³", "", page.texts[section]).replace("1/s", "")
+        assert_known(text, known)
+
+
+def _all(values: Any) -> set[float]:
+    """Every number of a document."""
+    if isinstance(values, dict):
+        return set().union(*(_all(v) for v in values.values())) if values else set()
+    if isinstance(values, list):
+        return set().union(*(_all(v) for v in values)) if values else set()
+    return {float(values)} if isinstance(values, int | float) else set()
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [(0.0, "0 %"), (0.0004, "< 0.1 %"), (0.0005, "0.1 %"), (0.5, "50.0 %"), (0.9994, "99.9 %"),
+     (0.9996, "> 99.9 %"), (1.0, "100 %")],
+)  # fmt: skip
+def test_shares_next_to_nothing_or_all(share: float, text: str) -> None:
+    assert view.percent(share) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.9994, "0.999"), (-0.0567, "−0.057"), (1.0, "1.00"), (31.72, "31.7"), (-2.5, "−2.50")],
+)
+def test_excesses(value: float, text: str) -> None:
+    assert view.excess(value) == text
+
+
+def test_a_line_cannot_hold_more_than_all() -> None:
+    line = {"run": "alpha", "frequency_hz": 50.0, "amplitude_rad": 1e-3, "share": 1.3}
+    assert view.line_rows({"maps": {"lines": [line]}})[0]["share"] == "100 %"
+    assert view.line_rows({"maps": None}) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({"causes": []}, "none"),
+        ({"causes": ["unknown"]}, "unknown"),
+        ({}, "open"),
+        ({"ambiguous_with": []}, "found"),
+    ],
+)
+def test_the_kind_of_the_answer(given: Document, changes: Document, kind: str) -> None:
+    assert view.headline(given | changes)[1] == kind
+    facts = [fact.value for fact in view.facts(given | changes)]
+    assert ("98.8 %" in facts) == (kind in ("open", "found"))
+    assert ("damping" in facts) == (kind != "none")
+
+
+def test_a_value_that_was_held_has_five_digits() -> None:
+    text = view.estimate({"value": -0.123456789, "std": 0.0, "unit": "1"})
+    assert "0.12346" in text
+    assert "0.123457" not in text
+
+
+def test_what_is_known_is_told_of_the_vocabulary_only(given: Document) -> None:
+    named = view.cause_paragraphs(given | {"causes": [CAUSE], "ambiguous_with": ["unknown", RIVAL]})
+    assert [cause["name"] for cause in named] == [CAUSE.replace("_", " "), RIVAL.replace("_", " ")]

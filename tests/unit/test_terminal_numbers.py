@@ -1,0 +1,223 @@
+"""Every number of the tables in a terminal is the one of the document or the estimate.
+
+Truth: a document and an estimate written by hand; cells are read back as a person reads them.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import re
+from typing import Any
+
+import pytest
+from rich.table import Table
+
+from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
+from identification.status import Status
+from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
+from tests.unit.shown_numbers import assert_shows
+from tunnel_lab import diagnosis_tables, tables
+
+Document = dict[str, Any]
+Y_UNIT = re.compile(r"\[[^\]]*\]|N m s²/rad²|N m/rad|m/s|N m|1/rad")
+
+
+@pytest.fixture
+def given() -> Document:
+    return copy.deepcopy(document())
+
+
+def rows(table: Table) -> list[list[str]]:
+    """The cells of a table, units and brackets of units left out."""
+    columns = [[str(cell) for cell in column.cells] for column in table.columns]
+    return [[Y_UNIT.sub("", cell) for cell in row] for row in zip(*columns, strict=True)]
+
+
+def short(text: str) -> tuple[float, float]:
+    """Value and standard deviation of the short notation."""
+    found = re.fullmatch(r"(-?\d+\.?(\d*))\((\d+\.?\d*)\)", text)
+    assert found, text
+    unit = 1.0 if "." in found[3] else 10.0 ** -len(found[2])
+    return float(found[1]), unit * float(found[3])
+
+
+def test_answers(given: Document) -> None:
+    *listed, last = rows(diagnosis_tables.candidates_table(given))
+    assert len(listed) == 4
+    for cells, candidate in zip(listed, given["candidates"], strict=False):
+        assert cells[0] == candidate["effect"]
+        assert_shows(cells[1], [candidate["probability"]])
+        fitted = candidate["effect"] not in ("none", "unknown")
+        assert_shows(cells[2], [100 * candidate["closed"]] if fitted else [])
+        wanted: list[float] = []
+        for value in candidate["parameters"].values():
+            wanted += [value["value"], value["std"]] if value["std"] else [value["value"]]
+        assert_shows(cells[3], wanted)
+    assert_shows(last[0], [3])
+    assert last[1] == "< 0.001"
+
+
+def test_answers_that_have_no_probability_are_counted_with_theirs(given: Document) -> None:
+    for candidate in given["candidates"][1:]:
+        candidate["probability"] = 0.0046
+    *listed, last = rows(diagnosis_tables.candidates_table(given))
+    assert len(listed) == 1
+    assert_shows(last[0], [6])
+    assert_shows(last[1], [6 * 0.0046])
+    for candidate in given["candidates"]:
+        candidate["probability"] = 0.005
+    assert len(rows(diagnosis_tables.candidates_table(given))) == 7  # six and the rest
+    for candidate in given["candidates"]:
+        candidate["probability"] = 0.0
+    assert len(rows(diagnosis_tables.candidates_table(given))) == 2  # one always, and the rest
+    given["candidates"] = given["candidates"][:1]
+    assert len(rows(diagnosis_tables.candidates_table(given))) == 1
+
+
+def test_the_gap(given: Document) -> None:
+    gap = given["gap"]
+    whole, *runs = rows(diagnosis_tables.gap_table(given))
+    assert_shows(whole[1].replace("+", ""), [gap["excess_before"]])
+    assert_shows(whole[2].replace("+", ""), [gap["excess_after"]])
+    for cells, run in zip(runs, gap["runs"], strict=True):
+        assert cells[0] == run["id"]
+        assert_shows(cells[1].replace("+", ""), [run["before"]])
+        assert_shows(cells[2].replace("+", ""), [run["after"]])
+        assert ("fitted" in cells[2]) == (not run["held_out"])
+
+
+def test_a_gap_without_a_name_has_nothing_after(given: Document) -> None:
+    cells = rows(diagnosis_tables.gap_table(given | {"causes": ["unknown"]}))
+    assert [row[2] for row in cells] == ["–"] * 4
+    given["gap"]["detected"] = False
+    assert rows(diagnosis_tables.gap_table(given)) == []
+
+
+def test_coefficients(given: Document) -> None:
+    before, after = given["coefficients"]["before"], given["coefficients"]["after"]
+    for cells, name in zip(rows(diagnosis_tables.coefficients_table(given)), before, strict=True):
+        old, new = before[name], after[name]
+        assert_shows(cells[1], [old["value"], old["std"]])
+        assert_shows(cells[2], [new["value"], new["std"]])
+        assert_shows(cells[3].replace("+", ""), [100 * (new["value"] - old["value"]) / abs(old["value"])])
+    before["cn_r"]["value"] = 0.0
+    assert rows(diagnosis_tables.coefficients_table(given))[1][3] == "+0 %"
+    del after["cn_beta"]
+    assert len(rows(diagnosis_tables.coefficients_table(given))) == 1
+
+
+def test_the_run_to_make(given: Document) -> None:
+    run = given["next_run"]
+    keys = ("spring_stiffness", "wind_speed", "release_angle", "duration", "separation")
+    assert_shows(diagnosis_tables.run_words(run).replace(" rad", ""), [run[key] for key in keys])
+    calm = diagnosis_tables.run_words(run | {"wind_speed": 0.0})
+    assert_shows(calm, [run[key] for key in keys if key != "wind_speed"])
+    assert len(diagnosis_tables.rival_lines(given)) == 2
+    assert len(diagnosis_tables.rival_lines(given | {"next_run": None})) == 2
+    assert diagnosis_tables.rival_lines(given | {"next_run": None, "ambiguous_with": []}) == []
+
+
+def test_noise_and_confirmation(given: Document) -> None:
+    first, second = diagnosis_tables.closing_lines(given)
+    assert_shows(first, [given["noise"]["std"]])
+    assert_shows(second, [given["confirmation"]["largest_difference_rad"]])
+    given["confirmation"]["agrees"] = False
+    assert len(diagnosis_tables.closing_lines(given)) == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.9996, "> 0.999"), (0.9994, "0.999"), (0.0006, "0.001"), (0.0004, "< 0.001")],
+)
+def test_probabilities(value: float, text: str) -> None:
+    assert diagnosis_tables.probability(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1.0, "100.0 %"), (0.9996, "> 99.9 %"), (0.982, "98.2 %"), (0.0, "0.0 %"), (-0.02, "-2.0 %")],
+)
+def test_shares(value: float, text: str) -> None:
+    assert diagnosis_tables.share(value) == text
+
+
+def quantity(value: float, std: float, unit: str = "1/rad") -> Quantity:
+    return Quantity(value, std, unit)
+
+
+def estimate() -> Estimate:
+    windows = (
+        WindowEstimate(0.25, 1.5, quantity(0.31, 0.0012), quantity(12.5, 0.021), quantity(0.0123, 0.00034)),
+        WindowEstimate(1.75, 1.25, quantity(0.21, 0.0014), quantity(12.7, 0.023), quantity(0.0145, 0.00036)),
+    )
+    runs = tuple(
+        RunEstimate(
+            name,
+            omega_n=quantity(12.34 + i, 0.056),
+            zeta=quantity(0.0123 + 0.001 * i, 0.00045),
+            windows=windows,
+        )
+        for i, name in enumerate(IDS)
+    )
+    return Estimate(
+        campaign="by hand", estimator="own", statuses=(Status.OK,),
+        cn_beta=quantity(0.4513, 0.0024), cn_r=quantity(-0.3132, 0.0225), yaw_inertia=quantity(0.1014, 0.0013),
+        mechanical_damping=quantity(0.0125, 0.00037), wind_off_inertia=quantity(0.1027, 0.0021), runs=runs,
+    )  # fmt: skip
+
+
+def test_coefficients_of_an_estimate() -> None:
+    found = estimate()
+    named = (found.cn_beta, found.cn_r, found.yaw_inertia, found.mechanical_damping, found.wind_off_inertia)
+    for cells, value in zip(rows(tables.coefficients_table(found)), named, strict=True):
+        assert value is not None
+        assert_shows(cells[1], [value.value, value.std])
+
+
+def test_errors_against_the_truth() -> None:
+    found, truth = estimate(), {"cn_beta": 0.5, "cn_r": -0.25, "yaw_inertia": 0.12}
+    head, *cells = rows(tables.truth_table([found], truth))
+    assert head[0] == "own"
+    for row, (name, value) in zip(cells, truth.items(), strict=True):
+        own = getattr(found, name)
+        error = own.value - value
+        assert_shows(row[1], [value])
+        assert_shows(row[2], [own.value, own.std])
+        assert float(row[3].replace(" %", "")) == pytest.approx(100 * error / abs(value), rel=0.5)
+        assert float(row[3].replace(" %", "")) * error > 0
+        assert_shows(row[4].replace("+", ""), [error / own.std])
+
+
+def test_runs_of_an_estimate() -> None:
+    found = estimate()
+    for cells, run, (spring, speed, *_) in zip(
+        rows(tables.runs_table(campaign(), found)), found.runs, CONDITIONS, strict=True
+    ):
+        assert cells[0] == run.id
+        assert_shows(cells[1], [] if spring is None else [spring])
+        assert float(cells[2]) == speed
+        for cell, value in zip(cells[3:5], (run.omega_n, run.zeta), strict=True):
+            assert value is not None
+            assert short(cell) == pytest.approx((value.value, value.std), rel=0.03)
+
+
+def test_windows_of_a_run() -> None:
+    run = estimate().runs[0]
+    table = tables.windows_table(run)
+    assert "3 cycles" in str(table.title)
+    for cells, window in zip(rows(table), run.windows, strict=True):
+        assert_shows(cells[0], [window.start_s])
+        assert_shows(cells[1], [window.start_s + window.duration_s])
+        for cell, value in zip(cells[2:], (window.amplitude, window.zeta, window.omega_n), strict=True):
+            assert short(cell) == pytest.approx((value.value, value.std), rel=0.03)
+
+
+def test_notes_name_the_runs_they_concern() -> None:
+    calm = estimate()
+    assert tables.status_lines(calm) == []
+    first = dataclasses.replace(calm.runs[0], statuses=(Status.NO_OSCILLATION,))
+    (line,) = tables.status_lines(dataclasses.replace(calm, runs=(first, *calm.runs[1:])))
+    assert line == f"{Status.NO_OSCILLATION.value} (alpha)"
+    every = tuple(dataclasses.replace(run, statuses=(Status.NO_OSCILLATION,)) for run in calm.runs)
+    assert tables.status_lines(dataclasses.replace(calm, runs=every)) == [Status.NO_OSCILLATION.value]
