@@ -21,18 +21,18 @@ from mujoco import rollout, sysid
 from rich.console import Console
 from rich.table import Table
 
-from diagnosis.data import prepare
-from diagnosis.diagnose import diagnose
-from diagnosis.least_squares import Fit, fit
-from diagnosis.noise import campaign_noise
-from diagnosis.problem import Problem, campaign_rig, held_end
-from diagnosis.start import StartingPoint, nominal_start, starting_points
-from tunnel_sim.campaign import Campaign
+from diagnosis._diagnose import diagnose
+from diagnosis.detection.sensor_noise import campaign_noise
+from diagnosis.fitting.least_squares import Fit, fit
+from diagnosis.fitting.problem import Problem, campaign_rig, held_end
+from diagnosis.fitting.run_data import prepare
+from diagnosis.fitting.starting_points import StartingPoint, nominal_start, starting_points
 from tunnel_sim.effects import ALL_EFFECTS
-from tunnel_sim.model import Model, build_model
-from tunnel_sim.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
-from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.virtual_campaign import simulate_campaign
+from tunnel_sim.engine.model import Model, build_model
+from tunnel_sim.engine.virtual_campaign import simulate_campaign
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
 
 CAUSES = {
     "no effect": (),

@@ -21,10 +21,10 @@ from rich.table import Table
 from throughput import interleaved, ratio
 
 import tunnel_sim.envs  # noqa: F401  registers the environments
+from tunnel_sim.engine.model import build_model
 from tunnel_sim.envs.conditions import plan_run
 from tunnel_sim.envs.config import FreeDecayConfig
-from tunnel_sim.model import build_model
-from tunnel_sim.rig import load_rig
+from tunnel_sim.files.rig_file import load_rig
 
 NAME = "tunnel_sim/FreeDecay-v0"
 DURATION = 60.0  # s, so that no run ends while it is timed

@@ -18,12 +18,12 @@ from peers import Method, present
 from rich.console import Console
 from rich.table import Table
 
-from identification.cramer_rao import damped_sinusoid_bound
+from identification.decay.run_fit import NO_WINDOWS
 from identification.estimators import ALL_ESTIMATORS, make_estimator
 from identification.estimators.output_error import OutputError
-from identification.run_fit import NO_WINDOWS
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.record import Record
+from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
 
 AMPLITUDE, ZERO, RATE, DURATION = 0.35, 0.004, 1000.0, 20.0
 DAMPING_RATIOS, FREQUENCIES, NOISE_SHARES = (0.002, 0.01, 0.05), (0.8, 2.0, 4.0), (0.001, 0.01)

@@ -61,8 +61,8 @@ def bare(file: Path, threads: int) -> dict[str, float]:
 
     from tunnel_lab.sweep.reading import read_sweep
     from tunnel_sim.effects import EffectChain
-    from tunnel_sim.model import build_model
-    from tunnel_sim.virtual_campaign import plan_effects, run_settings
+    from tunnel_sim.engine.model import build_model
+    from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 
     sweep, rng = read_sweep(file), np.random.default_rng(1)
     step = max(1, sweep.size // (BARE_RUNS // 4))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from identification.examination.remark import Remark
+from identification.remark import Remark
 
 SCHEMA_VERSION = 1
 

@@ -9,21 +9,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from diagnosis.data import Data, prepare, without_start
-from diagnosis.decide import UNKNOWN_SHARE, Weighed, form_floor, weigh
-from diagnosis.gap import GapTest, test_gap
-from diagnosis.least_squares import Fit, FitError, fit
-from diagnosis.mains import Hum, find_hum, refine_frequency, remove_hum
-from diagnosis.noise import Noise, NoiseTrend, campaign_noise, noise_trend, reading_step
-from diagnosis.outsiders import Outsider, weigh_outsiders
-from diagnosis.problem import Problem
-from diagnosis.random_moments import RandomAnswer, weigh_random_moments
-from diagnosis.rank import Hypothesis, polish, rank_pairs, rank_singles
-from diagnosis.refusal import refuse_indefinite
-from diagnosis.start import is_gross, nominal_start
-from tunnel_sim.campaign import Campaign
+from diagnosis.attribution.decide import UNKNOWN_SHARE, Weighed, form_floor, weigh
+from diagnosis.attribution.outsiders import Outsider, weigh_outsiders
+from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
+from diagnosis.attribution.rank import Hypothesis, polish, rank_pairs, rank_singles
+from diagnosis.detection.gap import GapTest, test_gap
+from diagnosis.detection.mains import Hum, find_hum, refine_frequency, remove_hum
+from diagnosis.detection.refusal import refuse_indefinite
+from diagnosis.detection.sensor_noise import Noise, NoiseTrend, campaign_noise, noise_trend, reading_step
+from diagnosis.fitting.least_squares import Fit, FitError, fit
+from diagnosis.fitting.problem import Problem
+from diagnosis.fitting.run_data import Data, prepare, without_start
+from diagnosis.fitting.starting_points import is_gross, nominal_start
 from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
 
 Progress = Callable[[str], None]
 

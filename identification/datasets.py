@@ -10,9 +10,9 @@ import csv
 from dataclasses import dataclass
 from importlib import resources
 
-from tunnel_sim.campaign import Campaign
-from tunnel_sim.campaign_io import read_campaign
-from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
 MEASURED_CAMPAIGNS: tuple[str, ...] = ("kvlcc2-roll-decay-0kn", "rotary-pendulum")
 """Names of the packaged measured campaigns."""

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from identification.examination.remark import Remark
+from identification.remark import Remark
 from identification.status import Status as Status
 from identification.status import by_gravity as by_gravity
-from tunnel_sim.errors import one_line
-from tunnel_sim.reading import as_described, check_shape
-from tunnel_sim.record import Array
+from tunnel_sim.files.reading import as_described, check_shape
+from tunnel_sim.vocabulary.errors import one_line
+from tunnel_sim.vocabulary.record import Array
 
 PARAMETERS = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 UNITS: Mapping[str, str] = {

@@ -28,7 +28,7 @@ from tunnel_lab.commands import (
     train,
     view,
 )
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 BAD_INPUT = 2
 INTERRUPTED = 130

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from diagnosis._diagnose import diagnose, vocabulary
 from diagnosis.blind.files import (
     SCHEMA_VERSION,
     SEAL,
@@ -19,10 +20,9 @@ from diagnosis.blind.files import (
     read_hashes,
     write_document,
 )
-from diagnosis.diagnose import diagnose, vocabulary
-from tunnel_sim.campaign_io import read_campaign
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.writing import output_folder
+from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.writing import output_folder
+from tunnel_sim.vocabulary.errors import TunnelError
 
 Told = Callable[[int, int, str], None]
 

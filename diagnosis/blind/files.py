@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tunnel_sim import limits
-from tunnel_sim.errors import TunnelError, shown
-from tunnel_sim.json_text import json_text
-from tunnel_sim.reading import read_json, read_regular
-from tunnel_sim.writing import write_whole
+from tunnel_sim.files.json_text import json_text
+from tunnel_sim.files.reading import read_json, read_regular
+from tunnel_sim.files.writing import write_whole
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 SCHEMA_VERSION = 1
 SEAL = "seal.json"
@@ -28,7 +28,7 @@ def write_document(path: Path, document: Mapping[str, Any]) -> str:
 
     Args:
         path: the file; replaced when it exists.
-        document: as for `tunnel_sim.json_text.json_text`.
+        document: as for `tunnel_sim.files.json_text.json_text`.
 
     Returns:
         SHA-256 of what was written, in hexadecimal.

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis.blind.files import KEY, SCHEMA_VERSION, SEAL, folder_hash, write_document
-from tunnel_sim.campaign_io import write_campaign
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.leftovers import clear_leftovers
-from tunnel_sim.reference.draw import DEFAULT_SHARES, Mixture
-from tunnel_sim.reference.make import as_campaign, draw_set, simulate_set, truth_of
-from tunnel_sim.writing import whole_folder
+from tunnel_reference.draw import DEFAULT_SHARES, Mixture
+from tunnel_reference.make import as_campaign, draw_set, simulate_set, truth_of
+from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.files.leftovers import clear_leftovers
+from tunnel_sim.files.writing import whole_folder
+from tunnel_sim.vocabulary.errors import TunnelError
 
 CHUNK = 100
 """Campaigns simulated together: their runs advance in one array, so that few at a time would cost as much."""

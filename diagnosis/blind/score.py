@@ -21,8 +21,8 @@ from diagnosis.blind.files import (
     read_hashes,
 )
 from diagnosis.blind.statistics import CalibrationBin, Share, calibration, share_of
-from tunnel_sim.errors import TunnelError, shown
-from tunnel_sim.reading import as_described
+from tunnel_sim.files.reading import as_described
+from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 CLOSED = 0.95
 WITHIN = 3.0

@@ -1,1 +1,1 @@
-"""The parts of `diagnosis.localise`: excess by run, time, amplitude and frequency, backbones, phase plane, maps."""
+"""Where the gap is: excess by run, time, amplitude and frequency; backbones, phase plane, maps."""

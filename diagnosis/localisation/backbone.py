@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.data import RunData
-from diagnosis.least_squares import Fit
-from diagnosis.spectra import linear_coefficients
-from identification.damped_oscillation import Decay
-from identification.decay_fit import Reading, fit_run
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.run_data import RunData
+from diagnosis.fitting.spectra import linear_coefficients
+from identification.decay.damped_oscillation import Decay
+from identification.decay.decay_fit import Reading, fit_run
+from identification.decay.windows import fit_windows
 from identification.estimate import NoiseLevel
-from identification.windows import fit_windows
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True, eq=False)

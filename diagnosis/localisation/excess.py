@@ -13,11 +13,11 @@ import numpy as np
 from scipy.fft import dct, idct
 from scipy.stats import chi2
 
-from diagnosis.least_squares import Fit
-from diagnosis.noise import estimate_variance
-from diagnosis.spectra import resonance
-from tunnel_sim.campaign import Campaign
-from tunnel_sim.record import Array
+from diagnosis.detection.sensor_noise import estimate_variance
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.spectra import resonance
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array
 
 #: Chance that the runs or bands of a campaign without a gap are said to hold one, all tests together.
 FALSE_ALARM_RATE = 0.01

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.least_squares import Fit, FitError, fit
+from diagnosis.fitting.least_squares import Fit, FitError, fit
+from diagnosis.fitting.problem import Problem
+from diagnosis.fitting.starting_points import nominal_start
 from diagnosis.localisation.backbone import Backbone, drift
 from diagnosis.localisation.excess import FALSE_ALARM_RATE, band_excesses, run_excesses, shortest_interval
 from diagnosis.localisation.mapping import Survey
-from diagnosis.problem import Problem
-from diagnosis.start import nominal_start
-from tunnel_sim.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign
 
 _MOST = 0.6  # share of the excess that makes a band or a run the place of the gap
 _COMPANION = 0.05  # likewise, of a second harmonic that goes with a shifted centre

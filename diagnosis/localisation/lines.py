@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.localisation.excess import FALSE_ALARM_RATE, RunExcess, chance
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 _WIDTH = 5  # coefficients a line spreads over
 _AROUND = 60  # coefficients on either side that show what a line stands out from

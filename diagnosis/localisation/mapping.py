@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.data import RunData
-from diagnosis.least_squares import Fit
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.run_data import RunData
 from diagnosis.localisation.backbone import backbones
 from diagnosis.localisation.excess import (
     Profile,
@@ -21,8 +21,8 @@ from diagnosis.localisation.excess import (
 from diagnosis.localisation.lines import residual_lines
 from diagnosis.localisation.maps import GroupExcess, Maps, RunMap, Trace
 from diagnosis.localisation.phase_plane import apparent_moment, motion, phase_plane
-from tunnel_sim.campaign import Campaign
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array
 
 _TIME_BINS = 60
 _AMPLITUDE_BINS = 40

@@ -11,7 +11,7 @@ from diagnosis.localisation.backbone import Backbone
 from diagnosis.localisation.excess import BandExcess, Profile
 from diagnosis.localisation.lines import ResidualLine
 from diagnosis.localisation.phase_plane import PhasePlane
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 _DIGITS = 5  # significant: more than any picture shows
 

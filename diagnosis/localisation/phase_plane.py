@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import savgol_coeffs
 
-from diagnosis.data import RunData
-from diagnosis.least_squares import Fit
-from diagnosis.spectra import linear_coefficients, resonance
-from tunnel_sim.record import Array
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.run_data import RunData
+from diagnosis.fitting.spectra import linear_coefficients, resonance
+from tunnel_sim.vocabulary.record import Array
 
 _WINDOW = (
     0.4  # of a cycle: passes the third harmonic at half height and keeps the noise of two derivatives down

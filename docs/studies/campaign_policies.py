@@ -24,8 +24,8 @@ from tunnel_lab.envs.campaign import CampaignEnv, reached
 from tunnel_lab.envs.picture import beliefs
 from tunnel_lab.envs.policies import POLICIES, run_campaign
 from tunnel_lab.envs.session import Knowledge, answers, probabilities
-from tunnel_sim.record import Array
-from tunnel_sim.writing import write_whole
+from tunnel_sim.files.writing import write_whole
+from tunnel_sim.vocabulary.record import Array
 
 CONTESTS = {"identification": ("scripted", "greedy"), "diagnosis": ("scripted", "separating")}
 SEEDS = {"identification": 50, "diagnosis": 50}
@@ -262,7 +262,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from tunnel_lab.plots import COLOURS, save
+    from tunnel_lab.plotting.plots import COLOURS, save
 
     figure = Figure(figsize=(10.0, 3.6), layout="constrained")
     FigureCanvasAgg(figure)

@@ -9,8 +9,8 @@ import numpy as np
 
 from docs.studies.network_study import HeldOutErrors, regenerated
 from identification.estimate import Estimate, WindowEstimate
-from tunnel_lab.plots import BLUE, COLOURS, MARKERS, VERMILION
-from tunnel_sim.campaign import Run
+from tunnel_lab.plotting.plots import BLUE, COLOURS, MARKERS, VERMILION
+from tunnel_sim.vocabulary.campaign import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,15 +13,16 @@ import numpy as np
 from scipy.stats import chi2
 
 from identification import identify
-from identification.cramer_rao import damped_sinusoid_bound
-from identification.damped_oscillation import Decay, free_decay, response_rows
+from identification.decay.damped_oscillation import Decay, free_decay, response_rows
 from identification.estimate import Estimate, Quantity
 from identification.neural.networks import Networks
 from identification.neural.shape import cycles_time, network_inputs
 from identification.neural.training_set import held_out_points
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.plan import CampaignPlan, EffectSetting, SensorModel, Truth, paper_plan
-from tunnel_sim.record import Array, Record
+from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+from tunnel_sim.files.plan_file import paper_plan
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.plan import CampaignPlan, EffectSetting, SensorModel, Truth
+from tunnel_sim.vocabulary.record import Array, Record
 
 NETWORK, CONVENTIONAL, BEST = "neural_network", "conventional", "output_error"
 METHODS = (NETWORK, CONVENTIONAL, BEST)
@@ -294,10 +295,10 @@ def reference_campaigns(count: int, seed: int, *, softening: bool) -> list[tuple
         seed: of everything drawn.
         softening: with a spring that softens and a damping that grows with the amplitude, as in `SOFTENING`.
     """
-    from tunnel_sim.reference.draw import CampaignDraw, EffectDraw, draw_conditions
-    from tunnel_sim.reference.forms import forms_of
-    from tunnel_sim.reference.make import as_campaign
-    from tunnel_sim.reference.severity import read_and_fit, simulate_motions
+    from tunnel_reference.draw import CampaignDraw, EffectDraw, draw_conditions
+    from tunnel_reference.forms import forms_of
+    from tunnel_reference.make import as_campaign
+    from tunnel_reference.severity import read_and_fit, simulate_motions
 
     rng = np.random.default_rng(seed)
     sized = (("cubic_stiffness", -1, 0.39), ("quadratic_damping", 1, 0.0038)) if softening else ()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from docs.studies.window_rivals import Explanation, WindowDiagnosis
-from tunnel_lab.plots import COLOURS
+from tunnel_lab.plotting.plots import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

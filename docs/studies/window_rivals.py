@@ -18,8 +18,8 @@ from scipy.optimize import least_squares
 from docs.studies.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
 from identification.datasets import WindowRow, paper_windows
 from tunnel_sim.effects import ALL_EFFECTS, Effect
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
 
 _SCAN = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # severities tried first, in the effect's own scale
 _STEP = 0.01  # of the finite differences, in units of the parameters' scales

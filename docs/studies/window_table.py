@@ -14,16 +14,17 @@ from math import pi, radians, sqrt
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from identification.damped_oscillation import Decay
 from identification.datasets import WindowRow, paper_derivatives, paper_springs, paper_windows
-from identification.decay_fit import Reading, fit_run
-from tunnel_sim.aero import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
+from identification.decay.damped_oscillation import Decay
+from identification.decay.decay_fit import Reading, fit_run
 from tunnel_sim.effects import Effect, EffectChain
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.forward import forward_motion
-from tunnel_sim.record import Array
-from tunnel_sim.rig import Rig, load_rig
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.aero import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import Rig
 
 CYCLES = 3
 _POINTS = 100  # of a window, as the paper's first network takes them

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 
-from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
-    from tunnel_sim.campaign import Campaign
+    from tunnel_sim.vocabulary.campaign import Campaign
 
 
 class Estimator(Protocol):

@@ -1,7 +1,7 @@
 """Bayesian: the posterior of each run's decay, and of the campaign's coefficients under all of them.
 
 The initial state, the zero and the noise level are integrated out in closed form and damping and frequency
-are summed over a grid (see `identification.posterior`), so that nothing rests on the likelihood being a
+are summed over a grid (see `identification.decay.posterior`), so that nothing rests on the likelihood being a
 parabola: in records of one to three cycles, or of few samples, it is not. Values are posterior means, their
 deviations the posterior's, and ωn and ζ carry their 95 % intervals. The campaign's coefficients are drawn from
 the product of the runs' likelihoods. Sources: Bretthorst, Bayesian Spectrum Analysis and Parameter Estimation
@@ -16,18 +16,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.assembly import RunDecay, combined_estimate
-from identification.damped_oscillation import Decay
-from identification.decay_fit import Reading, fit_run, project_run
-from identification.derivatives import Design, loads
+from identification.campaign.assembly import RunDecay, combined_estimate
+from identification.campaign.derivatives import Design, loads
+from identification.decay.damped_oscillation import Decay
+from identification.decay.decay_fit import Reading, fit_run, project_run
+from identification.decay.first_guess import starting_decay
+from identification.decay.importance import shared_moments
+from identification.decay.posterior import NoiseKnowledge, Posterior, posterior_of
+from identification.decay.run_fit import decay_covariance_of, describe_run, judge
+from identification.decay.thinning import block_means
 from identification.estimate import Estimate, NoiseLevel, Quantity, Status
-from identification.importance import shared_moments
-from identification.posterior import NoiseKnowledge, Posterior, posterior_of
-from identification.run_fit import decay_covariance_of, describe_run, judge
-from identification.start import starting_decay
-from identification.thinning import block_means
-from tunnel_sim.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array
 
 _LINEAR = 3  # initial angle and rate, zero
 

@@ -2,8 +2,8 @@
 
 The damped frequency f is the peak of the power spectral density, the time to half amplitude t½ = ln 2/σ comes
 from the decay of the peaks, and each wind-on run is set against the wind-off runs of its spring by eqs 7, 8, 17
-and 18 (`identification.pairing`). Standard deviations of f and σ are the scatter of one run's peaks. They cover
-scatter only, not the method's bias.
+and 18 (`identification.campaign.pairing`). Standard deviations of f and σ are the scatter of one run's peaks.
+They cover scatter only, not the method's bias.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.assembly import departures
-from identification.damped_oscillation import Decay
-from identification.derivatives import loads
+from identification.campaign.assembly import departures
+from identification.campaign.derivatives import loads
+from identification.campaign.pairing import PairedRun, paired_estimate
+from identification.decay.damped_oscillation import Decay
+from identification.decay.peaks import PeakDecay, peak_decay
+from identification.decay.residual_check import residual_check
+from identification.decay.spectrum import psd_peak
 from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_gravity
-from identification.pairing import PairedRun, paired_estimate
-from identification.peaks import PeakDecay, peak_decay
-from identification.residual_check import residual_check
-from identification.spectrum import psd_peak
-from identification.weighted_line import decay_covariance, deviations
-from tunnel_sim.campaign import Campaign, Run, SensorProperties
+from identification.statistics.weighted_line import decay_covariance, deviations
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 
 _LEAST_PROMINENCE = 40.0  # of the spectral peak; less may be noise
 

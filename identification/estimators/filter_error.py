@@ -16,14 +16,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.assembly import RunDecay, estimate_by_runs
-from identification.decay_fit import project_run
+from identification.campaign.assembly import RunDecay, estimate_by_runs
+from identification.decay.decay_fit import project_run
+from identification.decay.filter_fit import DrivenFit, fit_driven
+from identification.decay.residual_noise import Residual, noise_level, white_noise
+from identification.decay.run_fit import (
+    NO_WINDOWS,
+    FittedRun,
+    decay_covariance_of,
+    describe_run,
+    identify_run,
+)
+from identification.decay.thinning import block_means
 from identification.estimate import Estimate, NoiseLevel, Quantity, Status
-from identification.filter_fit import DrivenFit, fit_driven
-from identification.noise import Residual, noise_level, white_noise
-from identification.run_fit import NO_WINDOWS, FittedRun, decay_covariance_of, describe_run, identify_run
-from identification.thinning import block_means
-from tunnel_sim.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 
 _DECIDED = 6  # what a run's data decide: decay, stiffness, intensity, initial state, zero
 _INNOVATIONS_BLOCK = 3  # of them in an eighth of a cycle

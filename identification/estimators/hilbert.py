@@ -2,7 +2,7 @@
 
 Both are weighted lines over half-cycle averages of the analytic signal, whose deviations follow from the
 noise: √2 S/(√m A) for the logarithm and the phase alike. The ends are handled by carrying the record on with
-the decay found so far (see `identification.envelope`). Short stretches of the same lines give
+the decay found so far (see `identification.decay.envelope`). Short stretches of the same lines give
 ζ and ωn against the amplitude, the backbone of the rig, which stands in the run's windows; where a line does
 not fit a run, its deviations are raised to the scatter about it.
 
@@ -18,19 +18,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.assembly import RunDecay, estimate_by_runs
-from identification.damped_oscillation import Decay
-from identification.decay_fit import Reading, project_run
-from identification.envelope import Envelope, envelope
+from identification.campaign.assembly import RunDecay, estimate_by_runs
+from identification.decay.damped_oscillation import Decay
+from identification.decay.decay_fit import Reading, project_run
+from identification.decay.envelope import Envelope, envelope
+from identification.decay.first_guess import starting_decay
+from identification.decay.residual_check import residual_check
+from identification.decay.residual_noise import white_noise
+from identification.decay.run_fit import describe_run, judge
+from identification.decay.windows import CYCLES, modal_quantities
 from identification.estimate import Estimate, Quantity, Status, WindowEstimate
-from identification.noise import white_noise
-from identification.residual_check import residual_check
-from identification.run_fit import describe_run, judge
-from identification.start import starting_decay
-from identification.weighted_line import WeightedFit, decay_covariance, weighted_fit
-from identification.windows import CYCLES, modal_quantities
-from tunnel_sim.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.record import Array
+from identification.statistics.weighted_line import WeightedFit, decay_covariance, weighted_fit
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array
 
 _PASSES = 3  # each carries the record on with the decay of the one before
 _LEAST_POINTS = 5

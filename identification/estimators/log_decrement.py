@@ -19,18 +19,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.assembly import RunDecay, estimate_by_runs
-from identification.damped_oscillation import Decay
-from identification.decay_fit import Reading, project_run
+from identification.campaign.assembly import RunDecay, estimate_by_runs
+from identification.decay.damped_oscillation import Decay
+from identification.decay.decay_fit import Reading, project_run
+from identification.decay.first_guess import starting_frequency
+from identification.decay.peaks import PEAK_HALF_WIDTH, follow_peaks
+from identification.decay.residual_check import residual_check
+from identification.decay.residual_noise import white_noise
+from identification.decay.run_fit import describe_run, judge
 from identification.estimate import Estimate, Status
-from identification.noise import white_noise
-from identification.peaks import PEAK_HALF_WIDTH, follow_peaks
-from identification.residual_check import residual_check
-from identification.run_fit import describe_run, judge
-from identification.start import starting_frequency
-from identification.weighted_line import decay_covariance, weighted_fit
-from tunnel_sim.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.record import Array
+from identification.statistics.weighted_line import decay_covariance, weighted_fit
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array
 
 _LEAST_PEAKS = 5
 _LEAST_HEIGHT = 10.0  # in deviations of a peak: below, the logarithm bends the noise

@@ -3,7 +3,7 @@
 Every run is thinned to block means, its two poles are read from the shift of their Hankel matrix, and the
 first-order perturbation of that gives their covariance; the campaign's coefficients are those that fit the
 runs' poles best. Sources: Hua & Sarkar, IEEE Trans. Acoust. Speech Signal Process. 38 (1990) 814–824,
-doi 10.1109/29.56027; see `identification.pencil`.
+doi 10.1109/29.56027; see `identification.decay.pencil`.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.assembly import RunDecay, estimate_by_runs
-from identification.decay_fit import Reading, project_run
+from identification.campaign.assembly import RunDecay, estimate_by_runs
+from identification.decay.decay_fit import Reading, project_run
+from identification.decay.first_guess import starting_frequency
+from identification.decay.pencil import PencilDecay, pencil_decay
+from identification.decay.run_fit import describe_run, judge
+from identification.decay.thinning import block_means
 from identification.estimate import Estimate, Status
-from identification.pencil import PencilDecay, pencil_decay
-from identification.run_fit import describe_run, judge
-from identification.start import starting_frequency
-from identification.thinning import block_means
-from tunnel_sim.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 
 _DECAY_TIMES = 8.0  # 1/σ: what comes later holds e^−16 of the energy, and noise
 

@@ -3,7 +3,7 @@
 Each run is cut into consecutive windows of three cycles (the paper's Table III), found from zero crossings alone;
 the first network reads ζ off a window's shape, the second ωn off ζ and the window's length t3. The run's ζ and ωn
 are the averages over its windows, each with the weight its noise leaves it; eqs 10, 11, 17 and 18 then give Cnβ and
-Cnr from wind-on and wind-off runs of the same spring (`identification.pairing`).
+Cnr from wind-on and wind-off runs of the same spring (`identification.campaign.pairing`).
 
 A standard deviation holds the reading's noise, carried through crossings, shape and networks by the delta method;
 the posterior of the networks' weights; and their largest error on responses they were not trained on. Where the
@@ -23,21 +23,21 @@ from typing import ClassVar
 import numpy as np
 from scipy.stats import chi2
 
-from identification.assembly import departures
-from identification.damped_oscillation import Decay
-from identification.derivatives import loads
+from identification.campaign.assembly import departures
+from identification.campaign.derivatives import loads
+from identification.campaign.pairing import PairedRun, paired_estimate
+from identification.decay.damped_oscillation import Decay
+from identification.decay.readable import holds_motion
+from identification.decay.residual_check import residual_check
+from identification.decay.residual_noise import FALSE_ALARM_RATE, white_noise
+from identification.decay.windows import modal_quantities
 from identification.estimate import Estimate, Quantity, RunEstimate, Status, WindowEstimate, by_gravity
 from identification.neural.files import read_networks, shipped_networks
 from identification.neural.networks import Networks
 from identification.neural.shape import CYCLES, network_inputs, normalise, response_points
 from identification.neural.three_cycles import ThreeCycles, find_windows
-from identification.noise import FALSE_ALARM_RATE, white_noise
-from identification.pairing import PairedRun, paired_estimate
-from identification.readable import holds_motion
-from identification.residual_check import residual_check
-from identification.windows import modal_quantities
-from tunnel_sim.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array
 
 _UNLIKE = 0.1  # root mean square distance from a damped oscillation, of its amplitude, that is none
 _LEAST_FOR_SCATTER = 3

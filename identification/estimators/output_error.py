@@ -15,15 +15,27 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.assembly import air_of_runs, departures, limits, quantities, statuses_of_runs, wind_off
-from identification.decay_fit import DecayFit, fit_decays
-from identification.derivatives import Design, build_design, combine, derivatives, loads
+from identification.campaign.assembly import (
+    air_of_runs,
+    departures,
+    limits,
+    quantities,
+    statuses_of_runs,
+    wind_off,
+)
+from identification.campaign.derivatives import Design, build_design, combine, derivatives, loads
+from identification.decay.decay_fit import DecayFit, RunFit, fit_decays
+from identification.decay.residual_noise import noise_level
+from identification.decay.run_fit import FittedRun, identify_run, residuals_of
 from identification.estimate import Estimate, Quantity, Status, by_gravity
-from identification.information import determined, eliminate
-from identification.noise import noise_level
-from identification.run_fit import FittedRun, identify_run, residuals_of
-from identification.uncertainty import fisher_covariance, run_influences, scatter_of_runs, widened_covariance
-from tunnel_sim.campaign import Campaign, Run
+from identification.statistics.information import determined, eliminate, embed, scaled_solve
+from identification.statistics.widening import (
+    fisher_covariance,
+    scatter_of_runs,
+    widened_covariance,
+)
+from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.record import Array
 
 _JOINT_UNKNOWNS = 2  # of a run's own in the joint fit: its initial angle and rate
 
@@ -94,7 +106,7 @@ def _joint_estimate(
     if Status.MODEL_DEPARTS in statuses and found.names:
         windy = sum(run.wind_speed > 0.0 for run in runs)
         speaking = np.array([windy if name.startswith("cn_") else len(runs) for name in found.names])
-        influences = run_influences(fit.runs, design.links, found.jacobian)
+        influences = _influences(fit.runs, design.links, found.jacobian)
         own = widened_covariance(own, scatter_of_runs(influences, speaking))
     air = air_of_runs(design, found, own, runs)
     return replace(
@@ -115,3 +127,23 @@ def _joint_fit(design: Design, items: Sequence[FittedRun]) -> DecayFit | None:
     informations = [eliminate(fit.information, fit.score, 2)[0] for fit in own]
     start = combine(design, decays, informations)
     return None if start is None else fit_decays([item.reading for item in items], design.links, start[0])
+
+
+def _influences(runs: Sequence[RunFit], links: Sequence[Array], jacobian: Array) -> Array:
+    """What each run's residual contributes to parameters fitted to all runs.
+
+    Args:
+        runs: of the joint fit, with the zero common to them.
+        links: one (2, p) matrix per run.
+        jacobian: of the wanted parameters to φ, shape (q, p).
+
+    Returns:
+        Shape (runs, q).
+    """
+    total, scores = np.zeros((links[0].shape[1] + 1,) * 2), []
+    for run, link in zip(runs, links, strict=True):
+        information, score = run.reduced()
+        extended = embed(link, with_zero=True)
+        total += extended.T @ information @ extended
+        scores.append(extended.T @ score)
+    return np.asarray((jacobian @ scaled_solve(total, np.array(scores).T)[:-1]).T)

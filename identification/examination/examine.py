@@ -7,12 +7,12 @@ from dataclasses import replace
 from identification.examination.growth import growing_runs
 from identification.examination.labels import exchanged_labels
 from identification.examination.release import find_release
-from identification.examination.remark import Examined, Outcome, Remark
 from identification.examination.repeated import without_repeats
 from identification.examination.spring_line import springs_off_the_line
 from identification.examination.swings import swing_of
-from tunnel_sim.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.record import Record
+from identification.remark import Examined, Outcome, Remark
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
 
 
 def examine(campaign: Campaign) -> Examined:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identification.examination.remark import Outcome, Remark
 from identification.examination.swings import Swing
-from tunnel_sim.record import Array
+from identification.remark import Outcome, Remark
+from tunnel_sim.vocabulary.record import Array
 
 _CHANCE = 4.75  # standard deviations: one-sided, less than once in 1e6 runs of no damping at all
 

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
-from identification.examination.remark import Outcome, Remark
 from identification.examination.swings import Swing
-from tunnel_sim.record import Array
+from identification.remark import Outcome, Remark
+from tunnel_sim.vocabulary.record import Array
 
 #: How well a stated stiffness is usually known, as a ratio: weights and arm of a static calibration.
 SPRING_TOLERANCE = 0.01

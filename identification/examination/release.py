@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.decay_fit import Reading, RunFit, fit_run
-from identification.noise import white_noise
-from identification.start import starting_decay, starting_frequency
-from tunnel_sim.campaign import SensorProperties
-from tunnel_sim.record import Array, Record
+from identification.decay.decay_fit import Reading, RunFit, fit_run
+from identification.decay.first_guess import starting_decay, starting_frequency
+from identification.decay.residual_noise import white_noise
+from tunnel_sim.vocabulary.campaign import SensorProperties
+from tunnel_sim.vocabulary.record import Array, Record
 
 _NEAR_LARGEST = 0.9  # the last swing of this share of the largest comes after the release
 _LEAST_SAMPLES = 16

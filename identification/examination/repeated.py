@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from identification.examination.remark import Outcome, Remark
-from tunnel_sim.campaign import Campaign, Run
+from identification.remark import Outcome, Remark
+from tunnel_sim.vocabulary.campaign import Campaign, Run
 
 
 def without_repeats(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from identification.examination.labels import SPRING_TOLERANCE
-from identification.examination.remark import Outcome, Remark
 from identification.examination.swings import Swing
-from tunnel_sim.record import Array
+from identification.remark import Outcome, Remark
+from tunnel_sim.vocabulary.record import Array
 
 _FALSE_ALARM_RATE = 1e-3  # of sets of springs that are as good as SPRING_TOLERANCE
 _LEAST = 3  # springs that it takes to say which one is off

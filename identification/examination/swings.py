@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.damped_oscillation import Decay
-from identification.decay_fit import Reading, project_run
-from identification.pencil import PencilDecay, pencil_decay
-from identification.start import starting_frequency, thinned_reading
-from tunnel_sim.campaign import Run
-from tunnel_sim.record import Array
+from identification.decay.damped_oscillation import Decay
+from identification.decay.decay_fit import Reading, project_run
+from identification.decay.first_guess import starting_frequency, thinned_reading
+from identification.decay.pencil import PencilDecay, pencil_decay
+from tunnel_sim.vocabulary.campaign import Run
+from tunnel_sim.vocabulary.record import Array
 
 _UNKNOWNS = 5  # decay rate, stiffness, zero, initial angle and rate
 _LEAST_SAMPLES = 30  # of a part of a record whose poles are taken by themselves

@@ -16,11 +16,11 @@ from identification.neural.evidence import Hyperparameters
 from identification.neural.levenberg import Progress
 from identification.neural.network import parameter_count
 from identification.neural.training_set import SIZES
-from tunnel_sim import limits
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.json_text import json_line
-from tunnel_sim.reading import parse_json, read_regular
-from tunnel_sim.record import Array
+from tunnel_sim.files.json_text import json_line
+from tunnel_sim.files.reading import parse_json, read_regular
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True, eq=False)

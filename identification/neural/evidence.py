@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)

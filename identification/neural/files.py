@@ -21,10 +21,10 @@ from safetensors.numpy import load, save
 from identification.neural.network import Network, Scaling, parameter_count
 from identification.neural.networks import Errors, Networks
 from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec
-from tunnel_sim import limits
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.reading import as_described, parse_json, read_regular
-from tunnel_sim.record import Array
+from tunnel_sim.files.reading import as_described, parse_json, read_regular
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
 
 SHIPPED = "paper"
 _FIELDS = ("weights", "directions", "precision", "prior_precision", "inputs", "output")

@@ -21,7 +21,7 @@ import numpy as np
 from identification.neural.evidence import Hyperparameters, log_evidence, updated
 from identification.neural.network import Network, Scaling, parameter_count, split
 from identification.neural.training_set import Pairs
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
     from torch import Tensor

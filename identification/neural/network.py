@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)

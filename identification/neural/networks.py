@@ -11,7 +11,7 @@ import numpy as np
 from identification.neural.network import Network
 from identification.neural.shape import cycles_time, network_inputs
 from identification.neural.training_set import DataSpec, held_out_points
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from identification.decay.first_guess import starting_decay
+from identification.decay.readable import LEAST_SAMPLES
 from identification.neural.shape import CYCLES, POINTS, Shape, normalise
-from identification.readable import LEAST_SAMPLES
-from identification.start import starting_decay
-from tunnel_sim.record import Array, Record
+from tunnel_sim.vocabulary.record import Array, Record
 
 HALVES = 2 * CYCLES
 _SAMPLES_PER_CYCLE = 134  # kept of a denser record; four to each of the 100 points

@@ -28,7 +28,7 @@ from identification.neural.levenberg import (
 from identification.neural.network import Network, parameter_count
 from identification.neural.networks import Errors, Networks, held_out_errors
 from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, training_pairs
-from tunnel_sim.json_text import json_line
+from tunnel_sim.files.json_text import json_line
 
 NETWORKS = (DAMPING, FREQUENCY)
 _START, _TEST = 0, 2  # what a generator is for

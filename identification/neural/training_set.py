@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from identification.neural.shape import cycles_time, network_inputs
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 DAMPING, FREQUENCY = "damping", "frequency"
 SIZES = {DAMPING: (100, 5, 5, 1), FREQUENCY: (2, 2, 5, 1)}

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from decay_oracle import Oracle
 
-from tunnel_sim.aero import AeroDerivatives
-from tunnel_sim.rig import load_rig
-from tunnel_sim.run_settings import RodTwist, RunSettings, Series
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
+from tunnel_sim.vocabulary.aero import AeroDerivatives
 
 RIG = load_rig()
 DURATION, SAMPLE_RATE = 6.0, 1000.0

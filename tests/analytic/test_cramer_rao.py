@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.cramer_rao import campaign_bound, damped_sinusoid_bound
+from identification.uncertainty.cramer_rao import campaign_bound, damped_sinusoid_bound
 from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, angle_of, campaign
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 NAMES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import tunnel_sim.envs  # noqa: F401  registers the environments
-from identification.cramer_rao import campaign_bound
-from identification.damped_oscillation import Decay
-from identification.decay_fit import information_at
-from tunnel_sim.campaign import Campaign, RigProperties, SensorProperties
+from identification.decay.damped_oscillation import Decay
+from identification.decay.decay_fit import information_at
+from identification.uncertainty.cramer_rao import campaign_bound
 from tunnel_sim.envs.information import UNKNOWNS, Prior, half_log_det
-from tunnel_sim.forward import forward_motion
-from tunnel_sim.rig import load_rig
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
 
 RIG = load_rig()
 TRUTH = {"cn_beta": 0.47, "cn_r": -0.1, "yaw_inertia": 0.1, "mechanical_damping": 0.02, "sensor_zero": 0.004}
@@ -127,8 +127,8 @@ def test_under_the_operator_the_sensitivities_are_those_of_differences() -> None
     speed = set_point + (10.0 - set_point) * np.exp(-fine / 1.5)
 
     def reading(**changes: float) -> np.ndarray:
-        from tunnel_sim.aero import AeroDerivatives
-        from tunnel_sim.run_settings import RunSettings, Series
+        from tunnel_sim.physics.run_settings import RunSettings, Series
+        from tunnel_sim.vocabulary.aero import AeroDerivatives
 
         truth = {**TRUTH, "release_angle": 0.25, "release_rate": 0.0, **changes}
         settings = RunSettings(

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from law_cases import CASES, FRICTION, RIG, SAMPLE_RATE, Case
 
-from tunnel_sim.forward import backlash, forward_motion, forward_run, integrate
-from tunnel_sim.model import build_model
-from tunnel_sim.moment_law import parameter_vector
-from tunnel_sim.run_settings import RodTwist, RunSettings
-from tunnel_sim.simulate import simulate_motion
+from tunnel_sim.engine.model import build_model
+from tunnel_sim.engine.simulate import simulate_motion
+from tunnel_sim.physics.forward import backlash, forward_motion, forward_run, integrate
+from tunnel_sim.physics.moment_law import parameter_vector
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings
 
 
 def _difference(settings: RunSettings) -> float:

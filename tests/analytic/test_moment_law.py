@@ -10,10 +10,10 @@ import pytest
 from decay_oracle import Oracle
 from law_cases import CASES, DURATION, FREE_PLAY, FRICTION, RIG, SAMPLE_RATE, Case
 
-from tunnel_sim.model import build_model
-from tunnel_sim.moment_law import parameter_names
-from tunnel_sim.run_settings import Series
-from tunnel_sim.simulate import simulate_motion
+from tunnel_sim.engine.model import build_model
+from tunnel_sim.engine.simulate import simulate_motion
+from tunnel_sim.physics.moment_law import parameter_names
+from tunnel_sim.physics.run_settings import Series
 
 _RUNS: dict[tuple[str, float], np.ndarray] = {}
 

@@ -12,12 +12,12 @@ from law_cases import RIG, Case
 from tests.reference.effect_cases import settings
 from tests.reference.effect_oracle import Setting, reading
 from tunnel_sim.effects import effect_from
-from tunnel_sim.forward import forward_motion
-from tunnel_sim.model import Model, build_model
-from tunnel_sim.moment_law import state_names
-from tunnel_sim.plan import SensorModel
-from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.simulate import simulate_batch, simulate_motion
+from tunnel_sim.engine.model import Model, build_model
+from tunnel_sim.engine.simulate import simulate_batch, simulate_motion
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.moment_law import state_names
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.plan import SensorModel
 
 SAMPLE_RATE = 500.0
 

@@ -1,4 +1,4 @@
-"""Stiff springs against the closed form: frequency and damping as accurate as `tunnel_sim.steps` states.
+"""Stiff springs against the closed form: frequency and damping as accurate as `tunnel_sim.physics.steps` states.
 
 Truth: the solution of Izz β̈ + (Cr − Ca) β̇ + (Kr − Ka) β = 0, and for the steps themselves RK4's own amplification.
 """
@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from decay_oracle import AREA, LENGTH, closed_form
 
-from tunnel_sim.aero import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.forward import forward_motion
-from tunnel_sim.plan import SensorModel
-from tunnel_sim.rig import load_rig
-from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.simulate import simulate, simulate_motions
-from tunnel_sim.steps import BODY_TURN, FREQUENCY_ERROR, follow_fastest
+from tunnel_sim.engine.simulate import simulate, simulate_motions
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.steps import BODY_TURN, FREQUENCY_ERROR, follow_fastest
+from tunnel_sim.vocabulary.aero import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import SensorModel
 
 RIG = load_rig()
 AIR = AeroDerivatives(0.35, -0.7)

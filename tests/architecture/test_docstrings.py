@@ -37,7 +37,7 @@ COMMANDS = {
 } | {f"tunnel_lab.commands.blind.{name}" for name in ("make", "diagnose", "score")}
 EXEMPT = {"tunnel_lab.cli.tunnel", *COMMANDS}
 # The reference simulator is a test oracle with conventions of its own, not an interface.
-ORACLES = ("tunnel_sim.reference.",)
+ORACLES = ("tunnel_reference.",)
 
 UNIT = re.compile(
     r"""(?<![\w/])(

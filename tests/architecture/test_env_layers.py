@@ -16,7 +16,7 @@ def test_only_the_environments_import_gymnasium() -> None:
 
 
 def test_simulating_never_imports_gymnasium() -> None:
-    modules = imported_by("import tunnel_sim, tunnel_sim.simulate, tunnel_sim.virtual_campaign")
+    modules = imported_by("import tunnel_sim, tunnel_sim.engine.simulate, tunnel_sim.engine.virtual_campaign")
     assert "mujoco" in modules
     assert "gymnasium" not in modules
 

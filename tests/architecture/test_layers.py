@@ -59,9 +59,9 @@ def test_the_import_contracts_hold() -> None:
     ("module", "line"),
     [
         ("identification/estimate.py", "import mujoco"),
-        ("identification/estimate.py", "import tunnel_sim.model"),
-        ("tunnel_sim/record.py", "import identification.estimate"),
-        ("identification/estimate.py", "import tunnel_lab.formatting"),
+        ("identification/estimate.py", "import tunnel_sim.engine.model"),
+        ("tunnel_sim/vocabulary/record.py", "import identification.estimate"),
+        ("identification/estimate.py", "import tunnel_lab.terminal.formatting"),
     ],
 )
 def test_a_planted_breach_is_caught(tmp_path: Path, module: str, line: str) -> None:
@@ -79,11 +79,11 @@ def test_a_planted_breach_is_caught(tmp_path: Path, module: str, line: str) -> N
 def test_mujoco_is_imported_only_where_the_engine_runs() -> None:
     graph = grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
     importers = graph.find_modules_that_directly_import("mujoco")
-    assert "tunnel_sim.simulate" in importers
+    assert "tunnel_sim.engine.simulate" in importers
     outside = {name for name in importers if not name.startswith("tunnel_sim.")}
     # Inside functions, in a process of their own where they draw; live, the engine runs in front of the user.
     shown = {"film", "live", "stepper", "web", "window"}
-    assert outside <= {"tunnel_lab.rendering", *(f"tunnel_lab.show.{name}" for name in shown)}
+    assert outside <= {"tunnel_lab.show.rendering", *(f"tunnel_lab.show.{name}" for name in shown)}
 
 
 def test_reading_and_identifying_a_campaign_never_imports_the_engine() -> None:

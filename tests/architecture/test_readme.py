@@ -120,14 +120,14 @@ def test_the_links_lead_somewhere() -> None:
 
 
 def test_the_plan_shown_can_be_simulated(tmp_path: Path) -> None:
-    from tunnel_sim.plan import load_plan
+    from tunnel_sim.files.plan_file import load_plan
 
     (tmp_path / "plan.toml").write_text(toml_block("wind_speeds"), encoding="utf-8")
     assert len(load_plan(tmp_path / "plan.toml").conditions) == 4
 
 
 def test_the_measured_campaign_shown_can_be_read(tmp_path: Path) -> None:
-    from tunnel_sim.campaign_io import read_campaign
+    from tunnel_sim.files.campaign_io import read_campaign
 
     (tmp_path / "campaign.toml").write_text(toml_block("first-swing"), encoding="utf-8")
     (tmp_path / "runs").mkdir()

@@ -15,12 +15,12 @@ import pytest
 from tests.reference.effect_cases import VALUES, VOCABULARY, settings
 from tests.reference.effect_oracle import NOTHING, Setting, buffeted, fitted_phase, reading
 from tunnel_sim.effects import Effect, EffectChain, effect_from
-from tunnel_sim.forward import forward_motion
-from tunnel_sim.model import build_model
-from tunnel_sim.plan import SensorModel
-from tunnel_sim.rig import load_rig
-from tunnel_sim.sensor import read_motion
-from tunnel_sim.simulate import simulate_motion
+from tunnel_sim.engine.model import build_model
+from tunnel_sim.engine.sensor import read_motion
+from tunnel_sim.engine.simulate import simulate_motion
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.vocabulary.plan import SensorModel
 
 RIG = load_rig()
 QUIET = SensorModel(noise_std=0.0, resolution=0.0)

@@ -12,12 +12,12 @@ import pytest
 from tests.reference.effect_cases import VALUES, VOCABULARY, settings
 from tests.reference.effect_oracle import Setting
 from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.plan import SensorModel
-from tunnel_sim.record import Record
-from tunnel_sim.rig import load_rig
-from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.simulate import simulate, simulate_batch
+from tunnel_sim.engine.simulate import simulate, simulate_batch
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.record import Record
 
 RIG = load_rig()
 SENSOR = SensorModel(zero=0.003)

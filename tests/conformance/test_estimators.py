@@ -9,7 +9,7 @@ import pytest
 from identification import Estimate, Status, identify
 from identification.estimators import ALL_ESTIMATORS, ENTRIES, make_estimator
 from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, campaign, with_records
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 NAMES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 # Relative error on a noise-free campaign of the nominal model. A new estimator states its own here.

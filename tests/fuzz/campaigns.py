@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from tests.fuzz.values import Rng
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.record import Array, Record
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array, Record
 
 IDS = (
     "$\\foo$",

@@ -48,7 +48,7 @@ def _written(path: Path, content: bytes, rng: Rng) -> Path:
 
 def campaign_toml(folder: Path, rng: Rng) -> None:
     """``campaign.toml`` changed, its runs whole."""
-    from tunnel_sim.campaign_io import read_campaign
+    from tunnel_sim.files.campaign_io import read_campaign
 
     for name in ("r1.csv", "r2.parquet"):
         (folder / name).write_bytes(seeds.run_file(name))
@@ -57,7 +57,7 @@ def campaign_toml(folder: Path, rng: Rng) -> None:
 
 
 def _campaign_of(folder: Path, name: str, content: bytes, rng: Rng) -> None:
-    from tunnel_sim.campaign_io import read_campaign
+    from tunnel_sim.files.campaign_io import read_campaign
 
     document = seeds.campaign_document()
     run = next(one for one in document["runs"] if one["file"] == name)
@@ -79,15 +79,15 @@ def run_parquet(folder: Path, rng: Rng) -> None:
 
 def plan(folder: Path, rng: Rng) -> None:
     """A campaign description changed, and its effects made."""
-    from tunnel_sim.plan import load_plan
-    from tunnel_sim.virtual_campaign import plan_effects
+    from tunnel_sim.engine.virtual_campaign import plan_effects
+    from tunnel_sim.files.plan_file import load_plan
 
     plan_effects(load_plan(_written(folder / "plan.toml", _toml(seeds.PLAN, rng), rng)))
 
 
 def rig(folder: Path, rng: Rng) -> None:
     """A rig description changed."""
-    from tunnel_sim.rig import load_rig
+    from tunnel_sim.files.rig_file import load_rig
 
     load_rig(_written(folder / "rig.toml", _toml(seeds.packaged("rig.toml"), rng), rng))
 
@@ -97,7 +97,7 @@ def spring_table(folder: Path, rng: Rng) -> None:
     import typer
 
     from tunnel_lab.commands.springs import show
-    from tunnel_lab.spring_table import read_spring_table
+    from tunnel_lab.terminal.spring_table import read_spring_table
 
     table = read_spring_table(_written(folder / "springs.csv", changed_csv(seeds.springs_csv(), rng), rng))
     try:
@@ -108,7 +108,7 @@ def spring_table(folder: Path, rng: Rng) -> None:
 
 def effect_option(_folder: Path, rng: Rng) -> None:
     """The value of ``--effect`` changed, and the effect made."""
-    from tunnel_lab.effect_option import parse_effect
+    from tunnel_lab.terminal.effect_option import parse_effect
     from tunnel_sim.effects import effect_from
 
     setting = parse_effect(changed_line(seeds.EFFECT, rng))
@@ -117,14 +117,14 @@ def effect_option(_folder: Path, rng: Rng) -> None:
 
 def kinds_option(_folder: Path, rng: Rng) -> None:
     """The value of ``--kinds`` of ``tunnel blind make`` changed."""
-    from tunnel_sim.reference.make import parse_shares
+    from tunnel_reference.make import parse_shares
 
     parse_shares(changed_line(seeds.KINDS, rng))
 
 
 def uncertainties(folder: Path, rng: Rng) -> None:
     """A file of uncertainties changed."""
-    from identification.input_uncertainty import load_uncertainties
+    from identification.uncertainty.input_uncertainty import load_uncertainties
 
     load_uncertainties(_written(folder / "known.toml", _toml(seeds.UNCERTAINTIES, rng), rng))
 
@@ -139,7 +139,7 @@ def estimate(_folder: Path, rng: Rng) -> None:
 def blind_answers(folder: Path, rng: Rng) -> None:
     """Truth, answer, key or seal of a blind set changed; the hashes mostly agree."""
     from diagnosis.blind import score_set
-    from tunnel_lab import blind_page
+    from tunnel_lab.diagnosis_view import blind_page
 
     changed = ("truth", "answer", "seal")[rng.choice(3, p=(0.4, 0.4, 0.2))]
     (folder / "c1").mkdir()

@@ -15,7 +15,7 @@ from tests.fuzz import readers, tables, trials
 from tests.fuzz.summary import causes, causes_table
 from tests.fuzz.trials import Outcome, run_trial
 from tests.fuzz.workers import run_trials
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 SEED = 1
 READER_TRIALS, IDENTIFY_TRIALS = 2000, 60

@@ -19,7 +19,7 @@ import numpy as np
 
 from tests.fuzz.readers import READERS, Target
 from tests.fuzz.verbs import diagnose_campaign, identify_campaign
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 SHARES = {"readers": 0.966, "identify": 0.03, "diagnose": 0.004}
 """Which part of the trials goes where; a diagnosis takes seconds, a reader milliseconds."""

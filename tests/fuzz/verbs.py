@@ -9,7 +9,7 @@ from typing import Any
 
 from tests.fuzz.campaigns import degenerate
 from tests.fuzz.values import Rng
-from tunnel_sim.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign
 
 PICTURES = 0.03
 """Share of the identified campaigns that are drawn."""
@@ -23,7 +23,7 @@ def accepted_campaign(folder: Path, rng: Rng) -> Campaign:
     Raises:
         TunnelError: when the reader, or the writer for it, refuses the campaign.
     """
-    from tunnel_sim.campaign_io import read_campaign, write_campaign
+    from tunnel_sim.files.campaign_io import read_campaign, write_campaign
 
     return read_campaign(write_campaign(degenerate(rng), folder / "campaign"))
 
@@ -50,8 +50,8 @@ def identify_campaign(folder: Path, rng: Rng) -> None:
 
 def draw(campaign: Campaign, found: Any, folder: Path) -> None:
     """The figures of ``tunnel plot``."""
-    from tunnel_lab import plots
     from tunnel_lab.commands.plot import spread
+    from tunnel_lab.plotting import plots
 
     for page in plots.trace_pages(campaign):
         plots.save(page, folder / "traces.png")
@@ -64,9 +64,9 @@ def diagnose_campaign(folder: Path, rng: Rng) -> None:
     """A diagnosis with a small vocabulary: shown, written and, now and then, reported."""
     from tunnel_lab.files import json_text
 
-    from diagnosis.diagnose import diagnose
+    from diagnosis._diagnose import diagnose
     from tunnel_lab.commands.diagnose import show
-    from tunnel_lab.report import write_report
+    from tunnel_lab.diagnosis_view import write_report
     from tunnel_sim.effects import ALL_EFFECTS
 
     campaign = accepted_campaign(folder, rng)

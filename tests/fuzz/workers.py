@@ -198,9 +198,9 @@ def _prepare() -> None:
 
     mpl.use("agg")
     __import__("torch")
-    __import__("tunnel_sim.virtual_campaign")
-    __import__("diagnosis.diagnose")
-    __import__("tunnel_lab.report")
+    __import__("tunnel_sim.engine.virtual_campaign")
+    __import__("diagnosis._diagnose")
+    __import__("tunnel_lab.diagnosis_view")
     for make in _seed_makers(seeds):
         make()
     used = int(Path("/proc/self/statm").read_text("ascii").split()[0]) * resource.getpagesize()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tests.reference.effect_oracle import Setting
-from tunnel_sim.aero import AeroDerivatives
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.aero import AeroDerivatives
 
 # name: (channel, condition)
 VOCABULARY = {

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
 
 AREA, LENGTH, DENSITY = 0.036, 0.625, 1.204
 RESOLUTION = 2.0 * np.pi / 3.0 / 4096.0

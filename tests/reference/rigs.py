@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tunnel_sim.reference.conditions import Conditions
+from tunnel_reference.conditions import Conditions
 
 
 def rig(

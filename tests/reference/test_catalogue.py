@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tests.reference.rigs import rig
-from tunnel_sim.reference.catalogue import Group
-from tunnel_sim.reference.draw import KINDS, CampaignDraw, EffectDraw, Mixture, draw_campaign
-from tunnel_sim.reference.forcings import turbulence
-from tunnel_sim.reference.forms import FAMILIES, FORMS, forms_of
-from tunnel_sim.reference.nominal_fit import fit_nominal
-from tunnel_sim.reference.outside import OUTSIDE_FORMS
-from tunnel_sim.reference.severity import bind_effects, read_and_fit, simulate_motions, size_effects
+from tunnel_reference.catalogue import Group
+from tunnel_reference.draw import KINDS, CampaignDraw, EffectDraw, Mixture, draw_campaign
+from tunnel_reference.forcings import turbulence
+from tunnel_reference.forms import FAMILIES, FORMS, forms_of
+from tunnel_reference.nominal_fit import fit_nominal
+from tunnel_reference.outside import OUTSIDE_FORMS
+from tunnel_reference.severity import bind_effects, read_and_fit, simulate_motions, size_effects
 
 ALL_FORMS = (*FORMS, *OUTSIDE_FORMS)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunnel_sim.reference.draw import _twelve_runs
-from tunnel_sim.rig import load_rig
+from tunnel_reference.draw import _twelve_runs
+from tunnel_sim.files.rig_file import load_rig
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -7,11 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.reference.rigs import rig
-from tunnel_sim.reference import air_moments as air
-from tunnel_sim.reference import moments as m
-from tunnel_sim.reference.conditions import REFERENCE_LENGTH, Rod
-from tunnel_sim.reference.integrator import integrate
-from tunnel_sim.reference.terms import Phase, Term
+from tunnel_reference import air_moments as air
+from tunnel_reference import moments as m
+from tunnel_reference.conditions import REFERENCE_LENGTH, Rod
+from tunnel_reference.integrator import integrate
+from tunnel_reference.terms import Phase, Term
 
 
 def closed_form(c, run):

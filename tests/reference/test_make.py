@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.reference.rigs import rig
-from tunnel_sim.campaign_io import read_campaign
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.reference import draw, make
-from tunnel_sim.reference.draw import DEFAULT_SHARES, Mixture
+from tunnel_reference import draw, make
+from tunnel_reference.draw import DEFAULT_SHARES, Mixture
+from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def test_kinds_follow_their_shares():

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.reference.rigs import rig
-from tunnel_sim.reference import readings as r
-from tunnel_sim.reference.integrator import integrate
-from tunnel_sim.reference.readings import Order, Reading, ReadingTerm, read_motion
+from tunnel_reference import readings as r
+from tunnel_reference.integrator import integrate
+from tunnel_reference.readings import Order, Reading, ReadingTerm, read_motion
 
 
 @pytest.fixture(scope="module")

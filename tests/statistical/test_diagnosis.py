@@ -12,16 +12,17 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from diagnosis._diagnose import diagnose
 from diagnosis.blind.make import make_blind
-from diagnosis.diagnose import diagnose
-from diagnosis.gap import FALSE_ALARM_RATE
+from diagnosis.detection.gap import FALSE_ALARM_RATE
 from diagnosis.study import study
 from tests.reference.free_decays import RESOLUTION, Setting, campaign, with_records
 from tests.reference.rigs import rig
-from tunnel_sim.campaign_io import read_campaign
-from tunnel_sim.plan import EffectSetting, load_plan
-from tunnel_sim.reference import draw
-from tunnel_sim.virtual_campaign import simulate_campaign
+from tunnel_reference import draw
+from tunnel_sim.engine.virtual_campaign import simulate_campaign
+from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.plan_file import load_plan
+from tunnel_sim.vocabulary.plan import EffectSetting
 
 NOISE = 5e-4
 CAMPAIGNS = 400
@@ -110,7 +111,7 @@ def test_effects_of_the_reference_simulator_are_found(tmp_path, monkeypatch):
     conditions = rig(springs, speeds, (0.35,) * 6, 6.0)
     monkeypatch.setattr(draw, "draw_conditions", lambda _rng: conditions)
     wanted = ["coulomb_friction", "quadratic_damping", "sensor_nonlinearity", "nonlinear_yaw_damping"]
-    monkeypatch.setattr("tunnel_sim.reference.make._in_turn", lambda _order, number: wanted[:number])
+    monkeypatch.setattr("tunnel_reference.make._in_turn", lambda _order, number: wanted[:number])
     mixture = draw.Mixture(textbook=1.0, rare=0.0)
     key = make_blind(tmp_path / "set", count=4, seed=9, shares={"single": 1.0}, mixture=mixture)
     truths = json.loads(key.read_text(encoding="utf-8"))["truths"]

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.diagnose import diagnose
+from diagnosis._diagnose import diagnose
 from tests.reference.rigs import rig
-from tunnel_sim.reference.draw import CampaignDraw, EffectDraw
-from tunnel_sim.reference.forms import forms_of
-from tunnel_sim.reference.make import as_campaign
-from tunnel_sim.reference.severity import read_and_fit, simulate_motions
+from tunnel_reference.draw import CampaignDraw, EffectDraw
+from tunnel_reference.forms import forms_of
+from tunnel_reference.make import as_campaign
+from tunnel_reference.severity import read_and_fit, simulate_motions
 
 pytestmark = pytest.mark.slow
 

@@ -11,9 +11,9 @@ import pytest
 from scipy.stats import binom, chi2
 
 from identification import Status
-from identification.cramer_rao import campaign_bound
 from identification.estimators.conventional import Conventional
 from identification.estimators.output_error import OutputError
+from identification.uncertainty.cramer_rao import campaign_bound
 from tests.reference.free_decays import RESOLUTION, Setting, Truth, campaign
 
 NAMES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")

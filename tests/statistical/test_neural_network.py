@@ -9,8 +9,8 @@ from scipy.stats import binom, chi2
 from docs.studies.network_study import CONVENTIONAL, NETWORK, closeness, reference_campaigns, verdict
 from identification import identify
 from tests.reference.free_decays import damped_cosine
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
 
 TRIALS, NOISE, OMEGA = 300, 5e-4, 12.5
 FALSE_ALARM = 1e-3

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.budget import make_budget
-from identification.input_uncertainty import InputUncertainties
+from identification.uncertainty.budget import make_budget
+from identification.uncertainty.input_uncertainty import InputUncertainties
 from tests.reference.free_decays import RESOLUTION, Setting, campaign
 from tunnel_lab.scoring.check import check
 from tunnel_lab.scoring.grid import Cell, Grid

@@ -13,17 +13,17 @@ import pytest
 from scipy.signal import StateSpace, lfilter
 from scipy.stats import binom, chi2
 
-from identification.cramer_rao import damped_sinusoid_bound
+from identification.decay.run_fit import NO_WINDOWS
 from identification.estimators import make_estimator
 from identification.estimators.output_error import OutputError
-from identification.run_fit import NO_WINDOWS
-from tunnel_sim.aero import AeroDerivatives
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
+from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+from tunnel_reference.conditions import Conditions
+from tunnel_reference.forcings import turbulence
 from tunnel_sim.effects.buffeting import Buffeting
-from tunnel_sim.record import Record
-from tunnel_sim.reference.conditions import Conditions
-from tunnel_sim.reference.forcings import turbulence
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
 
 pytestmark = pytest.mark.slow
 

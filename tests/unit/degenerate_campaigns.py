@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.record import Array, Record
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array, Record
 
 Shape = Callable[[Array, np.random.Generator], Array]
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
 
 CAUSE, RIVAL = "quadratic_damping", "coulomb_friction"
 IDS = ("alpha", "beta", "gamma")

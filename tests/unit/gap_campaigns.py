@@ -6,14 +6,14 @@ import dataclasses
 
 import numpy as np
 
-from diagnosis.data import Data, RunData, prepare
-from diagnosis.least_squares import Fit, fit
-from diagnosis.noise import campaign_noise
-from diagnosis.problem import Point, Problem
-from diagnosis.start import nominal_start
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
+from diagnosis.detection.sensor_noise import campaign_noise
+from diagnosis.fitting.least_squares import Fit, fit
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.run_data import Data, RunData, prepare
+from diagnosis.fitting.starting_points import nominal_start
 from tunnel_sim.effects import Effect
-from tunnel_sim.record import Array, Record
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array, Record
 
 INTERVAL = 4e-3
 DURATION = 10.0

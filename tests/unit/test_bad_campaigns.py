@@ -8,8 +8,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from tunnel_sim.campaign_io import read_campaign
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.vocabulary.errors import TunnelError
 
 HEAD = 'schema_version = 1\n[campaign]\nname = "c"\n'
 RIG = "[rig]\nyaw_inertia = 0.11\nfrontal_area = 0.036\nreference_length = 0.625\n"

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.belief import (
+from identification.campaign.belief import (
     expected_belief,
     information_gain,
     prior_belief,
     run_link,
     update_belief,
 )
-from identification.cramer_rao import campaign_bound
-from identification.decay_fit import Prior, Reading, fit_decays
+from identification.decay.decay_fit import Prior, Reading, fit_decays
+from identification.decay.run_fit import identify_run
 from identification.estimate import PARAMETERS
-from identification.run_fit import identify_run
+from identification.uncertainty.cramer_rao import campaign_bound
 from tests.reference.free_decays import Setting, Truth, angle_of, campaign
 
 NOISE = 0.01

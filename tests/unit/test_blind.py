@@ -26,11 +26,11 @@ from diagnosis.result import (
 )
 from tests.reference.rigs import rig
 from tests.unit.gone_reader import unheard
-from tunnel_lab import blind_page
 from tunnel_lab.cli import main
-from tunnel_sim.campaign_io import read_campaign
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.reference import draw
+from tunnel_lab.diagnosis_view import blind_page
+from tunnel_reference import draw
+from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 @pytest.fixture(scope="module")

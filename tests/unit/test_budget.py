@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.budget import make_budget, with_budget
-from identification.input_uncertainty import InputUncertainties
+from identification.uncertainty.budget import make_budget, with_budget
+from identification.uncertainty.input_uncertainty import InputUncertainties
 from tests.reference.free_decays import TWELVE, Setting, campaign, with_records
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.record import Record
 
 EIGHT = (
     *(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0)),
@@ -140,7 +140,7 @@ def test_scatter_is_unknown_where_no_run_can_be_spared():
 
 def test_scatter_beyond_noise_is_flagged_as_rarely_as_stated():
     """Four sums of squares at 1 % each; a ratio that ignored how far a run bends the fit to itself would not."""
-    from identification.scatter import side_scatter
+    from identification.uncertainty.scatter import side_scatter
 
     flagged = 0
     for seed in range(60):

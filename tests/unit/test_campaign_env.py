@@ -11,14 +11,14 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_with_sb3
 
 import tunnel_sim.envs  # registers
-from diagnosis.diagnose import diagnose
+from diagnosis._diagnose import diagnose
 from identification import identify
-from identification.belief import information_gain
+from identification.campaign.belief import information_gain
 from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_lab.envs.menu import Costs
 from tunnel_lab.envs.session import probabilities
 from tunnel_lab.envs.truth import MEAN, RigTruth, draw_truth
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 ID = "tunnel_sim/Campaign-v0"
 SHORT = {"durations": (5.0,)}

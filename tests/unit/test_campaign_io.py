@@ -10,13 +10,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tunnel_sim import campaign_io
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.campaign_io import read_campaign, write_campaign
-from tunnel_sim.cycles import count_cycles
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.record import Record
-from tunnel_sim.run_files import read_table, table_bytes
+from tunnel_sim.files import campaign_io
+from tunnel_sim.files.campaign_io import read_campaign, write_campaign
+from tunnel_sim.files.run_files import read_table, table_bytes
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.cycles import count_cycles
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
 
 
 def decay(
@@ -299,7 +299,7 @@ def test_the_toml_itself_may_be_named(tmp_path: Path) -> None:
 
 def test_reading_imports_no_engine() -> None:
     code = (
-        "import sys, tunnel_sim.campaign_io, identification.datasets\n"
+        "import sys, tunnel_sim.files.campaign_io, identification.datasets\n"
         "sys.exit(bool({'mujoco', 'torch', 'matplotlib'} & sys.modules.keys()))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

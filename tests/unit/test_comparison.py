@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.comparison import ASPECTS, _rank_sum, changes, holm
-from identification.scoring import Trials
+from identification.scoring.accuracy import Trials
+from identification.scoring.comparison import ASPECTS, _rank_sum, changes, holm
 
 CELLS, COUNT = 6, 60
 

@@ -10,8 +10,8 @@ from identification.datasets import (
     paper_springs,
     paper_windows,
 )
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.rig import load_rig
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def test_table_2_is_the_paper_s() -> None:

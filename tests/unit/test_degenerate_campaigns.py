@@ -12,9 +12,9 @@ from identification import identify
 from identification.estimators import ALL_ESTIMATORS
 from identification.status import Status
 from tests.unit.degenerate_campaigns import degenerate_campaign, same_runs
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
 
 INERTIA = 0.11
 _RATE = 0.08

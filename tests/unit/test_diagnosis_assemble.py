@@ -9,19 +9,19 @@ import pytest
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.interpolate import CubicSpline
 
-from diagnosis.assemble import assemble, chosen_fit
-from diagnosis.candidates import candidates
-from diagnosis.decide import Weighed
-from diagnosis.diagnose import diagnose, vocabulary
-from diagnosis.localise import localise
-from diagnosis.rank import Hypothesis
-from diagnosis.reported import excess_base
+from diagnosis._diagnose import diagnose, vocabulary
+from diagnosis.answer.assemble import assemble, chosen_fit
+from diagnosis.answer.candidates import candidates
+from diagnosis.answer.reported import excess_base
+from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.rank import Hypothesis
+from diagnosis.localisation.localise import localise
 from diagnosis.study import study
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, with_blow
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
 
 NAMES = [kind.name for kind in ALL_EFFECTS]
 FEW = vocabulary(

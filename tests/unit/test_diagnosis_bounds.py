@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.least_squares import Fit
-from diagnosis.mains import refine_frequency, remove_hum
-from diagnosis.problem import Point, Problem
+from diagnosis.detection.mains import refine_frequency, remove_hum
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.problem import Point, Problem
 from diagnosis.result import ParameterEstimate
 from tests.unit.gap_campaigns import INTERVAL, NOISE, campaign, nominal
-from tunnel_lab.diagnosis_tables import parameter_lines
+from tunnel_lab.terminal.diagnosis_tables import parameter_lines
 from tunnel_sim.effects import effect_class
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.record import Record
 
 
 def _at(value: float) -> Fit:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.comparable import comparable_runs, frequency
-from diagnosis.diagnose import diagnose, vocabulary
+from diagnosis._diagnose import diagnose, vocabulary
+from diagnosis.detection.comparable import comparable_runs, frequency
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of
 

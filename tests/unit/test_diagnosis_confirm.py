@@ -5,19 +5,19 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis import confirm as module
-from diagnosis.cautions import cautions
-from diagnosis.confirm import TOLERANCE, Comparison, compare, confirm
-from diagnosis.data import Data, RunData
-from diagnosis.held_out import predict_held_out, refit_releases
-from diagnosis.least_squares import Fit, fit, sensitivities
-from diagnosis.noise import campaign_noise
-from diagnosis.problem import Point, Problem
-from diagnosis.reported import report_fits
-from diagnosis.start import starting_points
+from diagnosis.answer import confirm as module
+from diagnosis.answer.cautions import cautions
+from diagnosis.answer.confirm import TOLERANCE, Comparison, compare, confirm
+from diagnosis.answer.held_out import predict_held_out, refit_releases
+from diagnosis.answer.reported import report_fits
+from diagnosis.detection.sensor_noise import campaign_noise
+from diagnosis.fitting.least_squares import Fit, fit, sensitivities
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.run_data import Data, RunData
+from diagnosis.fitting.starting_points import starting_points
 from tests.unit.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 RELEASE = np.array([[0.35, 0.0], [-0.2, 0.4]])
 NOMINAL = (INERTIA, DAMPING, CN_BETA, CN_R, 0.001)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diagnosis.decide import (
+from diagnosis.attribution.decide import (
     FORM_MISFIT,
     FORM_MISFIT_UP_TO,
     PAIR_SHARE,

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from diagnosis.data import prepare
-from diagnosis.least_squares import (
+from diagnosis.fitting.least_squares import (
     FitError,
     clip,
     fit,
@@ -17,8 +16,9 @@ from diagnosis.least_squares import (
     scaled_residuals,
     sensitivities,
 )
-from diagnosis.problem import Point, Problem, condensed, held_end
-from diagnosis.start import nominal_start
+from diagnosis.fitting.problem import Point, Problem, condensed, held_end
+from diagnosis.fitting.run_data import prepare
+from diagnosis.fitting.starting_points import nominal_start
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
 from tests.unit.gap_campaigns import campaign, nominal

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import binom, kstest
 
-from diagnosis import gap  # its test_gap would be collected here by name
-from diagnosis.noise import Noise, NoiseTrend
-from diagnosis.spectra import resonance
+from diagnosis.detection import gap  # its test_gap would be collected here by name
+from diagnosis.detection.sensor_noise import Noise, NoiseTrend
+from diagnosis.fitting.spectra import resonance
 from tests.unit.gap_campaigns import campaign, nominal
 
 STEADY = NoiseTrend(0.0, 0.0, 0.0, judged=False)

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from diagnosis.coefficients import coefficients, rival_fits
-from diagnosis.data import Data, RunData
-from diagnosis.decide import LAPSE, Weighed
-from diagnosis.held_out import HeldOut, folds, predict_held_out
-from diagnosis.least_squares import fit
-from diagnosis.rank import Hypothesis
-from diagnosis.start import starting_points
+from diagnosis.answer.coefficients import coefficients, rival_fits
+from diagnosis.answer.held_out import HeldOut, folds, predict_held_out
+from diagnosis.attribution.decide import LAPSE, Weighed
+from diagnosis.attribution.rank import Hypothesis
+from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.run_data import Data, RunData
+from diagnosis.fitting.starting_points import starting_points
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from diagnosis.mains import find_hum, refine_frequency, remove_hum
-from diagnosis.spectra import mains_line
+from diagnosis.detection.mains import find_hum, refine_frequency, remove_hum
+from diagnosis.fitting.spectra import mains_line
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of, with_records
 from tests.unit.gap_campaigns import nominal
-from tunnel_sim.forward import backlash
+from tunnel_sim.physics.forward import backlash
 
 NOISE = 4e-4
 SETTINGS = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.least_squares import fit, normal_equations, sensitivities
-from diagnosis.next_run import planned_run, separating_run, separation
-from diagnosis.problem import Point, Problem
-from diagnosis.start import starting_points
+from diagnosis.answer.next_run import planned_run, separating_run, separation
+from diagnosis.fitting.least_squares import fit, normal_equations, sensitivities
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.starting_points import starting_points
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 

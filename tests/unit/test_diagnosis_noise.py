@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-from diagnosis.noise import (
+from diagnosis.detection.sensor_noise import (
     accuracy,
     campaign_noise,
     estimate_variance,
@@ -17,7 +17,7 @@ from diagnosis.noise import (
 )
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.record import Record
 
 NOISE = 5e-4
 SETTINGS = (Setting(16.12, 0.0), Setting(16.12, 20.0), Setting(44.84, 0.0), Setting(44.84, 20.0))

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.outsiders import weigh_outsiders
+from diagnosis.attribution.outsiders import weigh_outsiders
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_from
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.record import Record
 
 
 def changed(data, change):

@@ -7,9 +7,9 @@ import pytest
 from scipy.linalg import expm
 from scipy.signal import lfilter, lsim
 
-from diagnosis.process_noise import fit_turbulence, fit_wandering_shedding, whiteness
-from diagnosis.random_moments import weigh_random_moments, wind_off_excess
-from diagnosis.rank import Hypothesis
+from diagnosis.attribution.process_noise import fit_turbulence, fit_wandering_shedding, whiteness
+from diagnosis.attribution.random_moments import weigh_random_moments, wind_off_excess
+from diagnosis.attribution.rank import Hypothesis
 from tests.unit.gap_campaigns import (
     CN_BETA,
     CN_R,
@@ -23,7 +23,7 @@ from tests.unit.gap_campaigns import (
     with_blow,
 )
 from tunnel_sim.effects import effect_from
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.record import Record
 
 AREA, LENGTH = 0.036, 0.625
 BOTH = ("buffeting", "vortex_shedding")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.rank import rank_pairs, rank_singles
+from diagnosis.attribution.rank import rank_pairs, rank_singles
 from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 

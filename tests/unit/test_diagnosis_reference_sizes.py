@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.diagnose import diagnose, vocabulary
-from diagnosis.reference_sizes import parameter_unit, size_note, sized_coefficients
+from diagnosis._diagnose import diagnose, vocabulary
+from diagnosis.answer.reference_sizes import parameter_unit, size_note, sized_coefficients
 from diagnosis.result import ParameterEstimate
 from tests.reference import free_decays
 from tests.reference.free_decays import AREA, LENGTH, Setting
-from tunnel_sim.campaign import RigProperties
 from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.vocabulary.campaign import RigProperties
 
 SETTINGS = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0))
 RIGS = {

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.diagnose import diagnose
+from diagnosis._diagnose import diagnose
 from tests.unit.gap_campaigns import campaign
-from tunnel_sim.campaign import Campaign
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.record import Array, Record
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array, Record
 
 
 def _with_first(values: Array) -> Campaign:

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.data import prepare
-from diagnosis.equation_error import equation_error_start
-from diagnosis.least_squares import fit, fit_growing
-from diagnosis.problem import Point, Problem
-from diagnosis.spectra import residual_spectra, resonance, shedding_line
-from diagnosis.start import is_gross, nominal_start, project_out, starting_points
+from diagnosis.fitting.equation_error import equation_error_start
+from diagnosis.fitting.least_squares import fit, fit_growing
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.run_data import prepare
+from diagnosis.fitting.spectra import residual_spectra, resonance, shedding_line
+from diagnosis.fitting.starting_points import is_gross, nominal_start, project_out, starting_points
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, campaign, nominal

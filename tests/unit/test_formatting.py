@@ -8,7 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tunnel_lab.formatting import coefficient_label, concise, in_stds, significant, unit, unit_mark, with_std
+from tunnel_lab.terminal.formatting import (
+    coefficient_label,
+    concise,
+    in_stds,
+    significant,
+    unit,
+    unit_mark,
+    with_std,
+)
 
 
 @pytest.mark.parametrize(

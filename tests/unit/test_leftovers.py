@@ -13,10 +13,10 @@ import pytest
 
 from tests.reference.free_decays import Setting, campaign
 from tests.unit.killed import names_of_the_dead
-from tunnel_sim.campaign_io import read_campaign, write_campaign
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.leftovers import clear_leftovers, temporary_names
-from tunnel_sim.writing import whole_folder, write_whole
+from tunnel_sim.files.campaign_io import read_campaign, write_campaign
+from tunnel_sim.files.leftovers import clear_leftovers, temporary_names
+from tunnel_sim.files.writing import whole_folder, write_whole
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def test_the_next_writer_clears_what_a_killed_one_left(tmp_path: Path) -> None:
@@ -93,7 +93,7 @@ def test_links_in_the_place_of_leftovers_are_not_followed(tmp_path: Path) -> Non
 WRITER = """
 import sys, time
 from pathlib import Path
-from tunnel_sim import writing
+from tunnel_sim.files import writing
 def stop(*_):
     print("now", flush=True)
     time.sleep(60)

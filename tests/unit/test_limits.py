@@ -19,12 +19,12 @@ from tunnel_lab.scoring.grid import load_grid, packaged_grid
 from tunnel_lab.scoring.work import score_grid
 from tunnel_lab.sweep.product import Sweep
 from tunnel_lab.sweep.reading import read_sweep
-from tunnel_sim import limits
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.motion import sampling
-from tunnel_sim.plan import load_plan, paper_plan
-from tunnel_sim.plan_schema import first_twice
-from tunnel_sim.virtual_campaign import run_settings
+from tunnel_sim.engine.virtual_campaign import run_settings
+from tunnel_sim.files.plan_file import load_plan, paper_plan
+from tunnel_sim.files.plan_schema import first_twice
+from tunnel_sim.physics.motion import sampling
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "reference" / "limits.md"

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from diagnosis.data import without_start
-from diagnosis.least_squares import fit
+from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.problem import Problem
+from diagnosis.fitting.run_data import without_start
+from diagnosis.fitting.spectra import linear_coefficients
+from diagnosis.fitting.starting_points import nominal_start, starting_points
 from diagnosis.localisation.backbone import backbones, drift
 from diagnosis.localisation.excess import RunExcess, run_excesses, shortest_interval
+from diagnosis.localisation.localise import localise, telling_runs
 from diagnosis.localisation.phase_plane import apparent_moment
-from diagnosis.localise import localise, telling_runs
-from diagnosis.problem import Problem
-from diagnosis.spectra import linear_coefficients
-from diagnosis.start import nominal_start, starting_points
 from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, nominal, with_blow
 from tunnel_sim.effects import effect_class, effect_from
 

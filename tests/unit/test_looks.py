@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from tunnel_sim import scenery
-from tunnel_sim.aero import AeroDerivatives
-from tunnel_sim.davis import davis_vertices
-from tunnel_sim.model import build_model
-from tunnel_sim.rig import load_rig
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.engine import scenery
+from tunnel_sim.engine.model import build_model
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.davis import davis_vertices
 
 RIG = load_rig()
 PIECES = {

@@ -13,9 +13,9 @@ from identification.estimators.neural import NeuralNetwork, read_window
 from identification.neural.files import shipped_networks
 from identification.neural.three_cycles import find_windows
 from tests.reference.free_decays import damped_cosine
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
 
 ROOT = Path(__file__).parents[2]
 

@@ -26,7 +26,7 @@ from identification.neural.networks import held_out_errors
 from identification.neural.shape import network_inputs, response_points
 from identification.neural.train import TrainingSpec, train
 from identification.neural.training_set import DAMPING, SIZES, DataSpec, training_pairs
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 SHORT = TrainingSpec(seed=5, data=DataSpec(zeta_count=40, grid=(5, 9), test_count=50), starts=2,
                      damping_steps=6, frequency_steps=8)  # fmt: skip

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from identification import Status, identify
-from identification.damped_oscillation import Decay, free_decay
-from identification.decay_fit import Reading, fit_run
+from identification.decay.damped_oscillation import Decay, free_decay
+from identification.decay.decay_fit import Reading, fit_run
+from identification.decay.first_guess import starting_decay
 from identification.estimators.output_error import OutputError
-from identification.start import starting_decay
 from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, campaign, with_records
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.record import Record
 
 
 @pytest.mark.parametrize("zeta", [-0.002, 0.0, 0.001, 0.02, 0.2, 0.7, 1.0, 1.6])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
-from identification.peaks import _line
+from identification.decay.peaks import _line
 
 
 def test_the_gradient_and_its_deviation_are_those_of_a_linear_regression() -> None:

@@ -3,10 +3,11 @@ from pathlib import Path
 
 import pytest
 
-from tunnel_sim.aero import aerodynamic_damping, aerodynamic_stiffness
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.plan import EffectSetting, SensorModel, load_plan, paper_plan
-from tunnel_sim.rig import load_rig
+from tunnel_sim.files.plan_file import load_plan, paper_plan
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import EffectSetting, SensorModel
 
 SMALL = """
 name = "two"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunnel_sim.campaign_io import read_campaign, write_campaign
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.plausible import RANGES, plausible_values
+from tunnel_sim.files.campaign_io import read_campaign, write_campaign
+from tunnel_sim.files.plausible import RANGES, plausible_values
+from tunnel_sim.vocabulary.errors import TunnelError
 
 SLIPS = {
     "density in g/m3": ("air_density = 1.2", "air_density = 1204", "g/m3"),

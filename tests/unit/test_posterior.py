@@ -9,8 +9,8 @@ import pytest
 from identification import Estimate, identify
 from identification.estimate import Quantity
 from tests.reference.free_decays import TWELVE, Setting, campaign, damped_cosine
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
 
 
 def test_long_records_give_output_errors_values_and_deviations():

@@ -12,21 +12,21 @@ import pytest
 
 from diagnosis.blind.files import file_hash, read_document, read_hashes
 from identification.estimate import Estimate, Quantity, RunEstimate
-from identification.input_uncertainty import load_uncertainties
 from identification.neural.checkpoint import Checkpoint, read_checkpoint
 from identification.neural.files import read_networks, shipped_record
+from identification.uncertainty.input_uncertainty import load_uncertainties
 from tunnel_lab.scoring.grid import load_grid
 from tunnel_lab.scoring.results import read_trials
-from tunnel_lab.spring_table import read_spring_table
 from tunnel_lab.sweep.reading import read_sweep
 from tunnel_lab.sweep.store import open_store
-from tunnel_sim import limits
-from tunnel_sim.campaign_io import read_campaign
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.plan import load_plan
-from tunnel_sim.reading import check_count, parse_json, read_json, read_regular
-from tunnel_sim.rig import load_rig
-from tunnel_sim.run_files import read_table
+from tunnel_lab.terminal.spring_table import read_spring_table
+from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.plan_file import load_plan
+from tunnel_sim.files.reading import check_count, parse_json, read_json, read_regular
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.files.run_files import read_table
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError
 
 DEEP = 100_000
 READERS: dict[str, tuple[str, Callable[[Path], object]]] = {

@@ -6,8 +6,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from diagnosis.least_squares import fit
-from diagnosis.localise import localise
+from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.starting_points import starting_points
+from diagnosis.localisation.localise import localise
 from diagnosis.result import (
     Candidate,
     Coefficients,
@@ -18,13 +19,12 @@ from diagnosis.result import (
     ParameterEstimate,
     RunGap,
 )
-from diagnosis.start import starting_points
 from tests.unit.gap_campaigns import campaign, nominal
-from tunnel_lab.diagnosis_plots import diagnosis_figures, save_diagnosis_figures
-from tunnel_lab.report import render_report, write_report
-from tunnel_lab.report.page import DESCRIPTIONS
+from tunnel_lab.diagnosis_view import render_report, write_report
+from tunnel_lab.diagnosis_view.figures import diagnosis_figures, save_diagnosis_figures
+from tunnel_lab.diagnosis_view.page import DESCRIPTIONS
 from tunnel_sim.effects import effect_class, effect_from
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 CAUSE = "quadratic_damping"
 

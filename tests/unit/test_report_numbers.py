@@ -13,7 +13,7 @@ import pytest
 
 from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
-from tunnel_lab.report import render_report, view
+from tunnel_lab.diagnosis_view import render_report, view
 
 Document = dict[str, Any]
 

@@ -8,7 +8,7 @@ import pytest
 from identification import identify
 from identification.estimators.hilbert import Hilbert
 from tests.reference.free_decays import TWELVE, Setting, campaign
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.record import Record
 
 
 def decaying(law, *, frequency=2.0, noise=0.0, seed=1):

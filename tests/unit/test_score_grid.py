@@ -11,7 +11,7 @@ from tunnel_lab.scoring import work
 from tunnel_lab.scoring.draw import draw_trial
 from tunnel_lab.scoring.grid import Cell, Grid, load_grid, packaged_grid
 from tunnel_lab.scoring.results import Results, read_trials, scores_frame, write_trials
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 HEAD = 'schema_version = 1\nname = "g"\nseed = 1\ntrials = 4\n'
 DECAYS = "[[decays]]\nzeta = [0.01, 0.05]\nfrequency = [2.0]\nnoise = [0.01]\nduration = [4.0]\n"
@@ -82,7 +82,7 @@ def test_a_trial_hangs_on_its_seed_cell_and_number_only():
 
 
 def test_the_bound_is_that_of_the_start_actually_released():
-    from identification.cramer_rao import campaign_bound
+    from identification.uncertainty.cramer_rao import campaign_bound
 
     cell = Cell("campaign", 0.0015, 4.0, 0.35, 500.0, 0.0, wind_speed=25.0, springs=(16.12, 44.84))
     trial = draw_trial(cell, 1, 0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.estimate import Quantity
-from identification.scoring import Outcome, Proportion, collect, overall, score
+from identification.scoring.accuracy import Outcome, Proportion, collect, overall, score
 
 
 def outcomes(errors, *, std=1.0, truth=10.0, bound=1.0):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from identification.campaign.springs import FALSE_ALARM_RATE, fit_springs, wind_off_line
 from identification.datasets import paper_springs
-from identification.springs import FALSE_ALARM_RATE, fit_springs, wind_off_line
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 ROWS = paper_springs()
 STIFFNESS = np.array([row.stiffness_n_m_per_rad for row in ROWS])

@@ -9,12 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tunnel_sim.aero import AeroDerivatives
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.model import build_model
-from tunnel_sim.rig import load_rig
-from tunnel_sim.run_settings import RodTwist, RunSettings, Series
-from tunnel_sim.steps import (
+from tunnel_sim.engine.model import build_model
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
+from tunnel_sim.physics.steps import (
     BODY_TURN,
     MOST_SUBSTEPS,
     body_rate,
@@ -24,6 +22,8 @@ from tunnel_sim.steps import (
     for_rod,
     whole_steps,
 )
+from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.errors import TunnelError
 
 RIG = load_rig()
 PLAIN = RunSettings(

@@ -17,7 +17,7 @@ from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstim
 from identification.status import Status
 from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.unit.shown_numbers import assert_shows
-from tunnel_lab import diagnosis_tables, tables
+from tunnel_lab.terminal import diagnosis_tables, tables
 
 Document = dict[str, Any]
 Y_UNIT = re.compile(r"\[[^\]]*\]|N m s²/rad²|N m/rad|m/s|N m|1/rad")

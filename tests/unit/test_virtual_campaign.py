@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tunnel_sim.campaign import Campaign
-from tunnel_sim.campaign_io import read_campaign, write_campaign
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.plan import CampaignPlan, EffectSetting, load_plan
-from tunnel_sim.rig import load_rig
-from tunnel_sim.virtual_campaign import plan_effects, simulate_campaign, truth_document
+from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign, truth_document
+from tunnel_sim.files.campaign_io import read_campaign, write_campaign
+from tunnel_sim.files.plan_file import load_plan
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import CampaignPlan, EffectSetting
 
 PLAN = """
 name = "two-effects"

@@ -14,7 +14,7 @@ from tunnel_sim.effects import effect_from
 from tunnel_sim.effects.coulomb_friction import CoulombFriction
 from tunnel_sim.effects.cubic_stiffness import CubicStiffness
 from tunnel_sim.effects.quadratic_damping import QuadraticDamping
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 OMEGA, ZETA, COUNT = 12.6, 0.006, 8
 FEW = (CoulombFriction, QuadraticDamping, CubicStiffness)

@@ -15,14 +15,14 @@ from typing import BinaryIO
 import polars as pl
 import pytest
 
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.writing import (
+from tunnel_sim.files.writing import (
     output_folder,
     refuse_unwritable,
     write_encoded,
     write_json,
     write_whole,
 )
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def test_a_file_is_written_and_nothing_else(tmp_path: Path) -> None:
@@ -170,7 +170,7 @@ def child(code: str, *arguments: object, **options: object) -> subprocess.Comple
 
 STANDARD_OUTPUT = """
 from pathlib import Path
-from tunnel_sim.writing import write_whole
+from tunnel_sim.files.writing import write_whole
 print("before", flush=False)
 write_whole(Path("/dev/stdout"), b"content\\n")
 print("after")
@@ -197,10 +197,10 @@ from pathlib import Path
 import numpy as np
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.campaign_io import write_campaign
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.record import Record
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
 time = np.arange(5000) / 500.0
 run = Run("a", Record(time, 0.3 * np.cos(9.0 * time) + 1e-3 * np.sin(1e4 * time)), 0.0)
 campaign = Campaign("c", RigProperties(), SensorProperties(), (run,))
@@ -252,7 +252,7 @@ def test_a_table_is_written_by_its_library(tmp_path: Path) -> None:
 
 
 def test_a_report_that_cannot_be_drawn_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from tunnel_lab.report import page
+    from tunnel_lab.diagnosis_view import page
 
     def fails(*_: object) -> str:
         raise ValueError("no such glyph")

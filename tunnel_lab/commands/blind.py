@@ -64,11 +64,11 @@ def make(
     """
     from diagnosis.blind import make_blind
     from diagnosis.blind.files import SEAL, read_document
-    from tunnel_lab.progress import bar
-    from tunnel_lab.tables import say
-    from tunnel_sim.reference.draw import DEFAULT_SHARES, Mixture
-    from tunnel_sim.reference.make import parse_shares
-    from tunnel_sim.writing import refuse_unwritable
+    from tunnel_lab.terminal.progress import bar
+    from tunnel_lab.terminal.tables import say
+    from tunnel_reference.draw import DEFAULT_SHARES, Mixture
+    from tunnel_reference.make import parse_shares
+    from tunnel_sim.files.writing import refuse_unwritable
 
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
     if key is not None:
@@ -97,8 +97,8 @@ def diagnose(
       0 all answered, 2 bad input, 130 interrupted (what is answered stays).
     """
     from diagnosis.blind import answer_set, answers_folder
-    from tunnel_lab.progress import bar
-    from tunnel_lab.tables import say
+    from tunnel_lab.terminal.progress import bar
+    from tunnel_lab.terminal.tables import say
 
     names = split_names(exclude)
     with bar("diagnosing", None) as tell:
@@ -129,11 +129,11 @@ def score(
     [bold]Exit status[/bold]
       0 scored, 2 bad input: not all answered, or a file is not what was sealed.
     """
+    from diagnosis._diagnose import vocabulary
     from diagnosis.blind import score_set
-    from diagnosis.diagnose import vocabulary
-    from tunnel_lab import blind_page
-    from tunnel_lab.tables import say, show_tables
-    from tunnel_sim.writing import refuse_unwritable, write_json, write_whole
+    from tunnel_lab.diagnosis_view import blind_page
+    from tunnel_lab.terminal.tables import say, show_tables
+    from tunnel_sim.files.writing import refuse_unwritable, write_json, write_whole
 
     names = split_names(exclude)
     vocabulary(exclude=names)
@@ -159,6 +159,6 @@ def score(
 
 def _terminal() -> bool:
     """Whether standard error is a terminal."""
-    from tunnel_lab.tables import console
+    from tunnel_lab.terminal.tables import console
 
     return console(stderr=True).is_terminal

@@ -11,8 +11,8 @@ import typer
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
-    from tunnel_sim.campaign import Campaign, Run
-    from tunnel_sim.plan import CampaignPlan
+    from tunnel_sim.vocabulary.campaign import Campaign, Run
+    from tunnel_sim.vocabulary.plan import CampaignPlan
 
 SHOWN = ("output_error", "conventional", "neural_network")
 """Estimators of the comparison: the default, and the paper's two. `tunnel score` compares them all."""
@@ -46,9 +46,9 @@ def run(
       0 success, 1 an estimate failed or output_error missed the truth by more
       than four standard deviations, 2 bad input.
     """
-    from tunnel_lab.tables import say
-    from tunnel_sim.plan import paper_plan
-    from tunnel_sim.writing import output_folder
+    from tunnel_lab.terminal.tables import say
+    from tunnel_sim.files.plan_file import paper_plan
+    from tunnel_sim.files.writing import output_folder
 
     folder = output_folder(out)
     plan = paper_plan()
@@ -122,10 +122,10 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
     """
     from identification import identify
     from tunnel_lab.commands.simulate import simulate_with_progress
-    from tunnel_lab.tables import console
-    from tunnel_sim.campaign_io import write_campaign
-    from tunnel_sim.virtual_campaign import truth_document
-    from tunnel_sim.writing import write_json
+    from tunnel_lab.terminal.tables import console
+    from tunnel_sim.engine.virtual_campaign import truth_document
+    from tunnel_sim.files.campaign_io import write_campaign
+    from tunnel_sim.files.writing import write_json
 
     campaign = simulate_with_progress(plan)
     write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
@@ -146,7 +146,7 @@ def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: Camp
         estimates: of it, one per estimator.
         plan: of it.
     """
-    from tunnel_lab.tables import say, show_tables, status_lines, truth_table
+    from tunnel_lab.terminal.tables import say, show_tables, status_lines, truth_table
 
     say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")
     show_tables(truth_table(estimates, truth_of(plan)))
@@ -166,7 +166,7 @@ def measured_part(folder: Path) -> tuple[Campaign, Estimate]:
     """
     from identification import identify
     from identification.datasets import measured_campaign
-    from tunnel_sim.writing import write_json
+    from tunnel_sim.files.writing import write_json
 
     campaign = measured_campaign(MEASURED)
     estimate = identify(campaign, CHECKED_ESTIMATOR, throw=False)
@@ -182,7 +182,7 @@ def show_measured(campaign: Campaign, estimate: Estimate) -> None:
         estimate: of it.
     """
     from tunnel_lab.commands.identify import show
-    from tunnel_lab.tables import say
+    from tunnel_lab.terminal.tables import say
 
     say(f"Measured: {campaign.name}, {len(campaign.runs)} runs. {campaign.description}\n")
     show(campaign, estimate, windows=True)
@@ -203,9 +203,9 @@ def draw(
     Returns:
         Why there is no picture of the rig; empty where there is one.
     """
-    from tunnel_lab import plots
-    from tunnel_lab.rendering import render_rig
-    from tunnel_lab.tables import console
+    from tunnel_lab.plotting import plots
+    from tunnel_lab.show.rendering import render_rig
+    from tunnel_lab.terminal.tables import console
 
     off, on = wind_off_on_pair(campaign)
     plots.save(plots.wind_off_on_figure(off, on), folder / "traces.png")
@@ -228,7 +228,7 @@ def wind_off_on_pair(campaign: Campaign) -> tuple[Run, Run]:
     Raises:
         TunnelError: when no spring has both.
     """
-    from tunnel_sim.errors import TunnelError
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     for off in campaign.runs:
         pairs = [r for r in campaign.runs if r.wind_on and r.spring_stiffness == off.spring_stiffness]

@@ -11,8 +11,8 @@ import typer
 
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
-    from tunnel_sim.campaign import Campaign
     from tunnel_sim.effects import Effect
+    from tunnel_sim.vocabulary.campaign import Campaign
 
 NAME = "diagnose"
 STEPS = {
@@ -63,11 +63,11 @@ def run(
       0 answered, whatever the verdict; 2 bad input; 130 interrupted. A file is
       written whole or not at all.
     """
-    from diagnosis.diagnose import vocabulary
-    from tunnel_lab.tables import say
-    from tunnel_sim.campaign_io import read_campaign
-    from tunnel_sim.json_text import json_text
-    from tunnel_sim.writing import refuse_unwritable, write_json
+    from diagnosis._diagnose import vocabulary
+    from tunnel_lab.terminal.tables import say
+    from tunnel_sim.files.campaign_io import read_campaign
+    from tunnel_sim.files.json_text import json_text
+    from tunnel_sim.files.writing import refuse_unwritable, write_json
 
     kinds = vocabulary(split_names(effects), split_names(exclude))
     to_stdout = json is not None and str(json) == "-"
@@ -81,7 +81,7 @@ def run(
         write_json(json, document)
     if report is not None:
         from identification.examination.examine import examine
-        from tunnel_lab.report import write_report
+        from tunnel_lab.diagnosis_view import write_report
 
         write_report(document, examine(data).campaign, report)
     if to_stdout:
@@ -115,7 +115,7 @@ def diagnose_with_progress(campaign: Campaign, kinds: tuple[type[Effect], ...]) 
     Returns:
         The diagnosis.
     """
-    from diagnosis.diagnose import diagnose
+    from diagnosis._diagnose import diagnose
 
     with step_display() as tell:
         return diagnose(campaign, kinds=kinds, progress=tell)
@@ -130,7 +130,7 @@ def step_display() -> Iterator[Callable[[str], None]]:
     """
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    from tunnel_lab.tables import console
+    from tunnel_lab.terminal.tables import console
 
     terminal = console(stderr=True)
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
@@ -155,8 +155,8 @@ def show(document: dict[str, Any]) -> None:
     Args:
         document: of a diagnosis.
     """
-    from tunnel_lab import diagnosis_tables as parts
-    from tunnel_lab.tables import say, show_tables
+    from tunnel_lab.terminal import diagnosis_tables as parts
+    from tunnel_lab.terminal.tables import say, show_tables
 
     say(document["verdict"])
     for line in (parts.where_line(document), *parts.rival_lines(document)):

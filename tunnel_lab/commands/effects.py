@@ -34,9 +34,9 @@ def run(
     [bold]Exit status[/bold]
       0 shown, 2 bad input.
     """
-    from tunnel_lab import effect_listing, tables
+    from tunnel_lab.terminal import effect_listing, tables
     from tunnel_sim.effects import ALL_EFFECTS, effect_class
-    from tunnel_sim.writing import refuse_unwritable, write_json, write_whole
+    from tunnel_sim.files.writing import refuse_unwritable, write_json, write_whole
 
     kinds = ALL_EFFECTS if name is None else (effect_class(name),)
     for path in (json, markdown):

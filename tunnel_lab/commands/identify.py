@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tunnel_lab.estimator_help import command_with_estimators
+from tunnel_lab.terminal.estimator_help import command_with_estimators
 
 if TYPE_CHECKING:
-    from identification.budget import Budget
     from identification.estimate import Estimate
     from identification.estimators import Estimator
-    from tunnel_sim.campaign import Campaign
+    from identification.uncertainty.budget import Budget
+    from tunnel_sim.vocabulary.campaign import Campaign
 
 NAME = "identify"
 COMMAND = command_with_estimators()
@@ -91,11 +91,11 @@ def run(
       0 identified, 1 nothing could be identified, 2 bad input.
     """
     from identification import identify
-    from tunnel_lab.tables import say
-    from tunnel_sim.campaign_io import read_campaign
-    from tunnel_sim.errors import TunnelError
-    from tunnel_sim.json_text import json_text
-    from tunnel_sim.writing import refuse_unwritable, write_json
+    from tunnel_lab.terminal.tables import say
+    from tunnel_sim.files.campaign_io import read_campaign
+    from tunnel_sim.files.json_text import json_text
+    from tunnel_sim.files.writing import refuse_unwritable, write_json
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     for name in (estimator, *(models or ())):
         known_estimator(name)
@@ -151,9 +151,9 @@ def budgeted(
     from rich.text import Text
 
     from identification import identify
-    from identification.budget import make_budget, with_budget
-    from identification.input_uncertainty import InputUncertainties, load_uncertainties
-    from tunnel_lab.tables import console
+    from identification.uncertainty.budget import make_budget, with_budget
+    from identification.uncertainty.input_uncertainty import InputUncertainties, load_uncertainties
+    from tunnel_lab.terminal.tables import console
 
     inputs = InputUncertainties() if uncertainties is None else load_uncertainties(uncertainties)
     others = {
@@ -178,7 +178,7 @@ def show_budget(budget: Budget) -> None:
     Args:
         budget: of the estimate that was shown.
     """
-    from tunnel_lab import budget_table, tables
+    from tunnel_lab.terminal import budget_table, tables
 
     tables.say("")
     tables.show_tables(budget_table.budget_table(budget))
@@ -197,7 +197,7 @@ def known_estimator(name: str) -> None:
         TunnelError: when there is no such estimator, with the closest name.
     """
     from identification.estimators import ALL_ESTIMATORS
-    from tunnel_sim.errors import TunnelError, did_you_mean
+    from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
     if name not in ALL_ESTIMATORS:
         raise TunnelError(
@@ -215,7 +215,7 @@ def with_weights(name: str, weights: Path | None) -> str | Estimator:
     Raises:
         TunnelError: when the estimator has no weights.
     """
-    from tunnel_sim.errors import TunnelError
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     if weights is None:
         return name
@@ -235,7 +235,7 @@ def show(campaign: Campaign, estimate: Estimate, *, windows: bool) -> None:
         estimate: its estimate.
         windows: whether to show every run's windows, too.
     """
-    from tunnel_lab import tables
+    from tunnel_lab.terminal import tables
 
     tables.show_tables(tables.coefficients_table(estimate), tables.runs_table(campaign, estimate))
     if windows:

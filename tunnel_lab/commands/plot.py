@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from tunnel_sim.campaign import Campaign, Run
+    from tunnel_sim.vocabulary.campaign import Campaign, Run
 
 NAME = "plot"
 
@@ -35,10 +35,10 @@ def run(
       input.
     """
     from identification import identify
-    from tunnel_lab import plots
-    from tunnel_lab.tables import say
-    from tunnel_sim.campaign_io import read_campaign
-    from tunnel_sim.writing import output_folder
+    from tunnel_lab.plotting import plots
+    from tunnel_lab.terminal.tables import say
+    from tunnel_sim.files.campaign_io import read_campaign
+    from tunnel_sim.files.writing import output_folder
 
     data = read_campaign(campaign)
     folder = output_folder(out / campaign.resolve().name)

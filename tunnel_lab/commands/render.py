@@ -55,7 +55,7 @@ def run(
     """
     from tunnel_lab.show.film import Look, write_still
     from tunnel_lab.show.request import Request, shown_run
-    from tunnel_lab.tables import say
+    from tunnel_lab.terminal.tables import say
 
     targets = _targets(out)
     look = Look(*_pixels(size), fps=fps, speed=speed, camera=checked_camera(camera))
@@ -85,7 +85,7 @@ def _film(request: object, look: object, path: Path) -> None:
 
     from tunnel_lab.show.film import Look, write_film
     from tunnel_lab.show.request import Request
-    from tunnel_lab.tables import console
+    from tunnel_lab.terminal.tables import console
 
     assert isinstance(request, Request)
     assert isinstance(look, Look)
@@ -98,8 +98,8 @@ def _film(request: object, look: object, path: Path) -> None:
 
 def _targets(out: list[Path] | None) -> list[Path]:
     """The files to write, refused before the work is done where they cannot be."""
-    from tunnel_sim.errors import TunnelError
-    from tunnel_sim.writing import output_folder
+    from tunnel_sim.files.writing import output_folder
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     targets = out if out else list(_DEFAULT)
     for path in targets:
@@ -116,7 +116,7 @@ def _targets(out: list[Path] | None) -> list[Path]:
 
 
 def _pixels(size: str) -> tuple[int, int]:
-    from tunnel_sim.errors import TunnelError
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     width, cross, height = size.lower().partition("x")
     numbers = [int(part) if part.isdecimal() else 0 for part in (width, height)]
@@ -136,7 +136,7 @@ def checked_camera(name: str) -> str:
         TunnelError: when the rig has no such camera.
     """
     from tunnel_lab.show.film import CAMERAS
-    from tunnel_sim.errors import TunnelError, did_you_mean
+    from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
     if name not in CAMERAS:
         raise TunnelError(

@@ -90,7 +90,7 @@ def run(
     from tunnel_lab.scoring import check as checking
     from tunnel_lab.scoring import tables
     from tunnel_lab.scoring.results import Results, write_trials
-    from tunnel_lab.tables import say, show_tables
+    from tunnel_lab.terminal.tables import say, show_tables
 
     names = chosen(estimators)
     if breakdown:
@@ -150,7 +150,7 @@ def chosen(names: list[str] | None) -> tuple[str, ...]:
 def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results:
     from tunnel_lab.scoring.packaged import packaged_baseline
     from tunnel_lab.scoring.results import read_trials
-    from tunnel_sim.errors import TunnelError
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     baseline = packaged_baseline() if text == PACKAGED else read_trials(Path(text))
     gone = [name for name in baseline.estimators if name not in names]
@@ -175,8 +175,8 @@ def _grid(path: Path | None, baseline: Results | None, trials: int | None, seed:
 
 
 def _rows(grid: Grid, names: tuple[str, ...], jobs: int, out: Path | None) -> list[dict[str, object]]:
-    from tunnel_lab.progress import bar
     from tunnel_lab.scoring.work import score_grid
+    from tunnel_lab.terminal.progress import bar
 
     parts = None if out is None else out / "parts"
     with bar("scoring") as tell:
@@ -186,10 +186,10 @@ def _rows(grid: Grid, names: tuple[str, ...], jobs: int, out: Path | None) -> li
 def _keep(out: Path, results: Results) -> list[Path]:
     import shutil
 
-    from tunnel_lab.plots import save
+    from tunnel_lab.plotting.plots import save
     from tunnel_lab.scoring.figures import score_figure
     from tunnel_lab.scoring.results import parquet, scores_frame, write_trials
-    from tunnel_sim.writing import write_whole
+    from tunnel_sim.files.writing import write_whole
 
     written = [
         write_trials(out / "trials.parquet", results),
@@ -202,8 +202,8 @@ def _keep(out: Path, results: Results) -> list[Path]:
 
 def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
     """Only an interrupted score may be in the folder, or, with ``overwrite``, a finished one."""
-    from tunnel_sim.errors import TunnelError
-    from tunnel_sim.leftovers import clear_leftovers
+    from tunnel_sim.files.leftovers import clear_leftovers
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     if out is None or not out.exists():
         return
@@ -215,7 +215,7 @@ def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
 
 
 def _refuse_unwritable(path: Path | None) -> None:
-    from tunnel_sim.writing import refuse_unwritable
+    from tunnel_sim.files.writing import refuse_unwritable
 
     if path is not None:
         refuse_unwritable(path)
@@ -223,7 +223,7 @@ def _refuse_unwritable(path: Path | None) -> None:
 
 def _refuse_of_the_grid(given: dict[str, object]) -> None:
     """The breakdown map has conditions of its own."""
-    from tunnel_sim.errors import TunnelError
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     for name, value in given.items():
         if value is not None:
@@ -233,13 +233,13 @@ def _refuse_of_the_grid(given: dict[str, object]) -> None:
 def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, trials: int | None) -> None:
     import shutil
 
-    from tunnel_lab.plots import save
-    from tunnel_lab.progress import bar
+    from tunnel_lab.plotting.plots import save
     from tunnel_lab.scoring import breakdown as work
     from tunnel_lab.scoring import breakdown_view as view
     from tunnel_lab.scoring.results import parquet
-    from tunnel_lab.tables import console, say, show_tables
-    from tunnel_sim.writing import write_whole
+    from tunnel_lab.terminal.progress import bar
+    from tunnel_lab.terminal.tables import console, say, show_tables
+    from tunnel_sim.files.writing import write_whole
 
     terminal = console(stderr=True).is_terminal
     cases = work.make_cases(seed, realisations=trials or work.REALISATIONS, tell_steps=terminal)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from tunnel_sim.campaign import Campaign
-    from tunnel_sim.plan import CampaignPlan
+    from tunnel_sim.vocabulary.campaign import Campaign
+    from tunnel_sim.vocabulary.plan import CampaignPlan
 
 NAME = "simulate"
 
@@ -69,11 +69,11 @@ def run(
     [bold]Exit status[/bold]
       0 written, 2 bad input; nothing is written then.
     """
-    from tunnel_lab.effect_option import parse_effect
-    from tunnel_lab.tables import say
-    from tunnel_sim.campaign_io import write_campaign
-    from tunnel_sim.plan import load_plan
-    from tunnel_sim.virtual_campaign import plan_effects, truth_document
+    from tunnel_lab.terminal.effect_option import parse_effect
+    from tunnel_lab.terminal.tables import say
+    from tunnel_sim.engine.virtual_campaign import plan_effects, truth_document
+    from tunnel_sim.files.campaign_io import write_campaign
+    from tunnel_sim.files.plan_file import load_plan
 
     added = tuple(parse_effect(text) for text in effect or ())
     loaded = load_plan(plan)
@@ -99,8 +99,8 @@ def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
     Raises:
         TunnelError: when it is a file, or exists and may not be replaced.
     """
-    from tunnel_sim.errors import TunnelError
-    from tunnel_sim.leftovers import clear_leftovers
+    from tunnel_sim.files.leftovers import clear_leftovers
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     clear_leftovers(folder.resolve().parent)  # what a killed command set aside is there again
     if folder.exists() and not folder.is_dir():
@@ -120,8 +120,8 @@ def simulate_with_progress(plan: CampaignPlan) -> Campaign:
     """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from tunnel_lab.tables import console
-    from tunnel_sim.virtual_campaign import simulate_campaign
+    from tunnel_lab.terminal.tables import console
+    from tunnel_sim.engine.virtual_campaign import simulate_campaign
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     terminal = console(stderr=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from tunnel_lab.spring_table import SpringTable
+    from tunnel_lab.terminal.spring_table import SpringTable
 
 NAME = "springs"
 
@@ -35,7 +35,7 @@ def run(
     [bold]Exit status[/bold]
       0 fitted, 1 no inertia could be had, 2 bad input.
     """
-    from tunnel_lab.spring_table import read_spring_table
+    from tunnel_lab.terminal.spring_table import read_spring_table
 
     springs = read_spring_table(table) if table is not None else paper_table()
     show(springs, str(table) if table is not None else "the paper's Table II")
@@ -48,7 +48,7 @@ def paper_table() -> SpringTable:
         Ten springs.
     """
     from identification.datasets import paper_springs
-    from tunnel_lab.spring_table import SpringTable
+    from tunnel_lab.terminal.spring_table import SpringTable
 
     rows = paper_springs()
     return SpringTable(
@@ -70,9 +70,9 @@ def show(springs: SpringTable, source: str) -> None:
     """
     from math import pi
 
-    from identification.springs import fit_springs
-    from tunnel_lab import tables
-    from tunnel_lab.formatting import with_std
+    from identification.campaign.springs import fit_springs
+    from tunnel_lab.terminal import tables
+    from tunnel_lab.terminal.formatting import with_std
 
     fit = fit_springs(springs.stiffness, springs.frequency_hz)
     rows = tables.table(

@@ -74,7 +74,7 @@ def run(
       0 finished, 1 an estimator ended in an error of its own, 2 bad input,
       130 interrupted (what is finished stays).
     """
-    from tunnel_sim.errors import TunnelError
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     if summary is not None:
         if file is not None or out is not None:
@@ -103,11 +103,11 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
     Raises:
         TunnelError: for bad input.
     """
-    from tunnel_lab.progress import bar
     from tunnel_lab.sweep.engine import run_sweep
     from tunnel_lab.sweep.reading import read_sweep
-    from tunnel_lab.tables import say
-    from tunnel_sim.errors import TunnelError
+    from tunnel_lab.terminal.progress import bar
+    from tunnel_lab.terminal.tables import say
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     if workers is not None and scheduler not in (None, "local"):
         raise TunnelError(
@@ -131,7 +131,7 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
 def _work(workers: int | None, scheduler: str | None, sweep: Sweep) -> Work:
     from tunnel_lab.sweep.cluster import on_cluster
     from tunnel_lab.sweep.processes import available_processors, in_processes
-    from tunnel_lab.tables import say
+    from tunnel_lab.terminal.tables import say
 
     count = min(workers or available_processors(), sweep.shards)
 
@@ -152,12 +152,12 @@ def show_summary(folder: Path) -> None:
     """
     import polars as pl
 
-    from tunnel_lab import plots
+    from tunnel_lab.plotting import plots
     from tunnel_lab.sweep import figures
     from tunnel_lab.sweep.store import open_store
     from tunnel_lab.sweep.summary import paces, summarise
-    from tunnel_lab.tables import say, show_tables
-    from tunnel_sim.writing import output_folder, write_encoded
+    from tunnel_lab.terminal.tables import say, show_tables
+    from tunnel_sim.files.writing import output_folder, write_encoded
 
     store = open_store(folder)
     lines = summarise(store)

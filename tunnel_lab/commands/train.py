@@ -74,9 +74,9 @@ def _train(out: Path, spec: TrainingSpec, *, restart: bool) -> None:
 
     from identification.neural.checkpoint import Checkpoint, read_checkpoint
     from identification.neural.train import train
-    from tunnel_lab.progress import bar
-    from tunnel_lab.tables import say
-    from tunnel_sim.writing import refuse_unwritable, write_json, write_whole
+    from tunnel_lab.terminal.progress import bar
+    from tunnel_lab.terminal.tables import say
+    from tunnel_sim.files.writing import refuse_unwritable, write_json, write_whole
 
     partial = out.with_suffix(".part.safetensors")
     for path in (out, out.with_suffix(".json"), partial):
@@ -110,7 +110,7 @@ def _train(out: Path, spec: TrainingSpec, *, restart: bool) -> None:
 
 
 def _show(record: dict[str, Any]) -> None:
-    from tunnel_lab.tables import say, show_tables, table
+    from tunnel_lab.terminal.tables import say, show_tables, table
 
     headings = ("γ [1]", "α [1]", "β [1]", "ln evidence")
     result = table(f"Trained with seed {record['seed']}", "network", "start", *headings, right=headings)
@@ -141,6 +141,6 @@ def _check_range(option: str, limits: tuple[float, float], above: float, below: 
 
 
 def _refuse(where: str, what: str, remedy: str) -> None:
-    from tunnel_sim.errors import TunnelError
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     raise TunnelError(what, where=where, remedy=remedy)

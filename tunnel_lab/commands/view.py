@@ -56,7 +56,7 @@ def run(
     """
     from tunnel_lab.commands.render import checked_camera
     from tunnel_lab.show.request import Request, shown_run
-    from tunnel_sim.errors import TunnelError
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     request = Request(
         plan=None if plan is None else str(plan),

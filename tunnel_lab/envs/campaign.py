@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from identification.belief import information_gain
+from identification.campaign.belief import information_gain
 from identification.estimate import PARAMETERS
 from tunnel_lab.envs.menu import Costs, make_menu
 from tunnel_lab.envs.presets import PRESETS, Preset, preset_sensor
@@ -25,11 +25,11 @@ from tunnel_lab.envs.session import (
     probabilities,
 )
 from tunnel_lab.envs.truth import draw_truth
-from tunnel_sim.campaign import Campaign
 from tunnel_sim.effects import effect_class
-from tunnel_sim.errors import TunnelError, did_you_mean
-from tunnel_sim.record import Array
-from tunnel_sim.rig import load_rig
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.record import Array
 
 Observation = dict[str, Array]
 _LARGE = 1e4  # bound of estimates and covariances in the observation space

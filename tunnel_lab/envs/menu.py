@@ -9,10 +9,10 @@ from math import degrees, isfinite, radians
 
 import numpy as np
 
-from tunnel_sim.campaign import Run
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.record import Record
-from tunnel_sim.rig import Rig
+from tunnel_sim.vocabulary.campaign import Run
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.rig import Rig
 
 
 @dataclass(frozen=True)

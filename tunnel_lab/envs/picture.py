@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.belief import Belief, update_belief
+from identification.campaign.belief import Belief, update_belief
 from tunnel_lab.envs.session import Knowledge, answers, probabilities
-from tunnel_lab.tables import SYMBOLS
+from tunnel_lab.terminal.tables import SYMBOLS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +66,7 @@ def picture(known: Knowledge, targets: tuple[float, float], probability: float) 
 
 
 def _draw_record(axes: Axes, known: Knowledge) -> None:
-    from tunnel_lab.plots import WIND_OFF, WIND_ON
+    from tunnel_lab.plotting.plots import WIND_OFF, WIND_ON
 
     axes.set_xlabel("time [s]")
     axes.set_ylabel("angle β [rad]")
@@ -80,7 +80,7 @@ def _draw_record(axes: Axes, known: Knowledge) -> None:
 
 
 def _draw_spread(axes: Axes, known: Knowledge, targets: tuple[float, float]) -> None:
-    from tunnel_lab.plots import COLOURS
+    from tunnel_lab.plotting.plots import COLOURS
 
     history = beliefs(known)
     for place, (name, target) in enumerate(zip(("cn_beta", "cn_r"), targets, strict=True)):
@@ -95,7 +95,7 @@ def _draw_spread(axes: Axes, known: Knowledge, targets: tuple[float, float]) -> 
 
 
 def _draw_probabilities(axes: Axes, known: Knowledge, probability: float) -> None:
-    from tunnel_lab.plots import COLOURS
+    from tunnel_lab.plotting.plots import COLOURS
 
     names = [name.replace("_", "\n") for name in answers(known.conditions.effects)]
     axes.bar(names, probabilities(known), color=COLOURS[0])

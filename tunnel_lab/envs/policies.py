@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.decide import Weighed
-from diagnosis.least_squares import Fit
-from diagnosis.next_run import planned_run, separation
+from diagnosis.answer.next_run import planned_run, separation
+from diagnosis.attribution.decide import Weighed
+from diagnosis.fitting.least_squares import Fit
 from diagnosis.study import Study
-from identification.belief import expected_belief, information_gain
+from identification.campaign.belief import expected_belief, information_gain
 from tunnel_lab.envs.menu import Choice
 from tunnel_lab.envs.session import Knowledge
 
@@ -86,8 +86,8 @@ def separating(known: Knowledge) -> Action:
     """The run that is expected to tell the two best answers of the diagnosis apart, for its rig time.
 
     Over the whole menu, half the squared separation of the two fitted models (the expected log-likelihood ratio,
-    nats; see `diagnosis.next_run.separation`) over the run's cost. With one named answer only, its rival is the
-    nominal model.
+    nats; see `diagnosis.answer.next_run.separation`) over the run's cost. With one named answer only, its rival
+    is the nominal model.
 
     Args:
         known: the study, and what stands on the rig now.

@@ -10,8 +10,8 @@ from math import isfinite
 from types import MappingProxyType
 from typing import Any
 
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.plan import SensorModel
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import SensorModel
 
 
 @dataclass(frozen=True)

@@ -10,23 +10,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.gap import FALSE_ALARM_RATE
+from diagnosis.detection.gap import FALSE_ALARM_RATE
 from diagnosis.study import Study, study
-from identification.belief import Belief, prior_belief, run_link, update_belief
-from identification.decay_fit import Reading, RunFit
-from identification.noise import stated_noise
-from identification.run_fit import identify_run
+from identification.campaign.belief import Belief, prior_belief, run_link, update_belief
+from identification.decay.decay_fit import Reading, RunFit
+from identification.decay.residual_noise import stated_noise
+from identification.decay.run_fit import identify_run
 from identification.status import Status
 from tunnel_lab.envs.menu import Choice, Costs, Menu, stated_run
 from tunnel_lab.envs.truth import MEAN, STD, RigTruth
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.effects import effect_class
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.plan import Condition, SensorModel
-from tunnel_sim.record import Array, Record
-from tunnel_sim.rig import Rig
-from tunnel_sim.simulate import simulate
-from tunnel_sim.virtual_campaign import run_settings
+from tunnel_sim.engine.simulate import simulate
+from tunnel_sim.engine.virtual_campaign import run_settings
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import Condition, SensorModel
+from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.rig import Rig
 
 _EMPTY = Record(np.arange(2.0), np.zeros(2))  # of a run that is only planned
 
@@ -75,7 +75,7 @@ class Conditions:
         return np.arange(max(2, round(duration * rate))) / rate
 
     def link(self, choice: Choice) -> Array:
-        """How the run's decay hangs on the shared parameters, shape (2, 4); see `identification.belief`."""
+        """How the run's decay depends on the shared parameters, shape (2, 4); see `run_link`."""
         return run_link(stated_run(choice, "next", _EMPTY, self.rig.air.density), self.rig_properties)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from identification.estimate import PARAMETERS, UNITS
 from tunnel_sim.effects import Effect, effect_class, effect_from
-from tunnel_sim.errors import TunnelError, did_you_mean
-from tunnel_sim.plan import Truth
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.plan import Truth
 
 MEAN = {"cn_beta": 0.45, "cn_r": -0.12, "yaw_inertia": 0.1014, "mechanical_damping": 0.016}
 """Means of the coefficients an episode draws, in their units."""

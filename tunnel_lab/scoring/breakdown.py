@@ -17,19 +17,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.estimate import Quantity
-from identification.scoring import Outcome, Score, collect, score
+from identification.scoring.accuracy import Outcome, Score, collect, score
 from tunnel_lab.scoring.work import Row, Told, estimate_rows, fingerprint, resumed
+from tunnel_reference.conditions import Conditions
+from tunnel_reference.draw import CampaignDraw, EffectDraw
+from tunnel_reference.forms import forms_of
+from tunnel_reference.make import as_campaign
+from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_effects
 from tunnel_sim.effects import ALL_EFFECTS
-from tunnel_sim.reference.conditions import Conditions
-from tunnel_sim.reference.draw import CampaignDraw, EffectDraw
-from tunnel_sim.reference.forms import forms_of
-from tunnel_sim.reference.make import as_campaign
-from tunnel_sim.reference.severity import Simulated, read_and_fit, simulate_motions, size_effects
 
 if TYPE_CHECKING:
     import polars as pl
 
-    from tunnel_sim.campaign import Campaign
+    from tunnel_sim.vocabulary.campaign import Campaign
 
 NO_EFFECT = "no effect"
 SEVERITIES = (1.0, 10.0)
@@ -164,7 +164,7 @@ def _realise(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
 
 
 def _case(draw: CampaignDraw, simulated: Simulated, number: int) -> Case:
-    from identification.cramer_rao import campaign_bound
+    from identification.uncertainty.cramer_rao import campaign_bound
 
     campaign = as_campaign(simulated, "breakdown")
     starts = [(float(angle), 0.0) for angle in draw.conditions.start_angle]

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.text import Text
 
-from tunnel_lab.formatting import significant
 from tunnel_lab.scoring.breakdown import NO_EFFECT, Bias
 from tunnel_lab.scoring.tables import NAMES
-from tunnel_lab.tables import table
+from tunnel_lab.terminal.formatting import significant
+from tunnel_lab.terminal.tables import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
     from rich.table import Table
 
-    from tunnel_sim.record import Array
+    from tunnel_sim.vocabulary.record import Array
 
 SHOWN = ("cn_beta", "cn_r")
 ABOUT = (

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from identification.comparison import FALSE_ALARM_RATE, Change, changes, holm
-from identification.scoring import Trials
+from identification.scoring.accuracy import Trials
+from identification.scoring.comparison import FALSE_ALARM_RATE, Change, changes, holm
 from tunnel_lab.scoring.results import Key, Results, groups_of
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 @dataclass(frozen=True)

@@ -13,19 +13,20 @@ from zlib import crc32
 
 import numpy as np
 
-from tunnel_lab.effect_option import parse_effect
 from tunnel_lab.scoring.grid import NO_EFFECT, Cell
-from tunnel_sim.aero import AeroDerivatives
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_lab.terminal.effect_option import parse_effect
 from tunnel_sim.effects import Effect, EffectChain, effect_from
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.forward import forward_motion
-from tunnel_sim.plan import SensorModel, Truth
-from tunnel_sim.record import Record
-from tunnel_sim.rig import Rig, load_rig
-from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.sensor import read_motion
-from tunnel_sim.steps import follow_fastest, whole_steps
+from tunnel_sim.engine.sensor import read_motion
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.steps import follow_fastest, whole_steps
+from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import SensorModel, Truth
+from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.rig import Rig
 
 _ZETA_SPREAD, _FREQUENCY_SPREAD, _RELEASE_SPREAD = 0.05, 0.02, 0.03
 _ZERO_STD = 0.004  # rad
@@ -65,7 +66,7 @@ def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
 
 
 def _decay_trial(cell: Cell, rng: np.random.Generator) -> Trial:
-    from identification.cramer_rao import damped_sinusoid_bound
+    from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 
     rig = load_rig()
     zeta = cell.zeta * (1.0 + _ZETA_SPREAD * rng.uniform(-1.0, 1.0))
@@ -89,7 +90,7 @@ def _decay_trial(cell: Cell, rng: np.random.Generator) -> Trial:
 
 
 def _campaign_trial(cell: Cell, rng: np.random.Generator) -> Trial:
-    from identification.cramer_rao import campaign_bound
+    from identification.uncertainty.cramer_rao import campaign_bound
 
     truth = Truth(
         cn_beta=rng.uniform(0.25, 0.57),

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.scoring import INTERVAL, NOMINAL_COVERAGE, Score, score
-from tunnel_lab.plots import COLOURS, MARKERS
+from identification.scoring.accuracy import INTERVAL, NOMINAL_COVERAGE, Score, score
+from tunnel_lab.plotting.plots import COLOURS, MARKERS
 from tunnel_lab.scoring.grid import NO_EFFECT
 from tunnel_lab.scoring.results import Results
 from tunnel_lab.scoring.tables import NAMES

@@ -11,13 +11,21 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
-from tunnel_lab.effect_option import parse_effect
-from tunnel_sim import limits
+from tunnel_lab.terminal.effect_option import parse_effect
 from tunnel_sim.effects import effect_from
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.plan_schema import check_size, first_twice
-from tunnel_sim.reading import as_described, check_count, check_shape
-from tunnel_sim.toml_input import OneLine, SampleRate, StrictModel, check_version, load_toml, shown, validate
+from tunnel_sim.files.plan_schema import check_size, first_twice
+from tunnel_sim.files.reading import as_described, check_count, check_shape
+from tunnel_sim.files.toml_input import (
+    OneLine,
+    SampleRate,
+    StrictModel,
+    check_version,
+    load_toml,
+    shown,
+    validate,
+)
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError
 
 NO_EFFECT = "none"
 DECAY_QUANTITIES = ("zeta", "omega_n")
@@ -257,7 +265,7 @@ def packaged_grid() -> Grid:
 
 def _check_names(document: GridDocument, where: str) -> None:
     from identification.estimators import ALL_ESTIMATORS
-    from tunnel_sim.errors import did_you_mean
+    from tunnel_sim.vocabulary.errors import did_you_mean
 
     for name in document.trials_of:
         if name not in ALL_ESTIMATORS:

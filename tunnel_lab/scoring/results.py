@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from identification.estimate import Quantity
-from identification.scoring import Outcome, Score, Trials, collect, score
+from identification.scoring.accuracy import Outcome, Score, Trials, collect, score
 from tunnel_lab.scoring.grid import NO_EFFECT, Cell, Grid
 from tunnel_lab.scoring.work import Row, describe
-from tunnel_sim import limits
-from tunnel_sim.errors import shown
-from tunnel_sim.json_text import json_line
-from tunnel_sim.reading import as_described, frame_schema, parse_json, read_frame, read_regular
-from tunnel_sim.writing import write_whole
+from tunnel_sim.files.json_text import json_line
+from tunnel_sim.files.reading import as_described, frame_schema, parse_json, read_frame, read_regular
+from tunnel_sim.files.writing import write_whole
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import shown
 
 if TYPE_CHECKING:
     import polars as pl

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.text import Text
 
-from identification.scoring import Proportion, Score, mean_figure, overall, score
-from tunnel_lab.formatting import concise, significant
+from identification.scoring.accuracy import Proportion, Score, mean_figure, overall, score
 from tunnel_lab.scoring.check import Finding, Verdict
 from tunnel_lab.scoring.results import Results, groups_of
-from tunnel_lab.tables import SYMBOLS, table
+from tunnel_lab.terminal.formatting import concise, significant
+from tunnel_lab.terminal.tables import SYMBOLS, table
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from identification.estimate import Quantity
-    from identification.scoring import Trials
+    from identification.scoring.accuracy import Trials
 
 NAMES = {**SYMBOLS, "zeta": "ζ", "omega_n": "ωn"}
 """How the quantities of a score are written."""

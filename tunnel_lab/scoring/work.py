@@ -17,15 +17,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tunnel_lab.scoring.grid import Cell, Grid, check_trials
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.reading import read_json
-from tunnel_sim.writing import output_folder, write_json
+from tunnel_sim.files.reading import read_json
+from tunnel_sim.files.writing import output_folder, write_json
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from identification.estimate import Estimate
-    from tunnel_sim.campaign import Campaign
+    from tunnel_sim.vocabulary.campaign import Campaign
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")

@@ -1,6 +1,6 @@
 """A film of a run: the swinging body beside the trace of its angle.
 
-Frames are rendered off-screen, as `tunnel_lab.rendering` does it: in a process of their own, one OpenGL back
+Frames are rendered off-screen, as `tunnel_lab.show.rendering` does it: in a process of their own, one OpenGL back
 end after another. The trace is drawn twice, faint and full; every frame shows the full one up to the present.
 """
 
@@ -18,15 +18,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_lab.rendering import REMEDY, backends
+from tunnel_lab.show.rendering import REMEDY, backends
 from tunnel_lab.show.request import Request, ShownRun, shown_run
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.writing import write_whole
+from tunnel_sim.files.writing import write_whole
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from tunnel_sim.model import Model
+    from tunnel_sim.engine.model import Model
 
 Image = NDArray[np.uint8]
 CAMERAS = ("overview", "above", "side")
@@ -185,7 +185,7 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
     import mujoco
 
     from tunnel_lab.show.trace import draw_trace
-    from tunnel_sim.model import build_model
+    from tunnel_sim.engine.model import build_model
 
     model = build_model(run.rig, run.settings)
     left = 2 * round(BODY_SHARE * look.width / 2)

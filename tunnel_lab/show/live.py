@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 
 from tunnel_lab.show.request import ShownRun
-from tunnel_sim.model import build_model, build_spec
-from tunnel_sim.record import Array
+from tunnel_sim.engine.model import build_model, build_spec
+from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
     from collections.abc import Callable

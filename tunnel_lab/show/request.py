@@ -11,15 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.effect_option import parse_effect
-from tunnel_sim.errors import TunnelError, did_you_mean
-from tunnel_sim.plan import CampaignPlan, Condition, SensorModel, Truth, load_plan
-from tunnel_sim.rig import Rig, load_rig
-from tunnel_sim.run_settings import RunSettings
+from tunnel_lab.terminal.effect_option import parse_effect
+from tunnel_sim.files.plan_file import load_plan
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, SensorModel, Truth
+from tunnel_sim.vocabulary.rig import Rig
 
 if TYPE_CHECKING:
     from tunnel_sim.effects import EffectChain
-    from tunnel_sim.record import Record
+    from tunnel_sim.vocabulary.record import Record
 
 PAPER = {"cn_beta": 0.4719, "cn_r": -0.1033}
 """Coefficients of a run that no plan describes, 1/rad: the paper's Table IV, neural network."""
@@ -80,15 +82,15 @@ class ShownRun:
     @cached_property
     def settings(self) -> RunSettings:
         """The run's physics, effects included."""
-        from tunnel_sim.steps import follow_fastest
+        from tunnel_sim.physics.steps import follow_fastest
 
         return follow_fastest(self.rig, self.chain.physics())
 
     def record(self) -> Record:
         """What the potentiometer reads, simulated anew: the same bits every time."""
-        from tunnel_sim.model import build_model
-        from tunnel_sim.sensor import read_motion
-        from tunnel_sim.simulate import simulate_motion
+        from tunnel_sim.engine.model import build_model
+        from tunnel_sim.engine.sensor import read_motion
+        from tunnel_sim.engine.simulate import simulate_motion
 
         plan, _ = _plan_and_condition(self.request, self.rig)
         motion = simulate_motion(build_model(self.rig, self.settings), self.sensor.sample_rate)
@@ -109,7 +111,7 @@ def shown_run(request: Request) -> ShownRun:
             of range.
     """
     from tunnel_sim.effects import EffectChain
-    from tunnel_sim.virtual_campaign import plan_effects, run_settings
+    from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 
     rig = load_rig()
     plan, condition = _plan_and_condition(request, rig)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.record import Array, Record
+from tunnel_sim.vocabulary.record import Array, Record
 
 Image = NDArray[np.uint8]
 _DPI = 100

@@ -10,8 +10,8 @@ import time
 
 from tunnel_lab.show.live import LiveRun, Puppet
 from tunnel_lab.show.request import ShownRun
-from tunnel_lab.tables import say
-from tunnel_sim.errors import TunnelError
+from tunnel_lab.terminal.tables import say
+from tunnel_sim.vocabulary.errors import TunnelError
 
 WARNING = (
     "Listens on all network interfaces, without a password and without a check of the Origin: whoever reaches this "

@@ -11,7 +11,7 @@ import numpy as np
 
 from tunnel_lab.show.live import History, LiveRun
 from tunnel_lab.show.request import ShownRun
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from collections.abc import Callable

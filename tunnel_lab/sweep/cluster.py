@@ -14,8 +14,8 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from tunnel_lab.sweep.processes import Said
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.toml_input import one_line
+from tunnel_sim.files.toml_input import one_line
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from tunnel_lab.formatting import concise, significant, unit
-from tunnel_lab.plots import COLOURS, MARKERS
+from tunnel_lab.plotting.plots import COLOURS, MARKERS
 from tunnel_lab.sweep.summary import AXES, OVERALL, SEVERITY, Line, Pace
-from tunnel_lab.tables import SYMBOLS, table
+from tunnel_lab.terminal.formatting import concise, significant, unit
+from tunnel_lab.terminal.tables import SYMBOLS, table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from identification.estimate import Quantity
-    from identification.scoring import Proportion
+    from identification.scoring.accuracy import Proportion
 
 DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "cn_r": "Cnr"}
 """Quantities that have a panel; Izz, Cr and the sensor's zero stand in the first table and the CSV."""

@@ -18,7 +18,7 @@ from itertools import islice
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from tunnel_lab.sweep.shard import Finished

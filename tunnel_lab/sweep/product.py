@@ -14,11 +14,18 @@ from typing import Any
 import numpy as np
 
 from tunnel_lab.sweep.schema import ConditionsTable, SweepDocument
-from tunnel_sim import limits
-from tunnel_sim.plan import CampaignPlan, plan_from
-from tunnel_sim.plan_schema import DEFAULT_SAMPLE_RATE, STEPS_PER_SECOND, PlanDocument, check_size, run_count
-from tunnel_sim.reading import as_described, check_count, parse_json
-from tunnel_sim.rig import Rig, parse_rig
+from tunnel_sim.files.plan_file import plan_from
+from tunnel_sim.files.plan_schema import (
+    STEPS_PER_SECOND,
+    PlanDocument,
+    check_size,
+    run_count,
+)
+from tunnel_sim.files.reading import as_described, check_count, parse_json
+from tunnel_sim.files.rig_file import parse_rig
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.plan import DEFAULT_SAMPLE_RATE, CampaignPlan
+from tunnel_sim.vocabulary.rig import Rig
 
 STEPS_PER_SHARD = 500_000
 """Integration steps of one shard: about two seconds of one core, and the most a killed sweep loses per worker."""

@@ -14,11 +14,11 @@ from identification.estimators import ALL_ESTIMATORS
 from tunnel_lab.sweep.product import NO_EFFECT, Case, Sweep, check_sweep_size
 from tunnel_lab.sweep.schema import SweepDocument
 from tunnel_sim.effects import effect_class
-from tunnel_sim.errors import TunnelError, did_you_mean
-from tunnel_sim.motion import sampling
-from tunnel_sim.plan_schema import check_conditions, first_twice
-from tunnel_sim.rig import parse_rig, rig_document
-from tunnel_sim.toml_input import load_toml, shown, validate
+from tunnel_sim.files.plan_schema import check_conditions, first_twice
+from tunnel_sim.files.rig_file import parse_rig, rig_document
+from tunnel_sim.files.toml_input import load_toml, shown, validate
+from tunnel_sim.physics.motion import sampling
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
 _AXES = ("rig", "conditions", "sensor", "truth", "effects")
 
@@ -129,7 +129,7 @@ def _check_axes(sweep: Sweep, where: str) -> None:
 
 def _check_cases(sweep: Sweep, where: str) -> None:
     """Refuse what the simulator would refuse: every sensor and every effect, with each rig and conditions."""
-    from tunnel_sim.virtual_campaign import plan_effects, run_settings
+    from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 
     for case in _cases(sweep, "sensor", where):
         with _in(where):

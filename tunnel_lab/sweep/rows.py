@@ -11,9 +11,9 @@ import polars as pl
 
 from identification.estimate import PARAMETERS, UNITS
 from tunnel_lab.sweep.product import NO_EFFECT, Case
-from tunnel_sim.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.effects import effect_class
-from tunnel_sim.plan import Condition, EffectSetting
+from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.plan import Condition, EffectSetting
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate, Quantity, RunEstimate

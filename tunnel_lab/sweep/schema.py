@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
-from tunnel_sim.plan_schema import EffectTable, NotNegative, Positive, ReleaseAngle
-from tunnel_sim.toml_input import OneLine, SampleRate, StrictModel
+from tunnel_sim.files.plan_schema import EffectTable, NotNegative, Positive, ReleaseAngle
+from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel
 
 
 def _listed(value: object) -> object:

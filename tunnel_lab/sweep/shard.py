@@ -30,12 +30,12 @@ from tunnel_lab.sweep.rows import (
     Failure,
     estimate_rows,
 )
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.toml_input import one_line
+from tunnel_sim.files.toml_input import one_line
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
-    from tunnel_sim.campaign import Campaign
+    from tunnel_sim.vocabulary.campaign import Campaign
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Sums of a linear algebra library hang on its number of threads in their last bit; a shard uses one."""
@@ -124,7 +124,7 @@ def simulate_cases(cases: Sequence[Case], *, nthread: int = 1) -> list[Campaign 
 
 
 def _simulate(cases: Sequence[Case], nthread: int) -> Sequence[Campaign | Failure]:
-    from tunnel_sim.virtual_campaign import simulate_campaigns
+    from tunnel_sim.engine.virtual_campaign import simulate_campaigns
 
     try:
         return simulate_campaigns([case.plan for case in cases], cases[0].rig, nthread=nthread)

@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tunnel_lab.sweep.product import Sweep
-from tunnel_sim import limits
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.leftovers import clear_leftovers
-from tunnel_sim.reading import as_described, read_json, read_regular
-from tunnel_sim.toml_input import shown
-from tunnel_sim.writing import output_folder, write_json, write_whole
+from tunnel_sim.files.leftovers import clear_leftovers
+from tunnel_sim.files.reading import as_described, read_json, read_regular
+from tunnel_sim.files.toml_input import shown
+from tunnel_sim.files.writing import output_folder, write_json, write_whole
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     import polars as pl

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.scoring import Proportion, Score, Trials, score
+from identification.scoring.accuracy import Proportion, Score, Trials, score
 from tunnel_lab.sweep.product import NO_EFFECT
 from tunnel_lab.sweep.store import TIMINGS, Store
 from tunnel_sim.effects import effect_class
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.record import read_only
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import read_only
 
 if TYPE_CHECKING:
     import polars as pl

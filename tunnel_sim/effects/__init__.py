@@ -29,7 +29,7 @@ from tunnel_sim.effects.unsteady_aero_lag import UnsteadyAeroLag
 from tunnel_sim.effects.vortex_shedding import VortexShedding
 from tunnel_sim.effects.wind_speed_drift import WindSpeedDrift
 from tunnel_sim.effects.wind_speed_offset import WindSpeedOffset
-from tunnel_sim.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
 #: Every effect, in the order of the vocabulary.
 ALL_EFFECTS: tuple[type[Effect], ...] = (

@@ -10,10 +10,10 @@ from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
 
-from tunnel_sim.errors import TunnelError, did_you_mean
-from tunnel_sim.plan import SensorModel
-from tunnel_sim.record import Array
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.record import Array
 
 REFERENCE_SPEED = 20.0
 """m/s: where forms that depend on the speed agree with the textbook's."""

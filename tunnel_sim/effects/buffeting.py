@@ -9,8 +9,8 @@ from math import exp, pi, sqrt
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect, parameter
-from tunnel_sim.record import Array
-from tunnel_sim.run_settings import RunSettings, Series
+from tunnel_sim.physics.run_settings import RunSettings, Series
+from tunnel_sim.vocabulary.record import Array
 
 _INTERVAL = 1e-3  # s between samples of the random moment
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
-from tunnel_sim.plan import SensorModel
-from tunnel_sim.record import Array
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True, eq=False)

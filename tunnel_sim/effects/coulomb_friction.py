@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim import steps
 from tunnel_sim.effects.base import Drawn, Effect, parameter, with_law
-from tunnel_sim.record import Array
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.physics import steps
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect, parameter, with_law
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from tunnel_sim.effects.base import Effect, parameter
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Effect, exponent, parameter
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)

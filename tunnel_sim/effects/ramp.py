@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tunnel_sim.effects.base import parameter
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 EQUATION = "(1 − e^(−k t/T))/(1 − e^(−k))"
 

@@ -6,9 +6,9 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tunnel_sim import steps
 from tunnel_sim.effects.base import Circumstances, Drawn, Effect, Trial, parameter
-from tunnel_sim.run_settings import RodTwist, RunSettings
+from tunnel_sim.physics import steps
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings
 
 
 @dataclass(frozen=True)

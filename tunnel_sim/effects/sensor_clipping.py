@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Circumstances, Effect, Trial, parameter
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 _FAR = 2.0  # rad: where a limit on one side only puts the other
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect, parameter
-from tunnel_sim.forward import backlash
-from tunnel_sim.record import Array
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.physics.forward import backlash
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Circumstances, Drawn, Effect, Trial, exponent, parameter
-from tunnel_sim.record import Array
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.record import Array
 
 _REFERENCE = 0.2  # rad: where forms of another power give the same error
 

@@ -6,7 +6,7 @@ import dataclasses
 from dataclasses import dataclass
 
 from tunnel_sim.effects.base import Effect, parameter
-from tunnel_sim.plan import SensorModel
+from tunnel_sim.vocabulary.plan import SensorModel
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import isclose
 
 from tunnel_sim.effects.base import SPRING_TOLERANCE, Circumstances, Drawn, Effect, Trial, parameter
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from tunnel_sim.effects.base import Circumstances, Drawn, Effect, Trial, parameter
 from tunnel_sim.effects.ramp import EQUATION, ramp, settling
-from tunnel_sim.run_settings import RunSettings, Series
+from tunnel_sim.physics.run_settings import RunSettings, Series
 
 _SAMPLES = 201  # of a bent ramp, linear in between: within 1e-4 of the drift up to k = 5
 

@@ -6,7 +6,7 @@ import dataclasses
 from dataclasses import dataclass
 
 from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect, parameter
-from tunnel_sim.run_settings import RunSettings, Series
+from tunnel_sim.physics.run_settings import RunSettings, Series
 
 
 @dataclass(frozen=True)

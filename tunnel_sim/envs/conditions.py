@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from tunnel_sim.campaign import Run
 from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 from tunnel_sim.envs.config import FreeDecayConfig, angle_limit
 from tunnel_sim.envs.errors import EnvError, as_env_error
-from tunnel_sim.errors import TunnelError, did_you_mean
-from tunnel_sim.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
-from tunnel_sim.record import Record
-from tunnel_sim.rig import Rig
-from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.virtual_campaign import plan_effects, run_settings
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.campaign import Run
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
+from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.rig import Rig
 
 OPTIONS = ("spring", "spring_stiffness", "wind_speed", "air_density", "release_angle", "truth", "effects")
 TRUTH = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping", "sensor_zero")
@@ -52,7 +52,7 @@ class RunPlan:
     effects: tuple[Effect, ...] = ()
 
     def stated(self) -> RunSettings:
-        """The run's physics without its effects, as ``tunnel_sim.simulate`` takes it."""
+        """The run's physics without its effects, as ``tunnel_sim.engine.simulate`` takes it."""
         return run_settings(self.truth, self.condition)
 
     def run(self, record: Record) -> Run:

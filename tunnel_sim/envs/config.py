@@ -12,9 +12,10 @@ import numpy as np
 
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.information import Prior
-from tunnel_sim.errors import did_you_mean
-from tunnel_sim.plan import POTENTIOMETER_RESOLUTION, SensorModel
-from tunnel_sim.rig import Rig, load_rig
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.errors import did_you_mean
+from tunnel_sim.vocabulary.plan import POTENTIOMETER_RESOLUTION, SensorModel
+from tunnel_sim.vocabulary.rig import Rig
 
 PRESETS = ("plain", "operator")
 LEAST_DEVIATION = 1e-6
@@ -93,7 +94,7 @@ class FreeDecayConfig:
 
     @property
     def sample_times(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Times of a whole run's samples, s, as `tunnel_sim.simulate` has them."""
+        """Times of a whole run's samples, s, as `tunnel_sim.engine.simulate` has them."""
         return np.arange(self.steps * self.samples_per_step) / self.sample_rate
 
     @property

@@ -10,7 +10,7 @@ from gymnasium import spaces
 
 from tunnel_sim.envs.config import FreeDecayConfig
 from tunnel_sim.envs.errors import EnvError
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True, eq=False)

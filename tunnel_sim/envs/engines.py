@@ -9,12 +9,12 @@ import mujoco
 import numpy as np
 from mujoco import batch as mujoco_batch
 
-from tunnel_sim.model import Model, build_model
-from tunnel_sim.motion import sampling
-from tunnel_sim.record import Array
-from tunnel_sim.rig import Rig
-from tunnel_sim.run_settings import RunSettings
-from tunnel_sim.steps import follow_fastest
+from tunnel_sim.engine.model import Model, build_model
+from tunnel_sim.physics.motion import sampling
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.steps import follow_fastest
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import Rig
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """What MuJoCo needs to go on to the bit: full physics with plugin state, inputs, and the solver's warm start."""

@@ -20,10 +20,10 @@ from tunnel_sim.envs.information import Information, Prior
 from tunnel_sim.envs.readings import Readings
 from tunnel_sim.envs.sensing import RunningSensor
 from tunnel_sim.envs.sensitivity import NominalRun
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.record import Array, Record
-from tunnel_sim.rig import Rig
-from tunnel_sim.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.rig import Rig
 
 Flags = NDArray[np.bool_]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 class EnvError(TunnelError, ValueError):

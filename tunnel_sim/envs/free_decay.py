@@ -13,7 +13,7 @@ from tunnel_sim.envs.engines import Models, OneRun
 from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.rendering import RENDER_MODES, RigView
-from tunnel_sim.record import Array, Record
+from tunnel_sim.vocabulary.record import Array, Record
 
 
 class FreeDecayEnv(gymnasium.Env[Any, Any]):

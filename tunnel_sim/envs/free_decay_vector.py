@@ -17,7 +17,7 @@ from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.free_decay import render_fps
 from tunnel_sim.envs.rendering import RigView
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 
 class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):

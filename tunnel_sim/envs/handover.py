@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Protocol
 
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.envs.config import FreeDecayConfig
 from tunnel_sim.envs.errors import EnvError
-from tunnel_sim.rig import Rig
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.rig import Rig
 
 
 class _HasRig(Protocol):

@@ -25,8 +25,8 @@ import numpy as np
 
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.sensitivity import NominalRun, Sensitivities
-from tunnel_sim.errors import did_you_mean
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.errors import did_you_mean
+from tunnel_sim.vocabulary.record import Array
 
 UNKNOWNS = (
     "yaw_inertia", "mechanical_damping", "release_angle", "release_rate", "sensor_zero", "cn_beta", "cn_r",

@@ -7,11 +7,11 @@ import copy
 import numpy as np
 from numpy.typing import NDArray
 
+from tunnel_sim.engine.sensor import quantise
 from tunnel_sim.envs.config import FreeDecayConfig
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.sensing import RunningSensor
-from tunnel_sim.record import Array, Record
-from tunnel_sim.sensor import quantise
+from tunnel_sim.vocabulary.record import Array, Record
 
 
 class Readings:
@@ -63,7 +63,7 @@ class Readings:
         return quantise(chain.reading(held + sensor.zero + sensor.noise_std * noise), sensor.resolution)
 
     def take(self, angle: Array, step: NDArray[np.int64], running: NDArray[np.bool_]) -> Array:
-        """The next readings of all runs, with the bits of `tunnel_sim.sensor.read_motion`.
+        """The next readings of all runs, with the bits of `tunnel_sim.engine.sensor.read_motion`.
 
         Args:
             angle: of the rod's upper end at the samples, shape (runs, samples), rad.

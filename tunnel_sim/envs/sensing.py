@@ -1,4 +1,4 @@
-"""The reading of a run in progress, block by block, with the bits of `tunnel_sim.sensor.read_motion`."""
+"""The reading of a run in progress, block by block, with the bits of `tunnel_sim.engine.sensor.read_motion`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import copy
 import numpy as np
 
 from tunnel_sim.effects import EffectChain
-from tunnel_sim.plan import SensorModel
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.record import Array
 
 
 class RunningSensor:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.record import Array
+from tunnel_sim.vocabulary.record import Array
 
 DYNAMIC = 6  # Izz, Cr, angle, rate, Cnβ, Cnr; the zero's sensitivity is one
 

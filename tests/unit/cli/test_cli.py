@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 Outcome = tuple[int, str, str]
 Tunnel = Callable[..., Outcome]

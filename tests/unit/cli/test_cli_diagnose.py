@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from tests.reference.free_decays import Setting, campaign
-from tunnel_sim.campaign_io import write_campaign
 from tunnel_sim.effects import ALL_EFFECTS
-from tunnel_sim.plan import load_plan
-from tunnel_sim.virtual_campaign import simulate_campaign
+from tunnel_sim.engine.virtual_campaign import simulate_campaign
+from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.files.plan_file import load_plan
 
 Tunnel = Callable[..., tuple[int, str, str]]
 CAUSE = "coulomb_friction"
@@ -137,7 +137,7 @@ def test_an_interrupted_run_leaves_no_file(
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("diagnosis.diagnose.study", interrupted)
+    monkeypatch.setattr("diagnosis._diagnose.study", interrupted)
     (tmp_path / "out").mkdir()
     status, out, err = tunnel("diagnose", gap_free, "--json", tmp_path / "out" / "a.json")
     assert (status, out) == (130, "")

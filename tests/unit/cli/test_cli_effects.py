@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from tests.reference.effect_cases import VOCABULARY
-from tunnel_lab.effect_listing import example, markdown
-from tunnel_lab.effect_option import parse_effect
+from tunnel_lab.terminal.effect_listing import example, markdown
+from tunnel_lab.terminal.effect_option import parse_effect
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class, effect_from
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.plan import EffectSetting
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import EffectSetting
 
 Tunnel = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[3]

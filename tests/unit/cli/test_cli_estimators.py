@@ -3,7 +3,7 @@
 import pytest
 
 from identification.estimators import ENTRIES, Entry
-from tunnel_lab import estimator_help
+from tunnel_lab.terminal import estimator_help
 
 
 def test_help_lists_every_estimator_with_its_summary(tunnel):

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from tests.reference.free_decays import Setting, campaign
-from tunnel_lab.formatting import figure_text
-from tunnel_lab.plots import run_label, spectrum_figure
-from tunnel_sim.campaign import Campaign
-from tunnel_sim.campaign_io import write_campaign
+from tunnel_lab.plotting.plots import run_label, spectrum_figure
+from tunnel_lab.terminal.formatting import figure_text
+from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.vocabulary.campaign import Campaign
 
 Tunnel = Callable[..., tuple[int, str, str]]
 NAMES = (r"$\foo$", "[/x]", "_hidden", "[bold]:smile:", r"a\$b$", 'id="x"<svg>&amp;')

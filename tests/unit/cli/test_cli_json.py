@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.noise import Residual, noise_level
+from identification.decay.residual_noise import Residual, noise_level
 from tests.reference.free_decays import Setting, campaign
-from tunnel_sim.campaign import SensorProperties
-from tunnel_sim.campaign_io import write_campaign
+from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.vocabulary.campaign import SensorProperties
 
 Tunnel = Callable[..., tuple[int, str, str]]
 

@@ -24,9 +24,9 @@ from tunnel_lab.show.live import History, LiveRun, Puppet
 from tunnel_lab.show.request import Request, shown_run
 from tunnel_lab.show.trace import draw_trace
 from tunnel_lab.show.window import Controls, missing_display, window_loop
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.model import build_model
-from tunnel_sim.simulate import simulate_motion
+from tunnel_sim.engine.model import build_model
+from tunnel_sim.engine.simulate import simulate_motion
+from tunnel_sim.vocabulary.errors import TunnelError
 
 Tunnel = Callable[..., tuple[int, str, str]]
 PLAN = Path(__file__).parents[2] / "data" / "tiny-plan.toml"

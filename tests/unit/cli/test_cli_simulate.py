@@ -12,8 +12,9 @@ import pytest
 
 from identification.estimate import Estimate, Quantity, Status
 from tunnel_lab.commands.demo import misses, truth_of
-from tunnel_lab.rendering import backends, render_rig
-from tunnel_sim.plan import CampaignPlan, load_plan
+from tunnel_lab.show.rendering import backends, render_rig
+from tunnel_sim.files.plan_file import load_plan
+from tunnel_sim.vocabulary.plan import CampaignPlan
 
 Tunnel = Callable[..., tuple[int, str, str]]
 PLAN = Path(__file__).parents[2] / "data" / "tiny-plan.toml"
@@ -115,7 +116,7 @@ def test_the_demo_sees_an_estimate_that_is_missing_or_failed(plan: CampaignPlan)
 def test_a_failed_check_ends_the_demo_with_status_one(
     tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, plan: CampaignPlan
 ) -> None:
-    monkeypatch.setattr("tunnel_sim.plan.paper_plan", lambda: plan)
+    monkeypatch.setattr("tunnel_sim.files.plan_file.paper_plan", lambda: plan)
     monkeypatch.setattr("tunnel_lab.commands.demo.misses", lambda *_: ["planted"])
     monkeypatch.setenv("MUJOCO_GL", "nonsense")
     status, out, err = tunnel("demo", "--out", tmp_path / "out")

@@ -8,7 +8,7 @@ import pytest
 
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.rendering import RigView
-from tunnel_sim.rig import load_rig
+from tunnel_sim.files.rig_file import load_rig
 
 
 @pytest.fixture(autouse=True)

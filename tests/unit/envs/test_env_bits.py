@@ -12,9 +12,9 @@ from env_episodes import NAME, episode, make, same
 
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.spring_miscalibration import SpringMiscalibration
-from tunnel_sim.moment_law import state_names
-from tunnel_sim.rig import load_rig
-from tunnel_sim.simulate import simulate
+from tunnel_sim.engine.simulate import simulate
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.moment_law import state_names
 
 TRUTH = {"cn_beta": 0.47, "cn_r": -0.1, "yaw_inertia": 0.1, "mechanical_damping": 0.02, "sensor_zero": 0.004}
 STATED: dict[str, Any] = {

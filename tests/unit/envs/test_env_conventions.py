@@ -22,7 +22,7 @@ from tunnel_sim.envs import register_environments
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.handover import campaign_of
 from tunnel_sim.envs.rendering import RigView
-from tunnel_sim.rig import load_rig
+from tunnel_sim.files.rig_file import load_rig
 
 PRESETS = ("plain", "operator")
 ROOT = Path(__file__).parents[3]

@@ -11,7 +11,7 @@ from env_episodes import NAME, make
 
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.free_decay import FreeDecayEnv
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tunnel_lab.envs.menu import make_menu
-from tunnel_sim.errors import TunnelError
-from tunnel_sim.rig import load_rig
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.errors import TunnelError
 
 LISTS = {"springs": (5, 8), "wind_speeds": (0.0, 15.0), "release_angles_deg": (20.0,), "durations": (10.0,)}
 

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from tunnel_sim.envs.config import FreeDecayConfig
 from tunnel_sim.envs.controls import WindAnswer
-from tunnel_sim.rig import load_rig
+from tunnel_sim.files.rig_file import load_rig
 
 TRUTH = {"cn_beta": 0.47, "cn_r": -0.1, "yaw_inertia": 0.1, "mechanical_damping": 0.02, "sensor_zero": 0.0}
 STATED: dict[str, Any] = {"spring": 5, "wind_speed": 10.0, "release_angle": 0.2, "truth": TRUTH}

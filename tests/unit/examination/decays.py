@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.damped_oscillation import Decay, free_decay
-from tunnel_sim.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.record import Array, Record
+from identification.decay.damped_oscillation import Decay, free_decay
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array, Record
 
 INERTIA, DAMPING, CN_BETA, CN_R = 0.1, 0.015, 0.45, -0.1
 AREA, LENGTH, DENSITY = 0.036, 0.625, 1.2

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from decays import campaign, grid, reading, run, stated
 
-from diagnosis.diagnose import diagnose
+from diagnosis._diagnose import diagnose
 from identification import identify
 from identification.estimate import Estimate, Status
 from identification.examination.examine import examine
-from identification.examination.remark import Outcome, Remark
-from tunnel_sim.errors import TunnelError
+from identification.remark import Outcome, Remark
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def refused(data) -> Remark:

@@ -8,9 +8,9 @@ from decays import ANGLE, NOISE, RATE, grid, reading, run
 
 from identification.examination.examine import from_releases
 from identification.examination.release import find_release
-from identification.examination.remark import Outcome
-from tunnel_sim.campaign import SensorProperties
-from tunnel_sim.record import Record
+from identification.remark import Outcome
+from tunnel_sim.vocabulary.campaign import SensorProperties
+from tunnel_sim.vocabulary.record import Record
 
 HELD = int(3.0 * RATE)
 BEFORE = {

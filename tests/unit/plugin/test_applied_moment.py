@@ -7,10 +7,10 @@ from dataclasses import replace
 import mujoco
 import pytest
 
-from tunnel_sim.aero import AeroDerivatives
-from tunnel_sim.model import build_model
-from tunnel_sim.rig import load_rig
-from tunnel_sim.run_settings import RodTwist, RunSettings
+from tunnel_sim.engine.model import build_model
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings
+from tunnel_sim.vocabulary.aero import AeroDerivatives
 
 FRICTION = 0.05  # N m
 STILL = RunSettings(

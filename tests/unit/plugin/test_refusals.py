@@ -12,7 +12,7 @@ import mujoco
 import pytest
 from small_model import NUMERICS, small_model
 
-from tunnel_sim.moment_law import parameter_names
+from tunnel_sim.physics.moment_law import parameter_names
 
 PLUGIN_SOURCE = Path(__file__).parents[3] / "mjcf" / "plugin"
 NOT_NEGATIVE = ("air_density", "frontal_area", "reference_length", "width", "strouhal_number")

@@ -23,7 +23,7 @@ from tunnel_lab.sweep.processes import in_processes
 from tunnel_lab.sweep.product import Sweep
 from tunnel_lab.sweep.reading import read_sweep
 from tunnel_lab.sweep.store import begin, open_store
-from tunnel_sim.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError
 
 ROOT = Path(__file__).parents[3]
 PATIENCE_S = 120.0

@@ -15,9 +15,9 @@ from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.sweep.product import Sweep
 from tunnel_lab.sweep.reading import read_sweep
 from tunnel_lab.sweep.shard import run_shard
-from tunnel_sim.plan import load_plan
-from tunnel_sim.rig import load_rig
-from tunnel_sim.virtual_campaign import simulate_campaign
+from tunnel_sim.engine.virtual_campaign import simulate_campaign
+from tunnel_sim.files.plan_file import load_plan
+from tunnel_sim.files.rig_file import load_rig
 
 
 def variant(folder: Path, *changes: tuple[str, str]) -> Sweep:

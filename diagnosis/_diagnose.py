@@ -1,0 +1,65 @@
+"""The diagnosis of a campaign, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from diagnosis.answer.assemble import assemble, chosen_fit
+from diagnosis.detection.comparable import comparable_runs
+from diagnosis.detection.refusal import refuse_hopeless
+from diagnosis.localisation.localise import localise
+from diagnosis.result import Diagnosis
+from diagnosis.study import Progress, study
+from identification.examination.examine import examine
+from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+
+
+def diagnose(
+    campaign: Campaign, *, kinds: Sequence[type[Effect]] = ALL_EFFECTS, progress: Progress | None = None
+) -> Diagnosis:
+    """Say where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
+
+    Args:
+        campaign: measured or simulated runs.
+        kinds: the vocabulary to answer in.
+        progress: told what is being done.
+
+    Returns:
+        The answer, for the runs that one model can be fitted to; its cautions name any others.
+
+    Raises:
+        TunnelError: when the examination refuses the records, a run shows no decaying motion, or the nominal model
+            cannot be fitted to them.
+    """
+    examined = examine(campaign).accepted()
+    refuse_hopeless(examined.campaign)
+    campaign, left_out = comparable_runs(examined.campaign)
+    found = study(campaign, kinds, progress)
+    if progress is not None:
+        progress("where, and how far it closes")
+    best = chosen_fit(found)
+    where, maps = localise(campaign, found.nominal, None if best is found.nominal else best, found.causes)
+    return replace(assemble(found, where, maps, left_out), remarks=examined.remarks)
+
+
+def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:
+    """The effects to answer in.
+
+    Args:
+        include: names to restrict to; empty: all.
+        exclude: names to withhold.
+
+    Returns:
+        Effect classes in the order of the vocabulary.
+
+    Raises:
+        TunnelError: when a name is unknown, or nothing is left.
+    """
+    wanted = {effect_class(name) for name in include} if include else set(ALL_EFFECTS)
+    kinds = tuple(kind for kind in ALL_EFFECTS if kind in wanted - {effect_class(name) for name in exclude})
+    if not kinds:
+        raise TunnelError("no effect is left to answer with", remedy="exclude fewer effects")
+    return kinds

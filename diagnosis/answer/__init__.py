@@ -1,0 +1,1 @@
+"""From a study to the answer: held-out closure, coefficients, rivals, words."""

@@ -1,0 +1,165 @@
+"""From a study to the answer: figures on held-out runs, coefficients, rivals, words."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from diagnosis.answer.candidates import candidates
+from diagnosis.answer.cautions import cautions
+from diagnosis.answer.coefficients import coefficients, rival_fits
+from diagnosis.answer.held_out import HeldOut, predict_held_out
+from diagnosis.answer.next_run import separating_run
+from diagnosis.answer.reference_sizes import size_note, sized_coefficients
+from diagnosis.answer.reported import excess_base, gap_summary, report_fits
+from diagnosis.answer.verdict import blind_spots, cnr_note, verdict
+from diagnosis.attribution.decide import RIVAL_PROBABILITY, UNKNOWN_SHARE, Weighed
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.localisation.maps import Maps
+from diagnosis.result import (
+    Coefficients,
+    Diagnosis,
+    NoiseSummary,
+    Where,
+)
+from diagnosis.study import Study
+
+_LATE_START = (
+    "the nominal model misses the motion grossly, so records are read from their second passage through the middle "
+    "on: a start driven by hand is no free decay"
+)
+_PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
+
+
+def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = ()) -> Diagnosis:
+    """Compose the answer.
+
+    Args:
+        study: what was found.
+        where: where the gap is.
+        maps: the pictures' data.
+        left_out: sentences on runs that were left out.
+
+    Returns:
+        The diagnosis.
+    """
+    base = excess_base(study)
+    chosen = chosen_fit(study)
+    nominal_out = predict_held_out(study.nominal)
+    chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
+    begun = time.perf_counter()
+    shown = report_fits(study.nominal, chosen, nominal_out, chosen_out)
+    study.seconds["confirmation"] = time.perf_counter() - begun
+    gap = gap_summary(study, base, shown)
+    weighed = candidates(study, base)
+    data = study.nominal.problem.data
+    return Diagnosis(
+        campaign=study.campaign.name,
+        causes=study.causes,
+        verdict=verdict(
+            study.causes,
+            before=gap.excess_before,
+            after=gap.excess_after,
+            closed=gap.closed,
+            probability=weighed[0].probability,
+            held_out=any(run.held_out for run in gap.runs),
+        ),
+        gap=gap,
+        where=where,
+        maps=maps.to_json_dict(),
+        candidates=weighed,
+        ambiguous_with=_rival_names(study),
+        next_run=_next_run(study, chosen),
+        coefficients=_coefficients(study, chosen, nominal_out, chosen_out),
+        confirmation=shown.confirmation,
+        noise=_noise(study),
+        blind_spots=blind_spots(
+            springs=len(data.springs),
+            speeds=len({run.wind_speed for run in data.runs if run.wind_on}),
+            wind_off=any(not run.wind_on for run in data.runs),
+            wind_on=data.wind_on,
+            normalised=data.normalised,
+        ),
+        seconds=study.seconds,
+        provenance={"versions": {name: version(name) for name in _PACKAGES}},
+        cautions=(
+            *left_out,
+            *cautions(
+                study.campaign,
+                study.noise,
+                gap.runs,
+                shown.confirmation,
+                named=bool(study.causes) and study.causes != ("unknown",),
+            ),
+            *((_LATE_START,) if study.started_late else ()),
+            *_outside(study),
+        ),
+    )
+
+
+def _outside(study: Study) -> tuple[str, ...]:
+    """What outside the vocabulary would explain a gap of unknown cause."""
+    outsider = study.outsider
+    if study.causes != ("unknown",) or outsider is None or outsider.share >= UNKNOWN_SHARE:
+        return ()
+    closed = 100.0 * (1.0 - outsider.share)
+    return (f"{outsider.words}, which the vocabulary does not hold, would close {closed:.0f} % of the gap",)
+
+
+def chosen_fit(study: Study) -> Fit:
+    """The fit of the answer; the nominal one where nothing fitted is part of it."""
+    fitted = tuple(name for name in study.fitted if name != "unknown")
+    random = study.random_answer(fitted)
+    if random is not None:
+        return study.nominal if random.beside is None else random.beside.fit
+    hypothesis = study.hypothesis(fitted) if fitted else None
+    return study.nominal if hypothesis is None else hypothesis.fit
+
+
+def _coefficients(study: Study, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Coefficients:
+    campaign = study.campaign
+    before = coefficients(study.nominal, nominal_out, campaign, [(chosen, 1.0)] if study.causes else ())
+    rivals = rival_fits(study.weighed, study.hypotheses, chosen)
+    straight = next((h.textbook for h in study.hypotheses if h.fit is chosen), None)
+    after = coefficients(chosen, chosen_out, campaign, rivals, straight)
+    notes = (cnr_note(study.causes), size_note(campaign.rig, windy="cn_beta" in before))
+    return Coefficients(
+        before=sized_coefficients(before, campaign.rig),
+        after=sized_coefficients(after, campaign.rig),
+        note=" ".join(note for note in notes if note),
+    )
+
+
+def _rivals(study: Study) -> list[Weighed]:
+    chosen = set(study.fitted)
+    return [
+        answer
+        for answer in study.weighed[1:]
+        if answer.probability >= RIVAL_PROBABILITY
+        and answer.effects != ("unknown",)
+        and not chosen <= set(answer.effects)
+        and study.causes != ("unknown",)
+    ]
+
+
+def _rival_names(study: Study) -> tuple[str, ...]:
+    names = {name for answer in _rivals(study) for name in answer.effects}
+    return tuple(sorted(names - set(study.causes)))
+
+
+def _next_run(study: Study, chosen: Fit) -> dict[str, Any] | None:
+    for answer in _rivals(study):
+        hypothesis = study.hypothesis(answer.effects)
+        if hypothesis is not None and chosen is not study.nominal:
+            return separating_run(chosen, hypothesis.fit)
+    return None
+
+
+def _noise(study: Study) -> NoiseSummary:
+    noise = study.noise
+    stated = None if noise.stated_variance is None else float(np.sqrt(noise.stated_variance))
+    return NoiseSummary(float(np.sqrt(noise.used)), stated, noise.source, noise.reason)

@@ -1,0 +1,147 @@
+"""The answers weighed, with their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.answer.reference_sizes import parameter_unit
+from diagnosis.answer.reported import Base
+from diagnosis.attribution.decide import LAPSE, Weighed
+from diagnosis.attribution.process_noise import LONGEST_BANDWIDTH
+from diagnosis.attribution.random_moments import RandomAnswer
+from diagnosis.detection.gap import FALSE_ALARM_RATE
+from diagnosis.result import Candidate, ParameterEstimate
+from diagnosis.study import COARSE_STEP, HUM, Study
+
+_AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends there was stopped
+
+
+def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
+    """The answers weighed, with what they leave in the fitted runs by the fits' own integrator.
+
+    Args:
+        study: what was found.
+        base: what an excess is measured against.
+
+    Returns:
+        Answers, ``none`` and ``unknown`` among them, most probable first; their probabilities sum to 1.
+    """
+    found = []
+    if not study.causes:
+        return (
+            Candidate("none", 1.0 - FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
+            Candidate("unknown", FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
+        )
+    before = max(study.nominal.excess, 1e-9)
+    for answer in study.weighed:
+        if answer.effects == ("unknown",):
+            found.append(Candidate("unknown", answer.probability, before / _block(study), 0.0))
+            continue
+        name = " + ".join(sorted({*study.read_off, *answer.effects}))
+        left = answer.share * before / _block(study)
+        parameters = {**_read_parameters(study), **_parameters(study, answer)}
+        found.append(
+            Candidate(name, answer.probability, left, max(0.0, 1.0 - answer.share), _short(parameters))
+        )
+    if not study.weighed:
+        name = " + ".join(study.read_off)
+        left = study.nominal.excess / _block(study)
+        closed = 1.0 - max(left, 0.0) / max(left + base.hum + base.extra, 1e-9)
+        found.append(
+            Candidate(
+                name, 1.0 - LAPSE, left, float(np.clip(closed, 0.0, 1.0)), _short(_read_parameters(study))
+            )
+        )
+        found.append(Candidate("unknown", LAPSE, left + base.hum + base.extra, 0.0))
+    none = 0.0 if study.read_off else min(study.test.p_value, FALSE_ALARM_RATE)
+    found.append(Candidate("none", none, before / _block(study), 0.0))
+    return _normalised(found)
+
+
+def _normalised(found: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Most probable first, their probabilities summing to 1."""
+    total = sum(candidate.probability for candidate in found)
+    shared = [replace(candidate, probability=candidate.probability / total) for candidate in found]
+    return tuple(sorted(shared, key=lambda c: -c.probability))
+
+
+def _block(study: Study) -> int:
+    """Samples in a block mean: a structural excess of block means is as many times that of samples."""
+    return study.nominal.problem.data.runs[0].block
+
+
+def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
+    random = study.random_answer(answer.effects)
+    hypothesis = study.hypothesis(answer.effects) if random is None else random.beside
+    found: dict[str, ParameterEstimate] = {}
+    if hypothesis is not None:
+        problem = hypothesis.fit.problem
+        units = {
+            f"{kind.name}.{info.name}": info.unit for kind in problem.effects for info in kind.parameters()
+        }
+        inflate = float(np.sqrt(1.0 + max(hypothesis.fit.excess, 0.0)))
+        for name in problem.effect_names:
+            fit = hypothesis.fit
+            bound = fit.bound(name)
+            std = None if bound else fit.std(name) * inflate
+            found[name] = ParameterEstimate(fit.value(name), std, units[name], bound)
+        for name, value in problem.fixed:
+            found[name] = ParameterEstimate(value, 0.0, units[name])
+    if random is not None:
+        found |= _random_parameters(random)
+    return {name: replace(value, unit=parameter_unit(name, study.campaign)) for name, value in found.items()}
+
+
+def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
+    """Of a random moment; its size is known as well as the number of its correlation times allows."""
+    process, spectrum = answer.process, answer.process.spectrum
+    kind = answer.kind
+    severity, place = kind.parameters()
+    seconds = process.interval * sum(i.size for i in process.innovations)
+    independent = max(seconds * min(4.0 * spectrum.bandwidth, 1.0 / process.interval), 2.0)
+    relative = float(np.sqrt(0.5 / independent))
+    if spectrum.strouhal_number > 0.0:
+        amplitude = float(np.sqrt(2.0)) * spectrum.intensity
+        width = spectrum.bandwidth / max(spectrum.strouhal_number, 1e-9)
+        return {
+            f"{kind.name}.{severity.name}": ParameterEstimate(amplitude, amplitude * relative, "1"),
+            f"{kind.name}.{place.name}": ParameterEstimate(
+                spectrum.strouhal_number, spectrum.strouhal_number * width * relative, "1"
+            ),
+        }
+    # a corner beyond the rig's own frequencies is seen as white: only the size over its root is known there
+    return {
+        f"{kind.name}.{severity.name}": ParameterEstimate(
+            spectrum.intensity, spectrum.intensity * relative, "1"
+        ),
+        f"{kind.name}.{place.name}": ParameterEstimate(
+            spectrum.bandwidth,
+            None,
+            "Hz",
+            "upper" if spectrum.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None,
+        ),
+    }
+
+
+def _read_parameters(study: Study) -> dict[str, ParameterEstimate]:
+    found: dict[str, ParameterEstimate] = {}
+    if study.hum is not None:
+        amplitude, frequency = (f"{HUM.name}.{info.name}" for info in HUM.parameters())
+        found[amplitude] = ParameterEstimate(study.hum.amplitude, study.hum.std, "rad")
+        found[frequency] = ParameterEstimate(study.hum.frequency, study.hum.frequency_std, "Hz")
+    if study.coarse:
+        found[f"{COARSE_STEP.name}.{COARSE_STEP.parameters()[0].name}"] = ParameterEstimate(
+            study.step, None, "rad"
+        )
+    return found
+
+
+def _short(parameters: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
+    """Parameter names without the effect's, where there is one effect only."""
+    effects = {name.split(".")[0] for name in parameters}
+    if len(effects) != 1:
+        return dict(parameters)
+    return {name.split(".")[1]: value for name, value in parameters.items()}

@@ -1,0 +1,169 @@
+"""The figures reported, from the MuJoCo model: fitted runs predicted once more, to half the fits' step."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from diagnosis.fitting.problem import Point, Problem, campaign_rig, condensed, held_end
+from diagnosis.fitting.run_data import RunData
+from diagnosis.result import Confirmation
+from tunnel_sim.physics.motion import Motion
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+
+#: The two may differ by this share of a block mean's noise, root mean square over a run: a hundredth of its power.
+TOLERANCE = 0.1
+_TIMESTEP = 2e-3  # s at the most, half that of the fits: RK4 then errs a sixteenth as much
+_ROD_RESOLUTION = 0.25  # rad of the rod's own oscillation in one step: half of what the fits take
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Runs predicted by the MuJoCo model and by the forward integrator of the fits.
+
+    Args:
+        ids: of the runs.
+        residuals: reading minus the MuJoCo model's block means, in noise standard deviations, by run; those of
+            the forward integrator where MuJoCo could not integrate the motion.
+        differences: MuJoCo's block means minus the forward integrator's, rad, by run.
+        noise: standard deviation of a block mean's noise, rad, by run.
+        failure: why MuJoCo could not predict the runs; empty where it did.
+    """
+
+    ids: tuple[str, ...]
+    residuals: list[Array]
+    differences: list[Array]
+    noise: tuple[float, ...]
+    failure: str = ""
+
+    @property
+    def excess(self) -> float:
+        """Mean squared scaled residual minus one, over all runs."""
+        return float(np.mean(np.concatenate(self.residuals) ** 2)) - 1.0
+
+
+def compare(problem: Problem, common: Array, release: Array) -> Comparison:
+    """Predict runs with both models.
+
+    Args:
+        problem: runs and effects.
+        common: common parameters, shape (common,), or (runs, common) where each run has its own, as runs
+            held out of different fits do.
+        release: every run's own parameters, shape (runs, own).
+
+    Returns:
+        Residuals from the MuJoCo model, and its differences from the forward integrator.
+    """
+    runs = problem.data.runs
+    each = np.broadcast_to(common, (len(runs), common.shape[-1]))
+    distinct, which = np.unique(each, axis=0, return_inverse=True)
+    forward = problem.predict([Point(row, release) for row in distinct])
+    noise = tuple(float(np.sqrt(run.noise_variance)) for run in runs)
+    before = [forward[int(k)][i] for i, k in enumerate(which.ravel())]
+    predicted, failure = before, ""
+    try:
+        predicted = mujoco_blocks(problem, each, release)
+    except TunnelError as error:
+        failure = error.what
+    return Comparison(
+        ids=tuple(run.id for run in runs),
+        residuals=[(run.reading - p) / s for run, p, s in zip(runs, predicted, noise, strict=True)],
+        differences=[p - f for p, f in zip(predicted, before, strict=True)],
+        noise=noise,
+        failure=failure,
+    )
+
+
+def confirm(comparisons: Sequence[Comparison]) -> Confirmation:
+    """Judge whether the two models agree.
+
+    Args:
+        comparisons: of everything that is reported; one at least.
+
+    Returns:
+        The largest difference, and the root mean square of the run that is closest to its tolerance.
+    """
+    largest, worst, found = 0.0, -1.0, ("", 0.0, 0.0)
+    for comparison in comparisons:
+        for run, difference, noise in zip(
+            comparison.ids, comparison.differences, comparison.noise, strict=True
+        ):
+            largest = max(largest, float(np.max(np.abs(difference))))
+            rms = float(np.sqrt(np.mean(difference**2)))
+            if rms / noise > worst:
+                worst, found = rms / noise, (run, rms, TOLERANCE * noise)
+    failure = next((c.failure for c in comparisons if c.failure), "")
+    return Confirmation(worst <= TOLERANCE and not failure, largest, *found, failure=failure)
+
+
+def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array]:
+    """Block means of the reading that the MuJoCo model predicts.
+
+    Effects of the sensor act on every sample before it is averaged; the fits, which average first, only
+    approximate that.
+
+    Args:
+        problem: runs and effects.
+        common: common parameters of every run, shape (runs, common).
+        release: every run's own parameters, shape (runs, own).
+
+    Returns:
+        By run, rad, of the shape of the run's ``reading``.
+
+    Raises:
+        TunnelError: when the motion grows without bound.
+    """
+    from tunnel_sim.engine.simulate import simulate_motions  # only here: MuJoCo is slow to load
+
+    cases = [_Case(problem, common[i], release[i], run) for i, run in enumerate(problem.data.runs)]
+    by_interval: dict[float, list[_Case]] = {}
+    for case in cases:
+        by_interval.setdefault(case.run.interval, []).append(case)
+    blocks: dict[str, Array] = {}
+    for interval, group in by_interval.items():
+        motions = simulate_motions(
+            campaign_rig(problem.data), [case.physics for case in group], 1.0 / interval
+        )
+        for case, motion in zip(group, motions, strict=True):
+            blocks[case.run.id] = case.reading(motion)
+    return [blocks[run.id] for run in problem.data.runs]
+
+
+class _Case:
+    """One run at one point, as MuJoCo takes it."""
+
+    def __init__(self, problem: Problem, common: Array, own: Array, run: RunData) -> None:
+        self.run = run
+        self.chain = problem.chain(common, own, run)
+        self.zero = float(common[problem.nominal_names.index("zero")])
+        physics = held_end(condensed(self.chain.physics(), problem.data))
+        steps = int(np.ceil(run.interval / _longest_step(physics) - 1e-9))
+        self.physics = dataclasses.replace(
+            physics, timestep=run.interval / steps, duration=(run.reading.size + 1) * run.interval
+        )
+
+    def reading(self, motion: Motion) -> Array:
+        """Block means of the reading from the motion at the blocks' ends."""
+        run = self.run
+        ends = CubicHermiteSpline(motion.time_s, motion.angle, motion.rate)
+        samples = run.reading.size * run.block
+        time: Array = np.asarray(np.arange(samples) * (run.interval / run.block), np.float64)
+        angle: Array = np.asarray(ends(time), np.float64)
+        reading = self.chain.reading(self.chain.angle(angle, time) + self.zero)
+        means: Array = reading.reshape(run.reading.size, run.block).mean(axis=1)
+        return means
+
+
+def _longest_step(physics: RunSettings) -> float:
+    twist = physics.rod_twist
+    if twist is None:
+        return _TIMESTEP
+    share = twist.inertia_share
+    own = np.sqrt(1.0 / (twist.compliance * physics.yaw_inertia * share * (1.0 - share)))
+    return float(np.clip(_ROD_RESOLUTION / own, 1e-4, _TIMESTEP))

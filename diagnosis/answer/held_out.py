@@ -1,0 +1,157 @@
+"""How far the gap closes on runs that were not used for the fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.run_data import Data, RunData
+from tunnel_sim.vocabulary.record import Array
+
+_FOLDS = 3
+_RELEASE_STEPS = 4  # with the slopes of nearly the same parameters, two do
+_RELEASE_GAIN = 1e-6  # of a run's χ² that a step must save
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Prediction of runs left out of the fit.
+
+    Args:
+        residuals: by run id: reading minus prediction in noise standard deviations, only the run's own
+            parameters refitted.
+        points: by run id: the common parameters found without it, and its own.
+        common: the common parameters found without each fold, shape (folds, common).
+        names: of the common parameters.
+    """
+
+    residuals: dict[str, Array]
+    points: dict[str, tuple[Array, Array]]
+    common: Array
+    names: tuple[str, ...]
+
+    @property
+    def excess(self) -> dict[str, float]:
+        """By run id: mean squared scaled residual minus one."""
+        return {run: float(np.mean(residual**2)) - 1.0 for run, residual in self.residuals.items()}
+
+
+def folds(data: Data, count: int = _FOLDS) -> list[tuple[str, ...]]:
+    """Groups of runs to leave out in turn.
+
+    Args:
+        data: the runs.
+        count: number of groups, fewer where there are few runs.
+
+    Returns:
+        Ids by group. Runs alike in wind and spring go to different groups, and what is kept always has every
+        spring, wind-off runs and wind-on runs: without them nothing could be said of what is left out. A run
+        that alone stands for one of these is left out of none.
+    """
+    order = sorted(data.runs, key=lambda run: (run.wind_on, run.spring_stiffness or 0.0, run.wind_speed))
+    free = [run for run in order if _covers(data, [run])]
+    count = min(count, len(free))
+    if count < 2:
+        return []
+    groups: list[list[RunData]] = [[] for _ in range(count)]
+    for i, run in enumerate(free):
+        for turn in range(count):
+            group = groups[(i + turn) % count]
+            if _covers(data, [*group, run]):
+                group.append(run)
+                break
+    return [tuple(run.id for run in group) for group in groups if group]
+
+
+def _covers(data: Data, left_out: list[RunData]) -> bool:
+    """Whether the other runs have every spring, and wind on and off, as all runs have."""
+    gone = {run.id for run in left_out}
+    kept = [run for run in data.runs if run.id not in gone]
+    springs = {run.spring_stiffness for run in data.runs} == {run.spring_stiffness for run in kept}
+    return springs and {run.wind_on for run in data.runs} == {run.wind_on for run in kept}
+
+
+def predict_held_out(whole: Fit) -> HeldOut:
+    """Refit without each group of runs, and predict it.
+
+    Args:
+        whole: the fit of all runs, from which the smaller fits start.
+
+    Returns:
+        The excess of every run that could be left out.
+    """
+    data = whole.problem.data
+    residuals: dict[str, Array] = {}
+    points: dict[str, tuple[Array, Array]] = {}
+    found = []
+    ids = [run.id for run in data.runs]
+    for group in folds(data):
+        keep = [i for i, run_id in enumerate(ids) if run_id not in group]
+        out = [i for i, run_id in enumerate(ids) if run_id in group]
+        try:
+            smaller = fit(
+                _restricted(whole.problem, [ids[i] for i in keep]),
+                Point(whole.point.common, whole.point.release[keep]),
+                base=_sliced(whole, keep),
+                tolerance=1e-3,
+                max_iterations=6,
+            )
+            released, left = refit_releases(
+                _restricted(whole.problem, [ids[i] for i in out]),
+                Point(smaller.point.common, whole.point.release[out]),
+                [whole.jacobian[i][1] for i in out],
+            )
+        except (FitError, np.linalg.LinAlgError):
+            continue
+        found.append(smaller.point.common)
+        for k, i in enumerate(out):
+            residuals[ids[i]] = left[k]
+            points[ids[i]] = (released.common, released.release[k])
+    common = np.array(found) if found else np.zeros((0, len(whole.problem.names)))
+    return HeldOut(residuals, points, common, whole.problem.names)
+
+
+def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple[Point, list[Array]]:
+    """Fit only what each run has of its own: release and phases.
+
+    Args:
+        problem: runs and effects.
+        start: common parameters, which stay, and releases to start from.
+        slopes: derivatives of the scaled prediction to each run's own parameters, shape (n, own), from a fit of
+            about the same parameters.
+
+    Returns:
+        The point found, each run at its own best, and the scaled residuals there by run.
+    """
+    best, residuals = start, scaled_residuals(problem, start)
+    for _ in range(_RELEASE_STEPS):
+        steps = [np.linalg.lstsq(s, r, rcond=1e-10)[0] for s, r in zip(slopes, residuals, strict=True)]
+        trial = Point(best.common, best.release + np.stack(steps))
+        moved = scaled_residuals(problem, trial)
+        gains = [float(r @ r - m @ m) for r, m in zip(residuals, moved, strict=True)]
+        better = [gain > _RELEASE_GAIN * float(r @ r) for gain, r in zip(gains, residuals, strict=True)]
+        if not any(better):
+            break
+        best = Point(best.common, np.where(np.array(better)[:, None], trial.release, best.release))
+        residuals = [m if keep else r for m, r, keep in zip(moved, residuals, better, strict=True)]
+    return best, residuals
+
+
+def _restricted(problem: Problem, ids: list[str]) -> Problem:
+    return Problem(problem.data.subset(tuple(ids)), problem.effects, problem.fixed, problem.bent)
+
+
+def _sliced(whole: Fit, keep: list[int]) -> Fit:
+    return Fit(
+        _restricted(whole.problem, [whole.problem.data.runs[i].id for i in keep]),
+        Point(whole.point.common, whole.point.release[keep]),
+        [whole.residuals[i] for i in keep],
+        whole.chi2[keep],
+        whole.covariance,
+        [whole.jacobian[i] for i in keep],
+        whole.iterations,
+        whole.converged,
+    )

@@ -1,0 +1,176 @@
+"""The run that would tell two fitted models apart."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from diagnosis.fitting.least_squares import Fit, project_release
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.run_data import RunData
+from tunnel_sim.vocabulary.record import Array
+
+_ANGLES = (0.35, 0.14)  # rad
+_SPEEDS = (0.0, 10.0, 20.0, 30.0)  # m/s
+_STIFFNESS_FACTORS = (0.5, 1.0, 2.0)
+_DURATIONS = (10.0, 30.0)  # s
+_PHASES = 8  # of the true model's periodic effect, to mean over
+_PHASES_TRIED = (1, 720, 72)  # of each of the rival's none, one or two, to fit
+
+
+def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
+    """Among feasible runs, the one whose readings the two models predict most differently.
+
+    Args:
+        first: a fitted model.
+        second: its rival, fitted to the same runs.
+
+    Returns:
+        Spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and the expected
+        separation (see `separation`) in standard deviations of the noise; None in normalised form.
+    """
+    data = first.problem.data
+    if data.normalised:
+        return None
+    best: tuple[float, RunData, float] | None = None
+    for run, angle in _designs(first):
+        difference = separation(first, second, run, angle)
+        if difference is not None and (best is None or difference > best[0]):
+            best = (difference, run, angle)
+    if best is None:
+        return None
+    apart, run, angle = best
+    return {
+        "spring_stiffness": run.spring_stiffness,
+        "wind_speed": run.wind_speed,
+        "release_angle": angle,
+        "duration": run.duration,
+        "separation": apart,
+    }
+
+
+def planned_run(
+    fit: Fit, *, spring_stiffness: float, wind_speed: float, air_density: float, duration: float
+) -> RunData:
+    """A run that has not been made, with the sampling and the noise of those that have.
+
+    Args:
+        fit: to the runs made.
+        spring_stiffness: Kr, N m/rad.
+        wind_speed: V, m/s.
+        air_density: ρ, kg/m³; not used where the wind is off.
+        duration: s.
+    """
+    template = fit.problem.data.runs[0]
+    return dataclasses.replace(
+        template,
+        id="next",
+        reading=np.zeros(round(duration / template.interval)),
+        spring_stiffness=spring_stiffness,
+        wind_speed=wind_speed,
+        air_density=air_density if wind_speed > 0.0 else 0.0,
+        duration=duration,
+    )
+
+
+def _designs(fit: Fit) -> list[tuple[RunData, float]]:
+    data = fit.problem.data
+    density = max((run.air_density for run in data.runs), default=0.0) or 1.2
+    springs = sorted({round(k * f, 2) for k in data.springs for f in _STIFFNESS_FACTORS} | set(data.springs))
+    speeds = [v for v in _SPEEDS if v == 0.0 or data.wind_on]
+    designs = []
+    for spring in springs[:: max(1, len(springs) // 4)]:
+        for speed in speeds:
+            for duration in _DURATIONS:
+                run = planned_run(
+                    fit, spring_stiffness=spring, wind_speed=speed, air_density=density, duration=duration
+                )
+                designs += [(run, angle) for angle in _ANGLES]
+    return designs
+
+
+def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | None:
+    """How far apart two models predict one run's readings, once what the run has of its own is refitted.
+
+    Args:
+        first: a fitted model.
+        second: its rival.
+        run: its conditions and length; the reading in it is not used.
+        angle: of the release, rad.
+
+    Returns:
+        Standard deviations of the noise that the rival misses by, its release and the phases of its periodic
+        effects refitted, in mean square over the phases of the true one, which no one can choose; the smaller of
+        the two, whichever is true. None where a model's motion grows without bound. Half its square is the
+        log-likelihood ratio, nats, that the run is expected to bring if one of the two is right.
+    """
+    one, other = _predict(first, run, angle), _predict(second, run, angle)
+    if one is None or other is None:
+        return None
+    return min(_missed(one, other), _missed(other, one)) / float(np.sqrt(run.noise_variance))
+
+
+@dataclass(frozen=True, eq=False)
+class _Prediction:
+    """A run as a model predicts it.
+
+    Args:
+        reading: mean over the phases of its periodic effects, rad, shape (n,).
+        waves: what the cosine and the sine of each phase add, rad, shape (n, 2 × effects).
+        slopes: derivatives to the release, shape (n, 2).
+    """
+
+    reading: Array
+    waves: Array
+    slopes: Array
+
+
+def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
+    """Predict a run; None where it cannot be integrated.
+
+    What a periodic effect adds is of first order in its size, so that it turns with its phase as a pointer.
+    """
+    problem = Problem(
+        fit.problem.data.with_runs((run,)), fit.problem.effects, fit.problem.fixed, fit.problem.bent
+    )
+    count = len(problem.phased)
+    steps = np.array([1e-4 * angle, 1e-3 * angle])
+    own = np.array([angle, 0.0, *[0.0] * count])
+    rows = [own, *(own + np.eye(2, own.size) * steps[:, None])]
+    for turn in (0.5 * np.pi, np.pi):
+        rows += list(own + turn * np.eye(own.size)[2:])
+    values = np.stack([v[0] for v in problem.predict([Point(fit.point.common, row[None]) for row in rows])])
+    if not np.all(np.isfinite(values)):
+        return None
+    base, quarter, half = values[0], values[3 : 3 + count], values[3 + count :]
+    cosine = 0.5 * (base - half)
+    sine = quarter - base + cosine
+    waves = np.stack([cosine, sine], axis=1).reshape(2 * count, base.size)
+    return _Prediction(base - cosine.sum(axis=0), waves.T, ((values[1:3] - base) / steps[:, None]).T)
+
+
+def _missed(true: _Prediction, rival: _Prediction) -> float:
+    """Root of the sum of squares, rad, that the rival leaves of the true model."""
+    change = np.column_stack([true.reading - rival.reading, true.waves])
+    left, waves = project_release(change, rival.slopes), project_release(rival.waves, rival.slopes)
+    count = waves.shape[1] // 2
+    tried = _pointers(count, _PHASES_TRIED[count])
+    power = np.einsum("ij,jk,ik->i", tried, waves.T @ waves, tried)
+    squares = []
+    for pointer in _pointers(true.waves.shape[1] // 2, _PHASES):
+        missed = left @ np.append(1.0, pointer)
+        squares.append(float(missed @ missed + np.min(power - 2.0 * tried @ (waves.T @ missed))))
+    return float(np.sqrt(max(sum(squares) / len(squares), 0.0)))
+
+
+def _pointers(count: int, phases: int) -> Array:
+    """Cosine and sine of every combination of phases, shape (combinations, 2 × count)."""
+    circle = 2.0 * np.pi * np.arange(phases) / phases
+    combinations = list(itertools.product(circle.tolist(), repeat=count))
+    grid = np.array(combinations).reshape(len(combinations), count)
+    pointers: Array = np.stack([np.cos(grid), np.sin(grid)], axis=2).reshape(len(grid), 2 * count)
+    return pointers

@@ -1,0 +1,99 @@
+"""What is identified where the rig's sizes or the springs are not stated: names and units that say so."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from diagnosis.result import ParameterEstimate
+from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
+
+#: Units of what acts on the yaw axis, and of the same per unit inertia.
+_PER_INERTIA = {
+    "N m": "rad/s2",
+    "N m/rad": "1/s2",
+    "N m s/rad": "1/s",
+    "N m s2/rad2": "1/rad",
+    "rad/(N m)": "s2",
+}
+_AREA = {(True, True): "1", (False, True): "m2", (True, False): "m", (False, False): "m3"}
+_PER_INERTIA_AREA = {"1": "1/(kg m2)", "m2": "1/kg", "m": "1/(kg m)", "m3": "m/kg"}
+
+
+def parameter_unit(name: str, campaign: Campaign) -> str:
+    """The unit of an effect's parameter as identified.
+
+    Args:
+        name: ``effect.parameter``.
+        campaign: what is stated.
+
+    Returns:
+        The parameter's own unit; over that of Izz where any run states no spring, and times the frontal area
+        and the reference length where these are not stated.
+    """
+    effect, _, parameter = name.partition(".")
+    info = next(info for info in effect_class(effect).parameters() if info.name == parameter)
+    normalised = any(run.spring_stiffness is None for run in campaign.runs)
+    rig = campaign.rig
+    if info.per_pressure:
+        sized = _AREA[rig.frontal_area is not None, rig.reference_length is not None]
+        return _PER_INERTIA_AREA[sized] if normalised else sized
+    if info.unit == "l/V" and rig.reference_length is None:
+        return "m/V"
+    return _PER_INERTIA.get(info.unit, info.unit) if normalised else info.unit
+
+
+def sized_coefficients(
+    found: Mapping[str, ParameterEstimate], rig: RigProperties
+) -> dict[str, ParameterEstimate]:
+    """Coefficients under the names of what was identified.
+
+    Args:
+        found: ``cn_beta`` and ``cn_r``, with 1 in the place of every size that is not stated, or others.
+        rig: which sizes are stated.
+
+    Returns:
+        The same where both sizes are stated; else Cnβ and Cnr times the missing ones, by name, Cnβ·A·l (m³/rad) as
+        ``cn_beta_area_length`` and Cnr·A·l² (m⁴/rad) as ``cn_r_area_length2``.
+    """
+    names = _sized_names(rig)
+    return {
+        names[name][0] if name in names else name: replace(value, unit=names[name][1])
+        if name in names
+        else value
+        for name, value in found.items()
+    }
+
+
+def _sized_names(rig: RigProperties) -> dict[str, tuple[str, str]]:
+    """Name and unit of what stands for each coefficient."""
+    if rig.frontal_area is not None and rig.reference_length is not None:
+        return {}
+    if rig.reference_length is not None:
+        return {"cn_beta": ("cn_beta_area", "m2/rad"), "cn_r": ("cn_r_area", "m2/rad")}
+    if rig.frontal_area is not None:
+        return {"cn_beta": ("cn_beta_length", "m/rad"), "cn_r": ("cn_r_length2", "m2/rad")}
+    return {"cn_beta": ("cn_beta_area_length", "m3/rad"), "cn_r": ("cn_r_area_length2", "m4/rad")}
+
+
+def size_note(rig: RigProperties, *, windy: bool) -> str:
+    """What the coefficients are where sizes are not stated.
+
+    Args:
+        rig: which sizes are stated.
+        windy: whether coefficients of the air are given at all.
+
+    Returns:
+        A sentence; empty where they are Cnβ and Cnr.
+    """
+    stated = {"frontal_area": rig.frontal_area, "reference_length": rig.reference_length}
+    missing = [name for name, value in stated.items() if value is None]
+    if not missing or not windy:
+        return ""
+    beta = "Cnβ" + "·A" * (rig.frontal_area is None) + "·l" * (rig.reference_length is None)
+    rate = "Cnr" + "·A" * (rig.frontal_area is None) + "·l²" * (rig.reference_length is None)
+    return (
+        f"[rig] states no {' and no '.join(missing)}, so {beta} and {rate} are identified, not Cnβ and Cnr: state "
+        f"{'both' if len(missing) > 1 else 'it'} for these."
+    )

@@ -1,0 +1,171 @@
+"""The gap by run, before and after: what the MuJoCo model leaves of the fitted and the held-out runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.answer.confirm import Comparison, compare, confirm
+from diagnosis.answer.held_out import HeldOut
+from diagnosis.detection.gap import FALSE_ALARM_RATE
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.result import Confirmation, GapSummary, RunGap
+from diagnosis.study import COARSE_STEP, Study
+from tunnel_sim.vocabulary.record import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Reported:
+    """Residuals from the MuJoCo model, in noise standard deviations of block means, by run id.
+
+    Args:
+        before: of the nominal model fitted to all runs.
+        before_out: of the nominal model, of the runs that could be held out of its fit.
+        after: of the answer's model; of its fit of all runs where a run could not be held out.
+        held_out: ids of the runs that could.
+        confirmation: how far MuJoCo and the fits' integrator agree on these.
+    """
+
+    before: Mapping[str, Array]
+    before_out: Mapping[str, Array]
+    after: Mapping[str, Array]
+    held_out: frozenset[str]
+    confirmation: Confirmation
+
+
+def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Reported:
+    """Predict what is reported with the MuJoCo model, each fit once.
+
+    Args:
+        nominal: fit of the nominal model.
+        chosen: fit of the answer; the nominal one where nothing fitted is part of it.
+        nominal_out: runs held out of the first.
+        chosen_out: runs held out of the second.
+
+    Returns:
+        The residuals. Those of the nominal model's held-out runs are the fits' own less what MuJoCo changes
+        in the fit of all runs: the two lie close together.
+    """
+    before = compare(nominal.problem, nominal.point.common, nominal.point.release)
+    before_out = _corrected(nominal_out, before)
+    comparisons = [before]
+    if chosen is nominal:
+        after = dict(zip(before.ids, before.residuals, strict=True)) | before_out
+    else:
+        runs = chosen.problem.data.runs
+        points = [
+            chosen_out.points.get(run.id, (chosen.point.common, chosen.point.release[i]))
+            for i, run in enumerate(runs)
+        ]
+        held = compare(chosen.problem, np.array([c for c, _ in points]), np.array([r for _, r in points]))
+        comparisons.append(held)
+        after = dict(zip(held.ids, held.residuals, strict=True))
+    return Reported(
+        before=dict(zip(before.ids, before.residuals, strict=True)),
+        before_out=before_out,
+        after=after,
+        held_out=frozenset(chosen_out.residuals),
+        confirmation=confirm(comparisons),
+    )
+
+
+def _corrected(held_out: HeldOut, fitted: Comparison) -> dict[str, Array]:
+    """Residuals of held-out runs with MuJoCo's differences from the fit of all runs taken off."""
+    return {
+        run: held_out.residuals[run] - difference / noise
+        for run, difference, noise in zip(fitted.ids, fitted.differences, fitted.noise, strict=True)
+        if run in held_out.residuals
+    }
+
+
+@dataclass(frozen=True)
+class Base:
+    """What an excess is measured against.
+
+    Args:
+        variance: of one sample, rad²: noise and stated resolution.
+        extra: what a coarse step adds to that, as a share.
+        hum: what a hum adds, as a share.
+    """
+
+    variance: float
+    extra: float
+    hum: float
+
+
+def excess_base(study: Study) -> Base:
+    """The noise that a perfect model would leave.
+
+    Args:
+        study: its noise, step and hum.
+
+    Returns:
+        The stated noise where it is stated and the records contradict it, or the readings' step does; else the
+        noise estimated from the records.
+    """
+    estimated = float(np.mean(list(study.noise.variance.values())))
+    stated = study.noise.stated_variance
+    hum = 0.0 if study.hum is None else study.hum.excess
+    if stated is not None and (study.coarse or study.test.noisy):
+        return Base(stated, max(estimated / stated - 1.0, 0.0), hum * estimated / stated)
+    if study.coarse:
+        fine = (study.campaign.sensor.resolution or 0.0) ** 2 / 12.0
+        alone = max(estimated - study.step**2 / 12.0, 0.05 * estimated) + fine
+        return Base(alone, estimated / alone - 1.0, hum * estimated / alone)
+    return Base(estimated, 0.0, hum)
+
+
+def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
+    """The gap of the campaign and of every run, in noise variances of a sample.
+
+    Args:
+        study: what was found.
+        base: what an excess is measured against.
+        shown: residuals from the MuJoCo model.
+
+    Returns:
+        The summary.
+    """
+    ratio = base.extra + 1.0  # of the estimated noise to the base
+    random = study.random_answer(study.fitted)
+    explained = 0.0 if study.coarse and COARSE_STEP.name in study.causes else base.extra
+    runs, sizes = [], []
+    before_out, after_out = [], []
+    for run in study.nominal.problem.data.runs:
+        before = _excess(shown.before[run.id]) / run.block * ratio + base.hum + base.extra
+        after = _excess(shown.after[run.id]) / run.block * ratio + explained
+        if random is not None and run.wind_on:
+            after = random.process.excess / run.block * ratio + explained
+        held_out = run.id in shown.held_out
+        if held_out and run.id in shown.before_out:
+            before_out.append(_excess(shown.before_out[run.id]) / run.block * ratio + base.hum + base.extra)
+            after_out.append(after)
+        runs.append(RunGap(run.id, before, after, held_out=held_out))
+        sizes.append(run.reading.size * run.block)
+    weight = np.array(sizes) / np.sum(sizes)
+    total_before = float(weight @ [run.before for run in runs])
+    total_after = float(weight @ [run.after for run in runs])
+    named = bool(study.causes) and study.causes != ("unknown",)
+    return GapSummary(
+        detected=bool(study.causes),
+        excess_before=total_before,
+        excess_after=total_after if named else total_before,
+        closed=_closed(sum(before_out), sum(after_out), total_before, total_after) if named else 0.0,
+        runs=tuple(runs) if named else tuple(replace(run, after=run.before) for run in runs),
+        false_alarm_rate=FALSE_ALARM_RATE,
+        p_value=0.0 if study.read_off else study.test.p_value,
+        tests=study.test.tests,
+    )
+
+
+def _excess(residual: Array) -> float:
+    return float(np.mean(residual**2)) - 1.0
+
+
+def _closed(before_out: float, after_out: float, before: float, after: float) -> float:
+    """Share of the gap closed: on runs held out, or on all where none could be."""
+    if before_out > 0.0:
+        return float(np.clip(1.0 - max(after_out, 0.0) / before_out, 0.0, 1.0))
+    return float(np.clip(1.0 - max(after, 0.0) / before, 0.0, 1.0)) if before > 0.0 else 0.0

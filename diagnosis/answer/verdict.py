@@ -1,0 +1,114 @@
+"""The answer in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from diagnosis.names import plain
+from tunnel_sim.effects import effect_class
+
+_CHANNEL_WORDS = {
+    "stiffness": "the restoring moment",
+    "damping": "the damping",
+    "forcing": "an imposed moment",
+    "sensor": "the angle sensor",
+    "calibration": "a stated value",
+}
+
+
+def verdict(
+    causes: Sequence[str],
+    *,
+    before: float,
+    after: float,
+    closed: float,
+    probability: float,
+    held_out: bool = True,
+) -> str:
+    """The answer in one paragraph.
+
+    Args:
+        causes: names; empty for no gap.
+        before: excess of the nominal model, in units of the noise variance.
+        after: excess on held-out runs with the causes added, in units of the noise variance.
+        closed: share of the gap closed there.
+        probability: of the answer, a fraction.
+        held_out: whether any run could be held out; else ``after`` and ``closed`` are those of the fitted runs.
+
+    Returns:
+        Sentences.
+    """
+    if not causes:
+        return (
+            f"No gap: the nominal model explains the runs down to their noise "
+            f"(mean squared residual over noise variance, minus one: {before:+.3f})."
+        )
+    if tuple(causes) == ("unknown",):
+        return (
+            f"There is a gap ({before:.2f} times the noise power), and no effect of the vocabulary explains it. "
+            f"Do not trust the coefficients beyond the intervals given."
+        )
+    sources = "; ".join(_source(name) for name in causes)
+    runs = "on runs held out of the fit" if held_out else "in the fitted runs (none could be held out)"
+    return (
+        f"The gap ({before:.2f} times the noise power) comes from {plain(causes)} "
+        f"(probability {probability:.2f}): "
+        f"{sources}. With {'it' if len(causes) == 1 else 'them'} added, {100.0 * closed:.1f} % of the gap "
+        f"closes {runs}, and {max(after, 0.0):.3f} times the noise power is left."
+    )
+
+
+def _source(name: str) -> str:
+    kind = effect_class(name)
+    when = "with the wind on" if kind.condition == "wind_on" else "with the wind on and off"
+    return f"{_CHANNEL_WORDS[kind.channel]}, {when}"
+
+
+def cnr_note(causes: Sequence[str]) -> str:
+    """What the coefficients after mean, where a cause changes their meaning."""
+    return " ".join(
+        effect_class(name).caveat for name in causes if name != "unknown" and effect_class(name).caveat
+    )
+
+
+BLIND_SPOTS = (
+    "a constant sensor lag or filter: it only shifts the release",
+    "an error of the clock",
+    "a common scale on the inertia and all stiffnesses",
+    "a scale error of wind speed or air density: Cnβ and Cnr absorb it",
+)
+
+
+def blind_spots(
+    *, springs: int, speeds: int, wind_off: bool, wind_on: bool, normalised: bool
+) -> tuple[str, ...]:
+    """What these runs cannot show.
+
+    Args:
+        springs: number of different stiffnesses.
+        speeds: number of different wind speeds above zero.
+        wind_off: whether there are runs with the wind off.
+        wind_on: whether there are runs with the wind on.
+        normalised: whether stiffness is not stated.
+
+    Returns:
+        Clauses, those true of every free decay last.
+    """
+    found = []
+    if normalised:
+        found.append("anything about single springs: the runs state no stiffness")
+    elif springs < 2:
+        found.append(
+            "structural against viscous damping, gravity or a wrong spring: there is one spring only"
+        )
+    if not wind_on:
+        found.append("any effect of the air: there is no run with the wind on")
+    elif speeds < 2:
+        found.append(
+            "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
+        )
+    if wind_on and not wind_off:
+        found.append(
+            "mechanical against aerodynamic versions of one effect: there is no run with the wind off"
+        )
+    return (*found, *BLIND_SPOTS)

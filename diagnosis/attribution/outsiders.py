@@ -1,0 +1,107 @@
+"""Rivals from outside the vocabulary: known ways in which a rig misleads that no effect of it stands for.
+
+An effect of the vocabulary may close most of a gap it has no part in. Where something outside closes it better, the
+answer is `unknown`, with a word on what would explain it. Each outsider is linear in its size, so that the nominal
+fit's own residuals and sensitivities weigh it without a simulation. A gain that drifts in proportion to time is not
+among them: the damping absorbs it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.signal import lfilter
+
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.starting_points import project_out
+from tunnel_sim.vocabulary.record import Array
+
+_TIMES = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0)  # s: how slowly a zero follows
+
+
+@dataclass(frozen=True)
+class Outsider:
+    """Something outside the vocabulary, weighed.
+
+    Args:
+        words: what it is.
+        share: share of the gap it leaves open.
+    """
+
+    words: str
+    share: float
+
+
+def weigh_outsiders(nominal: Fit) -> Outsider | None:
+    """The outsider that closes most of the nominal model's gap.
+
+    Args:
+        nominal: the nominal fit.
+
+    Returns:
+        The best; None where there is no gap.
+    """
+    if nominal.excess <= 0.0:
+        return None
+    motions = _motions(nominal)
+    found = [
+        Outsider(words, share)
+        for words, columns in _OUTSIDERS
+        for share in (_share_left(nominal, trial) for trial in columns(motions))
+    ]
+    return min(found, key=lambda outsider: outsider.share)
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """One run: the nominal model's angle from its zero (rad), the noise of a block mean (rad), the interval (s)."""
+
+    angle: Array
+    noise: float
+    interval: float
+
+
+def _motions(nominal: Fit) -> list[_Motion]:
+    zero = nominal.value("zero")
+    runs = zip(nominal.problem.data.runs, nominal.residuals, strict=True)
+    return [
+        _Motion(
+            run.reading - residual * np.sqrt(run.noise_variance) - zero,
+            float(np.sqrt(run.noise_variance)),
+            run.interval,
+        )
+        for run, residual in runs
+    ]
+
+
+def _zero_follows_power(motions: list[_Motion]) -> list[list[Array]]:
+    """A zero that follows the squared angle, at once or late, from rest or from the value it has settled at."""
+    trials = []
+    for time, settled in product(_TIMES, (False, True)):
+        columns = []
+        for motion in motions:
+            square = motion.angle**2
+            keep = np.exp(-motion.interval / time) if time > 0.0 else 0.0
+            # at rest before the release, or held at the release angle for long
+            start = keep * square[0] if settled else 0.0
+            columns.append(lfilter([1.0 - keep], [1.0, -keep], square, zi=[start])[0] / motion.noise)
+        trials.append(columns)
+    return trials
+
+
+_OUTSIDERS: tuple[tuple[str, Callable[[list[_Motion]], list[list[Array]]]], ...] = (
+    ("a sensor zero that follows the power of the motion", _zero_follows_power),
+)
+
+
+def _share_left(nominal: Fit, columns: list[Array]) -> float:
+    left = project_out(nominal, columns)
+    power = sum(float(c @ c) for c in left)
+    if power <= 0.0:
+        return 1.0
+    along = sum(float(c @ r) for c, r in zip(left, nominal.residuals, strict=True))
+    excess = (nominal.total - along**2 / power) / nominal.count - 1.0
+    return max(excess, 0.0) / nominal.excess

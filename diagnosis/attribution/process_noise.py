@@ -1,0 +1,292 @@
+"""A random moment on the rig: its likelihood, by the innovations of a steady Kalman filter.
+
+Two kinds: turbulence, broad or about one frequency, and vortex shedding whose phase wanders, about a frequency
+that follows the wind. Åström, Introduction to Stochastic Control Theory (1970); Maine & Iliff, NASA RP-1077 (1981),
+filter error; the filter's Riccati equation by doubling: Anderson, Int. J. Control 28 (1978) 295,
+doi 10.1080/00207177808922455.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.optimize import minimize
+from scipy.signal import lfilter
+
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.spectra import linear_coefficients
+from tunnel_sim.vocabulary.record import Array
+
+_INTERVAL = 0.012  # s between the residuals the filter sees: well above the rig's frequencies
+_SETTLE = 1.0  # s at the start left out: the filter's own transient
+LONGEST_BANDWIDTH = 20.0  # Hz: the rig cannot tell a broader spectrum from white
+_LEAST_STROUHAL = 0.05  # bluff bodies shed at 0.1 to 0.3
+_LINE_SPACING = 0.3  # Hz, in the search for a line
+_WIDEST_LINE = 0.5  # Hz: beyond it a wandering line is turbulence
+_HIGHEST_LINE = 30.0  # Hz
+_DOUBLINGS = 30  # of the Riccati equation: 2^30 steps of the filter
+_EVALUATIONS = 60  # of the likelihood beyond the starting grid
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """A random moment's spectrum: first order about a centre.
+
+    Args:
+        intensity: standard deviation of the moment coefficient, dimensionless.
+        bandwidth: corner frequency beside the centre, Hz.
+        centre: Hz; 0 for turbulence without one.
+        strouhal_number: of a centre that follows the wind on the body's width; 0 where none does.
+    """
+
+    intensity: float
+    bandwidth: float
+    centre: float = 0.0
+    strouhal_number: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessNoise:
+    """A fitted random moment.
+
+    Args:
+        spectrum: as fitted.
+        drop: of −2 ln L against white measurement noise alone, wind-on runs, dimensionless.
+        cost: −2 ln L without constants, wind-on runs, dimensionless.
+        white_excess: mean squared scaled residual minus one of the same samples, without the moment.
+        excess: likewise of the scaled innovations.
+        innovations: scaled, by wind-on run.
+        run_ids: their runs.
+        interval: between innovations, s.
+    """
+
+    spectrum: Spectrum
+    drop: float
+    cost: float
+    white_excess: float
+    excess: float
+    innovations: list[Array]
+    run_ids: tuple[str, ...]
+    interval: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Channel:
+    """One wind-on run for the filter."""
+
+    id: str
+    residual: Array  # rad
+    variance: float  # rad2, of one residual
+    interval: float
+    oscillator: Array  # (2, 2): angle, rate
+    moment: float  # N m per unit coefficient, over the inertia
+    reduced: float  # V/width, Hz
+
+
+def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
+    """Explain the residuals of the wind-on runs by turbulence of common coefficient.
+
+    Args:
+        fit: the deterministic model's fit; its coefficients give the rig's response.
+        centred: whether its spectrum has a centre of its own.
+
+    Returns:
+        The fit; None without wind-on runs or where the model is not stable.
+    """
+    if not centred:
+        grid = [(s, b) for s in (3e-4, 1e-3, 3e-3, 1e-2, 3e-2) for b in (0.3, 3.0, 20.0)]
+        bounds = ((1e-7, 1.0), (0.03, LONGEST_BANDWIDTH))
+        return _fit(fit, lambda x: Spectrum(x[0], x[1]), grid, bounds)
+    about = [(s, b, f) for s in (1e-3, 3e-3, 1e-2) for b in (0.5, 2.0) for f in (1.5, 3.0, 4.5, 6.5, 9.0)]
+    limits = ((1e-7, 1.0), (0.1, LONGEST_BANDWIDTH), (0.3, 20.0))
+    return _fit(fit, lambda x: Spectrum(x[0], x[1], x[2]), about, limits)
+
+
+def fit_wandering_shedding(fit: Fit) -> ProcessNoise | None:
+    """Explain the residuals of the wind-on runs by vortex shedding whose phase wanders.
+
+    Args:
+        fit: the deterministic model's fit.
+
+    Returns:
+        The fit; None without wind-on runs or body width.
+    """
+    data = fit.problem.data
+    fastest = max(run.wind_speed for run in data.runs)
+    if data.width <= 0.0 or fastest <= 0.0:
+        return None
+    # lines wide enough for one to lie on any, up to what the filter's samples show
+    reduced = fastest / data.width
+    numbers = np.arange(_LEAST_STROUHAL, min(0.6, _HIGHEST_LINE / reduced), _LINE_SPACING / reduced)
+    grid = [(s, _LINE_SPACING / 3.0, float(n)) for s in (0.01, 0.05) for n in numbers]
+    bounds = ((1e-7, 5.0), (5e-4, _WIDEST_LINE), (_LEAST_STROUHAL, 1.0))
+    return _fit(fit, lambda x: Spectrum(x[0], x[1], strouhal_number=x[2]), grid, bounds)
+
+
+def _fit(
+    fit: Fit,
+    spectrum: Callable[[Sequence[float]], Spectrum],
+    grid: Sequence[tuple[float, ...]],
+    bounds: Sequence[tuple[float, float]],
+) -> ProcessNoise | None:
+    channels = [c for i in range(len(fit.residuals)) if (c := _channel(fit, i)) is not None]
+    if not channels:
+        return None
+
+    def cost(x: Array) -> float:
+        return sum(c for c, _ in _filtered(channels, spectrum(np.exp(x).tolist())))
+
+    start = np.log(min(grid, key=lambda x: cost(np.log(np.array(x)))))
+    found = minimize(
+        cost,
+        start,
+        method="Nelder-Mead",
+        bounds=[(np.log(low), np.log(high)) for low, high in bounds],
+        options={
+            "maxfev": _EVALUATIONS * len(start) // 2,
+            "xatol": 0.02,
+            "fatol": 0.5,
+            "initial_simplex": _simplex(start, np.log(bounds)),
+        },
+    )
+    best = spectrum(np.exp(found.x).tolist())
+    innovations = [scaled for _, scaled in _filtered(channels, best)]
+    kept = [c.residual[_skip(c) :] / np.sqrt(c.variance) for c in channels]
+    count = sum(i.size for i in innovations)
+    white = sum(float(k.size * np.log(c.variance) + k @ k) for c, k in zip(channels, kept, strict=True))
+    return ProcessNoise(
+        best,
+        white - float(found.fun),
+        float(found.fun),
+        sum(float(k @ k) for k in kept) / count - 1.0,
+        sum(float(i @ i) for i in innovations) / count - 1.0,
+        innovations,
+        tuple(c.id for c in channels),
+        channels[0].interval,
+    )
+
+
+def _simplex(start: Array, bounds: Array) -> Array:
+    """Half a factor of e along size and bandwidth, a tenth of it along a centre, which the grid has found."""
+    corners = np.vstack([start, start + np.diag([0.5, 0.5, 0.05][: start.size])])
+    if start.size == 3 and bounds[2, 1] < 0.5:  # a Strouhal number
+        corners[3, 2] = start[2] + 2e-3
+    return np.clip(corners, bounds[:, 0], bounds[:, 1])
+
+
+def _channel(fit: Fit, run_index: int) -> _Channel | None:
+    run = fit.problem.data.runs[run_index]
+    if not run.wind_on:
+        return None
+    inertia, damping, stiffness = linear_coefficients(fit, run_index)
+    if stiffness <= 0.0 or damping <= 0.0:
+        return None
+    group = max(1, round(_INTERVAL / run.interval))
+    count = run.reading.size // group
+    scale = np.sqrt(run.noise_variance)
+    residual = (fit.residuals[run_index][: count * group] * scale).reshape(count, group).mean(axis=1)
+    data = fit.problem.data
+    moment = 0.5 * run.air_density * run.wind_speed**2 * data.frontal_area * data.reference_length / inertia
+    oscillator = np.array([[0.0, 1.0], [-stiffness / inertia, -damping / inertia]])
+    reduced = run.wind_speed / data.width if data.width > 0.0 else 0.0
+    return _Channel(
+        run.id, residual, run.noise_variance / group, group * run.interval, oscillator, moment, reduced
+    )
+
+
+def _skip(channel: _Channel) -> int:
+    return min(channel.residual.size // 4, round(_SETTLE / channel.interval))
+
+
+def _filtered(channels: Sequence[_Channel], spectrum: Spectrum) -> list[tuple[float, Array]]:
+    """−2 ln L (without constants) and scaled innovations of the steady filter, by run."""
+    transition, disturbance = _discrete(channels, spectrum)
+    variance = np.array([c.variance for c in channels])
+    covariance = _steady_covariance(transition, disturbance, variance)
+    spread = covariance[:, 0, 0] + variance
+    gain = np.einsum("rij,rj->ri", transition, covariance[:, :, 0]) / spread[:, None]
+    closed = transition.copy()
+    closed[:, :, 0] -= gain
+    results = []
+    for i, channel in enumerate(channels):
+        if not (np.isfinite(spread[i]) and spread[i] > 0.0):
+            results.append((np.inf, np.zeros(0)))
+            continue
+        numerator, denominator = np.real(np.poly(transition[i])), np.real(np.poly(closed[i]))
+        innovations = lfilter(numerator, denominator, channel.residual)[_skip(channel) :]
+        cost = float(innovations.size * np.log(spread[i]) + innovations @ innovations / spread[i])
+        results.append((cost, innovations / np.sqrt(spread[i])))
+    return results
+
+
+def _discrete(channels: Sequence[_Channel], spectrum: Spectrum) -> tuple[Array, Array]:
+    """Transition and disturbance over one interval, shape (runs, n, n) each.
+
+    States: angle, rate, moment coefficient; about a centre, the coefficient's quadrature too. By one exponential:
+    Van Loan, IEEE Trans. Autom. Control 23 (1978) 395, doi 10.1109/TAC.1978.1101743.
+    """
+    corner = 2.0 * np.pi * spectrum.bandwidth
+    centred = spectrum.centre > 0.0 or spectrum.strouhal_number > 0.0
+    size = 4 if centred else 3
+    blocks = np.zeros((len(channels), 2 * size, 2 * size))
+    for block, channel in zip(blocks, channels, strict=True):
+        dynamics = np.zeros((size, size))
+        dynamics[:2, :2] = channel.oscillator
+        dynamics[1, 2] = channel.moment
+        dynamics[range(2, size), range(2, size)] = -corner
+        if centred:
+            turn = 2.0 * np.pi * (spectrum.centre + spectrum.strouhal_number * channel.reduced)
+            dynamics[2, 3], dynamics[3, 2] = -turn, turn
+        block[:size, :size], block[size:, size:] = -dynamics, dynamics.T
+        block[range(2, size), range(size + 2, 2 * size)] = 2.0 * corner * spectrum.intensity**2
+    step = np.array([channel.interval for channel in channels])
+    exponential = expm(blocks * step[:, None, None])
+    transition = np.swapaxes(exponential[:, size:, size:], 1, 2)
+    disturbance = transition @ exponential[:, :size, size:]
+    return transition, 0.5 * (disturbance + np.swapaxes(disturbance, 1, 2)) + 1e-18 * np.eye(size)
+
+
+def _steady_covariance(transition: Array, disturbance: Array, variance: Array) -> Array:
+    """Prediction covariance of the steady filter that reads the first state, shape (runs, n, n)."""
+    size = transition.shape[1]
+    a = np.swapaxes(transition, 1, 2).copy()
+    g = np.zeros_like(a)
+    g[:, 0, 0] = 1.0 / variance
+    h = disturbance
+    identity = np.eye(size)
+    with np.errstate(all="ignore"):  # a diverging trial is refused by its spread
+        for _ in range(_DOUBLINGS):
+            inverse = np.linalg.inv(identity + g @ h)
+            left = a @ inverse
+            grown = h + np.swapaxes(a, 1, 2) @ h @ inverse @ a
+            g = g + left @ g @ np.swapaxes(a, 1, 2)
+            a = left @ a
+            done = np.max(np.abs(grown - h)) <= 1e-12 * np.max(np.abs(grown))
+            h = 0.5 * (grown + np.swapaxes(grown, 1, 2))
+            if done:
+                break
+    return h
+
+
+def whiteness(result: ProcessNoise) -> tuple[float, float, float]:
+    """How far innovations are from white and steady.
+
+    Args:
+        result: a fit of process noise.
+
+    Returns:
+        Largest departure of a frequency band's mean power from 1, in its standard deviations; the same of a
+        quarter of the record in time; and the greatest share of the squared innovations' excess in one run.
+    """
+    bands, quarters = [], []
+    for innovations in result.innovations:
+        power = np.abs(np.fft.rfft(innovations - innovations.mean())) ** 2 / innovations.size
+        for part in np.array_split(power[1:], 8):
+            bands.append((float(part.mean()) - 1.0) * np.sqrt(part.size))
+        for part in np.array_split(innovations, 4):
+            quarters.append((float(np.mean(part**2)) - 1.0) * np.sqrt(part.size / 2.0))
+    by_run = [float(np.mean(i**2)) - 1.0 for i in result.innovations]
+    return float(np.max(np.abs(bands))), float(np.max(np.abs(quarters))), float(np.max(np.abs(by_run)))

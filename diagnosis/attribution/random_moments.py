@@ -1,0 +1,131 @@
+"""Random moments weighed last: they absorb almost anything, so they must pass for what they claim to be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from diagnosis.attribution.process_noise import (
+    ProcessNoise,
+    fit_turbulence,
+    fit_wandering_shedding,
+    whiteness,
+)
+from diagnosis.attribution.rank import Hypothesis
+from diagnosis.fitting.least_squares import Fit
+from tunnel_sim.effects import Effect, the_effect
+
+#: Largest departure of the innovations' power by band from white, in its standard deviations. Among 64 to 100
+#: bands the greatest is below 3.5 by chance; a real spectrum is not first-order, which adds some.
+_BAND_LIMIT = 7.0
+#: Likewise of quarters of the record in time.
+_TIME_LIMIT = 5.5
+#: Wind-off runs must be free of a gap: their excess as a share of the wind-on runs'.
+_WIND_OFF_SHARE = 0.05
+#: Single effects that a random moment is tried beside.
+_PARTNERS = 3
+#: −2 ln L by which an effect beside the random moment must improve on the moment alone: a parameter fitted by
+#: least squares to a random motion takes some ten of it for nothing.
+_EVIDENCE = 60.0
+#: −2 ln L beyond which a likelier kind of random moment rules another out: odds of e^10.
+_RIVAL_EVIDENCE = 20.0
+#: Where deterministic effects leave less than this, no random moment is needed.
+_CLOSED = 0.015
+
+
+@dataclass(frozen=True, eq=False)
+class RandomAnswer:
+    """A random moment, alone or beside one effect.
+
+    Args:
+        kind: of the random moment.
+        process: its fit.
+        beside: the fitted effect beside it, or None.
+        share: of the gap left open: the innovations' and the wind-off runs' excess over the nominal one's.
+    """
+
+    kind: type[Effect]
+    process: ProcessNoise
+    beside: Hypothesis | None
+    share: float
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects, sorted."""
+        return tuple(sorted((self.kind.name, *(() if self.beside is None else self.beside.effects))))
+
+
+def weigh_random_moments(
+    nominal: Fit, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], allowed: Collection[str]
+) -> list[RandomAnswer]:
+    """Try turbulence, and vortices whose phase wanders, alone and beside the best single effects.
+
+    Args:
+        nominal: the nominal fit.
+        singles: fitted single effects, best first.
+        pairs: fitted pairs.
+        allowed: names of the vocabulary to answer in.
+
+    Returns:
+        Of each kind the likeliest that passes, alone unless the evidence for an effect beside it is strong. To
+        pass, innovations must be white by band and steady in time, and wind-off runs without a gap. Empty where
+        none passes, or one or two deterministic effects close the gap already.
+    """
+    if any(max(hypothesis.fit.excess, 0.0) < _CLOSED * nominal.excess for hypothesis in (*singles, *pairs)):
+        return []
+    kinds: tuple[tuple[str, tuple[_Kind, ...]], ...] = (
+        ("broad_band", (fit_turbulence, partial(fit_turbulence, centred=True))),
+        ("narrow_band", (fit_wandering_shedding,)),
+    )
+    known = [(the_effect(random=random), fits) for random, fits in kinds]
+    tried = [_likeliest(kind, fits, nominal, singles) for kind, fits in known if kind.name in allowed]
+    answers = [answer for answer in tried if answer is not None]
+    least = min((answer.process.cost for answer in answers), default=0.0)
+    return [answer for answer in answers if answer.process.cost < least + _RIVAL_EVIDENCE]
+
+
+_Kind = Callable[[Fit], ProcessNoise | None]
+
+
+def _likeliest(
+    kind: type[Effect], fits: Sequence[_Kind], nominal: Fit, singles: Sequence[Hypothesis]
+) -> RandomAnswer | None:
+    for explain in fits:  # a spectrum with more freedom only where the simpler one does not pass
+        alone = _try(kind, explain, nominal, None, nominal)
+        partners = [s for s in singles if s.effects != (kind.name,)][:_PARTNERS]
+        beside = [a for s in partners if (a := _try(kind, explain, s.fit, s, nominal)) is not None]
+        best = min(beside, key=lambda a: a.process.cost, default=None)
+        if alone is None or (best is not None and best.process.cost < alone.process.cost - _EVIDENCE):
+            alone = best
+        if alone is not None:
+            return alone
+    return None
+
+
+def _try(
+    kind: type[Effect], explain: _Kind, fit: Fit, beside: Hypothesis | None, nominal: Fit
+) -> RandomAnswer | None:
+    off = wind_off_excess(fit)
+    if off > max(_WIND_OFF_SHARE * nominal.excess, 0.1):
+        return None
+    process = explain(fit)
+    if process is None or process.drop <= 0.0:
+        return None
+    band, quarter, _ = whiteness(process)
+    if band > _BAND_LIMIT or quarter > _TIME_LIMIT:
+        return None
+    share = (abs(process.excess) + max(off, 0.0)) / max(nominal.excess, 1e-9)
+    return RandomAnswer(kind, process, beside, share)
+
+
+def wind_off_excess(fit: Fit) -> float:
+    """Mean squared scaled residual minus one of the wind-off runs; 0 where there are none."""
+    off = [
+        float(np.mean(residual**2)) - 1.0
+        for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True)
+        if not run.wind_on
+    ]
+    return float(np.mean(off)) if off else 0.0

@@ -1,0 +1,1 @@
+"""Is there a gap? Noise, hum, comparable runs, and the tests against chance."""

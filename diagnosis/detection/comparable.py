@@ -1,0 +1,103 @@
+"""Runs that one model can be fitted to: all with their spring stated, or all of one spring that is not."""
+
+from __future__ import annotations
+
+import itertools
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.record import Record
+
+#: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
+#: fifth apart. What depends on amplitude moves a frequency gradually, and seldom as far.
+_SAME_SPRING = 1.1
+_PADDING = 8  # times the record, which places the peak of a few cycles within some per cent
+
+
+def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
+    """Leave out runs that cannot be fitted together with the others.
+
+    Args:
+        campaign: the runs.
+
+    Returns:
+        The campaign of the runs that can, and sentences that say what was left out and why; none where all
+        runs stay. Where some runs state ``spring_stiffness`` and others do not, the more numerous stay (those
+        that state it, where equal). Of runs that do not state it, those stay that oscillate alike at equal
+        wind: they alone can have one spring.
+    """
+    stated = [run for run in campaign.runs if run.spring_stiffness is not None]
+    bare = [run for run in campaign.runs if run.spring_stiffness is None]
+    said = []
+    kept = stated if len(stated) >= len(bare) else bare
+    if stated and bare:
+        other, what = (bare, "state no") if kept is stated else (stated, "state their")
+        said.append(
+            f"Left out, since they {what} spring_stiffness and the others "
+            f"{'do' if kept is stated else 'do not'}: {_ids(other)}. State it for all runs, or diagnose these "
+            f"by themselves."
+        )
+    if kept is bare:
+        same = _of_one_spring(bare)
+        if len(same) < len(bare):
+            other = [run for run in bare if run not in same]
+            said.append(
+                f"Left out, since unlike frequencies at equal wind show more than one spring, and these are not "
+                f"known to have that of the rest: {_ids(other)}. State spring_stiffness, or diagnose these by "
+                f"themselves."
+            )
+        kept = same
+    order = {run.id for run in kept}
+    return replace(campaign, runs=tuple(run for run in campaign.runs if run.id in order)), tuple(said)
+
+
+def _ids(runs: Sequence[Run]) -> str:
+    return ", ".join(run.id for run in runs)
+
+
+def _of_one_spring(runs: Sequence[Run]) -> list[Run]:
+    """The largest group of runs that may have one spring.
+
+    The air takes the same stiffness from every spring, so that at each speed the springs come in one order.
+    """
+    by_speed: dict[float, list[Run]] = defaultdict(list)
+    for run in runs:
+        by_speed[run.wind_speed].append(run)
+    groups = {speed: _by_frequency(alike) for speed, alike in by_speed.items()}
+    counts = {len(found) for found in groups.values()}
+    if counts == {1}:
+        return list(runs)
+    if len(counts) == 1:
+        ranks = [[run for found in groups.values() for run in found[rank]] for rank in range(counts.pop())]
+        return max(ranks, key=len)
+    return max((group for found in groups.values() for group in found), key=len)
+
+
+def _by_frequency(runs: Sequence[Run]) -> list[list[Run]]:
+    """Groups of runs of about the same frequency, slowest first."""
+    found = sorted(((frequency(run.record), run) for run in runs), key=lambda pair: pair[0])
+    groups = [[found[0][1]]]
+    for (last, _), (now, run) in itertools.pairwise(found):
+        if now > _SAME_SPRING * last:
+            groups.append([])
+        groups[-1].append(run)
+    return groups
+
+
+def frequency(record: Record) -> float:
+    """The frequency of a decay.
+
+    Args:
+        record: a run's reading.
+
+    Returns:
+        The peak of its spectrum, Hz.
+    """
+    swing = record.yaw_rad - np.mean(record.yaw_rad)
+    count = _PADDING * swing.size
+    peak = 1 + int(np.argmax(np.abs(np.fft.rfft(swing * np.hanning(swing.size), count))[1:]))
+    return peak * record.sample_rate / count

@@ -1,0 +1,110 @@
+"""Is there a gap? The nominal residuals against chance, by frequency band and by the noise's own behaviour."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from diagnosis.detection.noise_under_null import level_p_value, trend_p_values
+from diagnosis.detection.sensor_noise import Noise, NoiseTrend
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.spectra import resonance
+
+#: Rate at which a campaign without a gap is said to have one, all tests together.
+FALSE_ALARM_RATE = 1e-3
+#: The floor below 60 Hz may differ by this share from the one measured above it (quantisation colours it).
+_FLOOR_TOLERANCE = 0.03
+BANDS = ("below", "f0", "2f0", "3f0", "above")
+
+
+@dataclass(frozen=True)
+class GapTest:
+    """The tests of a gap.
+
+    Args:
+        detected: whether any of them sounds.
+        p_value: the smallest, times the number of tests (at most 1).
+        tests: p-value by name: the bands, and the noise's trend with the motion, its scatter and its level.
+        noisy: whether the noise itself misbehaves: it follows the motion, comes in bursts or is above what is
+            stated.
+    """
+
+    detected: bool
+    p_value: float
+    tests: Mapping[str, float]
+    noisy: bool
+
+
+def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) -> GapTest:
+    """Test a fit's residuals and the noise against chance.
+
+    Args:
+        fit: usually of the nominal model.
+        noise: the campaign's.
+        trend: of the noise with the motion.
+        coarse_step: whether the reading's step is known to be coarser than stated; the noise's level and trend
+            then say nothing more.
+
+    Returns:
+        The verdict at `FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
+    """
+    # stated noise that the records bear out may still lie a little below theirs
+    floor = (1.0 + _FLOOR_TOLERANCE) * max(noise.estimated / noise.used, 1.0)
+    tests = dict(zip(BANDS, band_p_values(fit, floor), strict=True)) | {"offset": offset_p_value(fit, floor)}
+    noisy: dict[str, float] = {}
+    if not coarse_step and noise.source != "floor":
+        noisy |= trend_p_values(trend, fit, noise)
+        if noise.stated_variance is not None:
+            noisy["noise level"] = level_p_value(fit, noise)
+    everything = tests | noisy
+    limit = FALSE_ALARM_RATE / len(everything)
+    smallest = min(everything.values())
+    return GapTest(
+        smallest < limit,
+        min(1.0, smallest * len(everything)),
+        everything,
+        any(p < limit * 0.01 for p in noisy.values()),
+    )
+
+
+def offset_p_value(fit: Fit, floor: float = 1.0) -> float:
+    """Chance that white noise alone moves the runs' means from the common zero as far as they lie.
+
+    Args:
+        fit: its residuals, in noise standard deviations.
+        floor: power of white noise that counts as chance, a factor on the noise variance.
+
+    Returns:
+        The p-value, one degree of freedom given to the zero.
+    """
+    total = sum(float(np.sum(residual)) ** 2 / residual.size for residual in fit.residuals)
+    runs = len(fit.residuals)
+    return float(chi2.sf(total / floor, runs - 1)) if runs > 1 else 1.0
+
+
+def band_p_values(fit: Fit, floor: float = 1.0) -> tuple[float, ...]:
+    """Chance that white noise alone gives as much power in each band, summed over the runs.
+
+    Args:
+        fit: its residuals, in noise standard deviations.
+        floor: power of white noise that counts as chance, a factor on the noise variance.
+
+    Returns:
+        One p-value per band of `BANDS`; the bands are multiples of each run's own frequency.
+    """
+    power, count = np.zeros(len(BANDS)), np.zeros(len(BANDS))
+    for index, (run, residual) in enumerate(zip(fit.problem.data.runs, fit.residuals, strict=True)):
+        spectrum = np.abs(np.fft.rfft(residual)) ** 2 / residual.size
+        frequency = np.fft.rfftfreq(residual.size, run.interval)
+        multiple = frequency[1:-1] / max(resonance(fit, index), 1e-9)
+        band = np.clip(np.floor(multiple + 0.5), 0, len(BANDS) - 1).astype(int)
+        power += np.bincount(band, spectrum[1:-1], len(BANDS))
+        count += np.bincount(band, minlength=len(BANDS))
+    # each ordinate is half a χ² of two degrees of freedom
+    values = [
+        float(chi2.sf(2.0 * p / floor, 2.0 * n)) if n > 0 else 1.0 for p, n in zip(power, count, strict=True)
+    ]
+    return tuple(values)

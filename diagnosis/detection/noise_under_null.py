@@ -1,0 +1,112 @@
+"""What the noise's statistics are by chance: white noise on the fitted motion, read off a lattice."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.stats import binom, t
+
+from diagnosis.detection.sensor_noise import Noise, NoiseTrend, trend_statistics
+from diagnosis.fitting.least_squares import Fit
+from tunnel_sim.vocabulary.record import Array
+
+#: Heavier tails than white noise has by this factor are let pass: a sensor's noise is not quite normal.
+_TAILS = 1.15
+#: Stated noise is often rounded to one digit, which moves its square by up to this factor.
+_ROUNDED_NOISE = 1.5
+#: Repetitions of the campaign, fewer where it is long, never below the least.
+_REPETITIONS, _FEWEST, _SAMPLES = 32, 16, 2.5e6
+#: A step this many times the noise beside it makes that noise uncertain; several are tried then.
+_COARSE = 3.0
+_FACTORS = (0.5, 1.0, 1.5)
+_NAMES = ("noise against amplitude", "noise against rate", "noise in bursts")
+_HANN = 1.57  # correlated bins of the periodogram that carry what one would without a window
+
+
+def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, float]:
+    """Chance that white noise behaves as the campaign's does.
+
+    Args:
+        trend: of the campaign.
+        fit: gives the motion.
+        noise: of the campaign.
+
+    Returns:
+        P-values by name, from Student's t of the campaign among repetitions of it simulated with white noise
+        and the readings' lattice (a prediction interval for one more; Geisser, Predictive Inference, 1993);
+        where the lattice hides the noise, the largest over noises that may be behind it. All 1 where the sampling
+        is too slow to tell.
+    """
+    if not trend.judged:
+        return dict.fromkeys(_NAMES, 1.0)
+    variance = {run.id: noise.variance[run.id] for run in fit.problem.data.runs}
+    hidden = trend.step**2 / 12.0
+    least = max(min(variance.values()) - hidden, 0.0)
+    factors = _FACTORS if trend.step > _COARSE * np.sqrt(least) else (1.0,)
+    found = np.zeros(3)
+    for factor in factors:
+        white = {run: factor * np.sqrt(max(v - hidden, 1e-3 * v)) for run, v in variance.items()}
+        found = np.maximum(found, _p_values(trend, _repetitions(fit, white, trend.step)))
+    return dict(zip(_NAMES, found.tolist(), strict=True))
+
+
+def _p_values(trend: NoiseTrend, chance: Array) -> Array:
+    count = len(chance)
+    mean, scatter = chance.mean(axis=0), np.maximum(chance.std(axis=0, ddof=1), 1e-9)
+    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(_TAILS)])
+    score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / count))
+    two_sided = 2.0 * t.sf(np.abs(score[:2]), count - 1)
+    return np.append(two_sided, t.sf(score[2], count - 1))
+
+
+def _repetitions(fit: Fit, white: Mapping[str, float], step: float) -> Array:
+    """Statistics of the campaign repeated, shape (repetitions, 3)."""
+    runs = fit.problem.data.runs
+    samples = sum(run.reading.size * run.block for run in runs)
+    count = int(np.clip(_SAMPLES / samples, _FEWEST, _REPETITIONS))
+    # the same campaign is held against the same repetitions, another against others
+    rng = np.random.default_rng([zlib.crc32(run.reading.tobytes()) for run in runs])
+    readings = []
+    for run, residual in zip(runs, fit.residuals, strict=True):
+        motion = _motion(run.reading - residual * np.sqrt(run.noise_variance), run.block)
+        reading = motion + white[run.id] * rng.standard_normal((count, motion.size))
+        if step > 0.0:
+            # where the lattice lies is not known
+            shift = step * rng.uniform(size=(count, 1))
+            reading = step * np.round((reading + shift) / step)
+        readings.append((reading, run.block / run.interval))
+    found = trend_statistics(readings)
+    assert found is not None  # the campaign was judged
+    return found
+
+
+def _motion(blocks: Array, block: int) -> Array:
+    """Samples of a motion from its block means."""
+    if block == 1:
+        return blocks
+    centres = np.arange(blocks.size) * block + 0.5 * (block - 1)
+    return np.asarray(CubicSpline(centres, blocks)(np.arange(blocks.size * block)), np.float64)
+
+
+def level_p_value(fit: Fit, noise: Noise) -> float:
+    """Chance that noise as stated, or rounded up to that, is estimated as high as it is.
+
+    Args:
+        fit: gives the records' lengths.
+        noise: of the campaign; its stated variance is not None.
+
+    Returns:
+        The p-value of a sign test: at least half the ordinates of the periodogram above the motion lie above the
+        median found, each with the chance that the largest noise the statement allows gives it.
+    """
+    assert noise.stated_variance is not None
+    level = noise.estimated / (_ROUNDED_NOISE * noise.stated_variance)
+    samples = sum(run.reading.size * run.block for run in fit.problem.data.runs)
+    ordinates = max(int(_ABOVE * 0.5 * samples / _HANN), 1)
+    return float(binom.sf((ordinates - 1) // 2, ordinates, 2.0**-level))
+
+
+_ABOVE = 0.48  # share of the ordinates that the estimate takes, where sampling is slowest

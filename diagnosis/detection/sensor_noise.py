@@ -1,0 +1,271 @@
+"""The noise of a record, from the part of its spectrum far above the motion, held against what is stated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.fitting.run_data import BLOCK_INTERVAL
+from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
+from tunnel_sim.vocabulary.record import Array, Record
+
+_FLOOR_FROM = 60.0  # Hz: above the motion, the rod's ringing and the mains
+_LN2 = float(np.log(2.0))  # median of a unit exponential: the periodogram of white noise
+_AGREES = 3.0  # standard deviations of the estimate at which the stated noise is borne out
+#: Share of the swing that block means and step leave in a fit of the nominal model's closed form, and its bands
+#: still pass for white.
+_ACCURACY = 4e-5
+_APART = 4.065  # standard deviations from the mean at which a run's noise is its own
+
+
+@dataclass(frozen=True)
+class Noise:
+    """A campaign's noise.
+
+    Args:
+        variance: of one sample, quantisation included, rad², by run id: what the diagnosis uses.
+        stated_variance: of one sample as the campaign states it, rad²; None where it does not.
+        source: ``stated``, ``estimated`` or ``floor``: whose the variance used is. The floor is the accuracy of
+            the fits, where the records hold less noise than that.
+        reason: why, in words.
+        estimate: the records' own variance, mean over the runs, rad²; None: the one used.
+    """
+
+    variance: dict[str, float]
+    stated_variance: float | None
+    source: str
+    reason: str
+    estimate: float | None = None
+
+    @property
+    def used(self) -> float:
+        """The variance used, mean over the runs, rad²."""
+        return float(np.mean(list(self.variance.values())))
+
+    @property
+    def estimated(self) -> float:
+        """The records' own variance, mean over the runs, rad²."""
+        return self.used if self.estimate is None else self.estimate
+
+
+def estimate_variance(record: Record) -> tuple[float, float]:
+    """White-noise variance from the median periodogram above the motion.
+
+    Args:
+        record: a run's reading.
+
+    Returns:
+        Variance of one sample, rad², and its relative standard deviation. Lines such as the mains' harmonics
+        do not move a median.
+    """
+    rate = record.sample_rate
+    low = min(_FLOOR_FROM, 0.25 * rate)
+    frequency, power = floor_periodogram(record.yaw_rad, rate)
+    floor = power[(frequency > low) & (frequency < 0.49 * rate)]
+    # a median of n exponentials scatters by 1/√n of its mean ln 2; the Hann window correlates neighbouring
+    # bins: 1.57 of them carry what one would without it
+    return float(np.median(floor) / _LN2 * rate / 2.0), float(np.sqrt(1.57 / floor.size) / _LN2)
+
+
+def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
+    """One-sided periodogram with a window whose leakage stays below the floor.
+
+    Args:
+        values: samples, shape (n,).
+        rate: Hz.
+
+    Returns:
+        Frequencies, Hz, and power, unit²/Hz.
+    """
+    window = np.hanning(values.size)
+    spectrum = np.fft.rfft((values - np.mean(values)) * window)
+    power = 2.0 * np.abs(spectrum) ** 2 / (rate * float(window @ window))
+    return np.asarray(np.fft.rfftfreq(values.size, 1.0 / rate), np.float64), power
+
+
+def campaign_noise(campaign: Campaign) -> Noise:
+    """The noise of every run: as stated where the records bear it out, else as estimated from them.
+
+    Args:
+        campaign: the runs.
+
+    Returns:
+        The stated noise where runs agree with one another and their mean with it, within `_AGREES` standard
+        deviations of the estimate; else the estimate, pooled over runs where they agree with one another.
+    """
+    estimates = {run.id: estimate_variance(run.record) for run in campaign.runs}
+    variances = np.array([value for value, _ in estimates.values()])
+    relative = np.array([std for _, std in estimates.values()])
+    pooled, uncertainty = float(np.mean(variances)), float(np.sqrt(np.sum(relative**2)) / relative.size)
+    floors = {run.id: accuracy(run.record) ** 2 for run in campaign.runs}
+    if any(floors[run] > value for run, (value, _) in estimates.items()):
+        return _floor(campaign, {run: value for run, (value, _) in estimates.items()}, floors)
+    uniform = bool(np.all(np.abs(variances / pooled - 1.0) < _APART * relative))
+    estimated = {run.id: pooled if uniform else estimates[run.id][0] for run in campaign.runs}
+    stated = _stated_variance(campaign.sensor, pooled)
+    found = f"{np.sqrt(pooled):.3g} ± {0.5 * uncertainty * np.sqrt(pooled):.1g} rad"
+    if stated is None:
+        return Noise(estimated, None, "estimated", "the campaign states no noise", pooled)
+    if not uniform:
+        said = f"its runs differ, {np.sqrt(variances.min()):.3g} to {np.sqrt(variances.max()):.3g} rad"
+    elif abs(pooled / stated - 1.0) < _AGREES * uncertainty:
+        used = dict.fromkeys(estimated, stated)
+        return Noise(used, stated, "stated", f"the records agree: {found}", pooled)
+    else:
+        said = f"they hold {found}"
+    reason = f"the records contradict the stated {np.sqrt(stated):.3g} rad: {said}"
+    return Noise(estimated, stated, "estimated", reason, pooled)
+
+
+def _stated_variance(sensor: SensorProperties, estimate: float) -> float | None:
+    """Variance of a sample as stated: with the resolution's share, or without where that is closer.
+
+    A data sheet may mean the noise before or after rounding.
+    """
+    if not sensor.noise_std:  # a noise of zero states nothing a record could have
+        return None
+    before = sensor.noise_std**2 + (sensor.resolution or 0.0) ** 2 / 12.0
+    after = sensor.noise_std**2
+    return min((before, after), key=lambda variance: abs(variance - estimate))
+
+
+def _floor(campaign: Campaign, estimates: dict[str, float], floors: dict[str, float]) -> Noise:
+    """The accuracy of the fits in the place of a noise that is smaller."""
+    pooled = float(np.mean(list(estimates.values())))
+    used = {run: max(value, floors[run]) for run, value in estimates.items()}
+    reason = (
+        f"the records hold {np.sqrt(pooled):.1g} rad, in {sum(used[r] > v for r, v in estimates.items())} of "
+        f"{len(used)} runs less than the fits' own accuracy, which stands in"
+    )
+    return Noise(used, _stated_variance(campaign.sensor, pooled), "floor", reason, pooled)
+
+
+def accuracy(record: Record) -> float:
+    """How small a sample's noise may be before the fits' own errors show.
+
+    Args:
+        record: a run's reading.
+
+    Returns:
+        Standard deviation of a sample, rad: a share of the swing, and thrice what RK4's loss of phase, (ωh)⁴/120
+        of it for steps h of a block (Hairer, Nørsett and Wanner, Solving ODEs I, sect. II.1), makes of the
+        reading: the error lies in one narrow band, noise in all.
+    """
+    swing = record.yaw_rad - np.mean(record.yaw_rad)
+    cycles = 1 + int(np.argmax(np.abs(np.fft.rfft(swing)[1:])))
+    omega = 2.0 * np.pi * cycles / record.duration
+    block = max(1, round(BLOCK_INTERVAL * record.sample_rate))
+    lag = omega * (record.time_s - record.time_s[0]) * (omega * BLOCK_INTERVAL) ** 4 / 120.0
+    lost = float(np.sqrt(np.mean((lag * swing) ** 2)))
+    return float(np.sqrt(block) * (_ACCURACY * np.max(np.abs(swing)) + 3.0 * lost))
+
+
+def reading_step(campaign: Campaign) -> float:
+    """The step of the lattice on which the readings lie.
+
+    Args:
+        campaign: the runs.
+
+    Returns:
+        The smallest difference between distinct readings, rad: the true resolution where the record visits
+        neighbouring steps, as every decay does; far below any step where readings are continuous.
+    """
+    steps = []
+    for run in campaign.runs:
+        distinct = np.unique(run.record.yaw_rad)
+        gaps = np.diff(distinct)
+        gaps = gaps[gaps > 1e-9]  # the same step printed twice with different rounding
+        if gaps.size:
+            steps.append(float(np.quantile(gaps, 0.02)))
+    return min(steps, default=0.0)
+
+
+@dataclass(frozen=True)
+class NoiseTrend:
+    """How the noise's level depends on the motion and on time.
+
+    Args:
+        amplitude_z: slope of the local noise variance against the squared amplitude, in units of its standard
+            deviation under steady white noise.
+        rate_z: likewise against the squared rate.
+        spread: natural logarithm of the ratio of the local variances' standard deviation to what their quartiles
+            give (of a normal distribution): heavy tails. Skewness alone makes it some 0.1.
+        step: of the lattice of the readings, rad.
+        judged: whether the sampling is fast enough to tell.
+    """
+
+    amplitude_z: float
+    rate_z: float
+    spread: float
+    step: float = 0.0
+    judged: bool = True
+
+
+_WINDOW = 0.02  # s: a small part of a swing, so that rate and angle differ
+_FEWEST = 10  # samples in a window
+
+
+def noise_trend(campaign: Campaign) -> NoiseTrend:
+    """Measure whether the noise is as strong in motion as at rest, and at all times.
+
+    Args:
+        campaign: the runs.
+
+    Returns:
+        Trends of the variance of fourth differences of the reading in windows of 20 ms, pooled over runs. What
+        white noise and the readings' lattice alone give is simulated (`diagnosis.detection.noise_under_null`).
+    """
+    values = trend_statistics([(run.record.yaw_rad[None], run.record.sample_rate) for run in campaign.runs])
+    if values is None:
+        return NoiseTrend(0.0, 0.0, 0.0, judged=False)
+    amplitude, rate, spread = values[0].tolist()
+    return NoiseTrend(amplitude, rate, spread, step=reading_step(campaign))
+
+
+def trend_statistics(readings: Sequence[tuple[Array, float]]) -> Array | None:
+    """The statistics of `NoiseTrend`.
+
+    Args:
+        readings: by run, readings of any number of repetitions, shape (repetitions, n), rad, and their rate, Hz.
+
+    Returns:
+        Shape (repetitions, 3): ``amplitude_z``, ``rate_z`` and ``spread``; None where none is fast enough.
+    """
+    parts = [_local_levels(reading, rate) for reading, rate in readings if round(_WINDOW * rate) >= _FEWEST]
+    if not parts:
+        return None
+    level, square, rate = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+    scatter = np.maximum(np.std(level, axis=-1), _TINY)
+    root = np.sqrt(level.shape[-1])
+    upper, lower = np.quantile(level, [0.75, 0.25], axis=-1)
+    bulk = np.maximum((upper - lower) / 1.349, _TINY * scatter)
+    along = [np.einsum("ij,ij->i", level, over) / (scatter * root) for over in (square, rate)]
+    return np.stack([*along, np.log(scatter / bulk)], axis=-1)
+
+
+_TINY = 1e-9  # of a level's mean: the quartiles of a reading that rests on one step coincide
+
+
+def _standardised(values: Array) -> Array:
+    centred = values - values.mean(axis=-1, keepdims=True)
+    result: Array = centred / np.maximum(centred.std(axis=-1, keepdims=True), 1e-300)
+    return result
+
+
+def _local_levels(reading: Array, rate: float) -> tuple[Array, Array, Array]:
+    """Mean squared fourth difference by window over its mean, less one; squared angle and rate, standardised."""
+    width = round(_WINDOW * rate)
+    reading = reading - reading.mean(axis=-1, keepdims=True)
+    # leaves (ω dt)⁴ of the motion: far below any noise
+    fourth = np.diff(reading, n=4, axis=-1)
+    count = fourth.shape[-1] // width
+
+    def windows(values: Array) -> Array:
+        return values[..., : count * width].reshape(*values.shape[:-1], count, width)
+
+    level = np.mean(windows(fourth) ** 2, axis=-1)
+    level = level / np.maximum(level.mean(axis=-1, keepdims=True), 1e-300) - 1.0
+    angle = windows(reading[..., 2:]).mean(axis=-1)
+    return level, _standardised(angle**2), _standardised(np.gradient(angle, axis=-1) ** 2)

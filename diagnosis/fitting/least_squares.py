@@ -1,0 +1,378 @@
+"""Weighted least squares of a campaign: Gauss–Newton with the releases eliminated run by run."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from diagnosis.fitting.problem import Point, Problem
+from tunnel_sim.vocabulary.record import Array
+
+_MAX_ITERATIONS = 25
+_AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
+_TRIES = 9  # dampings tried in a step, each ten times the last
+
+
+class FitError(ArithmeticError):
+    """A fit left the range in which the model can be integrated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted problem.
+
+    Args:
+        problem: what was fitted.
+        point: the parameter values found.
+        residuals: reading minus prediction in noise standard deviations, by run.
+        chi2: sum of their squares, by run, shape (runs,).
+        covariance: of the common parameters for the assumed noise, releases eliminated, shape (common, common).
+        jacobian: of the scaled residuals' prediction with respect to the common parameters, by run, shape
+            (n, common), and to the run's release, shape (n, 2).
+        iterations: Gauss–Newton steps made.
+        converged: whether the last step no longer paid.
+    """
+
+    problem: Problem
+    point: Point
+    residuals: list[Array]
+    chi2: Array
+    covariance: Array
+    jacobian: list[tuple[Array, Array]] = field(repr=False)
+    iterations: int
+    converged: bool
+
+    @property
+    def total(self) -> float:
+        """χ² of the campaign."""
+        return float(self.chi2.sum())
+
+    @property
+    def count(self) -> int:
+        """Number of residuals."""
+        return sum(r.size for r in self.residuals)
+
+    @property
+    def excess(self) -> float:
+        """Mean squared scaled residual minus one."""
+        return self.total / self.count - 1.0
+
+    def value(self, name: str) -> float:
+        """A common parameter by name."""
+        return float(self.point.common[self.problem.names.index(name)])
+
+    def std(self, name: str) -> float:
+        """Its standard deviation, were the model right."""
+        i = self.problem.names.index(name)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+    def bound(self, name: str) -> str | None:
+        """``lower`` or ``upper`` where a common parameter lies at that end of its range; None inside it."""
+        i = self.problem.names.index(name)
+        value = self.point.common[i]
+        for end, limits in zip(("lower", "upper"), self.problem.bounds, strict=True):
+            if np.isfinite(limits[i]) and abs(value - limits[i]) <= _AT_BOUND * max(
+                abs(limits[i]), abs(value)
+            ):
+                return end
+        return None
+
+
+def fit(
+    problem: Problem,
+    start: Point,
+    *,
+    base: Fit | None = None,
+    tolerance: float = 1e-4,
+    max_iterations: int = _MAX_ITERATIONS,
+) -> Fit:
+    """Minimise χ² from a starting point.
+
+    Args:
+        problem: runs and effects.
+        start: parameter values to start from.
+        base: a fit of the same runs with fewer effects. Its sensitivities then stand in for those of the
+            parameters both have while that makes good progress, which spares most of the simulations.
+        tolerance: a step must lower χ² by this share, or by 0.1, to go on.
+        max_iterations: Gauss–Newton steps at the most.
+
+    Returns:
+        The fit at the best point found.
+
+    Raises:
+        FitError: when the model cannot be integrated at the start.
+    """
+    state = _State(problem, clip(problem, start))
+    borrowed = base is not None
+    iterations = 0
+    converged = False
+    while iterations < max_iterations and not converged:
+        iterations += 1
+        state.linearise(base if borrowed else None)
+        gain = state.improve()
+        poor = gain < max(0.1, 0.02 * state.cost) if borrowed else gain < max(0.1, tolerance * state.cost)
+        if poor and borrowed:
+            borrowed = False  # once more with sensitivities of its own
+        elif poor:
+            converged = True
+    return state.result(iterations, converged)
+
+
+_HORIZONS = (0.25, 0.4, 0.6, 0.8)
+
+
+def fit_growing(problem: Problem, start: Point) -> Fit:
+    """Minimise χ² over the records' beginnings first, then over ever longer parts.
+
+    Args:
+        problem: runs and effects.
+        start: parameter values to start from; they may run out of phase well before the records end.
+
+    Returns:
+        The fit of the whole records.
+
+    Raises:
+        FitError: when the model cannot be integrated.
+    """
+    point = start
+    for share in _HORIZONS:
+        runs = tuple(
+            dataclasses.replace(run, reading=run.reading[: max(20, int(share * run.reading.size))])
+            for run in problem.data.runs
+        )
+        shorter = Problem(
+            dataclasses.replace(problem.data, runs=runs), problem.effects, problem.fixed, problem.bent
+        )
+        point = fit(shorter, point, tolerance=1e-3, max_iterations=15).point
+    return fit(problem, point)
+
+
+class _State:
+    """Where a minimisation stands."""
+
+    def __init__(self, problem: Problem, point: Point) -> None:
+        self.problem, self.point = problem, point
+        self.residuals = scaled_residuals(problem, point)
+        self.cost = _cost(self.residuals)
+        self.damping = 1e-6
+        self.jacobian: list[tuple[Array, Array]] = []
+
+    def linearise(self, base: Fit | None) -> None:
+        """Compute sensitivities, those of a smaller fit borrowed where given."""
+        self.jacobian = sensitivities(self.problem, self.point, base)
+        if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in self.jacobian):
+            raise FitError("the model's sensitivities are not finite")
+
+    def improve(self) -> float:
+        """Take one damped step; returns the drop of χ², 0 where no step lowers it."""
+        for _ in range(_TRIES):
+            trial = clip(
+                self.problem, _step(self.problem, self.point, self.residuals, self.jacobian, self.damping)
+            )
+            residuals = scaled_residuals(self.problem, trial)
+            cost = _cost(residuals)
+            if cost < self.cost:
+                gain = self.cost - cost
+                self.point, self.residuals, self.cost = trial, residuals, cost
+                self.damping = max(self.damping * 0.2, 1e-9)
+                return gain
+            self.damping = max(self.damping * 10.0, 1e-4)
+        return 0.0
+
+    def result(self, iterations: int, converged: bool) -> Fit:
+        """The fit as it stands."""
+        return Fit(
+            self.problem,
+            self.point,
+            self.residuals,
+            np.array([float(r @ r) for r in self.residuals]),
+            _covariance(self.jacobian),
+            self.jacobian,
+            iterations,
+            converged,
+        )
+
+
+def clip(problem: Problem, point: Point) -> Point:
+    """Bring the common parameters inside their bounds.
+
+    Args:
+        problem: gives the bounds.
+        point: parameter values.
+
+    Returns:
+        The point, its common parameters clipped.
+    """
+    lower, upper = problem.bounds
+    return Point(np.clip(point.common, lower, upper), point.release)
+
+
+def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
+    """Reading minus prediction.
+
+    Args:
+        problem: runs and effects.
+        point: parameter values.
+
+    Returns:
+        Residuals in noise standard deviations, by run, each of the shape of the run's reading.
+    """
+    return _scaled(problem, problem.predict([point])[0])
+
+
+def _scaled(problem: Problem, prediction: list[Array]) -> list[Array]:
+    return [
+        (run.reading - values) / np.sqrt(run.noise_variance)
+        for run, values in zip(problem.data.runs, prediction, strict=True)
+    ]
+
+
+def _cost(residuals: list[Array]) -> float:
+    total = sum(float(r @ r) for r in residuals)
+    return total if np.isfinite(total) else np.inf
+
+
+def difference_steps(problem: Problem, common: Array) -> Array:
+    """Steps for finite differences of the common parameters, one way, away from bounds.
+
+    Args:
+        problem: gives the parameters and their bounds.
+        common: their values, shape (common,).
+
+    Returns:
+        Steps, shape (common,), each in its parameter's unit.
+    """
+    scales = {
+        "yaw_inertia": 0.1,
+        "stiffness": 10.0,
+        "mechanical_damping": 0.02,
+        "cn_beta": 0.4,
+        "cn_r": 0.1,
+        "zero": 1.0,
+    }
+    for kind in problem.effects:
+        for info in kind.parameters():
+            scales[f"{kind.name}.{info.name}"] = info.scale
+    sizes = np.array(
+        [max(abs(value), scales[name]) for name, value in zip(problem.names, common, strict=True)]
+    )
+    steps = 1e-5 * sizes
+    _, upper = problem.bounds
+    steps[common + steps > upper] *= -1.0
+    return steps
+
+
+def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> list[tuple[Array, Array]]:
+    """Derivatives of the scaled prediction by finite differences.
+
+    Args:
+        problem: runs and effects.
+        point: where.
+        base: a fit of the same runs whose derivatives are taken over for the parameters it has.
+
+    Returns:
+        By run: with respect to the common parameters, shape (n, common), and the run's own, shape (n, own).
+    """
+    known = 0 if base is None else len(base.problem.names)
+    known_own = 0 if base is None else base.point.release.shape[1]
+    steps = difference_steps(problem, point.common)
+    points = [point]
+    for i in range(known, steps.size):
+        moved = point.common.copy()
+        moved[i] += steps[i]
+        points.append(Point(moved, point.release))
+    amplitude = np.maximum(np.abs(point.release[:, 0]), 1e-3)
+    own = point.release.shape[1]
+    release_steps = [1e-5 * amplitude, 1e-4 * amplitude, *[np.full_like(amplitude, 1e-5)] * (own - 2)]
+    for j in range(known_own, own):
+        release = point.release.copy()
+        release[:, j] += release_steps[j]
+        points.append(Point(point.common, release))
+    predictions = problem.predict(points)
+    result = []
+    for r, run in enumerate(problem.data.runs):
+        scale = np.sqrt(run.noise_variance)
+        with np.errstate(invalid="ignore"):  # a run that grew without bound; the caller looks for it
+            changes = [(moved[r] - predictions[0][r]) / scale for moved in predictions[1:]]
+        common = [c / steps[known + i] for i, c in enumerate(changes[: steps.size - known])]
+        ends = [c / release_steps[known_own + j][r] for j, c in enumerate(changes[steps.size - known :])]
+        if base is None:
+            result.append((np.stack(common, axis=1), np.stack(ends, axis=1)))
+        else:
+            result.append(
+                (
+                    np.column_stack([base.jacobian[r][0], *common]),
+                    np.column_stack([base.jacobian[r][1], *ends]),
+                )
+            )
+    return result
+
+
+def normal_equations(
+    jacobian: list[tuple[Array, Array]], residuals: list[Array], damping: float = 0.0
+) -> tuple[Array, Array, list[Array]]:
+    """Normal matrix and gradient of the common parameters with every run's release eliminated.
+
+    Args:
+        jacobian: from `sensitivities`.
+        residuals: scaled.
+        damping: of the release's own step, as a share of its diagonal.
+
+    Returns:
+        Matrix (common, common), gradient (common,), and per run the (2, common + 1) solution that gives the
+        release's step: release = solution[:, -1] − solution[:, :-1] @ common step.
+    """
+    count = jacobian[0][0].shape[1]
+    matrix, gradient = np.zeros((count, count)), np.zeros(count)
+    solutions = []
+    for (common, release), r in zip(jacobian, residuals, strict=True):
+        inner = release.T @ release
+        cross = np.column_stack([release.T @ common, release.T @ r])
+        size = np.sqrt(np.maximum(np.diag(inner), 1e-300))
+        ridge = inner / np.outer(size, size) + (1e-12 + damping) * np.eye(len(size))
+        solution = np.linalg.solve(ridge, cross / size[:, None]) / size[:, None]
+        matrix += common.T @ common - cross[:, :-1].T @ solution[:, :-1]
+        gradient += common.T @ r - cross[:, :-1].T @ solution[:, -1]
+        solutions.append(solution)
+    return matrix, gradient, solutions
+
+
+def _step(
+    problem: Problem,
+    point: Point,
+    residuals: list[Array],
+    jacobian: list[tuple[Array, Array]],
+    damping: float,
+) -> Point:
+    matrix, gradient, solutions = normal_equations(jacobian, residuals, damping)
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scaled = matrix / np.outer(scale, scale)
+    step = np.linalg.lstsq(scaled + damping * np.eye(len(scale)), gradient / scale, rcond=1e-13)[0] / scale
+    lower, upper = problem.bounds
+    moved = np.clip(point.common + step, lower, upper)
+    step = moved - point.common
+    release = np.stack([s[:, -1] - s[:, :-1] @ step for s in solutions])
+    return Point(moved, point.release + release)
+
+
+def _covariance(jacobian: list[tuple[Array, Array]]) -> Array:
+    matrix, _, _ = normal_equations(jacobian, [np.zeros(c.shape[0]) for c, _ in jacobian])
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    inverse: Array = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+    return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64)
+
+
+def project_release(change: Array, slopes: Array) -> Array:
+    """What of a change of one run's prediction its release cannot absorb.
+
+    Args:
+        change: shape (n,).
+        slopes: derivatives to the release, shape (n, own).
+
+    Returns:
+        The remainder, shape (n,).
+    """
+    left: Array = change - slopes @ np.linalg.lstsq(slopes, change, rcond=1e-10)[0]
+    return left

@@ -1,0 +1,292 @@
+"""The model of a campaign as a function of parameters: nominal, or with effects added."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from diagnosis.fitting.run_data import Data, RunData, hermite_means
+from tunnel_sim.effects import Effect, EffectChain
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.forward import forward_run, integrate
+from tunnel_sim.physics.moment_law import parameter_vector
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import Rig
+
+_LONGEST_STEP = 4.001e-3  # s
+_RESOLUTION = 0.055  # rad of the oscillation in one step: RK4 then errs by some 1e-6 rad over 10 s
+_ROD_RESOLUTION = 0.5  # rad of the rod's own oscillation in one step
+_THREADS = 2
+_SOFT_ROD = 2e-5  # rad/(N m): a stiffer rod's ringing at the release stays below the noise
+_POOL = ThreadPoolExecutor(_THREADS)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A value of every parameter of a problem.
+
+    Args:
+        common: parameters common to the runs, in the order of `Problem.names`, shape (common,).
+        release: of every run its own parameters, shape (runs, own): angle (rad) and rate (rad/s) of the
+            sensor's end at the record's start, then the phase (rad) of each periodic effect.
+    """
+
+    common: Array
+    release: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is fitted: prepared runs, and the effects added to the nominal model.
+
+    Args:
+        data: the runs.
+        effects: effect classes whose parameters are free.
+        fixed: value of effect parameters that are held, as ``effect.parameter``.
+        bent: names of effects whose form is free; the others keep the textbook's.
+    """
+
+    data: Data
+    effects: tuple[type[Effect], ...] = ()
+    fixed: tuple[tuple[str, float], ...] = ()
+    bent: tuple[str, ...] = ()
+
+    @cached_property
+    def nominal_names(self) -> tuple[str, ...]:
+        """Names of the nominal model's common parameters."""
+        first = "stiffness" if self.data.normalised else "yaw_inertia"
+        air = ("cn_beta", "cn_r") if self.data.wind_on else ()
+        return (first, "mechanical_damping", *air, "zero")
+
+    @cached_property
+    def effect_names(self) -> tuple[str, ...]:
+        """Names of the free effect parameters, as ``effect.parameter``."""
+        names = [
+            f"{kind.name}.{info.name}"
+            for kind in self.effects
+            for info in kind.parameters()
+            if not info.form or kind.name in self.bent
+        ]
+        held = dict(self.fixed)
+        return tuple(name for name in names if name not in held)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """All common parameters, the nominal ones first."""
+        return self.nominal_names + self.effect_names
+
+    @cached_property
+    def phased(self) -> tuple[str, ...]:
+        """Names of the effects that have a phase of their own in every run."""
+        return tuple(kind.name for kind in self.effects if kind.line)
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and greatest values of the common parameters."""
+        low = {"yaw_inertia": 1e-9, "stiffness": 1e-9}
+        infos = {f"{kind.name}.{info.name}": info for kind in self.effects for info in kind.parameters()}
+        lower = [infos[name].fit_lower if name in infos else low.get(name, -np.inf) for name in self.names]
+        upper = [infos[name].fit_upper if name in infos else np.inf for name in self.names]
+        return np.array(lower), np.array(upper)
+
+    def effects_at(self, common: Array) -> tuple[Effect, ...]:
+        """The effects with their parameters.
+
+        Args:
+            common: as in `Point`, shape (common,).
+
+        Returns:
+            One effect per class.
+        """
+        values = dict(zip(self.names, common.tolist(), strict=True)) | dict(self.fixed)
+        return tuple(
+            kind(**{i.name: values.get(f"{kind.name}.{i.name}", i.default) for i in kind.parameters()})
+            for kind in self.effects
+        )
+
+    def stated(self, common: Array, release: Array, run: RunData) -> RunSettings:
+        """The nominal physics of one run.
+
+        Args:
+            common: as in `Point`, shape (common,).
+            release: of the run, shape (2,).
+            run: conditions.
+
+        Returns:
+            The physics, before any effect.
+        """
+        value = dict(zip(self.names, common.tolist(), strict=True))
+        spring = value["stiffness"] if self.data.normalised else run.spring_stiffness
+        assert spring is not None
+        return RunSettings(
+            spring_stiffness=spring,
+            derivatives=AeroDerivatives(value.get("cn_beta", 0.0), value.get("cn_r", 0.0)),
+            yaw_inertia=1.0 if self.data.normalised else value["yaw_inertia"],
+            mechanical_damping=value["mechanical_damping"],
+            wind_speed=run.wind_speed,
+            air_density=run.air_density,
+            release_angle=float(release[0]),
+            release_rate=float(release[1]),
+            duration=run.duration,
+        )
+
+    def chain(self, common: Array, own: Array, run: RunData) -> EffectChain:
+        """The effects of one run.
+
+        Args:
+            common: as in `Point`, shape (common,).
+            own: the run's own parameters, a row of ``Point.release``, shape (own,).
+            run: conditions.
+
+        Returns:
+            The effects with the phases that the run has.
+        """
+        phases = dict(zip(self.phased, own[2:].tolist(), strict=True))
+        drawn = tuple(phases.get(kind.name) for kind in self.effects)
+        return EffectChain(self.stated(common, own, run), self.effects_at(common), drawn)
+
+    def predict(self, points: Sequence[Point]) -> list[list[Array]]:
+        """Predicted block means.
+
+        Args:
+            points: parameter values.
+
+        Returns:
+            For every point, for every run, the reading's block means, rad; infinite where the motion grows
+            without bound.
+        """
+        cases = [(p, r) for p in range(len(points)) for r in range(len(self.data.runs))]
+        jobs = [_Job(self, points[p], r) for p, r in cases]
+        half = (len(jobs) + _THREADS - 1) // _THREADS
+        results = list(_POOL.map(_run_jobs, [jobs[i : i + half] for i in range(0, len(jobs), half)]))
+        flat = [values for part in results for values in part]
+        count = len(self.data.runs)
+        return [flat[i * count : (i + 1) * count] for i in range(len(points))]
+
+
+class _Job:
+    """One run at one point."""
+
+    def __init__(self, problem: Problem, point: Point, run_index: int) -> None:
+        run = problem.data.runs[run_index]
+        self.run = run
+        self.zero = float(point.common[problem.nominal_names.index("zero")])
+        self.chain = problem.chain(point.common, point.release[run_index], run)
+        physics = held_end(condensed(self.chain.physics(), problem.data))
+        self.row, self.keep_alive = forward_run(physics)
+        self.law = parameter_vector(physics.law(campaign_rig(problem.data)))
+        substeps = int(np.ceil(run.interval / _longest_step(physics)))
+        self.row["step"], self.row["steps"] = run.interval / substeps, substeps
+
+    def reading(self, angle: Array, rate: Array) -> Array:
+        """Block means of the reading from angle and rate at the blocks' ends."""
+        weights = hermite_means(self.run.block)
+        h = self.run.interval
+        mean: Array = (
+            weights[0] * angle[:-1]
+            + weights[1] * angle[1:]
+            + h * (weights[2] * rate[:-1] + weights[3] * rate[1:])
+        )
+        time = np.asarray(
+            (np.arange(mean.size) + 0.5 * (self.run.block - 1) / self.run.block) * h, np.float64
+        )
+        return self.chain.reading(self.chain.angle(mean, time) + self.zero)
+
+
+def condensed(physics: RunSettings, data: Data) -> RunSettings:
+    """Replace a rod too stiff to ring visibly by its first-order effect on the slow motion.
+
+    With compliance c, the body leads the sensor's end by φ = a θ, a = c (s Ka + (1 − s) Kr): the inertia at the
+    sensor's end grows by the share (1 − s) a, and the air sees (1 + a) θ. What is dropped is of order (c Kr)².
+
+    Args:
+        physics: of one run.
+        data: gives the reference sizes.
+
+    Returns:
+        The run with a rigid rod, or as it was where the rod is soft.
+    """
+    twist = physics.rod_twist
+    if twist is None or twist.compliance > _SOFT_ROD:
+        return physics
+    share = twist.inertia_share
+    pressure = 0.5 * physics.air_density * physics.wind_speed**2 * data.frontal_area * data.reference_length
+    air = pressure * physics.derivatives.cn_beta
+    lead = twist.compliance * (share * air + (1.0 - share) * physics.spring_stiffness)
+    air_seen = AeroDerivatives(
+        physics.derivatives.cn_beta * (1.0 + lead), physics.derivatives.cn_r * (1.0 + lead)
+    )
+    inertia = physics.yaw_inertia * (1.0 + (1.0 - share) * lead)
+    return dataclasses.replace(physics, rod_twist=None, derivatives=air_seen, yaw_inertia=inertia)
+
+
+def held_end(physics: RunSettings) -> RunSettings:
+    """Take the release as that of the sensor's end, which is what a record shows.
+
+    Args:
+        physics: whose release angle is the sensor's end's.
+
+    Returns:
+        The same with the body's release angle.
+    """
+    if physics.rod_twist is None:
+        return physics
+    body = physics.release_angle * (1.0 + physics.spring_stiffness * physics.rod_twist.compliance)
+    return dataclasses.replace(physics, release_angle=body)
+
+
+def _longest_step(physics: RunSettings) -> float:
+    twist = physics.rod_twist
+    omega = np.sqrt(physics.spring_stiffness / physics.yaw_inertia)
+    longest = min(_LONGEST_STEP, _RESOLUTION / max(omega, 1e-9))
+    if twist is None:
+        return float(longest)
+    share = twist.inertia_share
+    own = np.sqrt(1.0 / (twist.compliance * physics.yaw_inertia * share * (1.0 - share)))
+    return float(min(longest, max(_ROD_RESOLUTION / own, 2e-4)))
+
+
+def campaign_rig(data: Data) -> Rig:
+    """A rig of the campaign's own reference sizes.
+
+    Args:
+        data: gives A, l and width.
+
+    Returns:
+        The packaged rig with these.
+    """
+    return _rig(data.frontal_area, data.reference_length, data.width)
+
+
+@lru_cache(maxsize=8)
+def _rig(area: float, length: float, width: float) -> Rig:
+    rig = load_rig()
+    body = dataclasses.replace(rig.body, frontal_area=area, length=length, width=width)
+    return dataclasses.replace(rig, body=body)
+
+
+def _run_jobs(jobs: list[_Job]) -> list[Array]:
+    """Integrate jobs, those of equal length together."""
+    out: list[Array | None] = [None] * len(jobs)
+    lengths = np.array([job.run.reading.size for job in jobs])
+    for length in np.unique(lengths):
+        at = np.flatnonzero(lengths == length)
+        while at.size:
+            rows = np.concatenate([jobs[i].row for i in at])
+            law = np.stack([jobs[i].law for i in at])
+            angle, rate, status = integrate(law, rows, int(length) + 1)
+            done = at if status == 0 else at[: status - 1]
+            for k, i in enumerate(done):
+                out[i] = jobs[i].reading(angle[k], rate[k])
+            if status == 0:
+                break
+            out[at[status - 1]] = np.full(int(length), np.inf)
+            at = at[status:]
+    return [values for values in out if values is not None]

@@ -1,0 +1,232 @@
+"""Spectral lines in residuals: the mains, and a frequency that follows the wind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.run_data import Data
+from tunnel_sim.vocabulary.record import Array
+
+_PADDING = 8  # zero padding: lines are found to a small part of a bin
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """A run's residual spectrum.
+
+    Args:
+        frequency: Hz, shape (n,).
+        transform: complex amplitude of a sine at that frequency, in noise standard deviations, shape (n,).
+        duration: s.
+        count: residuals in the record.
+    """
+
+    frequency: Array
+    transform: np.ndarray
+    duration: float
+    count: int
+
+    def at(self, frequency: float | Array) -> np.ndarray:
+        """Complex amplitude at any frequency (nearest of the padded grid)."""
+        index = np.round(np.asarray(frequency) / self.frequency[1]).astype(int)
+        found: np.ndarray = self.transform[np.clip(index, 0, self.transform.size - 1)]
+        return found
+
+    def power(self, frequency: float | Array) -> Array:
+        """Drop of χ² when a sine of free amplitude and phase is taken out."""
+        value: Array = np.abs(self.at(frequency)) ** 2 * self.count / 2.0
+        return value
+
+
+def residual_spectra(fit: Fit) -> list[Spectrum]:
+    """The spectrum of every run's scaled residuals.
+
+    Args:
+        fit: whose residuals.
+
+    Returns:
+        One spectrum per run, in order.
+    """
+    spectra = []
+    for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
+        size = _PADDING * residual.size
+        transform = np.fft.rfft(residual, size) * 2.0 / residual.size
+        spectra.append(
+            Spectrum(
+                np.asarray(np.fft.rfftfreq(size, run.interval), np.float64),
+                transform,
+                run.duration,
+                residual.size,
+            )
+        )
+    return spectra
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line found in the spectra.
+
+    Args:
+        parameter: frequency in Hz for the mains, Strouhal number for shedding.
+        drop: of χ² by taking it out of the runs concerned, dimensionless.
+        contrast: ratio of the drop at the line to the drop beside it (the greatest for the mains, the median for
+            shedding).
+        amplitude: rad at the sensor for the mains, moment coefficient for shedding.
+        phases: of sine, rad, by run, shape (runs,); zero for runs not concerned.
+        runs: how many runs it was sought in.
+    """
+
+    parameter: float
+    drop: float
+    contrast: float
+    amplitude: float
+    phases: Array
+    runs: int
+
+
+def mains_line(fit: Fit) -> Line | None:
+    """The strongest line near 50 Hz common to all runs.
+
+    Args:
+        fit: whose residuals.
+
+    Returns:
+        The line; None where the sampling is too slow to see it.
+    """
+    data = fit.problem.data
+    if any(1.0 / run.interval < 130.0 for run in data.runs):
+        return None
+    spectra = smooth_spectra(fit)
+    grid = np.arange(49.5, 50.5, 0.005)
+    total = np.sum([s.power(grid) for s in spectra], axis=0)
+    best = float(grid[np.argmax(total)])
+    beside = np.concatenate(
+        [np.arange(best - 4.0, best - 0.6, 0.02), np.arange(best + 0.6, best + 4.0, 0.02)]
+    )
+    floor = float(np.max(np.sum([s.power(beside) for s in spectra], axis=0)))
+    drop = float(total.max())
+    gain = [_block_gain(best, run.interval, run.block) for run in data.runs]
+    scale = [np.sqrt(run.noise_variance) / g for run, g in zip(data.runs, gain, strict=True)]
+    amplitude = float(
+        np.sqrt(np.mean([(np.abs(s.at(best)) * k) ** 2 for s, k in zip(spectra, scale, strict=True)]))
+    )
+    amplitude *= float(
+        np.sqrt(1.5)
+    )  # the smoothed transform keeps the noise's level: lines lose a third of power
+    # transform is of cos − i sin: a sine a sin(ωt + φ) gives a exp(i(φ − π/2))
+    phases = np.array([float(np.angle(s.at(best))) + np.pi / 2 for s in spectra])
+    return Line(best, drop, drop / max(floor, 1e-9), amplitude, phases, len(spectra))
+
+
+def smooth_spectra(fit: Fit) -> list[Spectrum]:
+    """`residual_spectra` with a Hann window, whose leakage from the motion does not reach the mains."""
+    return [_smooth(spectrum) for spectrum in residual_spectra(fit)]
+
+
+def _smooth(spectrum: Spectrum) -> Spectrum:
+    """The spectrum with the leakage of a strong line taken down (Hann window, in the frequency domain)."""
+    step = _PADDING
+    values = spectrum.transform
+    hann = 0.5 * values.copy()
+    hann[step:-step] -= 0.25 * (values[: -2 * step] + values[2 * step :])
+    return Spectrum(spectrum.frequency, hann * np.sqrt(8.0 / 3.0), spectrum.duration, spectrum.count)
+
+
+def _block_gain(frequency: float, interval: float, block: int) -> float:
+    """Gain of the block mean at a frequency."""
+    x = np.pi * frequency * interval / block
+    return float(np.sin(block * x) / (block * np.sin(x))) if block > 1 else 1.0
+
+
+def shedding_line(fit: Fit) -> Line | None:
+    """The strongest line at one Strouhal number in all wind-on runs.
+
+    Args:
+        fit: whose residuals.
+
+    Returns:
+        The line; None without wind or body width.
+    """
+    data = fit.problem.data
+    concerned = [i for i, run in enumerate(data.runs) if run.wind_on]
+    if not concerned or data.width <= 0.0:
+        return None
+    spectra = residual_spectra(fit)
+    speeds = np.array([data.runs[i].wind_speed for i in concerned])
+    spacing = 0.1 * data.width / (float(speeds.max()) * max(data.runs[i].duration for i in concerned))
+    grid = np.arange(0.02, 0.60, spacing)
+    powers = []
+    for i, speed in zip(concerned, speeds, strict=True):
+        own = resonance(fit, i)
+        frequency = grid * speed / data.width
+        power = spectra[i].power(frequency)
+        power[np.abs(frequency / own - 1.0) < 0.08] = 0.0  # the free motion's own line is not evidence
+        powers.append(np.minimum(power, _local_excess(power)))
+    total = np.sum(powers, axis=0)
+    best = float(grid[np.argmax(total)])
+    floor = float(np.median(total)) / np.log(2.0)
+    phases = np.zeros(len(data.runs))
+    amplitudes = []
+    for i, speed in zip(concerned, speeds, strict=True):
+        frequency = best * speed / data.width
+        gain = _forced_gain(fit, i, frequency) / np.sqrt(data.runs[i].noise_variance)
+        value = complex(spectra[i].at(frequency))
+        phases[i] = float(np.angle(value / gain)) + np.pi / 2
+        amplitudes.append((abs(value) / abs(gain), abs(gain) ** 2))
+    values, weights = np.array(amplitudes).T
+    amplitude = float(np.sum(values * weights) / np.sum(weights))
+    return Line(
+        best, float(total.max()), float(total.max()) / max(floor, 1e-9), amplitude, phases, len(concerned)
+    )
+
+
+def _local_excess(power: Array) -> Array:
+    """Cap on power so that one run cannot carry a line alone: ten times the run's own 99th percentile."""
+    return np.full_like(power, 10.0 * float(np.quantile(power, 0.99)) + 1.0)
+
+
+def resonance(fit: Fit, run_index: int) -> float:
+    """Frequency of a run's free motion in the fitted model.
+
+    Args:
+        fit: parameter values.
+        run_index: of the run.
+
+    Returns:
+        Hz.
+    """
+    inertia, _, stiffness = linear_coefficients(fit, run_index)
+    return float(np.sqrt(max(stiffness, 1e-12) / inertia) / (2.0 * np.pi))
+
+
+def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
+    """Inertia, damping and stiffness of a run in the fitted model, air included.
+
+    Args:
+        fit: parameter values.
+        run_index: of the run.
+
+    Returns:
+        kg m², N m s/rad and N m/rad; per unit inertia in normalised form.
+    """
+    problem = fit.problem
+    run = problem.data.runs[run_index]
+    stated = problem.stated(fit.point.common, fit.point.release[run_index], run)
+    area, length = problem.data.frontal_area, problem.data.reference_length
+    pressure = 0.5 * run.air_density * run.wind_speed**2 * area * length
+    stiffness = stated.spring_stiffness - pressure * stated.derivatives.cn_beta
+    rate = pressure * length / run.wind_speed if run.wind_on else 0.0
+    return stated.yaw_inertia, stated.mechanical_damping - rate * stated.derivatives.cn_r, stiffness
+
+
+def _forced_gain(fit: Fit, run_index: int, frequency: float) -> complex:
+    """Angle per unit moment coefficient at a frequency, rad."""
+    data: Data = fit.problem.data
+    run = data.runs[run_index]
+    inertia, damping, stiffness = linear_coefficients(fit, run_index)
+    omega = 2.0 * np.pi * frequency
+    moment = 0.5 * run.air_density * run.wind_speed**2 * data.frontal_area * data.reference_length
+    return complex(moment / (stiffness - inertia * omega**2 + 1j * omega * damping))

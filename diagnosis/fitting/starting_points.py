@@ -1,0 +1,228 @@
+"""Where fits start: the nominal model from the record alone, and an effect's severity from its signature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.fitting.equation_error import equation_error_start
+from diagnosis.fitting.least_squares import Fit, clip, normal_equations, scaled_residuals
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.run_data import Data, RunData
+from diagnosis.fitting.spectra import Line, mains_line, shedding_line
+from tunnel_sim.effects import Effect
+from tunnel_sim.effects.base import Circumstances, Trial
+from tunnel_sim.vocabulary.record import Array
+
+_GROSS = 0.01  # share of the reading's power
+_PADDING = 16  # zero padding of the spectrum that gives the first frequency
+
+
+def nominal_start(data: Data) -> Point:
+    """A starting point for the nominal model.
+
+    Args:
+        data: the runs.
+
+    Returns:
+        Inertia and aerodynamic stiffness by linear regression of the runs' frequencies, a small damping, and
+        the releases from the first samples.
+    """
+    omega2 = np.array([(2.0 * np.pi * _frequency(run)) ** 2 for run in data.runs])
+    zero = float(np.median([np.mean(run.reading) for run in data.runs]))
+    release = np.array([[np.mean(run.reading[:3]) - zero, 0.0] for run in data.runs])
+    if data.normalised:
+        return Point(
+            np.array(
+                [float(np.median(omega2)), 0.01 * float(np.sqrt(np.median(omega2))), *_still(data), zero]
+            ),
+            release,
+        )
+    spring = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
+    pressure = np.array(
+        [0.5 * r.air_density * r.wind_speed**2 * data.frontal_area * data.reference_length for r in data.runs]
+    )
+    # Kr = Izz ω² + pressure Cnβ, relative errors alike
+    design = np.column_stack([omega2, pressure]) / spring[:, None]
+    if not data.wind_on:
+        design = design[:, :1]
+    solution = np.linalg.lstsq(design, np.ones(len(spring)), rcond=None)[0]
+    inertia = float(solution[0]) if solution[0] > 0.0 else float(np.median(spring / omega2))
+    air = (float(solution[1]), 0.0) if data.wind_on else ()
+    damping = 0.01 * inertia * float(np.sqrt(np.median(omega2)))
+    return Point(np.array([inertia, damping, *air, zero]), release)
+
+
+def _still(data: Data) -> tuple[float, ...]:
+    return (0.0, 0.0) if data.wind_on else ()
+
+
+def _frequency(run: RunData) -> float:
+    """Frequency of the greatest peak of a run's spectrum, Hz."""
+    values = run.reading - run.reading.mean()
+    size = _PADDING * values.size
+    power = np.abs(np.fft.rfft(values * np.hanning(values.size), size)) ** 2
+    peak = int(np.argmax(power[1:-1])) + 1
+    left, middle, right = np.log(power[peak - 1 : peak + 2])
+    offset = 0.5 * (left - right) / (left - 2.0 * middle + right)
+    return float((peak + offset) / (size * run.interval))
+
+
+@dataclass(frozen=True)
+class StartingPoint:
+    """Where the fit of an effect starts, and what linear theory predicts of it.
+
+    Args:
+        problem: the fit with the effect added.
+        point: where to start.
+        predicted_drop: of χ² by linear theory, dimensionless.
+        balanced: whether the point comes from the balance of moments.
+    """
+
+    problem: Problem
+    point: Point
+    predicted_drop: float
+    balanced: bool = False
+
+
+#: Where the line of a periodic effect is found, by what sets its frequency.
+_LINES: Mapping[str, Callable[[Fit], Line | None]] = {"mains": mains_line, "shedding": shedding_line}
+
+
+def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
+    """Starting points for adding one effect to a fitted problem, by the drop of χ² predicted, greatest first.
+
+    Args:
+        base: the fit without it.
+        kind: the effect to add.
+
+    Returns:
+        One per trial; none where the effect cannot be seen in these runs.
+    """
+    data = base.problem.data
+    if kind.condition == "wind_on" and not data.wind_on:
+        return []
+    if kind.line:
+        line = _LINES[kind.line](base)
+        return [] if line is None else [_line_start(base, kind, line)]
+    found = [_scaled_start(base, kind, trial) for trial in kind.trials(_circumstances(data))]
+    if is_gross(base):
+        found.append(_balanced_start(base, kind))
+    return sorted((start for start in found if start is not None), key=lambda start: -start.predicted_drop)
+
+
+def is_gross(fit: Fit) -> bool:
+    """Whether a fit misses the motion itself, so that its sensitivities say little.
+
+    Args:
+        fit: any fit.
+
+    Returns:
+        True where the residual holds more than a hundredth of the reading's power.
+    """
+    readings = sum(
+        float(np.sum((r.reading - np.mean(r.reading)) ** 2 / r.noise_variance)) for r in fit.problem.data.runs
+    )
+    return fit.total > _GROSS * readings
+
+
+def _balanced_start(base: Fit, kind: type[Effect]) -> StartingPoint | None:
+    held = {f"{kind.name}.{name}": value for name, value in kind.regressed_at.items()}
+    fixed = dict(base.problem.fixed) | held
+    problem = Problem(
+        base.problem.data, (*base.problem.effects, kind), tuple(fixed.items()), base.problem.bent
+    )
+    point = equation_error_start(problem)
+    if point is None:
+        return None
+    point = clip(problem, point)
+    total = sum(float(r @ r) for r in scaled_residuals(problem, point))
+    return StartingPoint(problem, point, base.total - total, balanced=True) if np.isfinite(total) else None
+
+
+def _line_start(base: Fit, kind: type[Effect], line: Line) -> StartingPoint:
+    problem = Problem(base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.bent)
+    severity, place = kind.parameters()
+    lower, upper = severity.lower, severity.upper
+    values = np.array(
+        [np.clip(line.amplitude, lower, upper), np.clip(line.parameter, place.lower, place.upper)]
+    )
+    release = np.column_stack([base.point.release, line.phases])
+    return StartingPoint(problem, Point(np.concatenate([base.point.common, values]), release), line.drop)
+
+
+def _circumstances(data: Data) -> Circumstances:
+    greatest = max(float(np.max(np.abs(run.reading))) for run in data.runs)
+    return Circumstances(data.springs, greatest, data.normalised)
+
+
+def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint | None:
+    spring = kind.chosen_spring()
+    held = {} if spring is None else {spring: trial.values[spring]}
+    fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
+    freed = any(info.form and info.name in trial.values for info in kind.parameters())
+    with_free_form = (*base.problem.bent, kind.name) if freed else base.problem.bent
+    problem = Problem(base.problem.data, (*base.problem.effects, kind), fixed, with_free_form)
+    infos = [info for info in kind.parameters() if info.name not in held and (freed or not info.form)]
+    scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)
+    values = np.array([trial.values.get(info.name, info.default) for info in infos])
+    change = _moderate_change(base, problem, values, scaled)
+    if change is None:
+        return None
+    left = project_out(base, change)
+    power = sum(float(c @ c) for c in left)
+    if power <= 0.0:
+        return None
+    slope = sum(float(c @ r) for c, r in zip(left, base.residuals, strict=True)) / power
+    start, drop = values.copy(), slope * slope * power
+    if scaled is not None:
+        start[scaled] = np.clip(slope * values[scaled], infos[scaled].lower, infos[scaled].upper)
+        if start[scaled] == 0.0:
+            start[scaled], drop = 0.01 * values[scaled], 0.0
+    point = Point(np.concatenate([base.point.common, start]), base.point.release)
+    return StartingPoint(problem, point, drop)
+
+
+def _moderate_change(base: Fit, problem: Problem, values: Array, scaled: int | None) -> list[Array] | None:
+    """Change of the scaled prediction by an effect, one value lowered until the change is moderate.
+
+    ``values`` holds the effect's parameters and is changed in place to those that were used; ``scaled`` is the
+    place of the one that is lowered, None where none may be.
+    """
+    data = base.problem.data
+    scale = [np.sqrt(run.noise_variance) for run in data.runs]
+    limit = 3.0 * np.sqrt(base.total)
+    for _ in range(12):
+        moved = problem.predict([Point(np.concatenate([base.point.common, values]), base.point.release)])[0]
+        change = [
+            (m - run.reading) / s + r
+            for m, run, r, s in zip(moved, data.runs, base.residuals, scale, strict=True)
+        ]
+        size = float(np.sqrt(sum(float(c @ c) for c in change)))
+        if np.isfinite(size) and (size <= limit or scaled is None):
+            return change
+        if scaled is None:
+            return None
+        values[scaled] *= 0.1 if not np.isfinite(size) else max(0.01, 0.5 * limit / size)
+    return None
+
+
+def project_out(base: Fit, columns: list[Array]) -> list[Array]:
+    """What of a change of the prediction the fitted parameters cannot absorb.
+
+    Args:
+        base: a fit, whose common parameters and releases absorb.
+        columns: scaled change by run, each of shape (n,).
+
+    Returns:
+        The remainder, by run.
+    """
+    matrix, gradient, solutions = normal_equations(base.jacobian, columns)
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    step = np.linalg.lstsq(matrix / np.outer(scale, scale), gradient / scale, rcond=1e-12)[0] / scale
+    return [
+        column - common @ step - release @ (solution[:, -1] - solution[:, :-1] @ step)
+        for column, (common, release), solution in zip(columns, base.jacobian, solutions, strict=True)
+    ]

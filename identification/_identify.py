@@ -1,0 +1,59 @@
+"""The one verb: a campaign in, an estimate out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from identification.estimate import Estimate, RunEstimate, Status, by_gravity
+from identification.estimators import Estimator, make_estimator
+from identification.examination.examine import examine
+from identification.remark import Examined
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+
+
+def identify(
+    campaign: Campaign, estimator: str | Estimator = "output_error", *, throw: bool = True
+) -> Estimate:
+    """Identify a campaign's coefficients and each of its runs.
+
+    The campaign is examined first (`identification.examination.examine`): the estimate's remarks say what was
+    left out or cut.
+
+    Args:
+        campaign: the runs of one rig; angles in rad, stiffness in N m/rad, speed in m/s.
+        estimator: a name of `identification.estimators.ALL_ESTIMATORS`, or an estimator with settings of its
+            own, such as ``OutputError(cycles_per_window=5)``.
+        throw: raise when there is no result at all; otherwise the estimate's status says so.
+
+    Returns:
+        The estimate. What could not be had is None, and its statuses say why and what would give it.
+
+    Raises:
+        TunnelError: for an unknown estimator, a campaign without runs, a wind-on run without air density,
+            records that the examination refuses, and, with ``throw``, when no run could be identified.
+    """
+    chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator
+    if not campaign.runs:
+        raise TunnelError("campaign without runs", where=campaign.name, remedy="add at least one run")
+    examined = examine(campaign).accepted()
+    estimate = _of_all_runs(campaign, examined, chosen.estimate(examined.campaign))
+    if throw and estimate.status.failed:
+        what, _, remedy = estimate.status.value.partition(": ")
+        raise TunnelError(what, where=campaign.name, remedy=remedy)
+    return estimate
+
+
+def _of_all_runs(campaign: Campaign, examined: Examined, estimate: Estimate) -> Estimate:
+    """The estimate with the examination's remarks and a line for every run of the campaign, in its order."""
+    if not examined.remarks:
+        return estimate
+    found = {run.id: run for run in estimate.runs}
+    runs = tuple(found.get(run.id, RunEstimate(run.id, (Status.REPEATED_RUN,))) for run in campaign.runs)
+    statuses = {Status.REPEATED_RUN} if len(found) < len(runs) else set()
+    return replace(
+        estimate,
+        runs=runs,
+        statuses=by_gravity({*estimate.statuses, *statuses}),
+        remarks=examined.remarks,
+    )

@@ -1,0 +1,1 @@
+"""Many records together: pairs, springs, derivatives."""

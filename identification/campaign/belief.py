@@ -1,0 +1,211 @@
+"""What is known of Cnβ, Cnr, Izz and Cr after each run of a campaign, and what a further run would add.
+
+In the shared parameters φ = (1/Izz, Cnβ/Izz, Cr/Izz, Cnr/Izz) every run's decay rate and stiffness are linear
+(see `derivatives`), so a normal prior of φ and the runs' likelihood give a posterior at any number of runs, also
+where the runs alone do not separate the four. The initial state of every run and the sensor's zero are unknown
+throughout and eliminated. The information of a run that has not been made yet is Fisher's, exact for its sample
+times, at the parameters believed now: Bayesian D-optimal design with the nuisance parameters marginalised.
+Source: Chaloner & Verdinelli, Statist. Sci. 10 (1995) 273–304, doi 10.1214/ss/1177009939, sec. 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from identification.campaign.derivatives import Design, derivatives, loads
+from identification.decay.damped_oscillation import Decay
+from identification.decay.decay_fit import Prior, Reading, RunFit, fit_decays, information_at
+from identification.estimate import PARAMETERS
+from identification.statistics.information import eliminate, embed, inverse, scaled_solve
+from tunnel_sim.vocabulary.campaign import RigProperties, Run
+from tunnel_sim.vocabulary.record import Array
+
+# All four columns of φ, whatever the runs separate: the prior holds what they do not.
+_DESIGN = Design((np.zeros((2, 4)),), {"g": 0, "n": 1, "d": 2, "m": 3}, np.zeros(0), np.zeros(0), True)
+_COEFFICIENTS = [PARAMETERS.index("cn_beta"), PARAMETERS.index("cn_r")]
+_SAFE = 3.0  # standard deviations that keep a proposed run's stiffness and damping positive
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """A normal distribution of the coefficients.
+
+    Args:
+        shared: most probable φ, shape (4,), SI.
+        information: inverse covariance of φ and the sensor's zero, shape (5, 5); the zero's row is zero where
+            nothing is known of it.
+    """
+
+    shared: Array
+    information: Array
+
+    @property
+    def values(self) -> Array:
+        """Cnβ [1/rad], Cnr [1/rad], Izz [kg m²], Cr [N m s/rad], shape (4,)."""
+        return derivatives(_DESIGN, self.shared).values
+
+    @property
+    def covariance(self) -> Array:
+        """Of ``values``, in the products of their units, shape (4, 4)."""
+        jacobian = derivatives(_DESIGN, self.shared).jacobian
+        return np.asarray(jacobian @ self.shared_covariance @ jacobian.T)
+
+    @property
+    def shared_covariance(self) -> Array:
+        """Of φ with the zero eliminated, shape (4, 4)."""
+        return inverse(_without_zero(self.information))
+
+    def std(self, name: str) -> float:
+        """Standard deviation of a coefficient, in its unit.
+
+        Args:
+            name: one of `identification.estimate.PARAMETERS`.
+        """
+        place = PARAMETERS.index(name)
+        return float(np.sqrt(self.covariance[place, place]))
+
+    def relative_std(self, name: str) -> float:
+        """Standard deviation over the value's size (1); infinite at a value of zero.
+
+        Args:
+            name: one of `identification.estimate.PARAMETERS`.
+        """
+        value = abs(float(self.values[PARAMETERS.index(name)]))
+        return self.std(name) / value if value > 0.0 else inf
+
+
+def prior_belief(mean: Mapping[str, float], std: Mapping[str, float]) -> Belief:
+    """Independent normal distributions of the four coefficients, carried to φ to first order.
+
+    Args:
+        mean: by name, in the units of `identification.estimate.UNITS`.
+        std: likewise, above 0.
+
+    Returns:
+        The belief before any run; nothing is known of the sensor's zero.
+    """
+    inertia = mean["yaw_inertia"]
+    scaled = [1.0, mean["cn_beta"], mean["mechanical_damping"], mean["cn_r"]]
+    shared = np.array(scaled) / inertia
+    jacobian = derivatives(_DESIGN, shared).jacobian
+    variance = np.array([std[name] ** 2 for name in PARAMETERS])
+    information = np.zeros((5, 5))
+    information[:4, :4] = jacobian.T @ (jacobian / variance[:, None])
+    return Belief(shared, information)
+
+
+def run_link(run: Run, rig: RigProperties) -> Array:
+    """How a run's decay rate a [1/s] and stiffness k [1/s²] hang on φ.
+
+    Args:
+        run: its conditions; the record is not used.
+        rig: its frontal area and reference length.
+
+    Returns:
+        Shape (2, 4): (a, k) = L φ.
+
+    Raises:
+        ValueError: when the run states no spring stiffness.
+        TunnelError: when a wind-on run states no air density.
+    """
+    if run.spring_stiffness is None:
+        raise ValueError(f"run {run.id} states no spring stiffness")
+    stiffness_load, damping_load = loads(run, rig)
+    return np.array([[0.0, 0.0, 0.5, -0.5 * damping_load], [run.spring_stiffness, -stiffness_load, 0.0, 0.0]])
+
+
+def update_belief(
+    prior: Belief, links: Sequence[Array], runs: Sequence[tuple[Reading, RunFit]], noise_std: float
+) -> Belief:
+    """The posterior after all runs of a campaign: one joint fit with the prior, not run by run.
+
+    Args:
+        prior: the belief before the first run.
+        links: one per run, see `run_link`.
+        runs: readings and their own fits, which only start the joint one.
+        noise_std: of the reading, quantisation included, rad.
+
+    Returns:
+        The belief; ``prior`` itself where there is no run.
+
+    Raises:
+        ValueError: when the joint fit does not converge.
+    """
+    if not runs:
+        return prior
+    variance = noise_std**2
+    known = prior.information[:4, :4] * variance
+    fit = fit_decays(
+        [reading for reading, _ in runs],
+        links,
+        _start(prior.shared, known, links, [own for _, own in runs]),
+        prior=Prior(prior.shared, known),
+    )
+    if not fit.converged:
+        raise ValueError("the joint fit does not converge")
+    return Belief(fit.parameters, fit.normal / variance)
+
+
+def _start(mean: Array, known: Array, links: Sequence[Array], fits: Sequence[RunFit]) -> Array:
+    """The runs' own (a, k), weighed by what each knows of them, and the prior."""
+    normal, right = known.copy(), known @ mean
+    for link, fit in zip(links, fits, strict=True):
+        weight = eliminate(fit.information, fit.score, 2)[0]
+        normal = normal + link.T @ weight @ link
+        right = right + link.T @ weight @ np.array([fit.decay.rate, fit.decay.stiffness])
+    return scaled_solve(normal, right)
+
+
+def expected_belief(
+    belief: Belief, link: Array, time: Array, angle: float, noise_std: float
+) -> Belief | None:
+    """What would be known after one more run, released at rest.
+
+    Args:
+        belief: what is known now.
+        link: of the run, see `run_link`, shape (2, 4).
+        time: its sample times since the release, shape (n,), s.
+        angle: of the release, rad.
+        noise_std: of the reading, quantisation included, rad.
+
+    Returns:
+        The same values with more information; None where, within three standard deviations of the belief, the
+        run might not come back (no positive stiffness or damping).
+    """
+    rate, stiffness = map(float, link @ belief.shared)
+    spread = np.sqrt(np.diag(link @ belief.shared_covariance @ link.T))
+    if rate <= _SAFE * spread[0] or stiffness <= _SAFE * spread[1]:
+        return None
+    information = information_at(time, Decay(rate, stiffness), angle, 0.0) / noise_std**2
+    reduced, _ = eliminate(information, np.zeros(5), 3)
+    extended = embed(link, with_zero=True)
+    return Belief(belief.shared, belief.information + extended.T @ reduced @ extended)
+
+
+def information_gain(before: Belief, after: Belief) -> float:
+    """How much more is known of (Cnβ, Cnr): ½ ln(det Σ before / det Σ after), in nats.
+
+    It is the fall of the differential entropy of the two, the other parameters marginalised; negative where
+    ``after`` is wider.
+
+    Args:
+        before: a belief.
+        after: a later one.
+    """
+    return 0.5 * (_log_volume(before) - _log_volume(after))
+
+
+def _log_volume(belief: Belief) -> float:
+    block = belief.covariance[np.ix_(_COEFFICIENTS, _COEFFICIENTS)]
+    scale = np.sqrt(np.diag(block))
+    return float(np.linalg.slogdet(block / np.outer(scale, scale))[1] + 2.0 * np.sum(np.log(scale)))
+
+
+def _without_zero(information: Array) -> Array:
+    if information[4, 4] <= 0.0:
+        return information[:4, :4]
+    return eliminate(information, np.zeros(5), 4)[0]

@@ -1,0 +1,223 @@
+"""From decay rates and stiffnesses of the runs to Cnβ, Cnr, Izz and Cr, and what a campaign can tell apart.
+
+With g = 1/Izz, n = Cnβ/Izz, d = Cr/Izz and m = Cnr/Izz the equation of motion (paper, eqs 2–6, signs as in
+eqs 7 and 8) gives for run i
+
+    kᵢ = Krᵢ g − ½ρᵢVᵢ² A l n,    2aᵢ = d − ½ρᵢVᵢ A l² m,
+
+linear in (g, n, d, m). A block whose columns a campaign does not separate is left free, run by run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.campaign.springs import LEAST_SPREAD
+from identification.estimate import PARAMETERS
+from identification.statistics.information import determined, inverse, scaled_solve
+from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.campaign import RigProperties, Run
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+
+# Smallest singular value of two columns scaled to unit length: that of two runs whose springs, or speeds, differ by
+# the least spread that counts.
+_RANK_TOLERANCE = LEAST_SPREAD / np.sqrt(8.0)
+_GREATEST = (
+    1e60  # of a stiffness or a moment in SI units, and its inverse the least: fourth powers are formed
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """How the runs' decay rates and stiffnesses hang on the shared parameters φ.
+
+    Args:
+        links: one (2, p) matrix per run: (aᵢ, kᵢ) = Lᵢ φ.
+        columns: where g, n, d, m stand in φ; only those that the campaign separates.
+        stiffness_loads: ½ρV²·A·l per run, N m, shape (r,); without A·l where the size is unknown.
+        damping_loads: ½ρV·A·l² per run, N m s, shape (r,); without A·l² where the size is unknown.
+        has_size: whether the rig states A and l.
+    """
+
+    links: tuple[Array, ...]
+    columns: dict[str, int]
+    stiffness_loads: Array
+    damping_loads: Array
+    has_size: bool
+
+    @property
+    def size(self) -> int:
+        """Number of shared parameters p."""
+        return int(self.links[0].shape[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Derivatives:
+    """The campaign's parameters.
+
+    Args:
+        names: of `estimate.PARAMETERS`, those that could be had, in that order.
+        values: shape (p,), SI. Without the rig's size, cn_beta and cn_r stand for A·l·Cnβ and A·l²·Cnr.
+        jacobian: of the values to φ, shape (p, size).
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    jacobian: Array
+
+    def get(self, name: str) -> float | None:
+        """A value by name; None where it could not be had."""
+        return float(self.values[self.names.index(name)]) if name in self.names else None
+
+
+def loads(run: Run, rig: RigProperties) -> tuple[float, float]:
+    """What multiplies Cnβ and Cnr in a run: ½ρV²·A·l [N m] and ½ρV·A·l² [N m s]; A and l as 1 where unknown.
+
+    Args:
+        run: the run's conditions.
+        rig: the rig's size.
+
+    Raises:
+        TunnelError: when a wind-on run states no air density, and when a stated value is so large or small that
+            computing with it is beyond the double precision.
+    """
+    _within_range("spring_stiffness", run.spring_stiffness or 1.0, "N m/rad", run)
+    if not run.wind_on:
+        return 0.0, 0.0
+    if run.air_density is None:
+        raise TunnelError(
+            "wind-on run without air_density", where=f"run {run.id}", remedy="state it in kg/m3"
+        )
+    known = has_size(rig)
+    conditions = {
+        "air_density": run.air_density,
+        "wind_speed": run.wind_speed,
+        "frontal_area": rig.frontal_area if known and rig.frontal_area is not None else 1.0,
+        "reference_length": rig.reference_length if known and rig.reference_length is not None else 1.0,
+    }
+    found = aerodynamic_stiffness(1.0, **conditions), aerodynamic_damping(1.0, **conditions)
+    for load, unit in zip(found, ("N m", "N m s"), strict=True):
+        _within_range("wind_speed, air_density and the sizes: their product", load, unit, run)
+    return found
+
+
+def _within_range(name: str, value: float, unit: str, run: Run) -> None:
+    if not 1.0 / _GREATEST < abs(value) < _GREATEST:
+        raise TunnelError(
+            f"{name} = {value:g} {unit} cannot be computed with",
+            where=f"run {run.id}",
+            remedy="correct its unit",
+        )
+
+
+def has_size(rig: RigProperties) -> bool:
+    """Whether the rig states both frontal area and reference length."""
+    return rig.frontal_area is not None and rig.reference_length is not None
+
+
+def build_design(runs: Sequence[Run], rig: RigProperties) -> Design:
+    """Link runs of stated spring stiffness to the shared parameters.
+
+    Args:
+        runs: at least one, each with its spring_stiffness.
+        rig: the rig's size.
+
+    Returns:
+        The design; ``columns`` lacks g and n, or d and m, where the runs do not separate them.
+    """
+    springs = np.array([run.spring_stiffness for run in runs], dtype=np.float64)
+    pairs = np.array([loads(run, rig) for run in runs])
+    windy = bool(np.any(pairs[:, 0] > 0.0))
+    columns: dict[str, int] = {}
+    blocks: list[tuple[int, Array]] = []
+    for row, names, fixed, load in (
+        (1, "gn", springs, pairs[:, 0]),
+        (0, "dm", np.full(len(runs), 0.5), 0.5 * pairs[:, 1]),
+    ):
+        block = np.column_stack((fixed, -load)) if windy else fixed[:, None]
+        offset = sum(other.shape[1] for _, other in blocks)
+        if _full_rank(block):
+            columns |= {name: offset + index for index, name in enumerate(names[: block.shape[1]])}
+        else:
+            block = np.eye(len(runs))
+        blocks.append((row, block))
+    width = sum(block.shape[1] for _, block in blocks)
+    links = np.zeros((len(runs), 2, width))
+    links[:, blocks[0][0], : blocks[0][1].shape[1]] = blocks[0][1]
+    links[:, blocks[1][0], blocks[0][1].shape[1] :] = blocks[1][1]
+    return Design(tuple(links), columns, pairs[:, 0], pairs[:, 1], has_size(rig))
+
+
+def combine(design: Design, decays: Array, informations: Sequence[Array]) -> tuple[Array, Array] | None:
+    """The shared parameters that fit the runs' own decays best, by generalised least squares.
+
+    Args:
+        design: links of the runs.
+        decays: (a, k) per run, shape (r, 2), 1/s and 1/s².
+        informations: inverse covariance of each (a, k), shape (2, 2).
+
+    Returns:
+        φ, shape (p,), and its covariance, shape (p, p); None where the runs do not determine it.
+    """
+    pairs = list(zip(design.links, informations, strict=True))
+    normal = sum((link.T @ weight @ link for link, weight in pairs), np.zeros((design.size, design.size)))
+    right = sum(
+        (link.T @ weight @ decay for (link, weight), decay in zip(pairs, decays, strict=True)),
+        np.zeros(design.size),
+    )
+    return (scaled_solve(normal, right), inverse(normal)) if determined(normal) else None
+
+
+def derivatives(design: Design, parameters: Array) -> Derivatives:
+    """Cnβ, Cnr, Izz and Cr from the shared parameters, with the Jacobian for their covariance.
+
+    Args:
+        design: the campaign's design.
+        parameters: φ, shape (p,).
+
+    Returns:
+        The parameters the design separates; none where it does not give Izz, or gives one that is not positive.
+    """
+    if not positive_inertia(design, parameters):
+        return Derivatives((), np.zeros(0), np.zeros((0, design.size)))
+    inertia = 1.0 / float(parameters[design.columns["g"]])
+    sources = {"cn_beta": "n", "cn_r": "m", "yaw_inertia": "g", "mechanical_damping": "d"}
+    names, values, rows = [], [], []
+    for name in PARAMETERS:
+        if sources[name] not in design.columns:
+            continue
+        column = design.columns[sources[name]]
+        row = np.zeros(design.size)
+        value = inertia if name == "yaw_inertia" else float(parameters[column]) * inertia
+        if name != "yaw_inertia":
+            row[column] = inertia
+        row[design.columns["g"]] = -value * inertia
+        names.append(name)
+        values.append(value)
+        rows.append(row)
+    return Derivatives(tuple(names), np.array(values), np.array(rows))
+
+
+def positive_inertia(design: Design, parameters: Array) -> bool:
+    """Whether the design gives Izz at all, and a positive one.
+
+    Args:
+        design: the campaign's design.
+        parameters: φ, shape (p,).
+    """
+    return "g" in design.columns and bool(parameters[design.columns["g"]] > 0.0)
+
+
+def _full_rank(block: Array) -> bool:
+    lengths = np.linalg.norm(block, axis=0)
+    if not lengths.min() > 0.0:
+        return False
+    scaled = block / lengths
+    return (
+        bool(np.linalg.svd(scaled, compute_uv=False)[-1] > _RANK_TOLERANCE)
+        and block.shape[0] >= block.shape[1]
+    )

@@ -1,0 +1,333 @@
+"""Least squares of free decays: variable projection, one run or many with shared parameters.
+
+Every run i decays with (aᵢ, kᵢ) = Lᵢ φ, linear in the shared parameters φ; its initial angle and rate and the
+sensor's zero enter linearly, so they are eliminated in closed form and only φ is iterated. With white
+Gaussian noise this is maximum likelihood. Sources: Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413–432,
+doi 10.1137/0710036; the Jacobian is Kaufman's, BIT 15 (1975) 49–57, doi 10.1007/BF01932995.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from identification.decay.damped_oscillation import Decay, response_rows, sensitivity_weights
+from identification.statistics.information import eliminate, embed, scaled_solve
+from tunnel_sim.vocabulary.record import Array, Record, read_only
+
+# Local order of one run's unknowns throughout: decay rate, stiffness | zero | initial angle, initial rate.
+RATE, STIFFNESS, ZERO, ANGLE, ANGULAR_RATE = range(5)
+_TOLERANCE = 1e-12  # relative step of k, and of a in units of ωn, at which the iteration ends
+_ROUNDING = 1e-9  # a step this small that lowers the cost no more is limited by rounding alone
+_MAX_ITERATIONS = 100
+# Where the model departs grossly, Gauss–Newton closes in slowly: at the last iteration a fall of the cost by
+# less than this share of one sample's residual variance, a hundredth of a standard deviation, is good enough.
+_SETTLED = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A stretch of one record, with its clock set to zero at the first sample.
+
+    Args:
+        time: since the first sample, shape (n,), s.
+        yaw: sensor reading, shape (n,), rad.
+    """
+
+    time: Array
+    yaw: Array
+
+    @classmethod
+    def from_record(cls, record: Record) -> Reading:
+        """The whole record."""
+        return cls(read_only(record.time_s - record.time_s[0]), record.yaw_rad)
+
+
+@dataclass(frozen=True, eq=False)
+class RunFit:
+    """One run at the optimum.
+
+    Args:
+        decay: its decay rate and stiffness.
+        angle: initial angle from the sensor's zero, rad.
+        rate: initial rate, rad/s.
+        residual: reading less model, shape (n,), rad.
+        information: JᵀJ in the local order, shape (5, 5); divide by the noise variance for Fisher's.
+        score: Jᵀ residual, shape (5,).
+    """
+
+    decay: Decay
+    angle: float
+    rate: float
+    residual: Array
+    information: Array
+    score: Array
+
+    def reduced(self) -> tuple[Array, Array]:
+        """Information and score of (a, k, zero) with the initial state eliminated: shapes (3, 3), (3,)."""
+        return eliminate(self.information, self.score, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class DecayFit:
+    """Runs fitted together.
+
+    Args:
+        parameters: φ, shape (p,).
+        zero: the sensor's zero, rad.
+        runs: one per reading.
+        normal: information of φ, and of the zero last where it was estimated, shape (p, p) or (p + 1, p + 1).
+        converged: whether the step fell below 1e-12.
+        iterations: how many linearisations it took.
+    """
+
+    parameters: Array
+    zero: float
+    runs: tuple[RunFit, ...]
+    normal: Array
+    converged: bool
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known of the shared parameters before the runs, as a normal distribution.
+
+    Args:
+        mean: of φ, shape (p,).
+        information: inverse covariance of φ times the noise variance of the readings, shape (p, p): the weight
+            of the prior against one squared residual.
+    """
+
+    mean: Array
+    information: Array
+
+    def cost(self, parameters: Array) -> float:
+        """What the prior adds to the sum of squares at φ, shape (p,): rad²."""
+        away = parameters - self.mean
+        return float(away @ self.information @ away)
+
+
+def fit_decays(
+    readings: Sequence[Reading],
+    links: Sequence[Array],
+    start: Array,
+    *,
+    zero: float | None = None,
+    prior: Prior | None = None,
+    tolerance: float = _TOLERANCE,
+) -> DecayFit:
+    """Fit runs whose decay rate and stiffness are linear in shared parameters.
+
+    Args:
+        readings: the runs.
+        links: one (2, p) matrix Lᵢ per run: (aᵢ, kᵢ) = Lᵢ φ.
+        start: φ to start from, shape (p,).
+        zero: the sensor's zero where it is known, rad; estimated, common to the runs, where None.
+        prior: what is known of φ beforehand: the fit is then the maximum of the posterior, and ``normal`` has
+            the prior's information in it.
+        tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
+
+    Returns:
+        The fit; ``converged`` is False where the iteration stalled: the values are then the best met, and
+        ``runs`` is empty where even the start was out of range, or holds no motion.
+    """
+    best = _project(readings, links, np.asarray(start, dtype=np.float64), zero, prior)
+    samples = sum(reading.time.size for reading in readings)
+    damping, converged, iteration = 0.0, False, 0
+    while best.runs and not converged and iteration < _MAX_ITERATIONS:
+        iteration += 1
+        try:
+            normal, gradient = _shared_system(best, links, zero is None, prior)
+            step = scaled_solve(normal + damping * np.diag(np.diag(normal)), gradient)
+        except np.linalg.LinAlgError:  # no motion in a run: nothing to identify there
+            break
+        size = _relative_size(step[: best.parameters.size], links, best.runs)
+        trial = _project(readings, links, best.parameters + step[: best.parameters.size], zero, prior)
+        promised = float(step @ (2.0 * gradient - normal @ step))
+        gain = (best.cost - trial.cost) / max(promised, 1e-300)
+        converged = size <= tolerance or (size <= _ROUNDING and trial.cost >= best.cost)
+        if iteration == _MAX_ITERATIONS:
+            converged = converged or promised <= _SETTLED * best.cost / samples
+        damping = _next_damping(damping, gain)
+        if trial.runs and trial.cost <= best.cost:
+            best = trial
+    nothing = DecayFit(best.parameters, best.zero, (), np.zeros((0, 0)), False, iteration)
+    if not best.runs:
+        return nothing
+    try:
+        normal, _ = _shared_system(best, links, zero is None, prior)
+    except np.linalg.LinAlgError:
+        return nothing
+    return DecayFit(best.parameters, best.zero, best.runs, normal, converged, iteration)
+
+
+def fit_run(
+    reading: Reading, start: Decay, *, zero: float | None = None, tolerance: float = _TOLERANCE
+) -> DecayFit:
+    """Fit one run by itself: φ = (a, k).
+
+    Args:
+        reading: the run or a window of it.
+        start: decay to start from.
+        zero: the sensor's zero where it is known, rad.
+        tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
+
+    Returns:
+        The fit of one run.
+    """
+    decay = np.array([start.rate, start.stiffness])
+    return fit_decays([reading], [np.eye(2)], decay, zero=zero, tolerance=tolerance)
+
+
+def project_run(reading: Reading, decay: Decay) -> tuple[RunFit, float] | None:
+    """The best initial state and zero of a run whose decay is given, by another method say.
+
+    Args:
+        reading: the run.
+        decay: decay rate and normalised stiffness.
+
+    Returns:
+        The run at that decay and its sensor zero in rad; None where the decay overflows.
+    """
+    point = _project([reading], [np.eye(2)], np.array([decay.rate, decay.stiffness]), None)
+    return (point.runs[0], point.zero) if point.runs else None
+
+
+def projected_cost(reading: Reading, decay: Decay) -> float:
+    """What is left of a reading by the best initial state and zero for a given decay.
+
+    Args:
+        reading: angles in rad against s.
+        decay: decay rate and normalised stiffness.
+
+    Returns:
+        Sum of squares, rad²; infinite where the decay overflows.
+    """
+    return _project([reading], [np.eye(2)], np.array([decay.rate, decay.stiffness]), None).cost
+
+
+def information_at(time: Array, decay: Decay, angle: float, rate: float) -> Array:
+    """JᵀJ of one run's reading in the local order (a, k, zero, angle, rate).
+
+    Args:
+        time: since the initial state, shape (n,), s.
+        decay: decay rate and stiffness.
+        angle: initial angle, rad.
+        rate: initial rate, rad/s.
+
+    Returns:
+        Shape (5, 5); divided by the noise variance it is Fisher's information.
+    """
+    rows = _rows(time, decay)
+    weights = _local_weights(decay, angle, rate)
+    return np.asarray(weights @ (rows @ rows.T) @ weights.T)
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """The runs at one φ, with the linear unknowns at their best."""
+
+    parameters: Array
+    zero: float
+    runs: tuple[RunFit, ...]
+    cost: float = field(default=np.inf)
+
+
+def _project(
+    readings: Sequence[Reading],
+    links: Sequence[Array],
+    parameters: Array,
+    zero: float | None,
+    prior: Prior | None = None,
+) -> _Point:
+    decays = [Decay(*map(float, link @ parameters)) for link in links]
+    with np.errstate(over="ignore", invalid="ignore"):  # a trial far off may overflow; it is then refused
+        rows = [_rows(reading.time, decay) for reading, decay in zip(readings, decays, strict=True)]
+        grams = [block @ block.T for block in rows]
+    if not all(np.isfinite(gram).all() for gram in grams):
+        return _Point(parameters, 0.0, ())
+    moments = [block @ reading.yaw for block, reading in zip(rows, readings, strict=True)]
+    try:
+        best_zero = _common_zero(grams, moments) if zero is None else zero
+        states = [
+            scaled_solve(gram[:2, :2], moment[:2] - gram[:2, 4] * best_zero)
+            for gram, moment in zip(grams, moments, strict=True)
+        ]
+    except np.linalg.LinAlgError:
+        return _Point(parameters, 0.0, ())
+    runs, cost = [], 0.0 if prior is None else prior.cost(parameters)
+    for reading, decay, block, gram, (angle, rate) in zip(readings, decays, rows, grams, states, strict=True):
+        residual = reading.yaw - best_zero - angle * block[0] - rate * block[1]
+        weights = _local_weights(decay, float(angle), float(rate))
+        score = weights @ (block @ residual)
+        runs.append(RunFit(decay, float(angle), float(rate), residual, weights @ gram @ weights.T, score))
+        cost += float(residual @ residual)
+    return _Point(parameters, best_zero, tuple(runs), cost)
+
+
+def _rows(time: Array, decay: Decay) -> Array:
+    return response_rows(time, decay, constant=True)
+
+
+def _local_weights(decay: Decay, angle: float, rate: float) -> Array:
+    # The run's Jacobian, transposed, as a combination of the rows u, s, w, t·s, 1.
+    weights = np.zeros((5, 5))
+    weights[:2, :4] = sensitivity_weights(decay, angle, rate)
+    weights[ZERO, 4] = weights[ANGLE, 0] = weights[ANGULAR_RATE, 1] = 1.0
+    return weights
+
+
+def _common_zero(grams: Sequence[Array], moments: Sequence[Array]) -> float:
+    numerator = denominator = 0.0
+    order = [4, 0, 1]
+    for gram, moment in zip(grams, moments, strict=True):
+        information, score = eliminate(gram[np.ix_(order, order)], moment[order], 1)
+        denominator += float(information[0, 0])
+        numerator += float(score[0])
+    return numerator / denominator
+
+
+def _shared_system(
+    point: _Point, links: Sequence[Array], with_zero: bool, prior: Prior | None
+) -> tuple[Array, Array]:
+    keep = 3 if with_zero else 2
+    normal: Array | float = 0.0
+    gradient: Array | float = 0.0
+    for run, link in zip(point.runs, links, strict=True):
+        order = (
+            [RATE, STIFFNESS, ZERO, ANGLE, ANGULAR_RATE]
+            if with_zero
+            else [RATE, STIFFNESS, ANGLE, ANGULAR_RATE]
+        )
+        information, score = eliminate(run.information[np.ix_(order, order)], run.score[order], keep)
+        extended = embed(link, with_zero=with_zero)
+        normal = normal + extended.T @ information @ extended
+        gradient = gradient + extended.T @ score
+    normal, gradient = np.asarray(normal), np.asarray(gradient)
+    if prior is not None:
+        size = point.parameters.size
+        normal[:size, :size] += prior.information
+        gradient[:size] += prior.information @ (prior.mean - point.parameters)
+    return normal, gradient
+
+
+def _next_damping(damping: float, gain: float) -> float:
+    # Marquardt's damping by the ratio of the actual to the predicted fall of the cost: Gauss–Newton where the
+    # residual is small, and shorter steps where it is not and Gauss–Newton overshoots.
+    if gain < 0.25:
+        return max(4.0 * damping, 0.01)
+    if gain < 0.75:
+        return damping
+    return damping / 8.0 if damping > 1e-4 else 0.0
+
+
+def _relative_size(step: Array, links: Sequence[Array], runs: Sequence[RunFit]) -> float:
+    largest = 0.0
+    for link, run in zip(links, runs, strict=True):
+        rate, stiffness = np.abs(link @ step)
+        scale = max(abs(run.decay.stiffness), run.decay.rate**2)
+        largest = max(largest, rate / np.sqrt(scale), stiffness / scale)
+    return float(largest)

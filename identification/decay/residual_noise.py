@@ -1,0 +1,157 @@
+"""How noisy the sensor is, and whether the residual of a fit is that noise and no more.
+
+White noise has the same power slow and fast. The fast part of a residual (its sixth differences) holds noise
+alone, whatever the model; its slow part (means over an eighth of a cycle) holds also what the model does not
+explain, in the band where the oscillation is and the parameters are decided. Their ratio is tested by F.
+Quantisation adds resolution²/12 to the variance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from scipy.special import fdtri
+
+from identification.estimate import NoiseLevel
+from tunnel_sim.vocabulary.campaign import SensorProperties
+from tunnel_sim.vocabulary.record import Array
+
+FALSE_ALARM_RATE = 1e-3
+_STATEMENT_TOLERANCE = 0.05  # a stated or measured standard deviation is taken to be good to 5 %
+FLOOR = 1e-7  # of the largest reading: no sensor and no integrator is better, so no smaller noise is claimed
+_ORDER = 6
+# Variance of one sixth difference of unit white noise, and how many samples count as one independent one:
+# Σ (C(12, 6+j)/C(12, 6))² = C(24, 12)/C(12, 6)².
+_DIFFERENCE_GAIN = 924.0
+_SAMPLES_PER_DEGREE = 2704156.0 / 924.0**2
+_LONGEST_BLOCK = 1e9  # samples: longer than any record
+_CHANCE = 3.29  # two-sided 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """What a fit left of one run or window.
+
+    Args:
+        values: reading less model, shape (n,), rad.
+        block: samples in an eighth of a cycle.
+        unknowns: how many parameters the run's own data decided.
+        peak: largest distance of the reading from the sensor's zero, rad.
+    """
+
+    values: Array
+    block: int
+    unknowns: int
+    peak: float
+
+
+def eighth_of_a_cycle(omega_n: float, sample_interval: float) -> int:
+    """Samples in an eighth of the natural period, at least one.
+
+    Args:
+        omega_n: natural angular frequency, rad/s.
+        sample_interval: s.
+    """
+    return max(1, round(min(2.0 * np.pi / (8.0 * omega_n * sample_interval), _LONGEST_BLOCK)))
+
+
+def stated_noise(sensor: SensorProperties) -> float | None:
+    """√(noise_std² + resolution²/12), rad; None where noise_std is not stated.
+
+    Args:
+        sensor: what the campaign states.
+    """
+    if sensor.noise_std is None:
+        return None
+    return float(np.hypot(sensor.noise_std, (sensor.resolution or 0.0) / np.sqrt(12.0)))
+
+
+def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> NoiseLevel:
+    """The noise that standard deviations rest on, checked against the residuals.
+
+    The stated noise is used where the residuals bear it out, their own where they do not or none is stated.
+
+    Args:
+        residuals: of the runs fitted together.
+        sensor: what the campaign states.
+
+    Returns:
+        The level, with the verdicts on the model (``departs``) and on the statement (``disagrees``).
+    """
+    floor = FLOOR * max(residual.peak for residual in residuals)
+    unknowns = sum(residual.unknowns for residual in residuals)
+    count = sum(residual.values.size for residual in residuals)
+    squares = sum(float(residual.values @ residual.values) for residual in residuals)
+    total = max(float(np.sqrt(squares / max(count - unknowns, 1))), floor)
+    fast, degrees = _fast_part(residuals, total)
+    fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
+    stated = stated_noise(sensor)
+    stated = None if stated is None else max(stated, floor)
+    bears_out = stated is not None and _agree(fast, stated, degrees)
+    reference = stated if stated is not None and bears_out else fast
+    ratio, departs = _slow_part(residuals, reference, np.inf if bears_out else degrees)
+    if not departs and bears_out and stated is not None:
+        bears_out = _agree(total, stated, count - unknowns)
+    used = reference if departs or (bears_out and stated is not None) else total
+    return NoiseLevel(
+        std=used,
+        source="stated" if bears_out else "residual",
+        residual_std=total,
+        slow_ratio=ratio if departs else 1.0,
+        departs=departs,
+        disagrees=stated is not None and not bears_out,
+    )
+
+
+def white_noise(reading: Array, sensor: SensorProperties) -> float:
+    """The white part of a reading's noise, from its sixth differences, which hold next to none of the motion.
+
+    Args:
+        reading: of many samples per cycle, shape (n,), rad.
+        sensor: what the campaign states; used where the reading bears it out.
+
+    Returns:
+        Standard deviation of one sample, rad, quantisation included.
+    """
+    peak = 0.5 * float(np.ptp(reading))
+    floor = max(FLOOR * peak, 1e-300)
+    fast, degrees = _fast_part([Residual(reading, 1, 0, peak)], floor)
+    fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
+    stated = stated_noise(sensor)
+    return max(stated, floor) if stated is not None and _agree(fast, max(stated, floor), degrees) else fast
+
+
+def _fast_part(residuals: Sequence[Residual], fallback: float) -> tuple[float, float]:
+    # Standard deviation of the white part, and the degrees of freedom it is known with.
+    differences = [np.diff(r.values, _ORDER) for r in residuals if r.values.size > 4 * _ORDER]
+    count = sum(difference.size for difference in differences)
+    if count == 0:
+        return fallback, 1.0
+    power = sum(float(difference @ difference) for difference in differences) / count
+    return float(np.sqrt(power / _DIFFERENCE_GAIN)), count / _SAMPLES_PER_DEGREE
+
+
+def _agree(measured: float, stated: float, degrees: float) -> bool:
+    tolerance = _STATEMENT_TOLERANCE + _CHANCE / np.sqrt(2.0 * max(degrees, 1.0))
+    return bool(abs(measured / stated - 1.0) <= tolerance)
+
+
+def _slow_part(
+    residuals: Sequence[Residual], reference: float, reference_degrees: float
+) -> tuple[float, bool]:
+    # Power of block means over what white noise of the reference level would give, and the verdict by F.
+    power, degrees = 0.0, 0
+    for residual in residuals:
+        blocks = residual.values.size // residual.block
+        means = residual.values[: blocks * residual.block].reshape(blocks, residual.block).mean(axis=1)
+        power += float(means @ means) * residual.block
+        degrees += blocks - residual.unknowns
+    if degrees < 3:
+        return 1.0, False
+    ratio = power / degrees / reference**2
+    chance = float(fdtri(degrees, min(reference_degrees, 1e9), 1.0 - FALSE_ALARM_RATE))
+    departs = bool(ratio > chance * (1.0 + _STATEMENT_TOLERANCE) ** 2)
+    return max(ratio, 1.0), departs

@@ -1,0 +1,246 @@
+"""One run by itself: start, least squares, noise, standard deviations, windows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.decay.damped_oscillation import Decay
+from identification.decay.decay_fit import (
+    ANGLE,
+    ANGULAR_RATE,
+    RATE,
+    STIFFNESS,
+    ZERO,
+    DecayFit,
+    Reading,
+    RunFit,
+    fit_run,
+)
+from identification.decay.first_guess import starting_decay, thinned_reading
+from identification.decay.residual_noise import Residual, eighth_of_a_cycle, noise_level
+from identification.decay.windows import fit_windows, modal_quantities
+from identification.estimate import (
+    NoiseLevel,
+    Quantity,
+    RunEstimate,
+    Status,
+    WindowEstimate,
+    by_gravity,
+)
+from identification.statistics.information import determined, inverse
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array
+
+# The energy of the decay over the noise variance that noise alone reaches, at the best of all frequencies of
+# a record of 1e6 samples, less than once in 1e6 runs: 2 ln(1e12).
+_LEAST_ENERGY = 56.0
+_FEW_CYCLES = 3.0
+NO_WINDOWS = 10**6
+"""As periods in a window: longer than any record, so that a run has none."""
+_UNKNOWNS = 5
+_NEAR = 1e-6  # how close, as a ratio, block means bring the start to their own optimum
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRun:
+    """A run and its fit.
+
+    Args:
+        reading: what was fitted.
+        fit: None where the run could not be identified; the estimate's status says why.
+        noise: what the fit's residual says of the noise; None likewise.
+        estimate: the run's own result.
+    """
+
+    reading: Reading
+    fit: RunFit | None
+    noise: NoiseLevel | None
+    estimate: RunEstimate
+
+
+def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int | None = None) -> FittedRun:
+    """Identify ωn, ζ, the initial state and the sensor's zero of one run by maximum likelihood.
+
+    Args:
+        run: the run; wind and spring are of no concern here.
+        sensor: what is stated of the noise.
+        cycles_per_window: periods in each of its windows; where None three, or one in a short record.
+
+    Returns:
+        The fit and the run's estimate.
+    """
+    reading = Reading.from_record(run.record)
+    start = starting_decay(run.record)
+    if start is None:
+        return _failed(run, reading, Status.NO_OSCILLATION)
+    fit = fit_from(run, reading, start)
+    if fit is None:
+        return _failed(run, reading, Status.NOT_CONVERGED)
+    fitted = fit.runs[0]
+    noise, failure = judge(reading, fitted, fit.zero, sensor)
+    if failure is not None:
+        return _failed(run, reading, failure)
+    variance = noise.std**2 * noise.slow_ratio
+    covariance = decay_covariance_of(fitted) * variance
+    windows = fit_windows(reading, fitted.decay, fit.zero, noise, cycles=cycles_per_window)
+    estimate = describe_run(
+        run, reading, fitted, fit.zero, covariance, variance, noise=noise, windows=windows
+    )
+    found = None if estimate.omega_n is None else fitted
+    return FittedRun(reading, found, noise, estimate)
+
+
+def fit_from(run: Run, reading: Reading, start: Decay) -> DecayFit | None:
+    """The least-squares fit of a run by itself.
+
+    Args:
+        run: the run.
+        reading: all of its record.
+        start: decay to start from.
+
+    Returns:
+        The fit; None where it does not converge to a decay of positive stiffness.
+    """
+    fit = fit_run(reading, _near(run, start))
+    return fit if fit.converged and fit.runs[0].decay.stiffness > 0.0 else None
+
+
+def _near(run: Run, start: Decay) -> Decay:
+    # Most of the way to the optimum goes by block means, which cost a twentieth; the fit itself sees all samples.
+    if start.omega_d == 0.0:
+        return start
+    thin = thinned_reading(run.record, start.omega_d / (2.0 * np.pi))
+    if thin.time.size > run.record.time_s.size // 4:
+        return start
+    fit = fit_run(thin, start, tolerance=_NEAR)
+    return fit.runs[0].decay if fit.converged else start
+
+
+def residuals_of(
+    readings: Sequence[Reading], runs: Sequence[RunFit], zero: float, unknowns: int
+) -> list[Residual]:
+    """The residuals of fitted runs with what their judgement needs.
+
+    Args:
+        readings: of the runs.
+        runs: their fits.
+        zero: the sensor's, rad.
+        unknowns: how many parameters each run's own data decided.
+
+    Returns:
+        One per run.
+    """
+    return [
+        Residual(
+            values=run.residual,
+            block=eighth_of_a_cycle(
+                float(np.sqrt(abs(run.decay.stiffness))), float(reading.time[-1]) / (reading.time.size - 1)
+            ),
+            unknowns=unknowns,
+            peak=float(np.abs(reading.yaw - zero).max()),
+        )
+        for reading, run in zip(readings, runs, strict=True)
+    ]
+
+
+def decay_covariance_of(fitted: RunFit) -> Array:
+    """Covariance of (a, k) per noise variance, at the optimum of the least squares.
+
+    Args:
+        fitted: the run.
+
+    Returns:
+        Shape (2, 2); times the noise variance in rad² it is in 1/s and 1/s².
+    """
+    return inverse(fitted.information)[np.ix_([RATE, STIFFNESS], [RATE, STIFFNESS])]
+
+
+def judge(
+    reading: Reading, fitted: RunFit, zero: float, sensor: SensorProperties
+) -> tuple[NoiseLevel, Status | None]:
+    """What the residual of one run's fit says of the noise, and whether it shows a decay at all.
+
+    Args:
+        reading: what was fitted.
+        fitted: the run at its decay.
+        zero: its sensor zero, rad.
+        sensor: what is stated of the noise.
+
+    Returns:
+        The noise level, and the status of the failure: None where there is none.
+    """
+    noise = noise_level(residuals_of([reading], [fitted], zero, _UNKNOWNS), sensor)
+    motion = reading.yaw - zero - fitted.residual
+    if float(motion @ motion) < _LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
+        return noise, Status.NO_OSCILLATION
+    return noise, None if determined(fitted.information) else Status.NOT_DETERMINED
+
+
+def describe_run(
+    run: Run,
+    reading: Reading,
+    fitted: RunFit,
+    zero: float,
+    covariance: Array,
+    noise_variance: float,
+    *,
+    noise: NoiseLevel | None = None,
+    windows: tuple[WindowEstimate, ...] = (),
+) -> RunEstimate:
+    """One run's result from its decay, whichever method found that.
+
+    The initial state and the zero are those that fit the decay best; their uncertainty is that of the reading
+    and that of the decay.
+
+    Args:
+        run: its conditions.
+        reading: the whole run.
+        fitted: the run at its decay.
+        zero: its sensor zero, rad.
+        covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
+        noise_variance: of one sample of the reading, rad².
+        noise: the level that the deviations rest on; None where the method does not use it.
+        windows: of the run.
+
+    Returns:
+        The estimate with the statuses that its noise, its length and its spring call for; NOT_DETERMINED alone
+        where the method's covariance is none.
+    """
+    if not determined(covariance):
+        return RunEstimate(run.id, (Status.NOT_DETERMINED,))
+    rest, decay = [ZERO, ANGLE, ANGULAR_RATE], [RATE, STIFFNESS]
+    own = inverse(fitted.information[np.ix_(rest, rest)])
+    move = own @ fitted.information[np.ix_(rest, decay)]
+    deviations = np.sqrt(np.diag(own * noise_variance + move @ covariance @ move.T))
+    omega_n, zeta = modal_quantities(fitted.decay, covariance)
+    return RunEstimate(
+        id=run.id,
+        statuses=by_gravity(_statuses(run, reading, fitted.decay, noise)),
+        omega_n=omega_n,
+        zeta=zeta,
+        initial_angle=Quantity(fitted.angle, float(deviations[1]), "rad"),
+        initial_rate=Quantity(fitted.rate, float(deviations[2]), "rad/s"),
+        sensor_zero=Quantity(zero, float(deviations[0]), "rad"),
+        noise=noise,
+        windows=windows,
+    )
+
+
+def _statuses(run: Run, reading: Reading, decay: Decay, noise: NoiseLevel | None) -> set[Status]:
+    statuses = set()
+    if noise is not None and noise.departs:
+        statuses.add(Status.MODEL_DEPARTS)
+    if noise is not None and noise.disagrees:
+        statuses.add(Status.NOISE_DISAGREES)
+    if decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * _FEW_CYCLES:
+        statuses.add(Status.FEW_CYCLES)
+    if run.spring_stiffness is None:
+        statuses.add(Status.NO_STIFFNESS)
+    return statuses
+
+
+def _failed(run: Run, reading: Reading, status: Status) -> FittedRun:
+    return FittedRun(reading, None, None, RunEstimate(run.id, (status,)))

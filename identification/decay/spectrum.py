@@ -1,0 +1,72 @@
+"""The frequency of a damped oscillation from its power spectral density."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from identification.decay.readable import holds_motion
+from tunnel_sim.vocabulary.record import Array, Record, read_only
+
+_PADDING = 8  # zero padding: eight times the record, so the interpolated peak sits within 1/16 of a bin
+
+
+@dataclass(frozen=True)
+class SpectralPeak:
+    """The highest peak of a power spectral density.
+
+    Args:
+        frequency: of the peak, Hz; 0 where the record holds no motion (`readable.holds_motion`).
+        prominence: its power over the median's; white noise alone reaches 40 less than once in 1e6 records.
+    """
+
+    frequency: float
+    prominence: float
+
+
+def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) -> SpectralPeak:
+    """The damped frequency, as the peak of the power spectral density.
+
+    The mean is taken off, a Hann window keeps the offset and the negative frequencies from leaking into the
+    peak, zeros pad the record to at least eight times its length, and a parabola through the logarithm of the
+    three highest bins gives the peak between them.
+
+    Args:
+        record: the reading, n samples, rad against s.
+        padding: number of times its length the record is padded to at least; 1 is quicker, and good enough to
+            start a fit of many cycles from.
+        falling: whether the window falls from the record's start on, in place of rising first: it then sees a
+            decay that is over long before the record is.
+
+    Returns:
+        The peak.
+    """
+    if not holds_motion(record):
+        return SpectralPeak(0.0, 0.0)
+    centred = record.yaw_rad - record.yaw_rad.mean()
+    size = 1 << int(np.ceil(np.log2(padding * centred.size)))
+    power = np.abs(np.fft.rfft(centred * _window(centred.size, falling), size)) ** 2
+    # Below one cycle per record the spectrum holds the offset's remainder, not the oscillation.
+    lowest = max(1, int(size / centred.size))
+    peak = lowest + int(np.argmax(power[lowest:-1]))
+    if power[peak] <= 0.0:
+        return SpectralPeak(0.0, 0.0)
+    place = peak + _parabola_offset(power[peak - 1 : peak + 2])
+    median = max(float(np.median(power[lowest:])), 1e-300)
+    return SpectralPeak(place * record.sample_rate / size, float(power[peak]) / median)
+
+
+@lru_cache(maxsize=4)  # the runs of a campaign are mostly of one length
+def _window(size: int, falling: bool) -> Array:
+    return read_only(np.hanning(2 * size)[size:] if falling else np.hanning(size))
+
+
+def _parabola_offset(power: Array) -> float:
+    # Where the parabola through three log powers peaks, in bins from the middle one, at most one half.
+    low, middle, high = np.log(np.maximum(power, 1e-300))
+    curvature = low - 2.0 * middle + high
+    if curvature >= 0.0:
+        return 0.0
+    return float(np.clip(0.5 * (low - high) / curvature, -0.5, 0.5))

@@ -1,0 +1,41 @@
+"""Block means of a reading. A decay keeps its rate and frequency in them; only its amplitude falls a little."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.decay.decay_fit import Reading
+from identification.decay.readable import LEAST_SAMPLES
+from tunnel_sim.vocabulary.record import Array
+
+
+def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[Reading, int]:
+    """Thin a reading to means of equal blocks.
+
+    Args:
+        reading: the whole record.
+        frequency: of its oscillation, Hz.
+        per_cycle: least number of blocks per period; the record itself gives eight at the least.
+
+    Returns:
+        The thinned reading, its clock that of the blocks' middles, and how many samples a block holds.
+    """
+    rate = (reading.time.size - 1) / float(reading.time[-1])
+    factor = max(1, int(min(rate / (per_cycle * frequency), reading.time.size / LEAST_SAMPLES)))
+    return Reading(mean_of_blocks(reading.time, factor), mean_of_blocks(reading.yaw, factor)), factor
+
+
+def mean_of_blocks(values: Array, factor: int) -> Array:
+    """Means of consecutive values; those left over at the end are dropped.
+
+    Args:
+        values: shape (n,).
+        factor: number of values in a block.
+
+    Returns:
+        Shape (n // factor,).
+    """
+    if factor == 1:
+        return values
+    usable = values.size // factor * factor
+    return np.asarray(values[:usable].reshape(-1, factor).mean(axis=1))

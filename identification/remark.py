@@ -1,0 +1,84 @@
+"""What an examination says of a campaign, and what it does about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+
+
+class Outcome(Enum):
+    """What follows from a remark. Listed from the gravest to the least."""
+
+    REFUSED = "refused"
+    LEFT_OUT = "left out"
+    CUT = "cut"
+    NOTED = "noted"
+
+
+@dataclass(frozen=True)
+class Remark:
+    """One thing found in the records before the estimation.
+
+    Args:
+        outcome: whether the campaign is refused, the runs are left out or cut, or nothing is done.
+        runs: ids of the runs it concerns.
+        what: what was found, as a clause.
+        remedy: what to do about it.
+    """
+
+    outcome: Outcome
+    runs: tuple[str, ...]
+    what: str
+    remedy: str
+
+    def __str__(self) -> str:
+        """The remark in one line: runs, what, remedy."""
+        word = "run" if len(self.runs) == 1 else "runs"
+        return f"{word} {', '.join(self.runs)}: {self.what}; {self.remedy}"
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name."""
+        return {
+            "outcome": self.outcome.value,
+            "runs": list(self.runs),
+            "what": self.what,
+            "remedy": self.remedy,
+        }
+
+    @classmethod
+    def from_json_dict(cls, data: Mapping[str, Any]) -> Remark:
+        """The inverse of `to_json_dict`."""
+        return cls(
+            Outcome(data["outcome"]), tuple(map(str, data["runs"])), str(data["what"]), str(data["remedy"])
+        )
+
+
+@dataclass(frozen=True)
+class Examined:
+    """A campaign after its examination.
+
+    Args:
+        campaign: the runs to go on with; the given one itself where nothing was left out or cut.
+        remarks: what was found, in the order of the checks.
+    """
+
+    campaign: Campaign
+    remarks: tuple[Remark, ...] = ()
+
+    def accepted(self) -> Examined:
+        """Itself, unless the examination refuses the campaign.
+
+        Raises:
+            TunnelError: for the first remark that refuses it.
+        """
+        for remark in self.remarks:
+            if remark.outcome is Outcome.REFUSED:
+                word = "run" if len(remark.runs) == 1 else "runs"
+                where = f"{self.campaign.name}, {word} {', '.join(remark.runs)}"
+                raise TunnelError(remark.what, where=where, remedy=remark.remedy)
+        return self

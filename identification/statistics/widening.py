@@ -1,0 +1,62 @@
+"""Standard deviations that stay honest when the model does not explain the data.
+
+Where it does, the covariance is the inverse of Fisher's information. Where it does not, the residual is not
+white: the variances are widened by its power in the band of the oscillation, or to the scatter of the runs,
+whichever is more. The diagnosis widens by the same scatter.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from identification.estimate import NoiseLevel
+from identification.statistics.information import inverse
+from tunnel_sim.vocabulary.record import Array
+
+
+def widened_covariance(covariance: Array, least_std: Array) -> Array:
+    """Raise the standard deviations that fall short, keeping the correlations.
+
+    Args:
+        covariance: shape (p, p).
+        least_std: shape (p,).
+
+    Returns:
+        Shape (p, p).
+    """
+    factor = np.maximum(1.0, least_std / np.sqrt(np.diag(covariance)))
+    return np.asarray(covariance * np.outer(factor, factor))
+
+
+def fisher_covariance(normal: Array, noise: NoiseLevel) -> Array:
+    """Inverse information times the noise variance, widened by the slow ratio.
+
+    Args:
+        normal: JᵀJ, shape (p, p).
+        noise: the level it rests on.
+
+    Returns:
+        Shape (p, p).
+    """
+    return inverse(normal) * (noise.std**2 * noise.slow_ratio)
+
+
+def scatter_of_runs(influences: Array, speaking: NDArray[np.int64]) -> Array:
+    """How far the runs move parameters about their joint estimate, whatever colours the residuals.
+
+    The sandwich estimator with a run as the cluster (Liang & Zeger, Biometrika 73 (1986) 13,
+    doi 10.1093/biomet/73.1.13), widened by Student's t for the few runs that bear on a parameter.
+
+    Args:
+        influences: of every run, what its residual contributes to the parameters, shape (runs, q).
+        speaking: how many runs bear on each parameter, shape (q,).
+
+    Returns:
+        Standard deviations, shape (q,): 1.96 of them on either side are a 95 % interval.
+    """
+    free = np.maximum(speaking - 2, 1)
+    spread = np.sqrt(np.sum(influences**2, axis=0) * speaking / free)
+    return np.asarray(spread * student.ppf(0.975, free) / norm.ppf(0.975))

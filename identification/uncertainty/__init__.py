@@ -1,0 +1,1 @@
+"""What an estimate is worth: information, bounds, budgets."""

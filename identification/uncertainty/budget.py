@@ -1,0 +1,295 @@
+"""The uncertainty budget: from noise, stated inputs, scatter of the runs and choice of model to one covariance.
+
+First order after JCGM 100:2008 (GUM), correlated inputs after its 5.2:
+
+    U = U_noise + Σ_ij ρ_ij uᵢ cᵢ (u_j c_j)ᵀ + U_scatter + U_model.
+
+- Noise: the estimator's own covariance.
+- Inputs: an error common to all runs scales the coefficients in closed form, whatever the method:
+  (Cnβ, Cnr) ∝ Kr, V^(−2, −1), ρ^−1, A^−1, l^(−1, −2). An error of one spring's or one run's own is moved through
+  the estimator itself, one input at a time by one standard uncertainty (Kragten, Analyst 119 (1994) 2161–2165,
+  doi 10.1039/AN9941902161).
+- Scatter: how far the wind-off and the wind-on runs scatter about the coefficients they share, as far as it is more
+  than noise and the individual errors of the inputs explain (see `identification.uncertainty.scatter`).
+- Model: how far other methods, or the first half of every record, move the answer beyond chance; the largest move
+  is the half-width of a rectangular distribution (GUM 4.3.7).
+
+What this cannot see is what no repeat and no other method of the same model shows: see the diagnosis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from math import sqrt
+from typing import Any, Literal
+
+import numpy as np
+
+from identification.estimate import PARAMETERS, Estimate, Quantity
+from identification.uncertainty.input_uncertainty import InputUncertainties
+from identification.uncertainty.scatter import error_groups, scaled, side_scatter
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array, Record
+
+Identify = Callable[[Campaign], Estimate]
+Told = Callable[[str], None]
+_NAMES = (*PARAMETERS, "wind_off_inertia")
+# Powers with which a common scale of a stated input enters; the clock's is that of the time axis.
+_POWERS: Mapping[str, tuple[float, float, float, float, float]] = {
+    "spring_stiffness": (1.0, 1.0, 1.0, 1.0, 1.0),
+    "wind_speed": (-2.0, -1.0, 0.0, 0.0, 0.0),
+    "air_density": (-1.0, -1.0, 0.0, 0.0, 0.0),
+    "frontal_area": (-1.0, -1.0, 0.0, 0.0, 0.0),
+    "reference_length": (-1.0, -2.0, 0.0, 0.0, 0.0),
+    "yaw_inertia": (0.0, 0.0, 0.0, 0.0, 0.0),  # the nominal one decides nothing: Izz is identified
+    "clock": (0.0, 1.0, 2.0, 1.0, 2.0),
+}
+_CHANCE = 2.58  # of a move, in its standard deviations: once in a hundred
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """One line of the budget.
+
+    Args:
+        name: what is uncertain.
+        kind: GUM's evaluation: ``A`` by statistics, ``B`` by other means.
+        covariance: what it adds, shape (p, p), in the products of the quantities' units; a correlation may take
+            away.
+        note: why it is zero or could not be had; empty where there is nothing to say.
+        known: whether it could be had; where not, its covariance is zero and the total leaves it out.
+    """
+
+    name: str
+    kind: Literal["A", "B"]
+    covariance: Array
+    note: str = ""
+    known: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Budget:
+    """The budget of an estimate.
+
+    Args:
+        names: of the quantities, p of them: the estimate's parameters, and ``wind_off_inertia``.
+        units: likewise.
+        values: shape (p,).
+        components: noise first.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Array
+    components: tuple[Component, ...] = field(default_factory=tuple)
+
+    @property
+    def covariance(self) -> Array:
+        """Of the quantities, all components together, shape (p, p)."""
+        return np.asarray(np.sum([component.covariance for component in self.components], axis=0))
+
+    def std(self, name: str) -> float:
+        """Combined standard uncertainty of a quantity, in its unit."""
+        place = self.names.index(name)
+        return sqrt(float(self.covariance[place, place]))
+
+    def share(self, component: Component, name: str) -> float:
+        """Share of the quantity's variance that a component makes, a fraction.
+
+        Args:
+            component: one of the budget's.
+            name: of the quantity.
+        """
+        place = self.names.index(name)
+        return float(component.covariance[place, place] / self.covariance[place, place])
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Per quantity the combined standard uncertainty, per component its variance's root and sign."""
+        return {
+            "combined_std": {name: self.std(name) for name in self.names},
+            "components": [
+                {
+                    "name": one.name,
+                    "type": one.kind,
+                    "known": one.known,
+                    "note": one.note,
+                    "variance": dict(zip(self.names, np.diag(one.covariance).tolist(), strict=True)),
+                }
+                for one in self.components
+            ],
+        }
+
+
+def make_budget(
+    campaign: Campaign,
+    estimate: Estimate,
+    identify: Identify,
+    inputs: InputUncertainties,
+    *,
+    others: Mapping[str, Identify] | None = None,
+    told: Told | None = None,
+) -> Budget:
+    """The budget of a campaign's coefficients.
+
+    Args:
+        campaign: what was identified.
+        estimate: its estimate.
+        identify: the estimator that made it; it is asked again with changed campaigns.
+        inputs: how well the stated inputs are known.
+        others: other estimators, by name, whose spread counts as the choice of model.
+        told: told what is being done.
+
+    Returns:
+        The budget.
+
+    Raises:
+        TunnelError: when the estimate has no coefficients to make a budget of.
+    """
+    names = tuple(name for name in _NAMES if getattr(estimate, name) is not None)
+    if not set(names) & set(PARAMETERS):
+        raise TunnelError(
+            "no coefficient to make a budget of",
+            where=campaign.name,
+            remedy="state spring_stiffness, or leave --budget and --uncertainties out",
+        )
+    tell = told or (lambda _: None)
+    quantities: list[Quantity] = [getattr(estimate, name) for name in names]
+    budget = Budget(names, tuple(q.unit for q in quantities), np.array([q.value for q in quantities]))
+    noise = Component("noise of the readings", "A", _noise(estimate, budget))
+    common = _common(budget, inputs, any(run.wind_on for run in campaign.runs))
+    individual = _individual(campaign, budget, identify, inputs, tell)
+    scatter = _scatter(campaign, estimate, budget, inputs)
+    tell("choice of model")
+    rivals: dict[str, Estimate] = {name: other(campaign) for name, other in (others or {}).items()}
+    rivals["the first half of the records"] = identify(_first_half(campaign))
+    model = _model(budget, np.sqrt(np.diag(noise.covariance)), rivals)
+    return replace(budget, components=(noise, *common, *individual, *scatter, model))
+
+
+def with_budget(estimate: Estimate, budget: Budget) -> Estimate:
+    """The estimate with combined standard uncertainties in place of those of noise alone.
+
+    Args:
+        estimate: the budget's.
+        budget: of it.
+
+    Returns:
+        The same values; standard deviations and covariance are the budget's.
+    """
+    places = [budget.names.index(name) for name in estimate.parameters]
+    total = budget.covariance[np.ix_(places, places)]
+    quantities: dict[str, Any] = {
+        name: replace(getattr(estimate, name), std=budget.std(name)) for name in budget.names
+    }
+    return replace(estimate, covariance=tuple(map(tuple, total.tolist())), **quantities)
+
+
+def _noise(estimate: Estimate, budget: Budget) -> Array:
+    covariance = np.diag([getattr(estimate, name).std ** 2 for name in budget.names])
+    places = [budget.names.index(name) for name in estimate.parameters]
+    covariance[np.ix_(places, places)] = estimate.covariance_matrix
+    return covariance
+
+
+def _common(budget: Budget, inputs: InputUncertainties, windy: bool) -> list[Component]:
+    given = tuple(name for name in _POWERS if inputs.common.get(name, 0.0) > 0.0)
+    columns = [_NAMES.index(name) for name in budget.names]
+    moves = np.array(
+        [budget.values * np.array(_POWERS[name])[columns] * inputs.common[name] for name in given]
+    ).reshape(len(given), len(budget.names))
+    notes = {"yaw_inertia": "the nominal inertia is not used"}
+    if not windy:
+        notes |= dict.fromkeys(("wind_speed", "air_density"), "no wind-on run")
+    found = [
+        Component(f"{name}, common", "B", np.outer(move, move), notes.get(name, ""))
+        for name, move in zip(given, moves, strict=True)
+    ]
+    correlation = inputs.correlation(given) - np.eye(len(given))
+    if np.any(correlation != 0.0):
+        found.append(Component("correlations of these", "B", moves.T @ correlation @ moves))
+    return found
+
+
+def _individual(
+    campaign: Campaign, budget: Budget, identify: Identify, inputs: InputUncertainties, tell: Told
+) -> list[Component]:
+    found = []
+    for name, size in inputs.individual.items():
+        if size <= 0.0:
+            continue
+        groups = error_groups(campaign.runs, name)
+        total = np.zeros((len(budget.names),) * 2)
+        for number, group in enumerate(groups, 1):
+            tell(f"{name}, {number} of {len(groups)}")
+            runs = tuple(
+                scaled(run, name, 1.0 + size) if i in group else run for i, run in enumerate(campaign.runs)
+            )
+            values = _values(identify(replace(campaign, runs=runs)), budget)
+            if values is None:
+                raise TunnelError(
+                    f"no answer with {name} of run {campaign.runs[group[0]].id} {100 * size:g} % larger",
+                    where=campaign.name,
+                    remedy="use another estimator, or state a smaller uncertainty",
+                )
+            total += np.outer(values - budget.values, values - budget.values)
+        each = "spring" if name == "spring_stiffness" else "run"
+        note = "" if groups else "no run states it"
+        found.append(Component(f"{name}, each {each} its own", "B", total, note))
+    return found
+
+
+def _values(estimate: Estimate, budget: Budget) -> Array | None:
+    """The budget's quantities of another estimate; None where one is missing."""
+    found: list[Quantity | None] = [getattr(estimate, name) for name in budget.names]
+    given = [quantity.value for quantity in found if quantity is not None]
+    return np.array(given) if len(given) == len(found) else None
+
+
+def _scatter(
+    campaign: Campaign, estimate: Estimate, budget: Budget, inputs: InputUncertainties
+) -> list[Component]:
+    """Of the wind-off and of the wind-on runs, as far as nothing above explains it."""
+    found = []
+    sides = side_scatter(campaign, estimate.runs, inputs.individual)
+    for side, label in zip(sides, ("wind-off", "wind-on"), strict=True):
+        covariance = np.zeros((len(budget.names),) * 2)
+        shared = [name for name in side.names if name in budget.names]
+        mine, theirs = [budget.names.index(n) for n in shared], [side.names.index(n) for n in shared]
+        covariance[np.ix_(mine, mine)] = side.covariance[np.ix_(theirs, theirs)]
+        note = "" if covariance.any() else "explained by what is above"
+        note = note if side.known else "not known, since the campaign has no run to spare"
+        found.append(Component(f"scatter of the {label} runs", "A", covariance, note, known=side.known))
+    return found
+
+
+def _model(budget: Budget, own_std: Array, rivals: Mapping[str, Estimate]) -> Component:
+    """The largest move beyond chance, as the half-width of a rectangular distribution."""
+    largest, blamed = np.zeros(len(budget.names)), []
+    for name, rival in rivals.items():
+        values = _values(rival, budget)
+        if values is None:
+            continue
+        move = np.abs(values - budget.values)
+        # Of two unbiased answers to the same records, the better one is uncorrelated with their difference.
+        chance = np.sqrt(np.abs(_deviations(rival, budget) ** 2 - own_std**2))
+        move = np.where(move > _CHANCE * chance, move, 0.0)
+        if np.any(move > 0.0):
+            blamed.append(name)
+        largest = np.maximum(largest, move)
+    note = f"moved by {', '.join(blamed)}" if blamed else f"{', '.join(rivals)}: within chance"
+    return Component("choice of model", "B", np.diag(largest**2 / 3.0), note)
+
+
+def _deviations(estimate: Estimate, budget: Budget) -> Array:
+    found: list[Quantity | None] = [getattr(estimate, name) for name in budget.names]
+    return np.array([0.0 if quantity is None else quantity.std for quantity in found])
+
+
+def _first_half(campaign: Campaign) -> Campaign:
+    runs = []
+    for run in campaign.runs:
+        half = slice(0, max(2, run.record.time_s.size // 2))
+        runs.append(replace(run, record=Record(run.record.time_s[half], run.record.yaw_rad[half])))
+    return replace(campaign, runs=tuple(runs))

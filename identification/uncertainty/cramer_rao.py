@@ -1,0 +1,211 @@
+"""The Cramér–Rao bound: the smallest standard deviations any unbiased estimator can reach.
+
+Exact Fisher information of real damped sinusoids in white Gaussian noise at the sample times given, with the
+closed-form sensitivities of `damped_oscillation`. For long records of light damping it tends to
+
+    std(ζ)/ζ = 4 (S/A) √(σ/fs),   std(f)/f = ζ · std(ζ)/ζ,
+
+with noise S, initial amplitude A, decay rate σ = ζωn and sample rate fs. Source: S. M. Kay, Fundamentals of
+Statistical Signal Processing: Estimation Theory (1993), ch. 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.campaign.derivatives import build_design, derivatives, has_size
+from identification.decay.damped_oscillation import Decay
+from identification.decay.decay_fit import information_at
+from identification.estimate import PARAMETERS
+from identification.statistics.information import eliminate, embed, inverse
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+
+
+@dataclass(frozen=True)
+class SinusoidBound:
+    """Standard deviations no unbiased estimator of one damped sinusoid goes below.
+
+    Args:
+        amplitude: of the envelope at the first sample, rad.
+        phase: at the first sample, rad.
+        frequency: damped frequency, Hz.
+        omega_n: natural angular frequency, rad/s.
+        zeta: damping ratio.
+        offset: rad; 0 where it is known.
+    """
+
+    amplitude: float
+    phase: float
+    frequency: float
+    omega_n: float
+    zeta: float
+    offset: float
+
+
+def damped_sinusoid_bound(
+    time: Array,
+    *,
+    amplitude: float,
+    phase: float,
+    frequency: float,
+    zeta: float,
+    noise_std: float,
+    offset_known: bool = False,
+) -> SinusoidBound:
+    """The bound for y = A e^{−σt} cos(2πf t + φ) + offset + noise, all five unknown.
+
+    Args:
+        time: sample times from the instant of amplitude and phase, shape (n,), s.
+        amplitude: A, rad, above 0.
+        phase: φ, rad.
+        frequency: damped frequency f, Hz, above 0.
+        zeta: damping ratio, below 1.
+        noise_std: S, rad.
+        offset_known: whether the offset is known.
+
+    Returns:
+        The bound.
+
+    Raises:
+        ValueError: for an amplitude or frequency that is not positive, or |ζ| of 1 or more.
+    """
+    if amplitude <= 0.0 or frequency <= 0.0 or abs(zeta) >= 1.0:
+        raise ValueError("amplitude and frequency must be positive and zeta between -1 and 1")
+    omega_d = 2.0 * np.pi * frequency
+    decay = Decay.from_modal(omega_d / np.sqrt(1.0 - zeta**2), zeta)
+    angle = amplitude * np.cos(phase)
+    rate = -decay.rate * angle - omega_d * amplitude * np.sin(phase)
+    information = information_at(time, decay, float(angle), float(rate))
+    kept = [0, 1, 3, 4] if offset_known else [0, 1, 3, 4, 2]
+    covariance = np.zeros((5, 5))
+    covariance[: len(kept), : len(kept)] = inverse(information[np.ix_(kept, kept)]) * noise_std**2
+    jacobian = _modal_jacobian(decay, omega_d, amplitude, phase)
+    deviations = np.sqrt(np.diag(jacobian @ covariance @ jacobian.T))
+    return SinusoidBound(*map(float, deviations))
+
+
+def _modal_jacobian(decay: Decay, omega_d: float, amplitude: float, phase: float) -> Array:
+    # Rows: amplitude, phase, f, ωn, ζ, offset. Columns: a, k, angle, rate, offset.
+    a, omega = decay.rate, decay.omega_n
+    omega_row = np.array([0.0, 0.5 / omega, 0.0, 0.0, 0.0])
+    zeta_row = np.array([1.0 / omega, -0.5 * a / omega**3, 0.0, 0.0, 0.0])
+    damped_row = np.array([-a / omega_d, 0.5 / omega_d, 0.0, 0.0, 0.0])
+    # In-phase part x = A cos φ is the angle, quadrature A sin φ = −(rate + a·angle)/ωd.
+    in_phase, quadrature = amplitude * np.cos(phase), amplitude * np.sin(phase)
+    x_row = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
+    q_row = np.array([-in_phase, 0.0, -a, -1.0, 0.0]) / omega_d - quadrature / omega_d * damped_row
+    return np.array(
+        [
+            (in_phase * x_row + quadrature * q_row) / amplitude,
+            (in_phase * q_row - quadrature * x_row) / amplitude**2,
+            damped_row / (2.0 * np.pi),
+            omega_row,
+            zeta_row,
+            np.array([0.0, 0.0, 0.0, 0.0, 1.0]),
+        ]
+    )
+
+
+@dataclass(frozen=True)
+class CampaignBound:
+    """The bound of a campaign's common parameters, every run's initial state and the zero unknown.
+
+    Args:
+        parameters: names, as in `Estimate.parameters`.
+        covariance: smallest covariance, shape (p, p), in the products of their units.
+    """
+
+    parameters: tuple[str, ...]
+    covariance: tuple[tuple[float, ...], ...]
+
+    def std(self, name: str) -> float:
+        """The smallest standard deviation of a parameter.
+
+        Args:
+            name: one of ``parameters``.
+
+        Raises:
+            KeyError: when the campaign does not determine it.
+        """
+        if name not in self.parameters:
+            raise KeyError(name)
+        place = self.parameters.index(name)
+        return float(np.sqrt(self.covariance[place][place]))
+
+
+def campaign_bound(
+    campaign: Campaign,
+    *,
+    cn_beta: float,
+    cn_r: float,
+    yaw_inertia: float,
+    mechanical_damping: float,
+    noise_std: float,
+    initial_states: Sequence[tuple[float, float]] | None = None,
+) -> CampaignBound:
+    """The bound of Cnβ, Cnr, Izz and Cr together.
+
+    Args:
+        campaign: conditions and sample times; the readings themselves are not used.
+        cn_beta: true Cnβ, 1/rad.
+        cn_r: true Cnr, 1/rad.
+        yaw_inertia: true Izz, kg m².
+        mechanical_damping: true Cr, N m s/rad.
+        noise_std: of the reading, quantisation included (add resolution²/12 to the variance), rad.
+        initial_states: angle [rad] and rate [rad/s] at each run's first sample; where None, the runs' nominal
+            release angles at rest.
+
+    Returns:
+        The bound of the parameters the campaign separates.
+
+    Raises:
+        TunnelError: when a run states no spring stiffness, the rig no size although the wind blows, or a run
+            neither its initial state nor a release angle.
+    """
+    if any(run.spring_stiffness is None for run in campaign.runs):
+        raise TunnelError(
+            "run without spring_stiffness", where=campaign.name, remedy="state it for every run"
+        )
+    if any(run.wind_on for run in campaign.runs) and not has_size(campaign.rig):
+        remedy = "state frontal_area and reference_length"
+        raise TunnelError("rig without size", where=campaign.name, remedy=remedy)
+    design = build_design(campaign.runs, campaign.rig)
+    states = initial_states if initial_states is not None else _released(campaign)
+    normal = np.zeros((design.size + 1, design.size + 1))
+    for run, link, (angle, rate), loads in zip(
+        campaign.runs,
+        design.links,
+        states,
+        zip(design.stiffness_loads, design.damping_loads, strict=True),
+        strict=True,
+    ):
+        stiffness = float(run.spring_stiffness or 0.0) - float(loads[0]) * cn_beta
+        damping = mechanical_damping - float(loads[1]) * cn_r
+        decay = Decay(0.5 * damping / yaw_inertia, stiffness / yaw_inertia)
+        information = information_at(run.record.time_s - run.record.time_s[0], decay, angle, rate)
+        reduced, _ = eliminate(information, np.zeros(5), 3)
+        extended = embed(link, with_zero=True)
+        normal += extended.T @ reduced @ extended
+    truth = {"g": 1.0, "n": cn_beta, "d": mechanical_damping, "m": cn_r}
+    parameters = np.zeros(design.size)
+    for name, column in design.columns.items():
+        parameters[column] = truth[name] / yaw_inertia
+    found = derivatives(design, parameters)
+    covariance = found.jacobian @ (inverse(normal) * noise_std**2)[:-1, :-1] @ found.jacobian.T
+    names = tuple(name for name in PARAMETERS if name in found.names)
+    return CampaignBound(names, tuple(map(tuple, covariance.tolist())))
+
+
+def _released(campaign: Campaign) -> list[tuple[float, float]]:
+    states = []
+    for run in campaign.runs:
+        if run.release_angle is None:
+            where = f"run {run.id}"
+            raise TunnelError("no initial state", where=where, remedy="state release_angle or initial_states")
+        states.append((run.release_angle, 0.0))
+    return states

@@ -1,0 +1,155 @@
+"""How well a campaign's stated inputs are known: standard uncertainties, and which errors are common to runs.
+
+The campaign format states Kr, V, ρ, A and l as exact numbers; how well they are known comes from a small TOML:
+
+    schema_version = 1
+
+    [common]                      # one error for all runs: calibration of an instrument, a dimension
+    spring_stiffness = 0.005      # relative standard uncertainties throughout: 0.005 is half a per cent
+    wind_speed = 0.01
+    air_density = 0.003
+    frontal_area = 0.005
+    reference_length = 0.001
+
+    [individual]                  # an error of its own for every spring, or every wind-on run
+    spring_stiffness = 0.002
+    wind_speed = 0.005
+
+    [[correlations]]              # between common errors, such as V from a pitot tube and ρ
+    between = ["wind_speed", "air_density"]
+    coefficient = -0.5
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from tunnel_sim.files.toml_input import StrictModel, check_version, load_toml, shown, validate
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.record import Array
+
+COMMON = (
+    "spring_stiffness", "wind_speed", "air_density", "frontal_area", "reference_length", "yaw_inertia", "clock"
+)  # fmt: skip
+"""Inputs whose error may be common to all runs; ``clock`` is the scale of the time axis."""
+INDIVIDUAL = ("spring_stiffness", "wind_speed", "air_density")
+"""Inputs that may have an error of their own in every spring, or in every wind-on run."""
+
+_Relative = Annotated[float, Field(ge=0.0, lt=0.5)]
+_MEANING = "a relative standard uncertainty from 0 to 0.5, such as 0.01 for one per cent"
+
+
+@dataclass(frozen=True)
+class InputUncertainties:
+    """Relative standard uncertainties of what a campaign states; what is not named is taken as exact.
+
+    Args:
+        common: by name of `COMMON`: one error for all runs.
+        individual: by name of `INDIVIDUAL`: independent errors of springs or wind-on runs, besides the common one.
+        correlations: pairs of common inputs with their correlation coefficient.
+    """
+
+    common: Mapping[str, float] = field(default_factory=dict)
+    individual: Mapping[str, float] = field(default_factory=dict)
+    correlations: tuple[tuple[str, str, float], ...] = ()
+
+    def correlation(self, names: tuple[str, ...]) -> Array:
+        """Correlation matrix of common inputs.
+
+        Args:
+            names: of the inputs, n of them.
+
+        Returns:
+            Shape (n, n).
+        """
+        matrix = np.eye(len(names))
+        for first, second, coefficient in self.correlations:
+            if first in names and second in names:
+                i, j = names.index(first), names.index(second)
+                matrix[i, j] = matrix[j, i] = coefficient
+        return matrix
+
+
+class _CommonTable(StrictModel):
+    """``[common]``."""
+
+    spring_stiffness: _Relative = Field(default=0.0, description=_MEANING)
+    wind_speed: _Relative = Field(default=0.0, description=_MEANING)
+    air_density: _Relative = Field(default=0.0, description=_MEANING)
+    frontal_area: _Relative = Field(default=0.0, description=_MEANING)
+    reference_length: _Relative = Field(default=0.0, description=_MEANING)
+    yaw_inertia: _Relative = Field(default=0.0, description=_MEANING)
+    clock: _Relative = Field(default=0.0, description=_MEANING)
+
+
+class _IndividualTable(StrictModel):
+    """``[individual]``."""
+
+    spring_stiffness: _Relative = Field(default=0.0, description=_MEANING)
+    wind_speed: _Relative = Field(default=0.0, description=_MEANING)
+    air_density: _Relative = Field(default=0.0, description=_MEANING)
+
+
+class _CorrelationTable(StrictModel):
+    """``[[correlations]]``."""
+
+    between: list[str] = Field(min_length=2, max_length=2, description="a list of two inputs of [common]")
+    coefficient: Annotated[float, Field(ge=-1.0, le=1.0)] = Field(description="a number from -1 to 1")
+
+
+class _Document(StrictModel):
+    """The whole file."""
+
+    schema_version: int = Field(description="1")
+    common: _CommonTable = Field(default=_CommonTable(), description="a [common] table")
+    individual: _IndividualTable = Field(default=_IndividualTable(), description="an [individual] table")
+    correlations: list[_CorrelationTable] = Field(default=[], description="[[correlations]] tables")
+
+
+def load_uncertainties(path: Path) -> InputUncertainties:
+    """Read a file of uncertainties, as at the top of this module.
+
+    Args:
+        path: the TOML file.
+
+    Returns:
+        What it states.
+
+    Raises:
+        TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
+    """
+    raw = load_toml(path, missing="name a TOML of uncertainties, see docs/how-to/state-uncertainties.md")
+    check_version(raw, path)
+    document = validate(_Document, raw, path)
+    where = shown(path)
+    common = {name: value for name, value in document.common.model_dump().items() if value > 0.0}
+    individual = {name: value for name, value in document.individual.model_dump().items() if value > 0.0}
+    pairs: list[tuple[str, str, float]] = []
+    for table in document.correlations:
+        first, second = table.between
+        for name in (first, second):
+            if name not in COMMON:
+                raise TunnelError(f"no input {name!r}", where=where, remedy=did_you_mean(name, COMMON))
+            if name not in common:
+                raise TunnelError(
+                    f"correlated {name} has no uncertainty", where=where, remedy="state it under [common]"
+                )
+        if first == second or {first, second} in [{a, b} for a, b, _ in pairs]:
+            raise TunnelError(
+                f"{first} and {second} are correlated twice, or one input with itself",
+                where=where,
+                remedy="name every pair once",
+            )
+        pairs.append((first, second, table.coefficient))
+    found = InputUncertainties(common, individual, tuple(pairs))
+    if np.linalg.eigvalsh(found.correlation(COMMON))[0] < -1e-12:
+        raise TunnelError(
+            "these correlations contradict one another", where=where, remedy="correct a coefficient"
+        )
+    return found

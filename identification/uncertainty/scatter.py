@@ -1,0 +1,206 @@
+"""How far runs scatter about the coefficients they share, beyond what is known to be uncertain about them.
+
+Every run's decay rate a and stiffness k are linear in shared parameters (see `derivatives`); their residuals
+about the generalised least-squares fit are squared and summed, weighed by the runs' own variances, for wind-off and
+wind-on runs and for a and k apart. Where a sum exceeds, by more than chance, what noise and the stated individual
+errors of the inputs make it on the average, every run of it is given the variance of its own residual: a jackknife,
+linearised (J. G. MacKinnon & H. White, J. Econometrics 29 (1985) 305–325, doi 10.1016/0304-4076(85)90158-7).
+Repeats of a run count by themselves, no pairing is needed. The chance of a weighted sum of squares is
+Satterthwaite's, Biometrics Bull. 2 (1946) 110–114, doi 10.2307/3002019.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.campaign.derivatives import Design, build_design, combine, derivatives
+from identification.estimate import RunEstimate
+from identification.statistics.information import inverse
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
+from tunnel_sim.vocabulary.record import Array
+
+FALSE_ALARM_RATE = 0.01
+_LEAST_DEGREES = 0.5
+_STEP = 1e-4
+_LEAST_FREE = 0.1  # of a residual that the run's own pull leaves; of less, nothing can be told
+
+
+@dataclass(frozen=True, eq=False)
+class SideScatter:
+    """The scatter of the wind-off or of the wind-on runs.
+
+    Args:
+        known: whether the runs leave a degree of freedom to see it by.
+        ratio: largest of the sums of squares over its expectation, of a or of k (1).
+        names: parameters of the covariance.
+        covariance: what the excess adds to that of the parameters, shape (p, p); zero within chance.
+    """
+
+    known: bool
+    ratio: float
+    names: tuple[str, ...]
+    covariance: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """The runs' (a, k), stacked as one vector of length 2n."""
+
+    residual: Array
+    weight: Array
+    hat: Array
+    noise: Array
+    influence: Array
+    names: tuple[str, ...]
+
+
+def side_scatter(
+    campaign: Campaign, estimates: Sequence[RunEstimate], individual: Mapping[str, float]
+) -> tuple[SideScatter, SideScatter]:
+    """Scatter of wind-off and of wind-on runs.
+
+    Args:
+        campaign: the runs' conditions.
+        estimates: one per run, with ωn and ζ where they could be had.
+        individual: relative standard uncertainties of inputs that err run by run, or spring by spring.
+
+    Returns:
+        Wind-off, wind-on.
+    """
+    pairs = [
+        (run, found)
+        for run, found in zip(campaign.runs, estimates, strict=True)
+        if run.spring_stiffness is not None and found.omega_n is not None and found.zeta is not None
+    ]
+    runs = [run for run, _ in pairs]
+    nothing = SideScatter(False, 1.0, (), np.zeros((0, 0)))
+    if not pairs:
+        return nothing, nothing
+    design = build_design(runs, campaign.rig)
+    fitted = _fit(design, [estimate for _, estimate in pairs])
+    if fitted is None or not fitted[0].names:
+        return nothing, nothing
+    fit, shared = fitted
+    covariance = fit.noise + _input_covariance(runs, campaign.rig, design, shared, individual)
+    windy = np.repeat([run.wind_on for run in runs], 2)
+    return _side(fit, covariance, ~windy), _side(fit, covariance, windy)
+
+
+def _fit(design: Design, estimates: Sequence[RunEstimate]) -> tuple[_Fit, Array] | None:
+    decays, blocks = [], []
+    for found in estimates:
+        assert found.omega_n is not None
+        assert found.zeta is not None
+        omega, zeta = found.omega_n, found.zeta
+        decays.append([zeta.value * omega.value, omega.value**2])
+        # ωn and ζ of a decay are uncorrelated to first order in the damping.
+        jacobian = np.array([[zeta.value, omega.value], [2.0 * omega.value, 0.0]])
+        blocks.append(jacobian @ np.diag([omega.std**2, zeta.std**2]) @ jacobian.T)
+    informations = [inverse(block) for block in blocks]
+    combined = combine(design, np.array(decays), informations)
+    if combined is None:
+        return None
+    shared, inverse_normal = combined
+    links = np.concatenate(design.links)
+    weight = _diagonal(informations)
+    gain = inverse_normal @ links.T @ weight
+    found_values = derivatives(design, shared)
+    fit = _Fit(
+        residual=np.concatenate(decays) - links @ shared,
+        weight=weight,
+        hat=links @ gain,
+        noise=_diagonal(blocks),
+        influence=found_values.jacobian @ gain,
+        names=found_values.names,
+    )
+    return fit, shared
+
+
+def _diagonal(blocks: Sequence[Array]) -> Array:
+    size = 2 * len(blocks)
+    matrix = np.zeros((size, size))
+    for i, block in enumerate(blocks):
+        matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = block
+    return matrix
+
+
+def _input_covariance(
+    runs: Sequence[Run], rig: RigProperties, design: Design, shared: Array, individual: Mapping[str, float]
+) -> Array:
+    """Covariance of the (a, k) that runs seem to have because their inputs are not what is stated."""
+    total = np.zeros((2 * len(runs),) * 2)
+    before = np.concatenate(design.links) @ shared
+    for name, size in individual.items():
+        for group in error_groups(runs, name):
+            moved = [scaled(run, name, 1.0 + _STEP) if i in group else run for i, run in enumerate(runs)]
+            links = build_design(moved, rig).links
+            if links[0].shape != design.links[0].shape:
+                continue
+            move = (np.concatenate(links) @ shared - before) * (size / _STEP)
+            total += np.outer(move, move)
+    return total
+
+
+def error_groups(runs: Sequence[Run], name: str) -> list[list[int]]:
+    """Which runs share one individual error: those of a spring, or a single wind-on run.
+
+    Args:
+        runs: of the campaign.
+        name: of the input.
+
+    Returns:
+        Places of the runs, group by group.
+    """
+    if name != "spring_stiffness":
+        return [[i] for i, run in enumerate(runs) if run.wind_on]
+    springs: dict[float, list[int]] = {}
+    for i, run in enumerate(runs):
+        if run.spring_stiffness is not None:
+            springs.setdefault(run.spring_stiffness, []).append(i)
+    return list(springs.values())
+
+
+def scaled(run: Run, name: str, factor: float) -> Run:
+    """A run with one stated input changed.
+
+    Args:
+        run: as stated.
+        name: ``spring_stiffness``, ``wind_speed`` or ``air_density``.
+        factor: what the input is multiplied by (1).
+    """
+    if name == "wind_speed":
+        return replace(run, wind_speed=run.wind_speed * factor)
+    if name == "air_density":
+        return replace(run, air_density=None if run.air_density is None else run.air_density * factor)
+    spring = run.spring_stiffness
+    return replace(run, spring_stiffness=None if spring is None else spring * factor)
+
+
+def _side(fit: _Fit, covariance: Array, mine: Array) -> SideScatter:
+    from scipy.special import chdtri
+
+    size = fit.residual.size
+    added = np.zeros((len(fit.names),) * 2)
+    largest, seen = 0.0, False
+    for row in (0, 1):  # decay rates, then stiffnesses
+        chosen = (mine & (np.arange(size) % 2 == row)).astype(np.float64)
+        root = np.sqrt(chosen * np.diag(fit.weight))
+        # The weighed residuals of these rows are a linear map of errors of this covariance.
+        residual_map = root[:, None] * (np.eye(size) - fit.hat)
+        spread = residual_map @ covariance @ residual_map.T
+        if float(np.trace(residual_map @ fit.noise @ residual_map.T)) < _LEAST_DEGREES:
+            continue
+        seen = True
+        expected = float(np.trace(spread))
+        degrees = expected**2 / float(np.sum(spread**2))
+        ratio = float(np.sum((root * fit.residual) ** 2)) / expected
+        largest = max(largest, ratio)
+        if ratio > float(chdtri(degrees, FALSE_ALARM_RATE)) / degrees:
+            # As the jackknife does, every run is given the variance of its own residual, freed of its own pull.
+            freed = fit.residual / np.maximum(1.0 - np.diag(fit.hat), _LEAST_FREE)
+            excess = np.maximum(freed**2 - np.diag(covariance), 0.0)
+            added += (fit.influence * (chosen * excess)) @ fit.influence.T
+    return SideScatter(seen, largest, fit.names, added)

@@ -1,0 +1,259 @@
+"""The score of a blind check as sections: tables for a terminal, or a page in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from diagnosis.blind import Score
+    from diagnosis.blind.statistics import Share
+
+NAMES = {"cn_beta": "Cnβ", "cn_r": "Cnr"}
+KINDS = {
+    "single": "one effect",
+    "single, below 1": "· below 1 × noise power",
+    "single, 1 to 10": "· 1 to 10 × noise power",
+    "single, above 10": "· above 10 × noise power",
+    "pair": "two effects",
+    "none": "none acts",
+    "outside": "outside the vocabulary",
+    "withheld": "withheld from the vocabulary",
+    "all": "all",
+}
+
+
+@dataclass(frozen=True)
+class Section:
+    """A table with a title.
+
+    Args:
+        title: above it.
+        headings: of the columns.
+        rows: cells as text.
+        note: a line below it.
+    """
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+def sections(score: Score) -> list[Section]:
+    """All of a score that is shown, in order.
+
+    Args:
+        score: of a set.
+
+    Returns:
+        Sections; those without rows are left out.
+    """
+    found = [
+        _exact(score), _alarms(score), _calibration(score), _closure(score), _coefficients(score), _pairs(score),
+        _answers(score), _time(score),
+    ]  # fmt: skip
+    return [section for section in found if section.rows]
+
+
+def as_table(section: Section) -> Table:
+    """A section for the terminal."""
+    from tunnel_lab.terminal.tables import table
+
+    result = table(section.title, *section.headings, right=section.headings[1:-1])
+    for row in section.rows:
+        result.add_row(*row)
+    return result
+
+
+def origin_lines(score: Score) -> list[str]:
+    """What was scored, and the hashes that hold it to its word.
+
+    Args:
+        score: of a set.
+
+    Returns:
+        Lines.
+    """
+    lines = [f"{len(score.cases)} campaigns"]
+    if score.excluded:
+        lines.append(f"Withheld from the vocabulary: {', '.join(score.excluded)}")
+    if score.sealed:
+        lines.append(f"Key     sha256 {score.key_sha256} (verified, with every campaign)")
+    else:
+        lines.append("Open set: the truth lay beside the data, so this is no blind check")
+    lines.append(f"Answers sha256 {score.answers_sha256} (verified)")
+    return lines
+
+
+def markdown(score: Score, folder: str) -> str:
+    """The page.
+
+    Args:
+        score: of a set.
+        folder: of the set, as typed.
+
+    Returns:
+        Markdown, tables and the full confusion matrix included.
+    """
+    withheld = "".join(f" --exclude {name}" for name in score.excluded)
+    lines = [
+        "# Blind check",
+        "",
+        "Campaigns with hidden causes, drawn and simulated by the reference simulator (`tunnel_reference`:",
+        "another integrator, another friction law, and for every effect further forms than the one fitted),",
+        "diagnosed without their truth and scored against the sealed key. Half of all effects have the textbook",
+        "form; `outside` campaigns hold an effect that belongs to no family. Intervals are Wilson's at 95 %.",
+        "This page is written by the commands below; nothing in it is typed by hand.",
+        "",
+        "```bash",
+        *_commands(score, folder),
+        f"tunnel blind diagnose {folder}{withheld}",
+        f"tunnel blind score {folder}{withheld} --markdown docs/blind-check.md",
+        "```",
+        "",
+        *(f"    {line}" for line in origin_lines(score)),
+    ]
+    for section in sections(score):
+        lines += ["", f"## {section.title}", "", *_rows(section.headings, section.rows)]
+        if section.note:
+            lines += ["", section.note]
+    return "\n".join([*lines, "", *_matrix(score), ""])
+
+
+def _commands(score: Score, folder: str) -> list[str]:
+    made = score.made_with
+    if not made:
+        return []
+    kinds = ",".join(f"{kind}:{share:g}" for kind, share in made["kinds"].items())
+    return [
+        f"tunnel blind make {folder} --count {made['count']} --seed {made['seed']} --kinds {kinds} "
+        f"--textbook {made['textbook']:g} --rare {made['rare']:g}"
+    ]
+
+
+def _rows(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    aligned = ["---", *["---:"] * (len(headings) - 2), "---"][: len(headings)]
+    return [f"| {' | '.join(cells)} |" for cells in (headings, aligned, *rows)]
+
+
+def _exact(score: Score) -> Section:
+    rows = tuple((KINDS[name], *_share(found)) for name, found in score.exact().items())
+    return Section("Causes exactly right", ("campaigns where", "right", "of", "share", "95 %"), rows)
+
+
+def _alarms(score: Score) -> Section:
+    entries = {
+        "a cause called where none acts": score.false_alarms(),
+        "no cause called where one acts": score.missed(),
+        "truth named as rival in a wrong answer": score.rivals(),
+    }
+    rows = tuple((name, *_share(found)) for name, found in entries.items() if found.total)
+    return Section("Alarms", ("", "number", "of", "share", "95 %"), rows)
+
+
+def _calibration(score: Score) -> Section:
+    error, bins = score.calibration()
+    rows = tuple((f"{b.low:.1f} to {b.high:.1f}", f"{b.mean:.3f}", *_share(b.right)) for b in bins)
+    headings = ("probability stated", "mean", "right", "of", "share", "95 %")
+    note = f"Expected calibration error of the answer given, {len(rows)} bins in use: {error:.3f}"
+    return Section("Calibration", headings, rows, note)
+
+
+def _closure(score: Score) -> Section:
+    share, median, low = score.closure()
+    rows = (("at least 0.95 of the gap closed", *_share(share)),) if share.total else ()
+    note = f"Closed: median {median:.4f}, 5th percentile {low:.4f}"
+    return Section(
+        "Closure on held-out runs, causes named rightly", ("", "number", "of", "share", "95 %"), rows, note
+    )
+
+
+def _coefficients(score: Score) -> Section:
+    found = {(e.group, e.name, e.when): e for e in score.coefficients()}
+    rows = []
+    for (group, name, when), after in found.items():
+        before = found.get((group, name, "before"))
+        if when == "before" or before is None:
+            continue
+        low, high = after.within.interval
+        rows.append(
+            (
+                f"{group}: {NAMES[name]}",
+                f"{100.0 * before.median:.2g}",
+                f"{100.0 * after.median:.2g}",
+                f"{before.within.count}/{before.within.total}",
+                f"{after.within.count}/{after.within.total}",
+                f"{100.0 * low:.1f}–{100.0 * high:.1f} %",
+            )
+        )
+    headings = ("campaigns", "error before [%]", "after [%]", "≤ 3 std before", "after", "95 %")
+    note = (
+        "Errors are medians of |estimate − truth| over |truth|; ≤ 3 std counts errors within three standard "
+        "deviations of the estimate."
+    )
+    return Section("Coefficients before and after the causes are added", headings, tuple(rows), note)
+
+
+def _pairs(score: Score) -> Section:
+    found = score.pairs()
+    rows = tuple((name, str(number), "") for name, number in found.items()) if sum(found.values()) else ()
+    return Section("Answers to two effects", ("answered", "number", ""), rows)
+
+
+def _answers(score: Score) -> Section:
+    rows = []
+    for truth, answers in sorted(score.confusion().items(), key=lambda item: _order(item[0])):
+        total = sum(answers.values())
+        right = sum(c.right for c in score.cases if _row(c.withheld, c.truth) == truth)
+        wrong = sorted(answers.items(), key=lambda item: -item[1])
+        own = {"withheld": "unknown"}.get(truth, truth)
+        others = ", ".join(f"{name} {number}" for name, number in wrong if name != own)
+        rows.append((truth, str(total), str(right), others))
+    return Section("Answers by truth", ("truth", "number", "right", "answered otherwise"), tuple(rows))
+
+
+def _time(score: Score) -> Section:
+    median, high, largest = score.seconds()
+    rows = ((f"{median:.1f}", f"{high:.1f}", f"{largest:.1f}"),) if largest > 0.0 else ()
+    return Section("Seconds for each campaign", ("median", "90th percentile", "largest"), rows)
+
+
+def _matrix(score: Score) -> list[str]:
+    """The confusion matrix in full: truths down, answers across."""
+    found = score.confusion()
+    names = sorted({*found, *(name for row in found.values() for name in row)}, key=_order)
+    across = [name for name in names if name != "withheld"]
+    numbers = {name: str(index) for index, name in enumerate(across, 1)}
+    headings = ["truth", "", *numbers.values()]
+    rows = [
+        [name, numbers.get(name, ""), *(str(found.get(name, {}).get(other, "·")) for other in across)]
+        for name in names
+        if name in found
+    ]
+    key = ", ".join(f"{number} {name}" for name, number in numbers.items())
+    return [
+        "## Confusion matrix", "", "Truths down, answers across; `two or more` counts any pair as answered.", "",
+        *_rows(headings, rows), "", f"Columns: {key}.",
+    ]  # fmt: skip
+
+
+def _row(withheld: bool, truth: Sequence[str]) -> str:
+    from diagnosis.blind.cases import label
+
+    return "withheld" if withheld else label(truth)
+
+
+def _order(name: str) -> tuple[int, str]:
+    """Effects by name, then pairs, none, unknown, and what is not answered."""
+    last = ("two or more", "none", "unknown", "withheld", "no answer")
+    return (last.index(name) + 1 if name in last else 0, name)
+
+
+def _share(share: Share) -> tuple[str, str, str, str]:
+    low, high = share.interval
+    value = "–" if share.value is None else f"{100.0 * share.value:.1f} %"
+    return str(share.count), str(share.total), value, f"{100.0 * low:.1f}–{100.0 * high:.1f} %"

@@ -1,0 +1,161 @@
+"""Which effect, how far the gap closes, and the coefficients before and after."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tunnel_lab.diagnosis_view.figures_common import (
+    ACCENT,
+    AFTER,
+    BEFORE,
+    QUIET,
+    Document,
+    array,
+    figure,
+    plain,
+    quiet,
+)
+from tunnel_lab.terminal.formatting import coefficient_label, figure_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tunnel_sim.vocabulary.campaign import Campaign
+
+SHOWN = 8
+"""Candidates drawn: the rest have next to no probability."""
+
+
+def candidates_figure(document: Document) -> Figure:
+    """The answers by probability.
+
+    Args:
+        document: a diagnosis.
+
+    Returns:
+        A bar for each of the first eight answers, with its figure in words.
+    """
+    shown = document["candidates"][:SHOWN]
+    fig = figure(0.8 + 0.34 * len(shown))
+    axes = fig.add_subplot()
+    values = [candidate["probability"] for candidate in shown]
+    colours = [ACCENT if index == 0 else "0.72" for index in range(len(shown))]
+    axes.barh(range(len(shown)), values, color=colours, height=0.68)
+    for index, value in enumerate(values):
+        axes.text(value + 0.01, index, _percent(value), va="center", fontsize=9)
+    axes.set_yticks(range(len(shown)), [plain(candidate["effect"]) for candidate in shown])
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, 1.12)
+    axes.set_xticks(np.linspace(0.0, 1.0, 6), [f"{v:.0%}" for v in np.linspace(0.0, 1.0, 6)])
+    axes.set_xlabel("probability")
+    quiet(axes)
+    return fig
+
+
+def _percent(value: float) -> str:
+    if value >= 0.9995:
+        return "> 99.9 %"
+    return "< 0.1 %" if value < 1e-3 else f"{100.0 * value:.1f} %"
+
+
+def closure_figure(document: Document) -> Figure:
+    """Excess of every run before and after the causes are added, on a logarithmic scale above the noise.
+
+    Args:
+        document: a diagnosis.
+
+    Returns:
+        A pair of points per run.
+    """
+    runs = document["gap"]["runs"]
+    fig = figure(1.3 + 0.24 * max(len(runs), 4))
+    axes = fig.add_subplot()
+    rows = np.arange(len(runs))
+    before = np.array([run["before"] for run in runs])
+    after = np.array([run["after"] for run in runs])
+    axes.hlines(rows, after, before, color="0.8", linewidth=2.5)
+    axes.plot(before, rows, "s", color=BEFORE, ms=6, label="nominal model")
+    if not np.array_equal(before, after):
+        axes.plot(after, rows, "o", color=AFTER, ms=6, label="with the causes, run held out")
+    noise = [run["std"] for run in (document.get("maps") or {"runs": []})["runs"]]
+    if noise:
+        axes.axvspan(-3.0 * max(noise), 3.0 * max(noise), color="0.92", linewidth=0, label="noise (3σ)")
+    axes.axvline(0.0, color=QUIET, linewidth=0.8)
+    axes.set_xscale("symlog", linthresh=3.0 * max(noise, default=0.03))
+    axes.set_yticks(rows, [figure_text(run["id"]) for run in runs], fontsize=8)
+    axes.margins(x=0.04)
+    axes.invert_yaxis()
+    axes.set_xlabel("excess: mean squared residual over noise variance, minus one")
+    fig.legend(loc="outside upper left", ncols=3, fontsize=8, frameon=False)
+    quiet(axes)
+    return fig
+
+
+def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
+    """Reading and residuals of the runs with the largest gap.
+
+    Args:
+        document: a diagnosis with its maps.
+        campaign: the records.
+
+    Returns:
+        A column per run: the reading above, the residual before and after below; None without traces.
+    """
+    traces = document["maps"]["traces"]
+    records = {run.id: run.record for run in campaign.runs}
+    traces = [trace for trace in traces if trace["id"] in records]
+    if not traces:
+        return None
+    fig = figure(4.4)
+    panels = fig.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.2))
+    for column, trace in enumerate(traces):
+        top, bottom = panels[0, column], panels[1, column]
+        record = records[trace["id"]]
+        step = max(1, record.yaw_rad.size // 1500)
+        time = record.time_s - record.time_s[0]
+        top.plot(time[::step], record.yaw_rad[::step], color="0.25", linewidth=0.7)
+        top.set_title(f"{figure_text(trace['id'])}: reading [rad]", fontsize=10, loc="left")
+        when, before = array(trace["time_s"]), 1e3 * array(trace["before_rad"])
+        bottom.plot(when, before, color=BEFORE, linewidth=0.8, label="nominal model")
+        if trace["after_rad"] is not None:
+            after = 1e3 * array(trace["after_rad"])
+            bottom.plot(when, after, color=AFTER, linewidth=0.8, label="with the causes")
+        bottom.set_title("residual [10⁻³ rad]", fontsize=10, loc="left")
+        bottom.set_xlabel("time since the start of the record [s]")
+        bottom.margins(x=0.01)
+        quiet(top)
+        quiet(bottom)
+    handles, labels = panels[1, 0].get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
+    return fig
+
+
+def coefficients_figure(document: Document) -> Figure | None:
+    """The coefficients before and after, with 95 % intervals.
+
+    Args:
+        document: a diagnosis.
+
+    Returns:
+        A panel per coefficient; None where there is none.
+    """
+    before, after = (document["coefficients"][key] for key in ("before", "after"))
+    names = [name for name in before if name in after]
+    if not names:
+        return None
+    fig = figure(1.7)
+    for place, name in enumerate(names, 1):
+        axes = fig.add_subplot(1, len(names), place)
+        for row, (values, colour, marker) in enumerate(((before, BEFORE, "s"), (after, AFTER, "o"))):
+            axes.errorbar(
+                values[name]["value"], row, xerr=1.96 * values[name]["std"], color=colour, marker=marker,
+                ms=6, capsize=4,
+            )  # fmt: skip
+        axes.set_yticks([0, 1], ["before", "after"])
+        axes.set_ylim(1.6, -0.6)
+        axes.set_xlabel(coefficient_label(name, before[name]["unit"]))
+        axes.locator_params(axis="x", nbins=5)
+        quiet(axes)
+    return fig

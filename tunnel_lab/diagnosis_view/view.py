@@ -1,0 +1,317 @@
+"""The words and numbers of the page, formatted from the document; nothing is found here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tunnel_lab.terminal.formatting import COEFFICIENTS, at_bound, significant, unit_mark, with_std
+from tunnel_sim.effects import ALL_EFFECTS, effect_class
+from tunnel_sim.vocabulary.campaign import Campaign
+
+Document = Mapping[str, Any]
+_EFFECTS = frozenset(kind.name for kind in ALL_EFFECTS)
+_CONDITIONS = {"always": "wind on and off", "wind_on": "wind on only", None: "not told by these runs"}
+_ONCE_PER_SENTENCE = 0.01  # candidates less probable are counted, not listed
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A figure at the head of the page.
+
+    Args:
+        label: what it is.
+        value: formatted.
+        note: a few words more.
+    """
+
+    label: str
+    value: str
+    note: str = ""
+
+
+def headline(document: Document) -> tuple[str, str]:
+    """The answer in a few words, and its kind for the page's colour.
+
+    Args:
+        document: the diagnosis.
+
+    Returns:
+        Words, and one of ``none``, ``unknown``, ``open``, ``found``.
+    """
+    causes = document["causes"]
+    if not causes:
+        return "No gap", "none"
+    if causes == ["unknown"]:
+        return "A gap without a name", "unknown"
+    names = " and ".join(plain(name) for name in causes)
+    if document["ambiguous_with"]:
+        return f"{names}, or {' or '.join(plain(n) for n in document['ambiguous_with'])}", "open"
+    return names, "found"
+
+
+def facts(document: Document) -> list[Fact]:
+    """The figures at the head of the page.
+
+    Args:
+        document: the diagnosis.
+
+    Returns:
+        Facts in the order shown.
+    """
+    gap, where = document["gap"], document["where"]
+    found = [Fact("Gap of the nominal model", excess(gap["excess_before"]), "noise variances")]
+    if document["causes"] and document["causes"] != ["unknown"]:
+        left = Fact("With the causes added", excess(gap["excess_after"]), "on runs held out of the fit")
+        found += [left, Fact("Share closed", percent(gap["closed"]), "on runs held out of the fit")]
+    if document["causes"]:
+        found += [
+            Fact("Channel", where["channel"] or "open"),
+            Fact("Condition", _CONDITIONS.get(where["condition"], str(where["condition"]))),
+        ]
+    if document["candidates"]:
+        first = document["candidates"][0]
+        found.append(Fact("Probability of the answer", percent(first["probability"])))
+    return found
+
+
+def percent(value: float) -> str:
+    """A share as a percentage.
+
+    Args:
+        value: 0 to 1, a fraction.
+
+    Returns:
+        Text such as ``98.3 %``; shares next to nothing or to all are given as bounds.
+    """
+    if value > 0.9995:
+        return "> 99.9 %" if value < 1.0 else "100 %"
+    if value < 0.0005:
+        return "< 0.1 %" if value > 0.0 else "0 %"
+    return f"{100.0 * value:.1f} %"
+
+
+def excess(value: float) -> str:
+    """An excess, which means nothing below a thousandth of the noise power.
+
+    Args:
+        value: in noise variances, a ratio.
+
+    Returns:
+        Three significant digits, or three decimals where it is small.
+    """
+    return _minus(f"{value:.3f}" if abs(value) < 1.0 else significant(value, 3))
+
+
+def _minus(text: str) -> str:
+    """A minus sign in place of a leading hyphen."""
+    return "−" + text[1:] if text.startswith("-") else text
+
+
+def plain(name: str) -> str:
+    """An effect's name as words: underscores become spaces."""
+    return name.replace("_", " ")
+
+
+def interval(values: list[float] | None, unit: str) -> str:
+    """An interval in words.
+
+    Args:
+        values: its ends, or None.
+        unit: of both.
+
+    Returns:
+        Text such as ``0.00 to 4.20 s``; a dash where there is none.
+    """
+    if values is None:
+        return "–"
+    return f"{significant(values[0], 3)} to {significant(values[1], 3)} {unit}"
+
+
+def place_rows(document: Document) -> list[tuple[str, str]]:
+    """Where the gap is, field by field.
+
+    Args:
+        document: the diagnosis.
+
+    Returns:
+        Labels and values.
+    """
+    where = document["where"]
+    return [
+        ("Runs that carry it", ", ".join(where["runs"]) or "–"),
+        ("Time", interval(where["time_s"], "s")),
+        ("Amplitude", interval(where["amplitude_rad"], "rad")),
+        ("Frequency", interval(where["frequency_hz"], "Hz")),
+        ("Channel", where["channel"] or "open"),
+        ("Condition", _CONDITIONS.get(where["condition"], str(where["condition"]))),
+    ]
+
+
+def candidate_rows(document: Document) -> tuple[list[dict[str, Any]], int]:
+    """The answers weighed.
+
+    Args:
+        document: the diagnosis.
+
+    Returns:
+        Those of some probability (three at least), formatted, and how many more there are.
+    """
+    candidates = document["candidates"]
+    count = max(3, sum(c["probability"] >= _ONCE_PER_SENTENCE for c in candidates))
+    rows = [
+        {
+            "name": plain(c["effect"]),
+            "probability": percent(c["probability"]),
+            "closed": "–" if c["effect"] in ("none", "unknown") else percent(c["closed"]),
+            "excess": excess(c["excess_after"]),
+            "parameters": [(plain(n).replace(".", ": "), estimate(v)) for n, v in c["parameters"].items()],
+        }
+        for c in candidates[:count]
+    ]
+    return rows, max(len(candidates) - count, 0)
+
+
+def estimate(values: Document) -> str:
+    """A value with its standard deviation and unit.
+
+    Args:
+        values: ``value``, ``std`` and ``unit``.
+
+    Returns:
+        Text such as ``0.00401 ± 0.00002 N m``.
+    """
+    unit = str(values.get("unit", ""))
+    number = (
+        with_std(values["value"], values["std"])
+        if values["std"]
+        else significant(values["value"], 5) + (" (held)" if values["std"] == 0.0 else at_bound(values))
+    )
+    return _minus(f"{number} {'' if unit == '1' else unit_mark(unit)}".strip()).replace(" ", "\u00a0")
+
+
+def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
+    """What is known of every cause, from the vocabulary.
+
+    Args:
+        document: the diagnosis.
+
+    Returns:
+        Name, equation, signature, channel, condition and references of each.
+    """
+    found = []
+    for name in [*document["causes"], *document["ambiguous_with"]]:
+        if name not in _EFFECTS:
+            continue
+        kind = effect_class(name)
+        found.append(
+            {
+                "name": plain(name),
+                "meaning": (kind.__doc__ or "").split("\n")[0],
+                "equation": kind.equation,
+                "signature": kind.signature,
+                "where": f"{kind.channel}, {_CONDITIONS[kind.condition]}",
+                "references": kind.references,
+            }
+        )
+    return found
+
+
+def coefficient_rows(document: Document) -> list[dict[str, str]]:
+    """The coefficients before and after.
+
+    Args:
+        document: the diagnosis.
+
+    Returns:
+        Symbol, both estimates and the shift in words.
+    """
+    before, after = document["coefficients"]["before"], document["coefficients"]["after"]
+    return [
+        {
+            "symbol": COEFFICIENTS.get(name, name),
+            "before": estimate(before[name]) if name in before else "–",
+            "after": estimate(after[name]) if name in after else "–",
+            "interval": _interval95(after.get(name) or before[name]),
+        }
+        for name in [*before, *(n for n in after if n not in before)]
+    ]
+
+
+def _interval95(values: Document) -> str:
+    reach = 1.96 * values["std"]
+    return f"{_minus(significant(values['value'] - reach))} to {_minus(significant(values['value'] + reach))}"
+
+
+def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
+    """Every run with its conditions and excess before and after.
+
+    Args:
+        document: the diagnosis.
+        campaign: the records.
+
+    Returns:
+        Formatted rows in the campaign's order.
+    """
+    gap = {run["id"]: run for run in document["gap"]["runs"]}
+    rows = []
+    for run in campaign.runs:
+        own = gap.get(run.id)
+        rows.append(
+            {
+                "id": run.id,
+                "spring": "–" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
+                "wind": f"{run.wind_speed:g}" if run.wind_on else "off",
+                "duration": f"{run.record.duration:.3g}",
+                "rate": f"{run.record.sample_rate:.4g}",
+                "before": "–" if own is None else excess(own["before"]),
+                "after": "–" if own is None else excess(own["after"]),
+                "named": "yes" if run.id in document["where"]["runs"] else "",
+            }
+        )
+    return rows
+
+
+def next_run_rows(document: Document) -> list[tuple[str, str]]:
+    """The run expected to tell rivals apart.
+
+    Args:
+        document: the diagnosis.
+
+    Returns:
+        Labels and values; empty where no run is proposed.
+    """
+    run = document["next_run"] or {}
+    units = {
+        "spring_stiffness": "N m/rad",
+        "wind_speed": "m/s",
+        "release_angle": "rad",
+        "duration": "s",
+        "separation": "standard deviations of the noise, expected",
+    }
+    return [
+        (plain(name).capitalize(), f"{significant(value, 3)} {units.get(name, '')}".strip())
+        for name, value in run.items()
+        if isinstance(value, int | float)
+    ]
+
+
+def line_rows(document: Document) -> list[dict[str, str]]:
+    """Narrow lines in the residuals.
+
+    Args:
+        document: the diagnosis.
+
+    Returns:
+        Run, frequency, amplitude and share, formatted.
+    """
+    return [
+        {
+            "run": line["run"],
+            "frequency": significant(line["frequency_hz"], 4),
+            "amplitude": significant(1e3 * line["amplitude_rad"], 2),
+            "share": percent(min(line["share"], 1.0)),
+        }
+        for line in (document.get("maps") or {}).get("lines", [])
+    ]

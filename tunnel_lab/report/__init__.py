@@ -1,5 +1,0 @@
-"""The report of a diagnosis: one self-contained HTML page, rendered from its JSON document and the records."""
-
-from tunnel_lab.report.page import render_report, write_report
-
-__all__ = ["render_report", "write_report"]

@@ -1,0 +1,250 @@
+"""A diagnosis as lines and tables for a terminal, rendered from its JSON document."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from rich.text import Text
+
+from identification.remark import Remark
+from tunnel_lab.terminal.formatting import at_bound, coefficient_label, significant, unit_mark, with_std
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+SHOWN_PROBABILITY = 0.005
+"""Answers less probable than this are counted, not listed."""
+
+SHOWN_ANSWERS = 6
+"""At most this many answers are listed."""
+
+Document = Mapping[str, Any]
+
+
+def candidates_table(document: Document) -> Table:
+    """The answers weighed, most probable first.
+
+    Args:
+        document: of a diagnosis.
+
+    Returns:
+        A table with probability, share of the gap closed and parameters; a last row counts what is left out.
+    """
+    from tunnel_lab.terminal.tables import table
+
+    result = table(
+        f"Answers for {document['campaign']}",
+        *("answer", "probability", "share closed", "parameters"),
+        right=("probability", "share closed"),
+    )
+    shown = [
+        c for c in document["candidates"][:SHOWN_ANSWERS] if c["probability"] >= SHOWN_PROBABILITY
+    ] or document["candidates"][:1]
+    for candidate in shown:
+        fitted = candidate["effect"] not in ("none", "unknown")
+        result.add_row(
+            Text(candidate["effect"]),
+            probability(candidate["probability"]),
+            share(candidate["closed"]) if fitted else "–",
+            Text("\n".join(parameter_lines(candidate["parameters"]))),
+        )
+    left = document["candidates"][len(shown) :]
+    if left:
+        together = sum(candidate["probability"] for candidate in left)
+        result.add_row(Text(f"{len(left)} more, together"), probability(together), "", "")
+    return result
+
+
+def parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Fitted parameters, name and value on a line each: a terminal of 80 columns holds no more beside an answer.
+
+    Args:
+        parameters: value, std and unit by name; a std of zero means that the value was given, not fitted, and
+            none that it is not known.
+
+    Returns:
+        Lines such as ``friction_moment =`` and ``  0.003991 ± 0.000006 N m``; of a pair, each effect's
+        below its name.
+    """
+    lines: list[str] = []
+    effect = ""
+    for full, given in parameters.items():
+        owner, _, name = full.rpartition(".")
+        if owner != effect:
+            effect = owner
+            lines.append(f"{owner}:")
+        value = with_std(given["value"], given["std"]) if given["std"] else significant(given["value"])
+        mark = "" if given["unit"] == "1" else " " + unit_mark(given["unit"])
+        lines += [f"{name} =", f"  {value}{mark}{at_bound(given)}"]
+    return lines
+
+
+def gap_table(document: Document) -> Table:
+    """The gap before and after, all runs first.
+
+    Args:
+        document: of a diagnosis.
+
+    Returns:
+        A table of excesses in multiples of the noise power; without rows where no gap was found.
+    """
+    from tunnel_lab.terminal.tables import table
+
+    gap = document["gap"]
+    result = table(
+        "Gap (× noise power)",
+        *("run", "before", "after, held out"),
+        right=("before", "after, held out"),
+    )
+    if not gap["detected"]:
+        return result
+    named = document["causes"] != ["unknown"]
+    result.add_row("all", _excess(gap["excess_before"]), _excess(gap["excess_after"]) if named else "–")
+    for row in gap["runs"]:
+        after = _excess(row["after"]) + ("" if row["held_out"] else " (fitted)")
+        result.add_row(Text(row["id"]), _excess(row["before"]), after if named else "–")
+    return result
+
+
+def _excess(value: float) -> str:
+    """An excess to three decimals, without a sign of zero."""
+    return f"{round(value, 3) + 0.0:+.3f}"
+
+
+def coefficients_table(document: Document) -> Table:
+    """The coefficients of the nominal model before and after the causes are added.
+
+    Args:
+        document: of a diagnosis.
+
+    Returns:
+        A table with one standard deviation and the change; without rows where there are none.
+    """
+    from tunnel_lab.terminal.tables import table
+
+    result = table(
+        "Coefficients ± one standard deviation", "", "before", "after", "change", right=("change",)
+    )
+    before, after = document["coefficients"]["before"], document["coefficients"]["after"]
+    for name in before:
+        if name in after:
+            one, two = before[name], after[name]
+            change = 100.0 * (two["value"] - one["value"]) / abs(one["value"]) if one["value"] else 0.0
+            result.add_row(
+                Text(coefficient_label(name, one["unit"])),
+                with_std(one["value"], one["std"]),
+                with_std(two["value"], two["std"]),
+                f"{change:+.2g} %",
+            )
+    return result
+
+
+def where_line(document: Document) -> str:
+    """Where the gap is, in words.
+
+    Args:
+        document: of a diagnosis.
+
+    Returns:
+        A line; empty where there is no gap.
+    """
+    where = document["where"]
+    if where["words"]:
+        return f"Where: {where['words']}"
+    if where["channel"] is None:
+        return ""
+    when = {"wind_on": "with the wind on", "always": "with the wind on and off"}.get(where["condition"], "")
+    return f"Where: {where['channel']}, {when}".rstrip(", ")
+
+
+def rival_lines(document: Document) -> list[str]:
+    """What cannot be told from the causes, and the run that would tell.
+
+    Args:
+        document: of a diagnosis.
+
+    Returns:
+        Lines; none where the answer has no rival.
+    """
+    rivals, run = document["ambiguous_with"], document["next_run"]
+    lines = []
+    if rivals:
+        lines.append(f"These runs do not tell it from: {', '.join(rivals)}")
+    if run is not None:
+        lines.append(f"A run that would tell: {run_words(run)}")
+    elif rivals:
+        lines.append(
+            "Which run would tell cannot be worked out from these: state every spring_stiffness, add runs"
+        )
+    return lines
+
+
+def run_words(run: Mapping[str, float]) -> str:
+    """A run to make, in words.
+
+    Args:
+        run: spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and separation in
+            standard deviations of the noise.
+
+    Returns:
+        A clause.
+    """
+    wind = "wind off" if run["wind_speed"] == 0.0 else f"wind at {run['wind_speed']:g} m/s"
+    return (
+        f"spring of {run['spring_stiffness']:g} N m/rad, {wind}, released at {run['release_angle']:.2g} rad, "
+        f"{run['duration']:g} s long (the two then differ by {run['separation']:.0f} standard deviations)"
+    )
+
+
+def closing_lines(document: Document) -> list[str]:
+    """Notes below the tables: the noise, the MuJoCo model's word, a coefficient's meaning, blind spots.
+
+    Args:
+        document: of a diagnosis.
+
+    Returns:
+        Lines.
+    """
+    noise, note = document["noise"], document["coefficients"]["note"]
+    lines = [f"Noise: {noise['std']:.3g} rad, {noise['source']} ({noise['reason']})"]
+    checked = document["confirmation"]
+    if checked["agrees"]:
+        apart = f"{checked['largest_difference_rad']:.1e} rad"
+        lines.append(f"Excesses are the MuJoCo model's, which lies within {apart} of the fits")
+    if note:
+        lines.append(f"Note: {note}")
+    lines += [f"Caution: {Remark.from_json_dict(remark)}" for remark in document.get("remarks", ())]
+    lines += [f"Caution: {text}" for text in document["cautions"]]
+    if document["blind_spots"]:
+        lines.append("These runs cannot show:")
+        lines += [f"- {text}" for text in document["blind_spots"]]
+    return lines
+
+
+def probability(value: float) -> str:
+    """A probability to three digits, never rounded to 0 or 1.
+
+    Args:
+        value: probability.
+
+    Returns:
+        Text such as ``0.973`` or ``> 0.999``.
+    """
+    if value > 0.9995:
+        return "> 0.999"
+    return f"{value:.3f}" if value >= 0.0005 else "< 0.001"
+
+
+def share(value: float) -> str:
+    """A share in per cent, never rounded up to all.
+
+    Args:
+        value: share, 0 to 1.
+
+    Returns:
+        Text such as ``98.2 %``.
+    """
+    if 0.9995 <= value < 1.0:
+        return "> 99.9 %"
+    return f"{100.0 * value:.1f} %"

@@ -1,0 +1,227 @@
+"""The vocabulary of effects as tables, as JSON and as the reference page, all from the registry."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from tunnel_sim.effects import Effect, ParameterInfo
+
+SCHEMA_VERSION = 1
+ABOUT_DIRECTIONS = (
+    "Moments stand on the right-hand side of Izz β̈ + Cr β̇ + Kr β = Ka β + Ca β̇, with Ka = ½ρV²Al Cnβ and "
+    "Ca = ½ρVAl² Cnr; y is the reading."
+)
+"""What an equation of the listing refers to."""
+
+_PAGE_HEAD = """# Effects
+
+<!-- Written by `tunnel effects --markdown docs/reference/effects.md`: change the registry, not this page. -->
+
+What the nominal model leaves out, by the names under which `tunnel simulate` injects it and the diagnosis
+answers. `always` acts with the wind off too, `wind_on` only with the wind on.
+
+{directions}
+
+Every effect's first parameter is its severity; at zero the record is that of no effect to the last bit. A
+number in a plan or on the command line is in the unit given here:
+
+```toml
+[[effects]]
+name = "coulomb_friction"
+parameters = {{ friction_moment = 0.004 }}   # N m
+```
+
+```
+tunnel simulate plan.toml --out c --effect coulomb_friction:friction_moment=0.004
+```
+
+Real effects never have exactly these forms; a name stands for a family. What no free decay can show of them
+is said in [what no free decay can show](../theory/what-no-free-decay-can-show.md).
+
+"""
+
+
+def pretty_unit(unit: str) -> str:
+    """A unit as printed.
+
+    Args:
+        unit: as in the registry, such as ``1/rad2``; the unit of a parameter.
+
+    Returns:
+        The same with raised digits, such as ``1/rad²``.
+    """
+    return re.sub(r"(?<=[a-z])2", "²", unit)
+
+
+def summary(kind: type[Effect]) -> str:
+    """What an effect is, in one sentence: the first line of its docstring."""
+    return inspect.cleandoc(kind.__doc__ or "").splitlines()[0]
+
+
+def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
+    """Effects with all that is known of them, in JSON's types.
+
+    Args:
+        kinds: effects.
+
+    Returns:
+        ``{"schema_version", "effects": [...]}`` in the order given.
+    """
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "effects": [
+            {
+                "name": kind.name,
+                "channel": kind.channel,
+                "condition": kind.condition,
+                "stochastic": kind.random == "broad_band",
+                "summary": summary(kind),
+                "equation": kind.equation,
+                "signature": kind.signature,
+                "references": list(kind.references),
+                "parameters": [dataclasses.asdict(info) for info in kind.parameters()],
+            }
+            for kind in kinds
+        ],
+    }
+
+
+def listing(kinds: Sequence[type[Effect]]) -> Table:
+    """Effects with equation and parameters, one row each.
+
+    Args:
+        kinds: effects.
+
+    Returns:
+        A table for the terminal.
+    """
+    from rich.text import Text
+
+    from tunnel_lab.terminal.tables import table
+
+    last = "equation, then parameters [unit]"
+    result = table("Effects beyond the nominal model", "effect", "channel", "condition", last)
+    for column in result.columns[:3]:  # names are to be copied: never folded
+        column.no_wrap = True
+    for kind in kinds:
+        parameters = [f"{info.name} {info.symbol} [{pretty_unit(info.unit)}]" for info in kind.parameters()]
+        cells = (kind.name, kind.channel, kind.condition, "\n".join([kind.equation, *parameters]))
+        result.add_row(*map(Text, cells), end_section=True)
+    return result
+
+
+def parameter_table(kind: type[Effect]) -> Table:
+    """The parameters of one effect.
+
+    Args:
+        kind: the effect.
+
+    Returns:
+        A table for the terminal.
+    """
+    from rich.text import Text
+
+    from tunnel_lab.terminal.tables import table
+
+    right = ("typical", "from", "to", "default")
+    result = table("Parameters", "name", "symbol", "unit", "meaning", *right, right=right)
+    for info in kind.parameters():
+        numbers = (f"{value:g}" for value in (info.scale, info.lower, info.upper, info.default))
+        result.add_row(*map(Text, (info.name, info.symbol, pretty_unit(info.unit), info.meaning, *numbers)))
+    return result
+
+
+def lines(kind: type[Effect]) -> list[str]:
+    """All that is known of one effect besides its parameters.
+
+    Args:
+        kind: the effect.
+
+    Returns:
+        Lines for the terminal.
+    """
+    drawn = ["drawn:      a random moment, another in every run"] if kind.random == "broad_band" else []
+    return [
+        f"{kind.name}: {summary(kind)}",
+        "",
+        f"channel:    {kind.channel}",
+        f"condition:  {kind.condition}",
+        f"equation:   {kind.equation}",
+        f"signature:  {kind.signature}",
+        *drawn,
+        *(f"reference:  {reference}" for reference in kind.references),
+        "",
+    ]
+
+
+def example(kind: type[Effect]) -> str:
+    """How ``tunnel simulate`` is told to inject an effect of typical size.
+
+    Args:
+        kind: the effect.
+
+    Returns:
+        The option with its value.
+    """
+    values = ",".join(f"{info.name}={_typical(info):g}" for info in kind.parameters())
+    return f"--effect {kind.name}:{values}"
+
+
+def _typical(info: ParameterInfo) -> float:
+    """A value that may be given: the default where it is not zero, else the typical size."""
+    return info.default or info.scale
+
+
+def markdown(kinds: Sequence[type[Effect]]) -> str:
+    """The reference page.
+
+    Args:
+        kinds: effects.
+
+    Returns:
+        Markdown: an overview, then a section for each effect.
+    """
+    overview = ["| effect | channel | condition | equation |", "|---|---|---|---|"]
+    overview += [
+        f"| [`{kind.name}`](#{kind.name}) | {kind.channel} | {kind.condition} | {_cell(kind.equation)} |"
+        for kind in kinds
+    ]
+    sections = [_section(kind) for kind in kinds]
+    return _PAGE_HEAD.format(directions=ABOUT_DIRECTIONS) + "\n".join(overview) + "\n\n" + "\n".join(sections)
+
+
+def _section(kind: type[Effect]) -> str:
+    rows = [
+        f"| `{info.name}` | {info.symbol} | {pretty_unit(info.unit)} | {_cell(info.meaning)} | {info.scale:g} "
+        f"| {info.lower:g} | {info.upper:g} | {info.default:g} |"
+        for info in kind.parameters()
+    ]
+    return "\n".join(
+        [
+            f"## {kind.name}",
+            "",
+            summary(kind),
+            "",
+            f"- Channel `{kind.channel}`, condition `{kind.condition}`.",
+            f"- Equation: {_cell(kind.equation)}",
+            f"- What it leaves in a record: {kind.signature}",
+            *(f"- Reference: {reference}" for reference in kind.references),
+            "",
+            "| parameter | symbol | unit | meaning | typical | from | to | default |",
+            "|---|---|---|---|---|---|---|---|",
+            *rows,
+            "",
+        ]
+    )
+
+
+def _cell(text: str) -> str:
+    """Text whose bars do not end a cell of a Markdown table."""
+    return text.replace("|", "\\|")

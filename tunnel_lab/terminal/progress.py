@@ -1,0 +1,50 @@
+"""A progress bar with the time left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from tunnel_lab.terminal.tables import console
+
+
+@contextmanager
+def bar(what: str, total: int | None = None) -> Iterator[Callable[[int, int, str], None]]:
+    """A progress bar on standard error, where that is a terminal; elsewhere nothing is printed.
+
+    Args:
+        what: is going on.
+        total: number of items, where it is known beforehand.
+
+    Yields:
+        What to tell the number done, the number in all and the last one's name to. The first call says what was
+        done before, and does not count for the speed.
+    """
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    terminal = console(stderr=True)
+    columns = (
+        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        TextColumn("left"), TimeRemainingColumn(elapsed_when_finished=False),
+    )  # fmt: skip
+    with Progress(
+        *columns, console=terminal, disable=not terminal.is_terminal, speed_estimate_period=600
+    ) as progress:
+        task = progress.add_task(what, total=total)
+        begun = False
+
+        def tell(done: int, count: int, name: str) -> None:
+            nonlocal begun
+            if not begun:
+                progress.reset(task, completed=done, total=count)
+                begun = True
+            progress.update(task, completed=done, total=count, description=f"{what} {name}".rstrip())
+
+        yield tell

@@ -1,0 +1,235 @@
+"""Estimates as tables for a terminal: every number with its unit, every estimate with its deviation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from tunnel_lab.terminal.formatting import concise, in_stds, significant, unit, with_std
+
+if TYPE_CHECKING:
+    from identification.estimate import Estimate, Quantity, RunEstimate, Status
+    from tunnel_sim.vocabulary.campaign import Campaign
+
+SYMBOLS: Mapping[str, str] = {
+    "cn_beta": "Cnβ",
+    "cn_r": "Cnr",
+    "yaw_inertia": "Izz",
+    "mechanical_damping": "Cr",
+}
+"""How the paper writes the quantities of an estimate, by their name in its JSON."""
+
+
+BRACKETS = "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10."
+"""Said once below tables in the short notation."""
+
+
+class _Console(Console):
+    """A console that leaves it to ``main`` to end when the reader of a pipe goes away."""
+
+    def on_broken_pipe(self) -> None:
+        """Pass the error on; Rich itself would exit with status 1."""
+        raise BrokenPipeError
+
+
+def console(*, stderr: bool = False) -> Console:
+    """A console that colours nothing by guesswork and reads no markup: text is shown as it is.
+
+    Args:
+        stderr: print to standard error, where progress and status lines go.
+
+    Returns:
+        The console.
+    """
+    return _Console(stderr=stderr, highlight=False, markup=False, emoji=False)
+
+
+def say(line: str, *, stderr: bool = False) -> None:
+    """Print one line as it is: no markup, no wrapping, so that paths can be copied.
+
+    Args:
+        line: the text.
+        stderr: print to standard error.
+    """
+    console(stderr=stderr).print(line, soft_wrap=True)
+
+
+def show_tables(*tables: Table) -> None:
+    """Print tables, each followed by an empty line.
+
+    Args:
+        tables: those without rows are left out.
+    """
+    out = console()
+    for one in tables:
+        if one.row_count:
+            out.print(one)
+            out.print()
+
+
+def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
+    """An empty table in the house's style.
+
+    Args:
+        title: above it.
+        columns: headings, units included.
+        right: those headings whose columns are aligned to the right.
+
+    Returns:
+        The table.
+    """
+    result = Table(
+        title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_edge=False
+    )
+    for column in columns:
+        # As text, not markup: units stand in brackets. Folded, not cut: a digit must not be lost.
+        result.add_column(Text(column), justify="right" if column in right else "left", overflow="fold")
+    return result
+
+
+def coefficients_table(estimate: Estimate) -> Table:
+    """The campaign's coefficients, those that could be had.
+
+    Args:
+        estimate: of any campaign.
+
+    Returns:
+        A table; without rows when the campaign gives normalised form only.
+    """
+    result = table(f"{estimate.campaign} by {estimate.estimator}", "quantity", "estimate ± std")
+    for name, symbol in SYMBOLS.items():
+        quantity: Quantity | None = getattr(estimate, name)
+        if quantity is not None:
+            result.add_row(_named(symbol, quantity.unit), with_std(quantity.value, quantity.std))
+    if estimate.wind_off_inertia is not None:
+        quantity = estimate.wind_off_inertia
+        label = _named("Izz, gradient of Kr over ωn²", quantity.unit)
+        result.add_row(label, with_std(quantity.value, quantity.std))
+    return result
+
+
+def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Table:
+    """What each estimator says, beside what was injected.
+
+    Args:
+        estimates: of one simulated campaign, one per estimator.
+        truth: injected values by name, each in the unit of the estimate's quantity of that name.
+
+    Returns:
+        A table with a section for each estimator and a row for each quantity.
+    """
+    from identification.estimate import UNITS
+
+    result = table(
+        "Estimates against the injected truth",
+        *("quantity", "truth", "estimate ± std", "error", "error/std"),
+        right=("truth", "error", "error/std"),
+    )
+    for estimate in estimates:
+        if result.row_count:
+            result.add_section()
+        result.add_row(Text(estimate.estimator, style="bold"))
+        for name, value in truth.items():
+            row = (_named(SYMBOLS[name], UNITS[name]), significant(value))
+            quantity: Quantity | None = getattr(estimate, name)
+            if quantity is None:
+                result.add_row(*row, _status(estimate.status))
+                continue
+            error = quantity.value - value
+            relative = f"{100.0 * error / abs(value):+.1g} %" if value else ""
+            stds = in_stds(error, quantity.std)
+            result.add_row(*row, with_std(quantity.value, quantity.std), relative, stds)
+    return result
+
+
+def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
+    """Natural frequency and damping ratio of every run.
+
+    Args:
+        campaign: what was identified.
+        estimate: its estimate, runs in the same order.
+
+    Returns:
+        A table with a row for each run.
+    """
+    result = table(
+        f"Runs of {campaign.name}",
+        *("run", "Kr\n[N m/rad]", "V\n[m/s]", "ωn\n[rad/s]", "ζ\n[1]", "status"),
+        right=("Kr\n[N m/rad]", "V\n[m/s]"),
+    )
+    for run, found in zip(campaign.runs, estimate.runs, strict=True):
+        result.add_row(
+            Text(run.id),
+            "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
+            f"{run.wind_speed:g}",
+            _concise(found.omega_n),
+            _concise(found.zeta),
+            _status(found.status),
+        )
+    return result
+
+
+def windows_table(run: RunEstimate) -> Table:
+    """The run seen through consecutive windows, as in the paper's Table III.
+
+    Args:
+        run: an estimate of one run.
+
+    Returns:
+        A table with a row for each window, the largest amplitude first.
+    """
+    cycles = run.windows[0].cycles if run.windows else 0
+    result = table(
+        f"{run.id}: windows of {cycles} cycle{'s' if cycles > 1 else ''}",
+        *("from [s]", "to [s]", "amplitude [rad]", "ζ [1]", "ωn [rad/s]"),
+        right=("from [s]", "to [s]"),
+    )
+    for window in run.windows:
+        result.add_row(
+            f"{window.start_s:.2f}",
+            f"{window.start_s + window.duration_s:.2f}",
+            _concise(window.amplitude),
+            _concise(window.zeta),
+            _concise(window.omega_n),
+        )
+    return result
+
+
+def status_lines(estimate: Estimate) -> list[str]:
+    """What the estimate and its runs have to say, each thing once.
+
+    Args:
+        estimate: of any campaign.
+
+    Returns:
+        A line for each status other than "identified", with the runs it concerns and the remedy.
+    """
+    runs: dict[str, list[str]] = {status.value: [] for status in estimate.statuses if status.name != "OK"}
+    for run in estimate.runs:
+        for status in run.statuses:
+            if status.name != "OK":
+                runs.setdefault(status.value, []).append(run.id)
+    return [
+        f"{text} ({', '.join(ids)})" if ids and len(ids) < len(estimate.runs) else text
+        for text, ids in runs.items()
+    ]
+
+
+def _named(symbol: str, unit_name: str) -> Text:
+    """A symbol with its unit."""
+    return Text(f"{symbol} {unit(unit_name)}")
+
+
+def _concise(quantity: Quantity | None) -> str:
+    """A quantity whose unit stands in the heading."""
+    return "–" if quantity is None else concise(quantity.value, quantity.std)
+
+
+def _status(status: Status) -> str:
+    """A status in a few words; its remedy is printed below the table."""
+    return status.name.lower().replace("_", " ")

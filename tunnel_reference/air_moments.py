@@ -1,0 +1,133 @@
+"""The laws of the air and of forcing: speed, angle and moments on the body.
+
+Moments are N m on the right-hand side of Izz β̈ = …; ``rows`` are the runs a law applies to, ``p`` its
+parameters by run.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tunnel_reference.conditions import Array
+from tunnel_reference.forcings import RATE
+from tunnel_reference.terms import Params, Rows, Stage
+
+
+def speed_drift(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """V(t)/V = 1 + d g(t), g rising from 0 to 1 over the run as t^n/T^n."""
+    s.speed_ratio[rows] *= 1.0 + p["drift"] * np.minimum(s.time / p["span"], 1.0) ** p["exponent"]
+
+
+def speed_settling(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """V(t)/V = 1 + d (1 − e^(−t/τ))/(1 − e^(−T/τ))."""
+    rise = (1.0 - np.exp(-s.time / p["time"])) / (1.0 - np.exp(-p["span"] / p["time"]))
+    s.speed_ratio[rows] *= 1.0 + p["drift"] * rise
+
+
+def gust(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """V(t)/V = 1 + g exp(−((t − t0)/w)²): one slow gust, in the runs whose g is not zero."""
+    s.speed_ratio[rows] *= 1.0 + p["size"] * np.exp(-(((s.time - p["when"]) / p["width"]) ** 2))
+
+
+def lag(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
+    """Ka works on (1 − w1 − w2) β + w1 x1 + w2 x2 with τi ẋi = β − xi."""
+    beta = s.beta[rows]
+    deficiency = p["w1"] * (beta - x[0]) + p["w2"] * (beta - x[1])
+    s.air_angle[rows] -= deficiency
+    dx[0] = (beta - x[0]) / p["tau1"]
+    dx[1] = (beta - x[1]) / p["tau2"]
+
+
+def lag_one(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
+    """Ka works on β − w (β − x) with τ ẋ = β − x; w = 1 is the lag, w = −1 a lead of the same time."""
+    gap = s.beta[rows] - x[0]
+    s.air_angle[rows] -= p["w1"] * gap
+    dx[0] = gap / p["tau1"]
+
+
+def lag_cascade(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
+    """Ka works on x2 with τ/2 ẋ1 = β − x1, τ/2 ẋ2 = x1 − x2: two states in a row."""
+    beta = s.beta[rows]
+    s.air_angle[rows] += x[1] - beta
+    dx[0] = 2.0 * (beta - x[0]) / p["tau1"]
+    dx[1] = 2.0 * (x[0] - x[1]) / p["tau1"]
+
+
+def _pressure_stiffness(s: Stage, rows: Rows) -> Array:
+    """Ka at the present speed."""
+    return s.air_stiffness[rows] * s.speed_ratio[rows] ** 2
+
+
+def cubic_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Ka (κ β³ + q β⁵) more."""
+    a = s.air_angle[rows]
+    s.body[rows] += _pressure_stiffness(s, rows) * a**3 * (p["kappa"] + p["quintic"] * a * a)
+
+
+def saturating_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Ka β/(1 + k|β|) in place of Ka β; k < 0 grows."""
+    a = s.air_angle[rows]
+    s.body[rows] += _pressure_stiffness(s, rows) * (a / (1.0 + p["k"] * np.abs(a)) - a)
+
+
+def sine_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Ka sin(kβ)/k in place of Ka β, k = √(6|κ|)."""
+    a = s.air_angle[rows]
+    k = np.sqrt(6.0 * np.abs(p["kappa"]))
+    s.body[rows] += _pressure_stiffness(s, rows) * (np.sin(k * a) / k - a)
+
+
+def tangent_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Ka arctan(kβ)/k in place of Ka β, k = √(3|κ|); κ > 0 mirrored: 2β − arctan(kβ)/k."""
+    a = s.air_angle[rows]
+    k = np.sqrt(3.0 * np.abs(p["kappa"]))
+    s.body[rows] += np.sign(p["kappa"]) * _pressure_stiffness(s, rows) * (a - np.arctan(k * a) / k)
+
+
+def nonlinear_air_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Ca μ β² β̇ more."""
+    s.body[rows] += s.speed_ratio[rows] * s.air_damping[rows] * p["mu"] * s.beta[rows] ** 2 * s.rate[rows]
+
+
+def absolute_air_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Ca m |β| β̇ more."""
+    s.body[rows] += s.speed_ratio[rows] * s.air_damping[rows] * p["mu"] * np.abs(s.beta[rows]) * s.rate[rows]
+
+
+def saturating_air_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Ca μ β²/(1 + (β/b)²) β̇ more."""
+    square = s.beta[rows] ** 2
+    shape = p["mu"] * square / (1.0 + square / p["bend"] ** 2)
+    s.body[rows] += s.speed_ratio[rows] * s.air_damping[rows] * shape * s.rate[rows]
+
+
+def steady_moment(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """A steady moment times (V(t)/V)²."""
+    s.body[rows] += p["moment"] * s.speed_ratio[rows] ** 2
+
+
+# ---- forcing
+
+
+def tabled_moment(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """A moment given at 1 kHz, shape (runs, n), linear in between."""
+    table = p["table"]
+    place = s.time * RATE + 1e-9
+    k = int(place)
+    if k >= table.shape[1] - 1:
+        s.body[rows] += table[:, -1]
+        return
+    part = place - k
+    s.body[rows] += (1.0 - part) * table[:, k] + part * table[:, k + 1]
+
+
+def harmonic_moment(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """+M (sin(2πft + φ) + h sin(4πft + 2φ))."""
+    arg = 2.0 * np.pi * p["frequency"] * s.time + p["phase"]
+    s.body[rows] += p["moment"] * (np.sin(arg) + p["second"] * np.sin(2.0 * arg))
+
+
+def bump(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """+J/(w√π) exp(−((t − t0)/w)²): a blow of impulse J about one time."""
+    shape = np.exp(-(((s.time - p["when"]) / p["width"]) ** 2)) / (p["width"] * np.sqrt(np.pi))
+    s.body[rows] += p["impulse"] * shape

@@ -1,0 +1,189 @@
+"""Draws campaigns: conditions as on the rig, and which effects act how strongly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tunnel_reference.catalogue import Form, Group
+from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.forms import FAMILIES, forms_of
+from tunnel_reference.outside import OUTSIDE_FORMS
+
+KINDS = ("single", "pair", "none", "outside")
+DEFAULT_SHARES = {"single": 0.55, "pair": 0.17, "none": 0.14, "outside": 0.14}
+_STRONG_SHARE = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class EffectDraw:
+    """One effect of one campaign.
+
+    Args:
+        form: which.
+        extra: its secondary parameters.
+        sign: of its severity parameter.
+        target: excess it shall have alone after the nominal refit.
+        value: severity parameter; a first guess until it is sized.
+    """
+
+    form: Form
+    extra: dict[str, float]
+    sign: int
+    target: float
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignDraw:
+    """One campaign before it is simulated.
+
+    Args:
+        kind: ``single``, ``pair``, ``none`` or ``outside``.
+        conditions: runs and truth.
+        effects: none, one or two.
+        seed: of the sensor's noise.
+    """
+
+    kind: str
+    conditions: Conditions
+    effects: tuple[EffectDraw, ...]
+    seed: int
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """How forms are mixed.
+
+    Args:
+        textbook: probability of the textbook form.
+        rare: probability that another form is one of the rare ones (kept out of tuning sets at 0).
+    """
+
+    textbook: float = 0.5
+    rare: float = 0.5
+
+
+def draw_campaign(
+    rng: np.random.Generator, *, kind: str, mixture: Mixture | None = None, families: Sequence[str] = ()
+) -> CampaignDraw:
+    """Draw one campaign.
+
+    Args:
+        rng: source of everything random.
+        kind: one of ``KINDS``.
+        mixture: of forms.
+        families: of the effects, for ``single`` (one) and ``pair`` (two); drawn when empty.
+
+    Raises:
+        ValueError: for an unknown kind.
+    """
+    if kind not in KINDS:
+        raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
+    mixture = mixture or Mixture()
+    conditions = draw_conditions(rng)
+    effects: tuple[EffectDraw, ...] = ()
+    if kind == "outside":
+        pool = _pool(OUTSIDE_FORMS, rng, mixture)
+        effects = (_draw_effect(rng, pool[int(rng.integers(len(pool)))], conditions),)
+    elif kind != "none":
+        wanted = families or draw_families(rng, 1 if kind == "single" else 2)
+        effects = tuple(_draw_effect(rng, _draw_form(rng, name, mixture), conditions) for name in wanted)
+    return CampaignDraw(kind, conditions, effects, int(rng.integers(2**62)))
+
+
+def draw_families(rng: np.random.Generator, number: int) -> tuple[str, ...]:
+    """Different families, equally likely."""
+    return tuple(str(name) for name in rng.choice(np.array(FAMILIES), size=number, replace=False))
+
+
+def _pool(forms: Sequence[Form], rng: np.random.Generator, mixture: Mixture) -> list[Form]:
+    """The common or the rare forms, whichever the mixture draws; never empty if there is any."""
+    group = Group.RARE if rng.random() < mixture.rare else Group.COMMON
+    other = Group.COMMON
+    return [f for f in forms if f.group is group] or [f for f in forms if f.group is other]
+
+
+def _draw_form(rng: np.random.Generator, family: str, mixture: Mixture) -> Form:
+    """A form of the family."""
+    forms = forms_of(family)
+    textbook = rng.random() < mixture.textbook
+    others = _pool(forms, rng, mixture)
+    if textbook or not others:
+        return forms[0]
+    return others[int(rng.integers(len(others)))]
+
+
+def _draw_effect(rng: np.random.Generator, form: Form, conditions: Conditions) -> EffectDraw:
+    """Secondary parameters, sign and target excess: 1 to 10, in a fifth of the cases 10 to 100."""
+    top = (10.0, 100.0) if rng.random() < _STRONG_SHARE else (1.0, 10.0)
+    target = float(np.exp(rng.uniform(np.log(top[0]), np.log(top[1]))))
+    extra = {k: float(v) for k, v in form.draw(rng, conditions).items()}
+    sign = int(rng.choice(np.array(form.signs)))
+    return EffectDraw(form, extra, sign, target, form.start)
+
+
+def draw_conditions(rng: np.random.Generator) -> Conditions:
+    """Springs, speeds, releases, truth and sensor: mostly the plan of twelve runs, else another."""
+    design = _twelve_runs(rng) if rng.random() < 0.8 else _other_design(rng)
+    stiffness, speed, release = design
+    duration = 10.0 if rng.random() < 0.85 else float(rng.choice([8.0, 12.0, 15.0, 20.0]))
+    noise = float(rng.uniform(3e-4, 6e-4))
+    start = release * (1.0 + 0.03 * rng.standard_normal(release.size))
+    return Conditions(
+        spring_stiffness=stiffness,
+        wind_speed=speed,
+        release_angle=release,
+        start_angle=start,
+        air_density=float(rng.uniform(1.18, 1.22)),
+        duration=duration,
+        yaw_inertia=float(rng.uniform(0.098, 0.110)),
+        mechanical_damping=float(rng.uniform(0.007, 0.020)),
+        cn_beta=float(rng.uniform(0.25, 0.57)),
+        cn_r=float(-rng.uniform(0.06, 0.24)),
+        noise_std=noise,
+        stated_noise=round(noise, 5) if rng.random() < 0.5 else None,
+        zero=float(0.004 * rng.standard_normal()),
+    )
+
+
+def with_defaults(conditions: Conditions) -> Conditions:
+    """The same with arrays for calibration errors of the right length."""
+    n = conditions.runs
+    return replace(
+        conditions,
+        stiffness_scale=np.broadcast_to(conditions.stiffness_scale, (n,)).copy(),
+        speed_offset=np.broadcast_to(conditions.speed_offset, (n,)).copy(),
+    )
+
+
+def _twelve_runs(rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """Three springs at three speeds from 20°, two small releases, one between."""
+    low = float(rng.choice([16.12, 21.02]))
+    middle = float(rng.choice([21.02, 35.02] if low < 20.0 else [35.02]))
+    high = float(rng.choice([44.84, 51.88, 67.98]))
+    rows = [(k, v, 20.0) for k in (low, middle, high) for v in (0.0, 15.0, 25.0)]
+    rows += [(low, 0.0, 8.0), (low, 25.0, 8.0), (middle, 20.0, 14.0)]
+    return _columns(rows)
+
+
+def _other_design(rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """Two to four springs, two to four speeds with still air among them, 6 to 16 runs at mixed releases."""
+    table = [12.0, 16.12, 21.02, 28.0, 35.02, 44.84, 51.88, 60.0, 67.98, 80.0]
+    springs = np.sort(rng.choice(np.array(table), size=int(rng.integers(2, 5)), replace=False))
+    speeds = np.concatenate(
+        [[0.0], np.sort(rng.choice([10.0, 12.5, 15.0, 20.0, 25.0], int(rng.integers(1, 4)), False))]
+    )
+    big = float(rng.choice([10.0, 15.0, 20.0]))
+    rows = [(float(k), float(v), big) for k in springs for v in speeds]
+    rows += [(float(springs[0]), float(v), big * 0.4) for v in (speeds[0], speeds[-1])]
+    keep = rows[:16] if len(rows) > 16 else rows
+    return _columns(keep)
+
+
+def _columns(rows: Sequence[tuple[float, float, float]]) -> tuple[Array, Array, Array]:
+    """Stiffness, speed and release in radians, as arrays."""
+    stiffness, speed, degrees = (np.array(column) for column in zip(*rows, strict=True))
+    return stiffness, speed, np.round(np.radians(degrees), 4)

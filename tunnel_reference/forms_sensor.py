@@ -1,0 +1,114 @@
+"""Forms of the sensor's families."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tunnel_reference import readings as r
+from tunnel_reference.binding import ParamMaker, reading
+from tunnel_reference.catalogue import Draw, Extra, Form, Group
+from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.readings import Order
+
+T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
+_BOTH = (-1, 1)
+
+_CURVE: ParamMaker = lambda p, _e, _c: {"s": p}  # noqa: E731
+_CURVES = (
+    Form("sensor_nonlinearity", "cubic", T, "s, 1/rad²", 0.03,
+         reading(r.cubic_curve, Order.CURVE, _CURVE), _BOTH),
+    Form("sensor_nonlinearity", "sine", C, "s, 1/rad²", 0.03,
+         reading(r.sine_curve, Order.CURVE, _CURVE), _BOTH),
+    Form("sensor_nonlinearity", "tangent", C, "s, 1/rad²", 0.03,
+         reading(r.tangent_curve, Order.CURVE, _CURVE), _BOTH),
+    Form("sensor_nonlinearity", "loaded_potentiometer", R, "ρ", 0.03,
+         reading(r.loaded_potentiometer, Order.CURVE, _CURVE)),
+)  # fmt: skip
+
+_STEP: ParamMaker = lambda p, _e, _c: {"step": p}  # noqa: E731
+_STEPS = (
+    Form("sensor_quantisation", "rounding", T, "step, rad", 0.003,
+         reading(r.coarse_rounding, Order.ROUNDING, _STEP)),
+    Form("sensor_quantisation", "truncation", C, "step, rad", 0.003,
+         reading(r.coarse_truncation, Order.ROUNDING, _STEP)),
+    Form("sensor_quantisation", "uneven", R, "step, rad", 0.003,
+         reading(r.uneven_rounding, Order.ROUNDING, _STEP)),
+)  # fmt: skip
+
+
+def _gap(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+    """Half width, and where in the gap each run starts."""
+    start = np.random.default_rng(int(e["seed"])).uniform(-1.0, 1.0, c.runs) * e["random"]
+    return {"half": p, "start": start}
+
+
+def _start(random: float) -> Draw:
+    """A seed and how far off the middle of the gap a run may start."""
+    return lambda g, _c: {"seed": float(g.integers(0, 2**31)), "random": random}
+
+
+_LINKAGE = (
+    Form("sensor_hysteresis", "backlash", T, "w, rad", 0.001, reading(r.backlash, Order.LINKAGE, _gap),
+         draw=_start(0.0)),
+    Form("sensor_hysteresis", "backlash_any_start", C, "w, rad", 0.001,
+         reading(r.backlash, Order.LINKAGE, _gap), draw=_start(1.0)),
+    Form("sensor_hysteresis", "two_plays", C, "w, rad", 0.001, reading(r.two_plays, Order.LINKAGE, _gap),
+         draw=_start(0.5)),
+    Form("sensor_hysteresis", "sliding", R, "w, rad", 0.001, reading(r.sliding_linkage, Order.LINKAGE, _gap),
+         draw=_start(0.0)),
+)  # fmt: skip
+
+_DRIFTS = (
+    Form("sensor_drift", "linear", T, "d, rad", 0.002,
+         reading(r.drift, Order.ADDED, lambda p, _e, _c: {"drift": p, "exponent": 1.0}), _BOTH),
+    Form("sensor_drift", "power", C, "d, rad", 0.002,
+         reading(r.drift, Order.ADDED, lambda p, e, _c: {"drift": p, "exponent": e["exponent"]}), _BOTH,
+         draw=lambda g, _c: {"exponent": g.choice([0.5, 1.5, 2.0])}),
+    Form("sensor_drift", "warming", C, "d, rad", 0.002,
+         reading(r.settling_drift, Order.ADDED,
+                 lambda p, e, c: {"drift": p, "time": e["part"] * c.duration}), _BOTH,
+         draw=lambda g, _c: {"part": g.uniform(0.25, 0.7)}),
+)  # fmt: skip
+
+
+def _hum(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+    """Amplitude, frequency, and phases drawn per run."""
+    rng = np.random.default_rng(int(e["seed"]))
+    return {"amplitude": p, "frequency": e["frequency"], "phase": rng.uniform(0, 2 * np.pi, c.runs),
+            "third": e["third"], "third_phase": rng.uniform(0, 2 * np.pi, c.runs), "slow": 0.4}  # fmt: skip
+
+
+def _hum_draw(off: float, third: float) -> Draw:
+    """Seed, frequency within ``off`` of 50 Hz, and up to ``third`` of third harmonic."""
+    return lambda g, _c: {"seed": float(g.integers(0, 2**31)), "frequency": 50.0 + g.uniform(-off, off),
+                         "third": g.uniform(0.3, 1.0) * third}  # fmt: skip
+
+
+_HUM = (
+    Form("mains_hum", "line", T, "a, rad", 0.001,
+         reading(r.hum, Order.ADDED, _hum), draw=_hum_draw(0.0, 0.0)),
+    Form("mains_hum", "third_harmonic", C, "a, rad", 0.001, reading(r.hum, Order.ADDED, _hum),
+         draw=_hum_draw(0.03, 0.3)),
+    Form("mains_hum", "bursts", R, "a, rad", 0.001, reading(r.hum_bursts, Order.ADDED, _hum),
+         draw=_hum_draw(0.05, 0.0)),
+)  # fmt: skip
+
+
+def _limit(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+    """L = (1 − p) times the largest release angle."""
+    limit = (1.0 - p) * float(np.max(np.abs(c.start_angle)))
+    return {"limit": limit, "lower": e.get("lower", 1.0), "knee": e.get("knee", 0.1)}
+
+
+_LIMITS = (
+    Form("sensor_clipping", "hard", T, "1 − L/largest release", 0.05,
+         reading(r.clipping, Order.LIMIT, _limit),
+         limits=(1e-3, 0.8)),
+    Form("sensor_clipping", "soft", C, "1 − L/largest release", 0.05,
+         reading(r.soft_clipping, Order.LIMIT, _limit),
+         draw=lambda g, _c: {"knee": g.uniform(0.03, 0.12)}, limits=(1e-3, 0.8)),
+    Form("sensor_clipping", "upper_side", R, "1 − L/largest release", 0.05,
+         reading(r.clipping, Order.LIMIT, _limit), draw=lambda _g, _c: {"lower": 0.0}, limits=(1e-3, 0.8)),
+)  # fmt: skip
+
+SENSOR_FORMS: tuple[Form, ...] = (*_CURVES, *_STEPS, *_LINKAGE, *_DRIFTS, *_HUM, *_LIMITS)

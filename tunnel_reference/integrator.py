@@ -1,0 +1,272 @@
+"""Moves all runs of many campaigns at once: RK4 at a small step, dry friction by events inside the step.
+
+A campaign's effects are *terms*: a law with its parameters on the rows (runs) it applies to. A law reads and
+changes the moments of one RK4 stage. Friction laws only say their level; its sign is held through a step, and
+where the rate crosses zero within it the state is corrected from the crossing on: to slip the other way, or
+to stick until the other moments leave the level. The correction's local error is of third order in the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.terms import Law, Motion, Phase, Rows, Stage, Term
+
+
+@dataclass(eq=False)
+class _Group:
+    """One law on all rows of the batch that have it, with its block of the state vector."""
+
+    law: Law
+    phase: Phase
+    rows: Rows
+    params: dict[str, Array]
+    memory: Array
+    start: int = 0
+
+
+def _as_rows(indices: NDArray[np.intp]) -> Rows:
+    """A slice where the indices are consecutive (a view is cheaper than a gather)."""
+    first, last = int(indices[0]), int(indices[-1])
+    return slice(first, last + 1) if last - first + 1 == indices.size else indices
+
+
+def _stack(arrays: Sequence[Array]) -> Array:
+    """Join parameters along runs; time series of unequal length are held at their last value."""
+    if arrays[0].ndim == 1:
+        return np.concatenate(arrays)
+    longest = max(a.shape[1] for a in arrays)
+    return np.concatenate([np.pad(a, ((0, 0), (0, longest - a.shape[1])), mode="edge") for a in arrays])
+
+
+def _group_terms(
+    terms: Sequence[Sequence[Term]], offsets: Sequence[int], runs: Sequence[int]
+) -> list[_Group]:
+    """Merge equal laws of all campaigns into groups, in order of phase then first appearance."""
+    found: dict[tuple[int, Any, int], list[tuple[Term, NDArray[np.intp]]]] = {}
+    for number, campaign_terms in enumerate(terms):
+        rows = np.arange(offsets[number], offsets[number] + runs[number])
+        for term in campaign_terms:
+            states = 0 if term.memory is None else term.memory.shape[0]
+            found.setdefault((int(term.phase), term.law, states), []).append((term, rows))
+    groups = []
+    for (phase, law, states), members in sorted(found.items(), key=lambda item: item[0][0]):
+        rows = np.concatenate([r for _, r in members])
+        params = {k: _stack([t.params[k] for t, _ in members]) for k in members[0][0].params}
+        memory = np.concatenate(
+            [t.memory if t.memory is not None else np.zeros((0, r.size)) for t, r in members], axis=1
+        )
+        assert memory.shape[0] == states
+        groups.append(_Group(law, Phase(phase), _as_rows(rows), params, memory))
+    return groups
+
+
+class _Batch:
+    """The rows of several campaigns, all with a rigid or all with a flexible rod."""
+
+    def __init__(self, conditions: Sequence[Conditions], terms: Sequence[Sequence[Term]]) -> None:
+        runs = [c.runs for c in conditions]
+        self.offsets = np.concatenate([[0], np.cumsum(runs)]).astype(int)
+        self.size = int(self.offsets[-1])
+        self.flexible = conditions[0].rod is not None
+        self.groups = _group_terms(terms, [int(o) for o in self.offsets[:-1]], runs)
+        self.stiffness = np.concatenate([c.true_stiffness * np.ones(c.runs) for c in conditions])
+        self.air_stiffness = np.concatenate([c.air_stiffness for c in conditions])
+        self.air_damping = np.concatenate([c.air_damping for c in conditions])
+        self.inertia = np.repeat([c.yaw_inertia for c in conditions], runs)
+        self.damping = np.repeat([c.mechanical_damping for c in conditions], runs)
+        self.release = np.concatenate([c.start_angle for c in conditions])
+        self.ones = np.ones(self.size)
+        self.sign = np.zeros(self.size)
+        self.moving = np.ones(self.size)
+        self._rod(conditions, runs)
+        self.state = self._initial_state()
+        self.stage = self._new_stage(0.0, self.state)
+
+    def _rod(self, conditions: Sequence[Conditions], runs: Sequence[int]) -> None:
+        """Rod properties by row and which rows have friction."""
+        self.top_inertia, self.body_inertia = self.inertia, self.inertia
+        if self.flexible:
+            rods = [c.rod for c in conditions if c.rod is not None]
+            share = np.repeat([r.share for r in rods], runs)
+            self.rod_stiffness = np.repeat([1.0 / r.compliance for r in rods], runs)
+            self.rod_hardening = np.repeat([r.hardening for r in rods], runs)
+            self.held_body = np.repeat([r.held_body for r in rods], runs)
+            self.top_inertia, self.body_inertia = share * self.inertia, (1.0 - share) * self.inertia
+            ratio = np.repeat([r.damping_ratio for r in rods], runs)
+            self.rod_damping = 2.0 * ratio * np.sqrt(self.rod_stiffness * self.top_inertia)
+        dry = [np.arange(self.size)[g.rows] for g in self.groups if g.phase is Phase.FRICTION]
+        self.dry = np.unique(np.concatenate(dry)) if dry else np.zeros(0, dtype=np.intp)
+
+    def _initial_state(self) -> Array:
+        """Body angle, body rate, (spring end's angle, rate,) then the laws' memories, in one vector."""
+        blocks = [self.release.copy(), np.zeros(self.size)]
+        if self.flexible:
+            series = self.stiffness / (self.stiffness + self.rod_stiffness)
+            blocks[0] = np.where(self.held_body, self.release, self._held_at_top())
+            blocks += [
+                np.where(self.held_body, self.release * (1.0 - series), self.release),
+                np.zeros(self.size),
+            ]
+        position = len(blocks) * self.size
+        for group in self.groups:
+            group.start = position
+            position += group.memory.size
+            blocks.append(group.memory.ravel())
+        return np.concatenate(blocks)
+
+    def _held_at_top(self) -> Array:
+        """Body angle in balance when the spring end is held at the release angle."""
+        return np.asarray(self.release * self.rod_stiffness / (self.rod_stiffness - self.air_stiffness))
+
+    def _new_stage(self, time: float, state: Array) -> Stage:
+        """The stage before any law has acted."""
+        n = self.size
+        beta, rate = state[:n], state[n : 2 * n]
+        theta, omega = (state[2 * n : 3 * n], state[3 * n : 4 * n]) if self.flexible else (beta, rate)
+        return Stage(
+            time, beta, rate, theta, omega, self.stiffness, self.air_stiffness, self.air_damping,
+            self.ones.copy(), beta.copy(), theta.copy(), self.ones, self.ones, np.zeros(n),
+        )  # fmt: skip
+
+    def derivative(self, time: float, state: Array) -> Array:
+        """Time derivative of the state vector at the friction's present sign."""
+        n = self.size
+        stage = self._new_stage(time, state)
+        out = np.zeros_like(state)
+        self._apply(stage, state, out, (Phase.WIND, Phase.ANGLE))
+        stage.top = -self.stiffness * stage.spring_angle - self.damping * stage.omega
+        stage.body = stage.speed_ratio * (
+            stage.speed_ratio * self.air_stiffness * stage.air_angle + self.air_damping * stage.rate
+        )
+        if self.flexible:
+            twist = stage.theta - stage.beta
+            rod = self.rod_stiffness * twist * (1.0 + self.rod_hardening * twist * twist)
+            rod += self.rod_damping * (stage.omega - stage.rate)
+            stage.top -= rod
+            stage.body += rod
+        self._apply(stage, state, out, (Phase.MOMENT, Phase.FRICTION))
+        if not self.flexible:
+            stage.top = stage.top + stage.body
+        friction = self.sign * stage.level
+        self.stage = stage
+        if self.flexible:
+            out[:n], out[n : 2 * n] = stage.rate, stage.body / self.body_inertia
+            out[2 * n : 3 * n] = stage.omega * self.moving
+            out[3 * n : 4 * n] = (stage.top - friction) / self.top_inertia * self.moving
+        else:
+            out[:n] = stage.rate * self.moving
+            out[n : 2 * n] = (stage.top - friction) / self.inertia * self.moving
+        return out
+
+    def _apply(self, stage: Stage, state: Array, out: Array, phases: tuple[Phase, ...]) -> None:
+        """Let the laws of these phases act."""
+        for group in self.groups:
+            if group.phase in phases:
+                shape = group.memory.shape
+                block = slice(group.start, group.start + group.memory.size)
+                group.law(
+                    stage, group.rows, group.params, state[block].reshape(shape), out[block].reshape(shape)
+                )
+
+    def start_friction(self) -> None:
+        """Set the friction's sign from rest: against the way the other moments push, or stick."""
+        if self.dry.size:
+            self.derivative(0.0, self.state)
+            self._leave_rest(self.dry)
+
+    def step(self, time: float, h: float) -> None:
+        """Advance by one RK4 step, then correct rows whose rate changed sign under friction."""
+        before = self.state
+        k1 = self.derivative(time, before)
+        k2 = self.derivative(time + h / 2, before + (h / 2) * k1)
+        k3 = self.derivative(time + h / 2, before + (h / 2) * k2)
+        k4 = self.derivative(time + h, before + h * k3)
+        self.state = before + (h / 6) * (k1 + 2.0 * (k2 + k3) + k4)
+        if self.dry.size:
+            self._friction(before, k1, h)
+
+    def _friction(self, before: Array, slope: Array, h: float) -> None:
+        """Correct crossings of the rate within the last step; let rows at rest go or stay."""
+        rows = self.dry
+        at = rows + (3 if self.flexible else 1) * self.size
+        crossed = rows[self.state[at] * self.sign[rows] < 0.0]
+        if crossed.size:
+            self._cross(crossed, before, slope, h)
+        resting = rows[self.moving[rows] == 0.0]
+        if resting.size:
+            self._leave_rest(resting)
+
+    def _cross(self, rows: NDArray[np.intp], before: Array, slope: Array, h: float) -> None:
+        """From the crossing on, friction acts the other way, or holds."""
+        angle_at = rows + (2 if self.flexible else 0) * self.size
+        rate_at = angle_at + self.size
+        v0, v1, a0 = before[rate_at], self.state[rate_at], slope[rate_at]
+        bend = v1 - v0 - a0 * h
+        # v(u) = v0 + a0 h u + bend u²; the root by two Newton steps from the chord's.
+        u = np.clip(v0 / np.where(v0 == v1, 1.0, v0 - v1), 0.0, 1.0)
+        for _ in range(2):
+            gradient = a0 * h + 2.0 * bend * u
+            gradient = np.where(np.abs(gradient) < 1e-300, 1.0, gradient)
+            u = np.clip(u - (v0 + a0 * h * u + bend * u * u) / gradient, 0.0, 1.0)
+        left = (1.0 - u) * h
+        level, net = self.stage.level[rows], self.stage.top[rows]
+        stick = np.abs(net) <= level
+        turned = np.where(stick, 0.0, np.sign(net))
+        push = (self.sign[rows] - turned) * level / self.top_inertia[rows]
+        at_rest = before[angle_at] + h * (v0 * u + a0 * h * u**2 / 2.0 + bend * u**3 / 3.0)
+        slid_angle = self.state[angle_at] + push * left**2 / 2.0
+        slid_rate = v1 + push * left
+        self.state[angle_at] = np.where(stick, at_rest, slid_angle)
+        self.state[rate_at] = np.where(stick, 0.0, slid_rate)
+        self.sign[rows] = turned
+        self.moving[rows] = np.where(stick, 0.0, 1.0)
+
+    def _leave_rest(self, rows: NDArray[np.intp]) -> None:
+        """Rows at rest slip once the other moments exceed the level."""
+        net = self.stage.top[rows]
+        go = np.abs(net) > self.stage.level[rows]
+        self.sign[rows] = np.where(go, np.sign(net), 0.0)
+        self.moving[rows] = np.where(go, 1.0, 0.0)
+
+
+def integrate(
+    conditions: Sequence[Conditions], terms: Sequence[Sequence[Term]], *, substeps: int = 10
+) -> list[Motion]:
+    """Integrate campaigns together from rest at their start angles.
+
+    Args:
+        conditions: one per campaign; all with or all without a flexible rod, equal sample rates.
+        terms: the terms of each campaign.
+        substeps: RK4 steps per sample.
+
+    Returns:
+        One motion per campaign.
+
+    Raises:
+        ValueError: when rigid and flexible rods, or sample rates, are mixed.
+    """
+    if len({c.rod is None for c in conditions}) != 1 or len({c.sample_rate for c in conditions}) != 1:
+        raise ValueError("a batch needs one kind of rod and one sample rate")
+    batch = _Batch(conditions, terms)
+    batch.start_friction()
+    samples = max(c.samples for c in conditions)
+    interval = 1.0 / conditions[0].sample_rate
+    h, n = interval / substeps, batch.size
+    first = 2 * n if batch.flexible else 0
+    angle, rate = np.empty((samples, n)), np.empty((samples, n))
+    for k in range(samples):
+        angle[k], rate[k] = batch.state[first : first + n], batch.state[first + n : first + 2 * n]
+        if k < samples - 1:
+            for j in range(substeps):
+                batch.step(k * interval + j * h, h)
+    spans = [slice(int(a), int(b)) for a, b in zip(batch.offsets[:-1], batch.offsets[1:], strict=True)]
+    return [
+        Motion(angle[: c.samples, s], rate[: c.samples, s]) for c, s in zip(conditions, spans, strict=True)
+    ]

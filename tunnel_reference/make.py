@@ -1,0 +1,212 @@
+"""Makes sets of campaigns with known truth.
+
+``python -m tunnel_reference.make OUT --count N --seed S`` writes OUT/c0001, OUT/c0002, …
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tunnel_reference.conditions import FRONTAL_AREA, NOMINAL_INERTIA, REFERENCE_LENGTH, WIDTH
+from tunnel_reference.draw import DEFAULT_SHARES, CampaignDraw, Mixture, draw_campaign
+from tunnel_reference.forms import FAMILIES
+from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_effects
+from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.record import Record
+
+SCHEMA_VERSION = 1
+_CHUNK = 400
+
+
+def plan_kinds(count: int, shares: dict[str, float]) -> list[str]:
+    """How many campaigns of each kind, by largest remainder, in order of the shares."""
+    total = sum(shares.values())
+    exact = {kind: count * share / total for kind, share in shares.items()}
+    numbers = {kind: int(value) for kind, value in exact.items()}
+    left = count - sum(numbers.values())
+    for kind in sorted(exact, key=lambda k: numbers[k] - exact[k])[:left]:
+        numbers[kind] += 1
+    return [kind for kind, number in numbers.items() for _ in range(number)]
+
+
+def draw_set(count: int, seed: int, shares: dict[str, float], mixture: Mixture) -> list[CampaignDraw]:
+    """Draw a set: families of single effects in turn, pairs so that each family comes about equally often.
+
+    Args:
+        count: number of campaigns.
+        seed: of everything random; the same arguments give the same set.
+        shares: of the kinds.
+        mixture: of the forms.
+    """
+    root = np.random.SeedSequence(seed)
+    order_seed, *seeds = root.spawn(count + 1)
+    order = np.random.default_rng(order_seed)
+    kinds = plan_kinds(count, shares)
+    singles = _in_turn(order, sum(k == "single" for k in kinds))
+    firsts = _in_turn(order, sum(k == "pair" for k in kinds))
+    draws = []
+    for kind, child in zip(kinds, seeds, strict=True):
+        rng = np.random.default_rng(child)
+        families: tuple[str, ...] = ()
+        if kind == "single":
+            families = (singles.pop(),)
+        elif kind == "pair":
+            first = firsts.pop()
+            families = (first, str(rng.choice([f for f in FAMILIES if f != first])))
+        draws.append(draw_campaign(rng, kind=kind, mixture=mixture, families=families))
+    return [draws[i] for i in order.permutation(count)]
+
+
+def _in_turn(rng: np.random.Generator, number: int) -> list[str]:
+    """Families, each as often as the others to within one, in random order."""
+    rounds = -(-number // len(FAMILIES))
+    names = [str(name) for _ in range(rounds) for name in rng.permutation(np.array(FAMILIES))]
+    return names[:number]
+
+
+def simulate_set(draws: Sequence[CampaignDraw], *, progress: bool = False) -> list[Simulated]:
+    """Size the effects of drawn campaigns and simulate them."""
+    sized = size_effects(draws, progress=progress)
+    if progress:
+        print(f"simulating {len(sized)} campaigns", file=sys.stderr)
+    return [read_and_fit(d, motion) for d, motion in zip(sized, simulate_motions(sized), strict=True)]
+
+
+def as_campaign(simulated: Simulated, name: str) -> Campaign:
+    """The campaign as it is handed out: stated conditions and readings."""
+    c = simulated.draw.conditions
+    time = np.round(c.time, 9)
+    runs = tuple(
+        Run(
+            id=f"r{number + 1:02d}",
+            record=Record(time, np.round(simulated.readings[:, number], 7)),
+            wind_speed=float(c.wind_speed[number]),
+            spring_stiffness=float(c.spring_stiffness[number]),
+            air_density=round(c.air_density, 4),
+            release_angle=float(c.release_angle[number]),
+        )
+        for number in range(c.runs)
+    )
+    return Campaign(
+        name=name,
+        rig=RigProperties(NOMINAL_INERTIA, FRONTAL_AREA, REFERENCE_LENGTH, WIDTH),
+        sensor=SensorProperties(c.sample_rate, c.resolution, c.stated_noise),
+        runs=runs,
+    )
+
+
+def truth_of(simulated: Simulated) -> dict[str, Any]:
+    """What is true of a campaign, for ``truth.json``.
+
+    ``effects`` is the sorted list of family names (``["unknown"]`` for an effect outside the vocabulary,
+    ``[]`` for none), ``severity`` the excess after the nominal refit and ``parameters`` each effect's form,
+    severity parameter with its symbol, secondary parameters and the excess it was sized for by itself.
+    """
+    draw, c = simulated.draw, simulated.draw.conditions
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "yaw_inertia": c.yaw_inertia,
+        "mechanical_damping": c.mechanical_damping,
+        "air_density": c.air_density,
+        "cn_beta": c.cn_beta,
+        "cn_r": c.cn_r,
+        "noise_std": c.noise_std,
+        "sensor_zero": c.zero,
+        "effects": sorted({e.form.family for e in draw.effects}),
+        "kind": draw.kind,
+        "form": [e.form.name for e in sorted(draw.effects, key=lambda e: e.form.family)],
+        "severity": simulated.excess,
+        "run_severity": [float(v) for v in simulated.run_excess],
+        "parameters": {
+            (e.form.family if e.form.family != "unknown" else e.form.name): {
+                "form": e.form.name,
+                "group": str(e.form.group),
+                "symbol": e.form.symbol,
+                "value": e.sign * e.value,
+                "target_severity": e.target,
+                **e.extra,
+            }
+            for e in draw.effects
+        },
+    }
+
+
+def make_set(
+    out: Path, *, count: int, seed: int, shares: dict[str, float], mixture: Mixture, progress: bool = False
+) -> None:
+    """Draw, simulate and write a set of campaigns OUT/c0001, c0002, ….
+
+    Raises:
+        TunnelError: when the folder is not empty.
+    """
+    if out.exists() and any(out.iterdir()):
+        raise TunnelError("the folder is not empty", where=str(out), remedy="name a new one")
+    draws = draw_set(count, seed, shares, mixture)
+    width = max(4, len(str(count)))
+    for start in range(0, count, _CHUNK):
+        for number, simulated in enumerate(
+            simulate_set(draws[start : start + _CHUNK], progress=progress), start + 1
+        ):
+            name = f"c{number:0{width}d}"
+            write_campaign(as_campaign(simulated, name), out / name, truth=truth_of(simulated))
+
+
+def parse_shares(text: str) -> dict[str, float]:
+    """Kinds with optional weights, such as ``single:3,none``; the default mixture's weights where not given.
+
+    Raises:
+        TunnelError: for an unknown kind or a weight that is no positive number.
+    """
+    shares: dict[str, float] = {}
+    for item in text.split(","):
+        kind, _, weight = item.strip().partition(":")
+        if kind not in DEFAULT_SHARES:
+            raise TunnelError(
+                f"unknown kind {kind!r}", where="--kinds", remedy=did_you_mean(kind, DEFAULT_SHARES)
+            )
+        try:
+            shares[kind] = float(weight) if weight else DEFAULT_SHARES[kind]
+        except ValueError:
+            shares[kind] = -1.0
+        if not 0.0 < shares[kind] < np.inf:
+            raise TunnelError(f"bad weight {weight!r}", where="--kinds", remedy="give a number above zero")
+    return shares
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run from the command line; the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m tunnel_reference.make", description=__doc__)
+    parser.add_argument("out", type=Path, help="folder to make")
+    parser.add_argument("--count", type=int, default=200, help="number of campaigns")
+    parser.add_argument("--seed", type=int, required=True, help="of everything random")
+    parser.add_argument(
+        "--kinds", default=",".join(DEFAULT_SHARES), help="kinds with optional weights, kind:weight"
+    )
+    parser.add_argument("--textbook", type=float, default=0.5, help="probability of the textbook form")
+    parser.add_argument("--rare", type=float, default=0.5, help="share of rare forms among the others")
+    given = parser.parse_args(arguments)
+    try:
+        make_set(
+            given.out,
+            count=given.count,
+            seed=given.seed,
+            shares=parse_shares(given.kinds),
+            mixture=Mixture(given.textbook, given.rare),
+            progress=True,
+        )
+    except TunnelError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,145 @@
+"""A small joint fit of the nominal model, by Gauss–Newton on damped sinusoids in closed form.
+
+It sizes effects (what remains of them after the fit); it is no estimator of the project.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH, Array, Conditions
+
+_ITERATIONS = 12
+_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class NominalFit:
+    """The nominal model fitted to a campaign.
+
+    Args:
+        parameters: Izz, Cr, Cnβ, Cnr, shape (4,).
+        zero: the sensor's zero, rad.
+        residual_power: mean squared residual per run, rad², shape (runs,).
+    """
+
+    parameters: Array
+    zero: float
+    residual_power: Array
+
+
+def _rates(c: Conditions, p: Array) -> tuple[Array, Array, Array, Array]:
+    """Decay rate σ and ωd per run with their gradients over (Izz, Cr, Cnβ, Cnr), shapes (R,) and (R, 4)."""
+    inertia, damping, cn_beta, cn_r = p
+    moment = 0.5 * c.air_density * c.wind_speed**2 * FRONTAL_AREA * REFERENCE_LENGTH
+    lever = 0.5 * c.air_density * c.wind_speed * FRONTAL_AREA * REFERENCE_LENGTH**2
+    sigma = (damping - lever * cn_r) / (2.0 * inertia)
+    square = (c.spring_stiffness - moment * cn_beta) / inertia
+    omega = np.sqrt(np.maximum(square - sigma**2, 0.25))
+    ones = np.ones_like(sigma)
+    d_sigma = np.stack([-sigma / inertia, ones / (2 * inertia), 0 * ones, -lever / (2 * inertia)], axis=1)
+    d_square = np.stack([-square / inertia, 0 * ones, -moment / inertia, 0 * ones], axis=1)
+    d_omega = (d_square / 2.0 - sigma[:, None] * d_sigma) / omega[:, None]
+    return sigma, omega, d_sigma, d_omega
+
+
+def _basis(time: Array, sigma: Array, omega: Array) -> tuple[Array, Array]:
+    """e^(−σt) cos ωt and e^(−σt) sin ωt, each of shape (R, n)."""
+    decay = np.exp(-sigma[:, None] * time)
+    phase = omega[:, None] * time
+    return decay * np.cos(phase), decay * np.sin(phase)
+
+
+def _linear(cosine: Array, sine: Array, readings: Array) -> tuple[Array, Array, float]:
+    """Amplitudes a, b per run and the common zero for given rates, by linear least squares."""
+    runs, n = readings.shape
+    basis = np.stack([cosine, sine], axis=1)
+    gram = basis @ basis.transpose(0, 2, 1)
+    sums = basis.sum(axis=2)
+    right = np.einsum("rkn,rn->rk", basis, readings)
+    reduce = np.linalg.solve(gram, np.stack([right, sums], axis=2))
+    fitted, levels = reduce[:, :, 0], reduce[:, :, 1]
+    numerator = readings.sum() - np.einsum("rk,rk->", sums, fitted)
+    zero = float(numerator / (runs * n - np.einsum("rk,rk->", sums, levels)))
+    ab = fitted - zero * levels
+    return ab[:, 0], ab[:, 1], zero
+
+
+def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
+    """Fit Izz, Cr, Cnβ, Cnr, the zero and every run's start to the readings.
+
+    Args:
+        c: conditions; the stated stiffness and speed are used, the true coefficients only to start from.
+        readings: shape (n, runs), rad; n may be less than the campaign's samples (a record cut short).
+
+    Returns:
+        The fit; its residuals are noise where the nominal model holds.
+    """
+    y = np.ascontiguousarray(readings.T)
+    time = c.time[: y.shape[1]]
+    p = np.array([c.yaw_inertia, c.mechanical_damping, c.cn_beta, c.cn_r])
+    scale = np.array([1e-3, 1e-3, 1e-2, 1e-2])
+    best = np.inf
+    step: NDArray[np.float64] = np.zeros(4)
+    kept: tuple[Array, float, Array] | None = None
+    for _ in range(_ITERATIONS):
+        sigma, omega, d_sigma, d_omega = _rates(c, p)
+        cosine, sine = _basis(time, sigma, omega)
+        a, b, zero = _linear(cosine, sine, y)
+        model = a[:, None] * cosine + b[:, None] * sine
+        residual = y - model - zero
+        power = np.einsum("rn,rn->r", residual, residual) / y.shape[1]
+        cost = float(power.sum())
+        if not cost < best:
+            step = step / 4.0
+            p = p - 3.0 * step
+            if np.max(np.abs(step / scale)) < _TOLERANCE:
+                break
+            continue
+        improved = best - cost
+        best, kept = cost, (p, zero, power)
+        quadrature = b[:, None] * cosine - a[:, None] * sine
+        columns = np.stack([cosine, sine, -time * model, time * quadrature], axis=1)
+        step = _newton(columns, residual, d_sigma, d_omega)
+        if np.max(np.abs(step / scale)) < _TOLERANCE or improved < 1e-7 * cost:
+            break
+        p = p + step
+    if kept is None:
+        raise ValueError("the readings must be finite")
+    return NominalFit(kept[0], kept[1], kept[2])
+
+
+def _newton(columns: Array, residual: Array, d_sigma: Array, d_omega: Array) -> Array:
+    """The Gauss–Newton step of the four shared parameters, starts and zero projected out.
+
+    ``columns`` has shape (R, 4, n): the basis of the start, and the derivatives by σ and ωd.
+    """
+    runs, _, n = columns.shape
+    gram = columns @ columns.transpose(0, 2, 1)
+    sums = columns.sum(axis=2)
+    right = np.einsum("rkn,rn->rk", columns, residual)
+    # Unknowns: the four parameters, then the zero; every run's start is eliminated run by run.
+    shape = np.zeros((runs, 2, 5))
+    shape[:, 0, :4], shape[:, 1, :4] = d_sigma, d_omega
+    moment = np.zeros((5, 5))
+    load = np.zeros(5)
+    for r in range(runs):
+        t = shape[r]
+        cross = gram[r][:2, 2:] @ t
+        cross[:, 4] += sums[r, :2]
+        full = t.T @ gram[r][2:, 2:] @ t
+        full[4, :] += sums[r, 2:] @ t
+        full[:, 4] += t.T @ sums[r, 2:]
+        full[4, 4] += n
+        target = t.T @ right[r, 2:]
+        target[4] += residual[r].sum()
+        solved = np.linalg.solve(gram[r][:2, :2], np.column_stack([cross, right[r, :2]]))
+        moment += full - cross.T @ solved[:, :5]
+        load += target - cross.T @ solved[:, 5]
+    diagonal = np.sqrt(np.maximum(np.diag(moment), 1e-30))
+    scaled = moment / np.outer(diagonal, diagonal)
+    answer = np.linalg.lstsq(scaled, load / diagonal, rcond=1e-11)[0] / diagonal
+    return np.asarray(answer[:4], dtype=np.float64)

@@ -1,0 +1,246 @@
+"""The laws of the sensor: from the motion of its end to the reading.
+
+A law takes the reading so far (shape (samples, runs), rad) and returns the next; ``Order`` says in which
+order they act. Noise and the common zero come after the laws of the angle, clipping and rounding last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.terms import Motion
+
+
+class Order(IntEnum):
+    """Where in the sensor's chain a law acts."""
+
+    LINKAGE = 0  # between rod and sensor
+    CURVE = 1  # the sensor's characteristic
+    ADDED = 2  # what is added to the reading
+    NOISE = 3  # after zero and noise
+    LIMIT = 4  # the converter's range
+    ROUNDING = 5  # the converter's step; replaces the stated rounding
+    LINE = 6  # after rounding: lost and held samples
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A campaign's reading on its way through the sensor.
+
+    Args:
+        value: shape (samples, runs), rad.
+        motion: of the sensor's end.
+        conditions: the campaign's.
+        rng: for laws that draw.
+    """
+
+    value: Array
+    motion: Motion
+    conditions: Conditions
+    rng: np.random.Generator
+
+
+Params = Mapping[str, Array]
+ReadingLaw = Callable[[Reading, Params], Array]
+
+
+@dataclass(frozen=True, eq=False)
+class ReadingTerm:
+    """A sensor law with its parameters by run.
+
+    Args:
+        law: the law.
+        order: when it acts.
+        params: arrays of shape (runs,).
+    """
+
+    law: ReadingLaw
+    order: Order
+    params: dict[str, Array]
+
+
+def read_motion(
+    conditions: Conditions, motion: Motion, terms: Sequence[ReadingTerm], rng: np.random.Generator
+) -> Array:
+    """The sensor's reading of a motion.
+
+    Args:
+        conditions: the campaign's noise, zero and resolution.
+        motion: of the sensor's end.
+        terms: sensor laws.
+        rng: noise first, then whatever the laws draw, so that one seed gives one noise whatever the effects.
+
+    Returns:
+        The reading, shape (samples, runs), rad.
+    """
+    noise = conditions.noise_std * rng.standard_normal(motion.angle.shape)
+    value = motion.angle
+    ordered = sorted(terms, key=lambda t: t.order)
+    for term in (t for t in ordered if t.order < Order.NOISE):
+        value = term.law(Reading(value, motion, conditions, rng), term.params)
+    value = value + conditions.zero + noise
+    for term in (t for t in ordered if Order.NOISE <= t.order < Order.LINE):
+        value = term.law(Reading(value, motion, conditions, rng), term.params)
+    if not any(t.order is Order.ROUNDING for t in ordered):
+        value = np.round(value / conditions.resolution) * conditions.resolution
+    for term in (t for t in ordered if t.order is Order.LINE):
+        value = term.law(Reading(value, motion, conditions, rng), term.params)
+    return value
+
+
+# ---- linkage
+
+_PLAY_STEPS = 8
+
+
+def _fine_path(motion: Motion, interval: float) -> Array:
+    """The angle at eight points per sample by cubic Hermite, shape (8 (n−1) + 1, runs)."""
+    u = (np.arange(_PLAY_STEPS) / _PLAY_STEPS)[None, :, None]
+    a, b = motion.angle[:-1, None], motion.angle[1:, None]
+    ra, rb = motion.rate[:-1, None] * interval, motion.rate[1:, None] * interval
+    inner = (
+        (1 + 2 * u) * (1 - u) ** 2 * a
+        + u * (1 - u) ** 2 * ra
+        + u * u * (3 - 2 * u) * b
+        + u * u * (u - 1) * rb
+    )
+    return np.concatenate([inner.reshape(-1, motion.angle.shape[1]), motion.angle[-1:]])
+
+
+def _play(path: Array, half: Array, start: Array) -> Array:
+    """The play operator: the output moves only when pushed by the edges of the gap ±half."""
+    out = np.empty_like(path)
+    low, high = path - half, path + half
+    now = path[0] + start * half
+    for k in range(path.shape[0]):
+        now = np.minimum(np.maximum(now, low[k]), high[k])
+        out[k] = now
+    return out
+
+
+def backlash(r: Reading, p: Params) -> Array:
+    """Backlash ±w, starting at ``start`` (−1…1) of its gap."""
+    path = _fine_path(r.motion, 1.0 / r.conditions.sample_rate)
+    return r.value + (_play(path, p["half"], p["start"]) - path)[::_PLAY_STEPS]
+
+
+def two_plays(r: Reading, p: Params) -> Array:
+    """The mean of backlash ±1.5w and ±0.5w: hysteresis with a rounded loop (Prandtl–Ishlinskii)."""
+    path = _fine_path(r.motion, 1.0 / r.conditions.sample_rate)
+    wide, narrow = (_play(path, f * p["half"], p["start"]) for f in (1.5, 0.5))
+    return r.value + (0.5 * (wide + narrow) - path)[::_PLAY_STEPS]
+
+
+def sliding_linkage(r: Reading, p: Params) -> Array:
+    """The reading lags by z: dz = dβ − |dβ| z/w: a linkage that yields before it slides (Dahl)."""
+    path = _fine_path(r.motion, 1.0 / r.conditions.sample_rate)
+    z = -p["start"] * p["half"]
+    out = np.empty_like(path)
+    move = np.diff(path, axis=0, prepend=path[:1])
+    for k in range(path.shape[0]):
+        # Exact over one step of constant direction.
+        side = np.sign(move[k]) * p["half"]
+        z = side + (z - side) * np.exp(-np.abs(move[k]) / p["half"])
+        out[k] = z
+    return r.value - out[::_PLAY_STEPS]
+
+
+# ---- curve
+
+
+def cubic_curve(r: Reading, p: Params) -> Array:
+    """Adds s y³."""
+    return r.value + p["s"] * r.value**3
+
+
+def sine_curve(r: Reading, p: Params) -> Array:
+    """sin(ky)/k for s < 0, sinh(ky)/k for s > 0, k = √(6|s|)."""
+    k = np.sqrt(6.0 * np.abs(p["s"]))
+    return np.where(p["s"] < 0.0, np.sin(k * r.value), np.sinh(k * r.value)) / k
+
+
+def tangent_curve(r: Reading, p: Params) -> Array:
+    """tan(ky)/k for s > 0, arctan(ky)/k for s < 0, k = √(3|s|)."""
+    k = np.sqrt(3.0 * np.abs(p["s"]))
+    return np.where(p["s"] < 0.0, np.arctan(k * r.value), np.tan(k * r.value)) / k
+
+
+def loaded_potentiometer(r: Reading, p: Params) -> Array:
+    """A loaded potentiometer of span 2π/3: u/(1 + ρ u (1 − u)) at u = ½ + y/span; unit slope, zero at 0."""
+    span = 2.0 * np.pi / 3.0
+    rho, u = p["s"], 0.5 + r.value / span
+    middle = 0.5 / (1.0 + rho / 4.0)
+    slope = 1.0 / (1.0 + rho / 4.0)
+    return span * (u / (1.0 + rho * u * (1.0 - u)) - middle) / slope
+
+
+# ---- added
+
+
+def drift(r: Reading, p: Params) -> Array:
+    """Adds d (t/T)^n."""
+    t = r.conditions.time / r.conditions.duration
+    return r.value + p["drift"] * t[:, None] ** p["exponent"]
+
+
+def settling_drift(r: Reading, p: Params) -> Array:
+    """Adds d (1 − e^(−t/τ))/(1 − e^(−T/τ)): warming up."""
+    t = r.conditions.time[:, None]
+    return r.value + p["drift"] * np.expm1(-t / p["time"]) / np.expm1(-r.conditions.duration / p["time"])
+
+
+def hum(r: Reading, p: Params) -> Array:
+    """Adds a (sin(2πft + φ) + h sin(6πft + φ3))."""
+    arg = 2.0 * np.pi * p["frequency"] * r.conditions.time[:, None]
+    return r.value + p["amplitude"] * (
+        np.sin(arg + p["phase"]) + p["third"] * np.sin(3.0 * arg + p["third_phase"])
+    )
+
+
+def hum_bursts(r: Reading, p: Params) -> Array:
+    """Hum whose amplitude swells slowly: a (1 + ½ sin(2π f2 t + φ2)) sin(2πft + φ)."""
+    t = r.conditions.time[:, None]
+    swell = 1.0 + 0.5 * np.sin(2.0 * np.pi * p["slow"] * t + p["third_phase"])
+    return r.value + p["amplitude"] * swell * np.sin(2.0 * np.pi * p["frequency"] * t + p["phase"])
+
+
+# ---- limit
+
+
+def clipping(r: Reading, p: Params) -> Array:
+    """−L ≤ y ≤ L; ``lower`` 0 leaves the lower side free."""
+    low = np.where(p["lower"] > 0.0, -p["limit"], -np.inf)
+    return np.clip(r.value, low, p["limit"])
+
+
+def soft_clipping(r: Reading, p: Params) -> Array:
+    """|y| bends over towards L within a share k of it: below (1 − k) L straight, then exponential."""
+    size = np.abs(r.value)
+    knee = (1.0 - p["knee"]) * p["limit"]
+    over = np.maximum(size - knee, 0.0)
+    room = p["knee"] * p["limit"]
+    return np.sign(r.value) * (np.minimum(size, knee) + room * (-np.expm1(-over / room)))
+
+
+# ---- rounding
+
+
+def coarse_rounding(r: Reading, p: Params) -> Array:
+    """Rounded to a step."""
+    return np.round(r.value / p["step"]) * p["step"]
+
+
+def coarse_truncation(r: Reading, p: Params) -> Array:
+    """Cut down to a step."""
+    return np.floor(r.value / p["step"]) * p["step"]
+
+
+def uneven_rounding(r: Reading, p: Params) -> Array:
+    """Rounded to a step whose every other level is a quarter step off (a converter's uneven codes)."""
+    level = np.round(r.value / p["step"])
+    return p["step"] * (level + 0.25 * (np.mod(level, 2.0) - 0.5))

@@ -1,0 +1,183 @@
+"""Simulates drawn campaigns and sizes their effects, by secant steps in logarithms.
+
+The excess of an effect is mean(residual²)/noise² − 1 over all runs after the nominal model is refitted,
+noise² being the variance of the sensor's noise and of its stated rounding.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tunnel_reference.catalogue import Bound
+from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.draw import CampaignDraw, EffectDraw, with_defaults
+from tunnel_reference.integrator import integrate
+from tunnel_reference.nominal_fit import fit_nominal
+from tunnel_reference.readings import ReadingTerm, read_motion
+from tunnel_reference.terms import Motion, Term
+
+PASSES = 6
+TOLERANCE = 0.1
+_SUBSTEPS = 10
+_ROD_SUBSTEPS = 20
+_COARSE, _ROD_COARSE = 1, 10
+_SHORT = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """A campaign simulated.
+
+    Args:
+        draw: what was simulated.
+        readings: shape (samples, runs), rad.
+        excess: after the nominal refit.
+        run_excess: the same by run, shape (runs,).
+    """
+
+    draw: CampaignDraw
+    readings: Array
+    excess: float
+    run_excess: Array
+
+
+def bind_effects(draw: CampaignDraw) -> tuple[Conditions, list[Bound]]:
+    """Conditions and terms of a campaign with all its effects; calibration first, others read it."""
+    conditions, terms = with_defaults(draw.conditions), []
+    for effect in draw.effects:
+        conditions, _ = effect.form.bind(effect.sign * effect.value, effect.extra, conditions)
+    for effect in draw.effects:
+        _, term = effect.form.bind(effect.sign * effect.value, effect.extra, conditions)
+        if term is not None:
+            terms.append(term)
+    return conditions, terms
+
+
+def _batches(conditions: Sequence[Conditions]) -> dict[tuple[bool, bool], list[int]]:
+    """Campaign numbers that may be integrated together without much waste: by rod and by short or long."""
+    found: dict[tuple[bool, bool], list[int]] = {}
+    for number, c in enumerate(conditions):
+        found.setdefault((c.rod is not None, c.duration > _SHORT), []).append(number)
+    return found
+
+
+def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> list[Motion]:
+    """Integrate campaigns in as few batches as possible.
+
+    Args:
+        draws: what to simulate.
+        fine: 10 steps a sample (20 with a flexible rod); else 1 (10), to size effects.
+    """
+    bound = [bind_effects(d) for d in draws]
+    motions: list[Motion | None] = [None] * len(draws)
+    for (flexible, _), numbers in _batches([c for c, _ in bound]).items():
+        substeps = (
+            (_ROD_SUBSTEPS if flexible else _SUBSTEPS) if fine else (_ROD_COARSE if flexible else _COARSE)
+        )
+        terms = [[t for t in bound[i][1] if isinstance(t, Term)] for i in numbers]
+        for i, motion in zip(
+            numbers, integrate([bound[i][0] for i in numbers], terms, substeps=substeps), strict=True
+        ):
+            motions[i] = motion
+    return [m for m in motions if m is not None]
+
+
+def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
+    """Read a motion through the campaign's sensor and refit the nominal model."""
+    conditions, terms = bind_effects(draw)
+    sensor = [t for t in terms if isinstance(t, ReadingTerm)]
+    readings = read_motion(conditions, motion, sensor, np.random.default_rng(draw.seed))
+    power = fit_nominal(draw.conditions, readings).residual_power / conditions.noise_power
+    return Simulated(draw, readings, float(np.mean(power)) - 1.0, power - 1.0)
+
+
+def _is_sensor(effect: EffectDraw, conditions: Conditions) -> bool:
+    """Whether the effect leaves the motion as it is."""
+    return isinstance(effect.form.bind(effect.value, effect.extra, with_defaults(conditions))[1], ReadingTerm)
+
+
+class _Search:
+    """The search for one effect's severity parameter."""
+
+    def __init__(self, campaign: int, slot: int, alone: CampaignDraw) -> None:
+        self.campaign, self.slot, self.alone = campaign, slot, alone
+        self.sensor = _is_sensor(alone.effects[0], alone.conditions)
+        self.motion: Motion | None = None
+        self.tried: list[tuple[float, float]] = []
+        self.done = False
+
+    def try_out(self) -> None:
+        """Read and fit the motion at the present value and learn from it; only sensor effects keep it."""
+        assert self.motion is not None
+        finite = bool(np.all(np.isfinite(self.motion.angle)))
+        self.learn(read_and_fit(self.alone, self.motion).excess if finite else np.inf)
+        if not self.sensor:
+            self.motion = None
+
+    def learn(self, excess: float) -> None:
+        """Take in the excess at the present value and choose the next one."""
+        effect = self.alone.effects[0]
+        excess = max(excess, 2e-3) if np.isfinite(excess) else 1e6
+        self.tried.append((np.log(effect.value), np.log(excess)))
+        target = np.log(effect.target)
+        if abs(self.tried[-1][1] - target) < TOLERANCE:
+            self.done = True
+            return
+        slope = 2.0
+        if len(self.tried) > 1:
+            (x0, y0), (x1, y1) = sorted(self.tried, key=lambda pair: abs(pair[1] - target))[:2]
+            slope = float(np.clip((y1 - y0) / (x1 - x0), 0.7, 5.0)) if x0 != x1 else 2.0
+        nearest = min(self.tried, key=lambda pair: abs(pair[1] - target))
+        step = float(np.clip((target - nearest[1]) / slope, -4.0, 4.0))
+        value = float(np.clip(np.exp(nearest[0] + step), *effect.form.limits))
+        if value == effect.value:
+            self.done = True
+        self.alone = replace(self.alone, effects=(replace(effect, value=value),))
+
+    def settle(self) -> None:
+        """Go back to the value that came closest."""
+        effect = self.alone.effects[0]
+        target = np.log(effect.target)
+        nearest = min(self.tried, key=lambda pair: abs(pair[1] - target))
+        value = float(np.exp(nearest[0]))
+        self.alone = replace(self.alone, effects=(replace(effect, value=value),))
+
+
+def size_effects(draws: Sequence[CampaignDraw], *, progress: bool = False) -> list[CampaignDraw]:
+    """Size every effect, each by itself in its campaign's conditions.
+
+    Args:
+        draws: drawn campaigns.
+        progress: say on standard error how the search goes.
+
+    Returns:
+        The same with severity parameters set.
+    """
+    searches = [
+        _Search(number, slot, replace(draw, effects=(effect,)))
+        for number, draw in enumerate(draws)
+        for slot, effect in enumerate(draw.effects)
+    ]
+    for turn in range(PASSES):
+        active = [s for s in searches if not s.done]
+        stale = [s for s in active if s.motion is None]
+        for search, motion in zip(stale, simulate_motions([s.alone for s in stale], fine=False), strict=True):
+            search.motion = motion
+        for search in active:
+            search.try_out()
+        if progress:
+            left = sum(not s.done for s in searches)
+            print(f"sizing, pass {turn + 1}: {left} of {len(searches)} effects left", file=sys.stderr)
+        if all(s.done for s in searches):
+            break
+    out = list(draws)
+    for search in searches:
+        search.settle()
+        effects = list(out[search.campaign].effects)
+        effects[search.slot] = search.alone.effects[0]
+        out[search.campaign] = replace(out[search.campaign], effects=tuple(effects))
+    return out

@@ -1,0 +1,1 @@
+"""The MuJoCo side: model, plugin, simulation, sensor and scenery."""

@@ -1,0 +1,264 @@
+"""The rig's MuJoCo model: the structure of ``mjcf/rig.xml`` filled with the rig description's numbers."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import resources
+
+import mujoco
+import numpy as np
+
+from tunnel_sim.engine import scenery
+from tunnel_sim.engine.plugin import load_plugin
+from tunnel_sim.physics.moment_law import state_vector
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.steps import check_stable
+from tunnel_sim.vocabulary.davis import davis_vertices
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import Rig
+
+_SERIES = ("wind_speed", "forcing")
+_THINNEST = 1e-3  # width over length: MuJoCo refuses the inertias of a body without any
+_NATIVE = frozenset({"spring_stiffness", "mechanical_damping", "yaw_inertia"})  # owned by joint and body
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A compiled model of the rig in one run.
+
+    Args:
+        mj: the compiled model.
+        rig: what it was built from.
+        settings: likewise.
+        spec: the complete MJCF specification; ``spec.to_xml()`` writes it.
+    """
+
+    mj: mujoco.MjModel
+    rig: Rig
+    settings: RunSettings
+    spec: mujoco.MjSpec = field(repr=False)
+
+    @cached_property
+    def yaw_address(self) -> int:
+        """Index of the spring end's angle in ``qpos`` and of its rate in ``qvel``."""
+        return int(self.mj.joint("yaw").qposadr[0])
+
+    def with_settings(self, settings: RunSettings) -> Model:
+        """The same model with another run's numbers, without compiling again.
+
+        Args:
+            settings: of the same structure: timestep, series lengths and rigid or twisting rod.
+
+        Returns:
+            A model whose physics equals to the bit that of ``build_model(rig, settings)``.
+
+        Raises:
+            TunnelError: when the plugin refuses the numbers, or the steps are too long for them.
+        """
+        check_stable(self.rig, settings)
+        mj = copy.copy(self.mj)
+        twist = settings.rod_twist
+        share = twist.inertia_share if twist is not None else 0.0
+        mj.joint("yaw").stiffness = settings.spring_stiffness
+        mj.joint("yaw").damping = settings.mechanical_damping
+        mj.body("davis").inertia = _inertia(self.rig, settings.yaw_inertia * (1.0 - share))
+        if twist is not None:
+            mj.joint("rod_twist").stiffness = 1.0 / twist.compliance
+            mj.joint("rod_twist").damping = twist.damping(settings.yaw_inertia)
+            mj.body("rod_end").inertia = _inertia(self.rig, settings.yaw_inertia * share)
+        mj.numeric_data[:] = numeric_vector(mj, numerics(self.rig, settings))
+        try:
+            mujoco.mj_setConst(mj, mujoco.MjData(mj))
+        except (ValueError, mujoco.FatalError) as error:
+            raise _refusal(error) from error
+        return Model(mj, self.rig, settings, self.spec)
+
+    def to_xml(self) -> str:
+        """The complete MJCF, numbers and all."""
+        return str(self.spec.to_xml())
+
+    def release_state(self) -> mujoco.MjData:
+        """The state at the release: the body held at rest at its angle until now.
+
+        With a flexible rod the body holds the release angle and the spring's end is in balance between
+        spring and twisted rod. The plugin's state (lag, angle, rate, twist and its rate, time, started)
+        starts there too, the lag at the body's angle; friction's deflection, its last number, starts at zero.
+        """
+        data = mujoco.MjData(self.mj)
+        release = self.settings.release_angle
+        twist = self.settings.rod_twist
+        end = release
+        if twist is not None:
+            end = release / (1.0 + self.settings.spring_stiffness * twist.compliance)
+            data.joint("rod_twist").qpos = release - end
+        data.joint("yaw").qpos = end
+        data.joint("yaw").qvel = self.settings.release_rate
+        started = {"lagged": release, "angle": end, "twist": release - end, "started": 1.0}
+        data.plugin_state[:] = state_vector({**started, "rate": self.settings.release_rate})
+        return data
+
+
+def build_model(rig: Rig, settings: RunSettings) -> Model:
+    """Build and compile the model of one run.
+
+    Args:
+        rig: geometry, mass and sensor.
+        settings: spring, damper, inertia, air and every further term of the moment law.
+
+    Returns:
+        The model.
+
+    Raises:
+        TunnelError: when MuJoCo or the plugin refuses the configuration, or the steps are too long for it.
+    """
+    check_stable(rig, settings)
+    spec = build_spec(rig, settings)
+    try:
+        compiled = spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise _refusal(error) from error
+    return Model(compiled, rig, settings, spec)
+
+
+def _refusal(error: Exception) -> TunnelError:
+    text = " ".join(str(error).split())
+    return TunnelError(f"MuJoCo refuses the model: {text}", remedy="correct the run's settings")
+
+
+def build_spec(rig: Rig, settings: RunSettings) -> mujoco.MjSpec:
+    """The complete MJCF specification of one run.
+
+    Args:
+        rig: geometry, mass and sensor.
+        settings: the run's physics.
+
+    Returns:
+        The specification, ready to compile or to write as XML.
+    """
+    load_plugin()
+    with resources.as_file(resources.files("mjcf") / "rig.xml") as path:
+        spec = mujoco.MjSpec.from_file(str(path))
+    spec.option.timestep = settings.timestep
+    _place_scenery(spec, rig)
+    _place_rig(spec, rig)
+    _set_dynamics(spec, rig, settings)
+    _set_numerics(spec, rig, settings)
+    return spec
+
+
+def _place_scenery(spec: mujoco.MjSpec, rig: Rig) -> None:
+    section, rod = rig.working_section, rig.rod
+    spring = scenery.coil(
+        2.4 * rod.diameter, rod.diameter / 4, section.height + 0.25 * rod.length_above_ceiling,
+        section.height + 0.9 * rod.length_above_ceiling, turns=7,
+    )  # fmt: skip
+    pieces = {
+        "floor": scenery.floor(section),
+        "glass": scenery.glass(section),
+        "frame": scenery.frame(rig),
+        "marks": scenery.marks(rig),
+        "spring": spring,
+    }
+    for name, piece in pieces.items():
+        mesh = spec.mesh(name)
+        mesh.uservert, mesh.userface = piece.vertices.ravel(), piece.faces.ravel()
+    spec.body("view_centre").pos = (0.0, 0.0, 0.45 * section.height)
+
+
+def _place_rig(spec: mujoco.MjSpec, rig: Rig) -> None:
+    body = rig.body
+    centre = body.ground_clearance + body.height / 2
+    top = rig.working_section.height + 1.2 * rig.rod.length_above_ceiling  # the pointer turns above the yoke
+    spec.body("davis").pos = (0.0, 0.0, centre)
+    spec.site("nose").pos = (body.length / 2, 0.0, 0.0)
+    spec.mesh("davis_body").uservert = davis_vertices(body).ravel()
+    rod = spec.geom("rod")
+    rod.size = (rig.rod.diameter / 2, (top - centre) / 2, 0.0)
+    rod.pos = (0.0, 0.0, (top + centre) / 2)
+    pointer = spec.geom("pointer")
+    pointer.size = (0.07, rig.rod.diameter / 5, rig.rod.diameter / 5)
+    pointer.pos = (0.07, 0.0, top)
+
+
+def _set_dynamics(spec: mujoco.MjSpec, rig: Rig, settings: RunSettings) -> None:
+    for geom in spec.geoms:
+        geom.mass = 0.0  # mass and inertia are given below, not by the shapes
+    twist = settings.rod_twist
+    share = twist.inertia_share if twist is not None else 0.0
+    _set_inertia(spec.body("davis"), rig, settings.yaw_inertia * (1.0 - share), rig.body.mass)
+    yaw = spec.joint("yaw")
+    yaw.stiffness[0], yaw.damping[0] = settings.spring_stiffness, settings.mechanical_damping
+    if twist is not None:
+        _set_inertia(spec.body("rod_end"), rig, settings.yaw_inertia * share, 0.1 * rig.body.mass)
+        spec.body("davis").add_joint(name="rod_twist", type=mujoco.mjtJoint.mjJNT_HINGE, axis=(0.0, 0.0, 1.0))
+        spec.joint("rod_twist").stiffness[0] = 1.0 / twist.compliance
+        spec.joint("rod_twist").damping[0] = twist.damping(settings.yaw_inertia)
+        spec.plugins[0].config = {"joint": "yaw", "twist_joint": "rod_twist"}
+
+
+def _set_inertia(body: mujoco.MjsBody, rig: Rig, yaw_inertia: float, mass: float) -> None:
+    body.explicitinertial = True
+    body.mass = mass
+    body.ipos, body.iquat = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+    body.inertia = _inertia(rig, yaw_inertia)
+
+
+def _inertia(rig: Rig, yaw_inertia: float) -> tuple[float, float, float]:
+    """Principal inertias, kg m²: yaw as given, the others those of a box scaled alike (never in motion)."""
+    length, height = rig.body.length, rig.body.height
+    width = max(rig.body.width, _THINNEST * length)
+    scale = yaw_inertia / (length**2 + width**2)
+    return scale * (width**2 + height**2), scale * (length**2 + height**2), yaw_inertia
+
+
+def _set_numerics(spec: mujoco.MjSpec, rig: Rig, settings: RunSettings) -> None:
+    for name, values in numerics(rig, settings).items():
+        spec.add_numeric(name=name, data=list(values), size=len(values))
+
+
+def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
+    """What the MJCF's numerics hold: the moment law's parameters and the sampled inputs.
+
+    Args:
+        rig: gives frontal area, reference length and width.
+        settings: gives the rest.
+
+    Returns:
+        Values by name; what joint and body own is left out.
+
+    Raises:
+        TunnelError: when a series has an unknown name.
+    """
+    law = settings.law(rig)
+    values: dict[str, tuple[float, ...]] = {
+        name: (value,) for name, value in law.items() if name not in _NATIVE
+    }
+    values["wind_speed"] = (settings.wind_speed,)
+    for name, series in settings.series.items():
+        if name not in _SERIES:
+            raise TunnelError(f"unknown series {name!r}", remedy=did_you_mean(name, _SERIES))
+        values[name] = series.values
+        values[f"{name}_interval"] = (series.interval,)
+    return values
+
+
+def numeric_vector(model: mujoco.MjModel, values: Mapping[str, Sequence[float]]) -> Array:
+    """A model's ``numeric_data`` with some numerics changed.
+
+    Args:
+        model: the compiled model.
+        values: new value, or series of the same length, by numeric name.
+
+    Returns:
+        Array of shape (nnumericdata,).
+    """
+    data = np.array(model.numeric_data)
+    for name, value in values.items():
+        numeric = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name)
+        start = model.numeric_adr[numeric]
+        data[start : start + model.numeric_size[numeric]] = value
+    return data

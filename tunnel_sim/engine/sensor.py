@@ -1,0 +1,46 @@
+"""From the angle of the rod's upper end to the reading of the potentiometer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tunnel_sim.effects.chain import EffectChain
+from tunnel_sim.physics.motion import Motion
+from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.record import Array, Record
+
+
+def read_motion(
+    motion: Motion, sensor: SensorModel, rng: np.random.Generator, chain: EffectChain | None = None
+) -> Record:
+    """The reading y = quantised(β + zero + noise), with the sensor's effects at their places.
+
+    Args:
+        motion: of the rod's upper end.
+        sensor: noise, zero and resolution; a resolution of 0 leaves the reading continuous.
+        rng: source of the noise.
+        chain: the run's effects; those that do not concern the sensor do nothing here.
+
+    Returns:
+        The record. The ideal converter has no end stop: clipping is an effect.
+    """
+    angle = motion.angle
+    if chain is not None:
+        angle, sensor = chain.angle(angle, motion.time_s), chain.sensor(sensor)
+    reading = angle + sensor.zero + sensor.noise_std * rng.standard_normal(angle.shape)
+    if chain is not None:
+        reading = chain.reading(reading)
+    return Record(motion.time_s, quantise(reading, sensor.resolution))
+
+
+def quantise(reading: Array, step: float) -> Array:
+    """Round to a multiple of the resolution.
+
+    Args:
+        reading: rad, any shape.
+        step: rad; 0 leaves the reading as it is.
+
+    Returns:
+        The rounded reading, rad.
+    """
+    return np.round(reading / step) * step if step > 0.0 else reading

@@ -1,0 +1,222 @@
+"""Runs of the virtual rig: one, many at once, or a whole campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+import mujoco
+import numpy as np
+from mujoco import batch as mujoco_batch
+
+from tunnel_sim.effects import Effect, EffectChain
+from tunnel_sim.engine.model import Model, build_model
+from tunnel_sim.engine.sensor import read_motion
+from tunnel_sim.physics.motion import Motion, sampling
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.steps import follow_fastest
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.rig import Rig
+
+Progress = Callable[[int, int], None]
+_CHUNK_STEPS = 4_000_000  # steps recorded at once: bounds the memory of a large batch
+
+
+def simulate_motion(model: Model, sample_rate: float) -> Motion:
+    """Integrate one run with plain ``mj_step``.
+
+    Args:
+        model: the rig in this run.
+        sample_rate: Hz.
+
+    Returns:
+        The motion from the release on.
+
+    Raises:
+        TunnelError: when the integration leaves the finite range.
+    """
+    samples, steps = sampling(model.settings, sample_rate)
+    data = model.release_state()
+    angle, rate = np.empty(samples), np.empty(samples)
+    at = model.yaw_address
+    for i in range(samples):
+        angle[i], rate[i] = data.qpos[at], data.qvel[at]
+        if i + 1 < samples:
+            mujoco.mj_step(model.mj, data, steps)
+    _check_finite(angle, "the run")
+    return Motion(np.arange(samples) / sample_rate, angle, rate)
+
+
+def simulate(
+    rig: Rig,
+    settings: RunSettings,
+    sensor: SensorModel,
+    rng: np.random.Generator,
+    *,
+    effects: Sequence[Effect] = (),
+) -> Record:
+    """Simulate one run as the sensor sees it.
+
+    Args:
+        rig: geometry, mass and sensor.
+        settings: the physics of the run as stated.
+        sensor: the potentiometer.
+        rng: source of its noise and of what effects draw.
+        effects: what acts beyond the stated physics.
+
+    Returns:
+        The record.
+
+    Raises:
+        TunnelError: when the integration leaves the finite range or the settings are refused.
+    """
+    chain = EffectChain.draw(settings, effects, rng)
+    motion = simulate_motion(build_model(rig, follow_fastest(rig, chain.physics())), sensor.sample_rate)
+    return read_motion(motion, sensor, rng, chain)
+
+
+def simulate_batch(
+    rig: Rig,
+    settings: Sequence[RunSettings],
+    sensor: SensorModel,
+    rngs: Sequence[np.random.Generator],
+    *,
+    effects: Sequence[Effect] = (),
+    nthread: int = 0,
+    progress: Progress | None = None,
+) -> list[Record]:
+    """Simulate many runs on a thread pool.
+
+    Args:
+        rig: geometry, mass and sensor, common to the runs.
+        settings: the stated physics of every run.
+        sensor: the potentiometer, common to the runs.
+        rngs: one generator per run.
+        effects: what acts beyond the stated physics, in all runs.
+        nthread: threads; 0 takes all processors. The result is the same to the bit whatever the number,
+            and the same as a loop over `simulate`.
+        progress: called with (runs done, runs in all).
+
+    Returns:
+        One record per run, in order.
+
+    Raises:
+        TunnelError: when a run leaves the finite range or its settings are refused.
+    """
+    if len(rngs) != len(settings):
+        raise TunnelError(
+            f"{len(settings)} runs but {len(rngs)} random generators", remedy="give one generator per run"
+        )
+    chains = [EffectChain.draw(run, effects, rng) for run, rng in zip(settings, rngs, strict=True)]
+    true = [chain.physics() for chain in chains]
+    motions = simulate_motions(rig, true, sensor.sample_rate, nthread=nthread, progress=progress)
+    return [
+        read_motion(motion, sensor, rng, chain)
+        for motion, rng, chain in zip(motions, rngs, chains, strict=True)
+    ]
+
+
+def simulate_motions(
+    rig: Rig,
+    settings: Sequence[RunSettings],
+    sample_rate: float,
+    *,
+    nthread: int = 0,
+    progress: Progress | None = None,
+) -> list[Motion]:
+    """Integrate many runs on a thread pool; arguments and guarantees as in `simulate_batch`.
+
+    Args:
+        rig: geometry and mass, common to the runs.
+        settings: the physics of every run.
+        sample_rate: Hz.
+        nthread: threads; 0 takes all processors.
+        progress: called with (runs done, runs in all).
+
+    Returns:
+        One motion per run, in order.
+
+    Raises:
+        TunnelError: when a run leaves the finite range, its settings are refused, or its fastest motion asks
+            for too many steps.
+    """
+    motions: dict[int, Motion] = {}
+    settings = [_followed(rig, run, number) for number, run in enumerate(settings, 1)]
+    for group in _groups(settings):
+        samples, steps = sampling(settings[group[0]], sample_rate)
+        size = max(1, _CHUNK_STEPS // (samples * steps))
+        for start in range(0, len(group), size):
+            chunk = group[start : start + size]
+            done = _integrate_chunk(rig, [settings[i] for i in chunk], sample_rate, nthread)
+            for index, motion in zip(chunk, done, strict=True):
+                _check_finite(motion.angle, f"run {index + 1}")
+                motions[index] = motion
+            if progress is not None:
+                progress(len(motions), len(settings))
+    return [motions[i] for i in range(len(settings))]
+
+
+def _followed(rig: Rig, run: RunSettings, number: int) -> RunSettings:
+    try:
+        return follow_fastest(rig, run)
+    except TunnelError as error:
+        raise TunnelError(error.what, where=f"run {number}", remedy=error.remedy) from error
+
+
+def _groups(settings: Sequence[RunSettings]) -> list[list[int]]:
+    """Indices of runs that one compiled model can serve with expanded fields."""
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for i, run in enumerate(settings):
+        groups.setdefault((run.duration, *run.layout()), []).append(i)
+    return list(groups.values())
+
+
+def _integrate_chunk(rig: Rig, runs: list[RunSettings], sample_rate: float, nthread: int) -> list[Motion]:
+    model = build_model(rig, runs[0])
+    batch = mujoco_batch.Batch(model.mj, nsim=len(runs), nthread=nthread)
+    fields = {
+        name: batch.expand(name) for name in ("jnt_stiffness", "dof_damping", "numeric_data", "body_inertia")
+    }
+    states = {name: batch.bind(name) for name in ("qpos", "qvel", "plugin_state")}
+    for i, run in enumerate(runs):
+        case = model.with_settings(run)
+        for name, values in fields.items():
+            values[i] = getattr(case.mj, name)
+        data = case.release_state()
+        for name, values in states.items():
+            values[i] = getattr(data, name)
+    batch.set_const()
+    samples, steps = sampling(runs[0], sample_rate)
+    qpos, qvel = states["qpos"].copy(), states["qvel"].copy()
+    with _no_log():
+        recorded = batch.rollout(nstep=(samples - 1) * steps, record=("qpos", "qvel"))
+    at = model.yaw_address
+    time = np.arange(samples) / sample_rate
+    motions = []
+    for i in range(len(runs)):
+        angle = np.concatenate([qpos[i, at : at + 1], recorded["qpos"][i, steps - 1 :: steps, at]])
+        rate = np.concatenate([qvel[i, at : at + 1], recorded["qvel"][i, steps - 1 :: steps, at]])
+        motions.append(Motion(time, angle, rate))
+    return motions
+
+
+@contextmanager
+def _no_log() -> Iterator[None]:
+    """Keep MuJoCo from printing and logging into the working folder what `_check_finite` says."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _check_finite(angle: Array, where: str) -> None:
+    if not np.all(np.isfinite(angle)) or np.max(np.abs(angle)) > 1e3:
+        raise TunnelError(
+            "the motion grows without bound",
+            where=where,
+            remedy="check that spring and wind leave a positive stiffness (Kr > Ka) and the damping's sign",
+        )

@@ -1,0 +1,1 @@
+"""Reading and writing: campaigns, run files and plans, each checked, each written whole or not at all."""

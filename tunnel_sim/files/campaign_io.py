@@ -1,0 +1,230 @@
+"""Campaigns in and out: a folder with ``campaign.toml`` and one CSV or Parquet file per run.
+
+The reader never opens ``truth.json``. The writer writes the whole campaign or nothing.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from tunnel_sim.files.campaign_schema import (
+    CAMPAIGN_FILE,
+    NO_CAMPAIGN,
+    CampaignDocument,
+    RunTable,
+    campaign_document,
+    parse_document,
+    read_document,
+    rig_properties,
+    run_place,
+    sensor_properties,
+)
+from tunnel_sim.files.json_text import json_text
+from tunnel_sim.files.leftovers import clear_leftovers
+from tunnel_sim.files.plausible import plausible_run
+from tunnel_sim.files.reading import check_count
+from tunnel_sim.files.run_checks import angle_in_radians, enough_cycles, uniform_times
+from tunnel_sim.files.run_files import RUN_FORMATS, read_table, table_bytes
+from tunnel_sim.files.toml_input import shown
+from tunnel_sim.files.writing import whole_folder
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.record import Record
+
+TRUTH_FILE = "truth.json"
+RUN_FOLDER = "runs"
+
+
+def read_campaign(folder: Path | str) -> Campaign:
+    """Read and check a campaign.
+
+    Args:
+        folder: the campaign's folder, or the ``campaign.toml`` in it.
+
+    Returns:
+        The campaign, angles in radians.
+
+    Raises:
+        TunnelError: for the first thing that is wrong, in one line that names file, run and remedy.
+    """
+    folder = Path(folder)
+    if folder.name == CAMPAIGN_FILE and folder.is_file():
+        folder = folder.parent
+    if not folder.is_dir():
+        raise TunnelError("no such folder", where=shown(folder), remedy=NO_CAMPAIGN)
+    document = read_document(folder / CAMPAIGN_FILE)
+    sensor = sensor_properties(document.sensor)
+    return Campaign(
+        name=document.campaign.name,
+        description=document.campaign.description,
+        rig=rig_properties(document.rig),
+        sensor=sensor,
+        runs=tuple(_read_runs(folder, document, sensor)),
+    )
+
+
+def write_campaign(
+    campaign: Campaign,
+    folder: Path | str,
+    *,
+    run_format: str = "parquet",
+    truth: Mapping[str, Any] | None = None,
+    overwrite: bool = False,
+) -> Path:
+    """Write a campaign so that reading it gives the same numbers: whole, or not at all.
+
+    Args:
+        campaign: what to write; it must pass every check of the reader.
+        folder: the folder to make; its parents are made where they are missing.
+        run_format: ``parquet`` or ``csv``.
+        truth: what a simulator knows, written as ``truth.json``; None writes none.
+        overwrite: whether a folder that is there already may be replaced; only one that is empty or holds a
+            campaign and nothing else is.
+
+    Returns:
+        The folder.
+
+    Raises:
+        TunnelError: the folder is there, or may not be replaced; the campaign would not be readable; the disk
+            refuses.
+        ValueError: ``truth`` holds NaN or an infinity.
+        TypeError: ``truth`` holds what JSON cannot.
+    """
+    folder = Path(folder)
+    if run_format not in RUN_FORMATS:
+        raise TunnelError(
+            f"unknown run format '{run_format}'",
+            where=shown(folder),
+            remedy=did_you_mean(run_format, RUN_FORMATS),
+        )
+    clear_leftovers(folder.resolve().parent)  # what a killed command set aside is there again
+    _check_target(folder, overwrite=overwrite)
+    files = _run_files(campaign, run_format)
+    document = campaign_document(campaign, files)
+    _check_campaign(campaign, document, folder)
+    truth_text = None if truth is None else json_text(truth)
+    with whole_folder(folder) as partial:
+        (partial / RUN_FOLDER).mkdir()
+        for run in campaign.runs:
+            (partial / files[run.id]).write_bytes(table_bytes(run.record, folder / files[run.id]))
+        if truth_text is not None:
+            (partial / TRUTH_FILE).write_bytes(truth_text.encode())
+        (partial / CAMPAIGN_FILE).write_bytes(tomli_w.dumps(document).encode())
+    return folder
+
+
+def _read_runs(folder: Path, document: CampaignDocument, sensor: SensorProperties) -> Iterator[Run]:
+    """The runs in turn, as long as there is room for their samples."""
+    samples = 0
+    for table in document.runs:
+        run = _read_run(folder, table, sensor)
+        yield run
+        samples += run.record.time_s.size
+        remedy = "put the runs into several campaigns"
+        check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", shown(folder), remedy)
+
+
+def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
+    sample_rate = sensor.sample_rate
+    path = folder / run.file
+    where = run_place(path, run.id)
+    _check_inside(folder, path, where)
+    time_s, reading, column = read_table(path, where, timed=sample_rate is None)
+    if time_s is None:
+        if sample_rate is None:
+            raise TunnelError(
+                "no column time_s and no sample_rate",
+                where=where,
+                remedy="add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml",
+            )
+        time_s = np.arange(reading.size) / sample_rate
+    uniform_times(time_s, sample_rate, where)
+    record = Record(time_s, angle_in_radians(reading, column, run.release_angle, where))
+    cycles = enough_cycles(record, where)
+    if sensor.plausible is not False:
+        plausible_run(record, cycles, where)
+    return Run(
+        id=run.id,
+        record=record,
+        wind_speed=run.wind_speed,
+        spring_stiffness=run.spring_stiffness,
+        air_density=run.air_density,
+        release_angle=run.release_angle,
+    )
+
+
+def _check_inside(folder: Path, path: Path, where: str) -> None:
+    """Refuse a run file that a symbolic link takes outside the folder."""
+    try:
+        inside = path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):
+        raise TunnelError("the path cannot be followed", where=where, remedy="correct 'file'") from None
+    if not inside:
+        raise TunnelError(
+            "a symbolic link leads outside the campaign's folder",
+            where=where,
+            remedy="copy the file into the folder",
+        )
+
+
+def _check_campaign(campaign: Campaign, document: dict[str, Any], folder: Path) -> None:
+    """Everything the reader would refuse, before anything is written."""
+    parse_document(document, folder / CAMPAIGN_FILE)
+    for run in campaign.runs:
+        where = run_place(folder, run.id)
+        time_s, yaw = run.record.time_s, run.record.yaw_rad
+        if not (np.isfinite(time_s).all() and np.isfinite(yaw).all()):
+            raise TunnelError(
+                "the record holds NaN or an infinity", where=where, remedy="shorten the run or leave it out"
+            )
+        uniform_times(time_s, campaign.sensor.sample_rate, where)
+        angle_in_radians(yaw, "yaw_rad", run.release_angle, where)
+        cycles = enough_cycles(run.record, where)
+        if campaign.sensor.plausible is not False:
+            plausible_run(run.record, cycles, where)
+
+
+def _run_files(campaign: Campaign, run_format: str) -> dict[str, str]:
+    """A file for every run: named by id where that is safe on any disk, else by number."""
+    ids = [run.id for run in campaign.runs]
+    safe = all(re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,79}", name) for name in ids)
+    named = safe and len({name.lower() for name in ids}) == len(ids)
+    return {
+        name: f"{RUN_FOLDER}/{name if named else f'run-{number:04d}'}.{run_format}"
+        for number, name in enumerate(ids, start=1)
+    }
+
+
+def _check_target(folder: Path, *, overwrite: bool) -> None:
+    where = shown(folder)
+    if not folder.is_dir():
+        if folder.exists() or folder.is_symlink():
+            raise TunnelError("this is not a folder", where=where, remedy="choose another name")
+        return
+    if not overwrite:
+        raise TunnelError(
+            "the folder exists", where=where, remedy="choose another one, or ask to overwrite it"
+        )
+    entries = list(folder.iterdir())
+    if entries and not (folder / CAMPAIGN_FILE).is_file():
+        raise TunnelError(
+            "the folder holds no campaign", where=where, remedy="choose another one, or empty it"
+        )
+    # What the writer did not make is somebody's work: replacing the folder would delete it.
+    strange = [p for p in entries if p.name not in (CAMPAIGN_FILE, TRUTH_FILE, RUN_FOLDER)]
+    runs = folder / RUN_FOLDER
+    if runs.is_dir() and not runs.is_symlink():
+        strange += [p for p in runs.iterdir() if p.is_dir() or p.suffix.lower()[1:] not in RUN_FORMATS]
+    if strange:
+        raise TunnelError(
+            f"the folder holds more than a campaign ({strange[0].name})",
+            where=where,
+            remedy="move that away, or choose another folder",
+        )

@@ -1,0 +1,206 @@
+"""The tables of ``campaign.toml``, and their translation to and from the campaign's vocabulary."""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from tunnel_sim.files.plausible import plausible_values
+from tunnel_sim.files.reading import check_count
+from tunnel_sim.files.toml_input import (
+    OneLine,
+    SampleRate,
+    StrictModel,
+    check_version,
+    load_toml,
+    shown,
+    validate,
+)
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError
+
+CAMPAIGN_FILE = "campaign.toml"
+NO_CAMPAIGN = f"name a folder that holds a {CAMPAIGN_FILE}"
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+class CampaignTable(StrictModel):
+    """``[campaign]``."""
+
+    name: OneLine = Field(description="a short name in quotes")
+    description: str = Field(default="", description="text in quotes, or leave it out")
+
+
+class RigTable(StrictModel):
+    """``[rig]``."""
+
+    yaw_inertia: Positive | None = Field(default=None, description="a positive number in kg m2")
+    frontal_area: Positive | None = Field(default=None, description="a positive number in m2")
+    reference_length: Positive | None = Field(default=None, description="a positive number in m")
+    width: Positive | None = Field(default=None, description="a positive number in m")
+
+
+class SensorTable(StrictModel):
+    """``[sensor]``."""
+
+    sample_rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
+    resolution: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
+    noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
+    plausible: bool | None = Field(
+        default=None, description="false to keep what looks like a slip of units, or leave it out"
+    )
+
+
+class RunTable(StrictModel):
+    """``[[runs]]``."""
+
+    id: OneLine = Field(description="a short unique name in quotes")
+    file: OneLine = Field(description="a path inside the campaign's folder, such as 'runs/r01.csv'")
+    spring_stiffness: Positive | None = Field(
+        default=None, description="a positive number in N m/rad, or leave it out for the normalised form"
+    )
+    wind_speed: NotNegative = Field(description="a number in m/s, 0 for wind-off")
+    air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
+    release_angle: float | None = Field(default=None, description="a number in rad")
+
+
+class CampaignDocument(StrictModel):
+    """The whole of ``campaign.toml``."""
+
+    schema_version: Literal[1] = Field(description="1")
+    campaign: CampaignTable = Field(description="a [campaign] table with a name")
+    rig: RigTable = Field(default=RigTable(), description="a [rig] table")
+    sensor: SensorTable = Field(default=SensorTable(), description="a [sensor] table")
+    runs: list[RunTable] = Field(min_length=1, description="one [[runs]] table or more")
+
+
+def read_document(path: Path) -> CampaignDocument:
+    """Read and validate ``campaign.toml``; the run files are not opened.
+
+    Args:
+        path: the file.
+
+    Returns:
+        The validated document.
+
+    Raises:
+        TunnelError: for the first thing that is wrong, naming file, run and remedy.
+    """
+    return parse_document(load_toml(path, missing=NO_CAMPAIGN), path)
+
+
+def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
+    """Validate the content of ``campaign.toml``.
+
+    Args:
+        document: the tables.
+        path: the file they come from or go to, for the message.
+
+    Returns:
+        The validated document.
+
+    Raises:
+        TunnelError: for the first thing that is wrong, naming file, run and remedy.
+    """
+    check_version(document, path)
+    parsed = validate(CampaignDocument, document, path)
+    remedy = "put the runs into several campaigns"
+    check_count(len(parsed.runs), limits.CAMPAIGN_RUNS, "runs", shown(path), remedy)
+    seen: set[str] = set()
+    for run in parsed.runs:
+        where = run_place(path, run.id)
+        if run.id in seen:
+            raise TunnelError(
+                f"the id '{run.id}' is used twice", where=where, remedy="give every run its own id"
+            )
+        seen.add(run.id)
+        _check_run(run, where)
+    if parsed.sensor.plausible is not False:
+        _check_sizes(parsed, path)
+    return parsed
+
+
+def run_place(path: Path, run_id: str) -> str:
+    """File and run for an error message.
+
+    Args:
+        path: of the run's file, or of the campaign's folder.
+        run_id: the run's.
+    """
+    return f"{shown(path)}, run '{run_id}'"
+
+
+def _check_sizes(document: CampaignDocument, path: Path) -> None:
+    plausible_values(document.rig.model_dump(), f"{shown(path)}, [rig]")
+    for run in document.runs:
+        plausible_values(run.model_dump(), run_place(path, run.id))
+
+
+def _check_run(run: RunTable, where: str) -> None:
+    if run.wind_speed > 0.0 and run.air_density is None:
+        raise TunnelError(
+            f"wind-on (wind_speed = {run.wind_speed:g} m/s) without air_density",
+            where=where,
+            remedy="give air_density in kg/m3 (about 1.2 for air)",
+        )
+    if run.release_angle is not None and abs(run.release_angle) > np.pi:
+        raise TunnelError(
+            f"release_angle = {run.release_angle:g} is beyond half a turn: it looks like degrees",
+            where=where,
+            remedy=f"give it in rad ({np.deg2rad(run.release_angle):.4g})",
+        )
+    windows, posix = PureWindowsPath(run.file), PurePosixPath(run.file)
+    if windows.drive or windows.root or posix.is_absolute() or ".." in windows.parts + posix.parts:
+        raise TunnelError(
+            f"the path '{run.file}' may lead outside the campaign's folder",
+            where=where,
+            remedy="put the file inside the folder and name it without '..' or a leading '/'",
+        )
+
+
+def rig_properties(table: RigTable) -> RigProperties:
+    """The vocabulary's form of ``[rig]``."""
+    return RigProperties(**table.model_dump())
+
+
+def sensor_properties(table: SensorTable) -> SensorProperties:
+    """The vocabulary's form of ``[sensor]``."""
+    return SensorProperties(**table.model_dump())
+
+
+def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, Any]:
+    """The tables of ``campaign.toml`` for a campaign.
+
+    Args:
+        campaign: the campaign.
+        files: the file of every run, by id, relative to the campaign's folder.
+
+    Returns:
+        The tables, in the order in which they are written; what is None is left out.
+    """
+    head = {"name": campaign.name, "description": campaign.description or None}
+    document: dict[str, Any] = {"schema_version": 1, "campaign": _stated(head)}
+    for key, values in (("rig", vars(campaign.rig)), ("sensor", vars(campaign.sensor))):
+        if _stated(values):
+            document[key] = _stated(values)
+    document["runs"] = [
+        {"id": run.id, "file": files[run.id]}
+        | _stated({key: value for key, value in vars(run).items() if key not in ("id", "record")})
+        for run in campaign.runs
+    ]
+    return document
+
+
+def _stated(values: dict[str, Any]) -> dict[str, Any]:
+    # NumPy scalars are turned into the floats that TOML can hold; -0.0 and digits are kept.
+    return {
+        key: float(value) if isinstance(value, np.floating | np.integer) else value
+        for key, value in values.items()
+        if value is not None
+    }

@@ -1,0 +1,308 @@
+"""Reading files: regular ones only, of limited size, and every fault is one `TunnelError`.
+
+All readers of all packages go through here. A FIFO or a device is refused without waiting for it, and what is too
+large is refused before it is held in memory.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import stat
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_CHUNK = 2**22
+_FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
+"""What malformed content makes of code that takes it apart."""
+
+
+def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", readable: str = "") -> bytes:
+    """Read a regular file.
+
+    Args:
+        path: the file.
+        limit: the most it may hold, bytes.
+        where: what to call it in messages; its path when empty.
+        missing: the remedy where there is no such file.
+        readable: the remedy where it is no regular file or cannot be read.
+
+    Returns:
+        Its content.
+
+    Raises:
+        TunnelError: no such file, not a regular file, not readable, or too large.
+    """
+    where = where or shown(path)
+    readable = readable or "name a file that can be read"
+    try:
+        # O_NONBLOCK: to open a FIFO that nobody writes to would wait for ever.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except (FileNotFoundError, NotADirectoryError):
+        raise TunnelError("no such file", where=where, remedy=missing or "check the path") from None
+    except (OSError, ValueError) as error:
+        raise _unreadable(error, where, readable) from None
+    try:
+        _check_kind(os.fstat(descriptor), limit, where, readable)
+        return _content(descriptor, limit, where)
+    except OSError as error:
+        raise _unreadable(error, where, readable) from None
+    finally:
+        os.close(descriptor)
+
+
+def read_text(path: Path, limit: int, *, where: str = "", missing: str = "") -> str:
+    """Read a regular file of UTF-8 text; a byte order mark is left out.
+
+    Args:
+        path: the file.
+        limit: the most it may hold, bytes.
+        where: what to call it in messages; its path when empty.
+        missing: the remedy where there is no such file.
+
+    Returns:
+        The text.
+
+    Raises:
+        TunnelError: as `read_regular`, or not UTF-8.
+    """
+    where = where or shown(path)
+    return decoded(read_regular(path, limit, where=where, missing=missing), where)
+
+
+def decoded(content: bytes, where: str) -> str:
+    """UTF-8 text; a byte order mark is left out.
+
+    Args:
+        content: of the file.
+        where: what to call it in messages.
+
+    Returns:
+        The text.
+
+    Raises:
+        TunnelError: not UTF-8.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise TunnelError(
+            f"not UTF-8 text (line {line})", where=where, remedy="save the file as UTF-8"
+        ) from None
+
+
+def read_json(path: Path, *, remedy: str, limit: int = limits.JSON_BYTES) -> dict[str, Any]:
+    """Read a JSON object.
+
+    Args:
+        path: the file.
+        remedy: what to do where it is missing or malformed.
+        limit: the most it may hold, bytes.
+
+    Returns:
+        The object.
+
+    Raises:
+        TunnelError: as `read_regular` and `parse_json`.
+    """
+    return parse_json(read_regular(path, limit, missing=remedy, readable=remedy), shown(path), remedy)
+
+
+def parse_json(content: bytes | str, where: str, remedy: str) -> dict[str, Any]:
+    """A JSON object from its text.
+
+    Args:
+        content: UTF-8.
+        where: what to call it in messages.
+        remedy: what to do where it is malformed.
+
+    Returns:
+        The object; nested no deeper than `limits.NESTING`, no integer longer than `limits.INTEGER_BITS`.
+
+    Raises:
+        TunnelError: not UTF-8, not JSON, not an object, NaN or an infinity in it, nested too deep, or an integer
+            too long.
+    """
+    text = content if isinstance(content, str) else decoded(content, where)
+    try:
+        # A number such as 1e999 is read as an infinity, by a path of its own.
+        found = json.loads(text, parse_constant=_no_constant, parse_float=_finite)
+    except (ValueError, RecursionError) as error:
+        raise TunnelError(f"is no JSON ({one_line(error, 80)})", where=where, remedy=remedy) from None
+    if not isinstance(found, dict):
+        raise TunnelError("is no JSON object", where=where, remedy=remedy)
+    check_shape(found, where, remedy)
+    return found
+
+
+def check_shape(document: Mapping[str, Any], where: str, remedy: str) -> None:
+    """Refuse a document that nests too deep or holds an integer too long for what is done with it.
+
+    Args:
+        document: of plain values.
+        where: what to call it in messages.
+        remedy: what to do about it.
+
+    Raises:
+        TunnelError: for the first such place.
+    """
+    level: list[Any] = [document]
+    for _ in range(limits.NESTING + 1):
+        following: list[Any] = []
+        for value in level:
+            if isinstance(value, Mapping):
+                following += value.values()
+            elif isinstance(value, list):
+                following += value
+            elif isinstance(value, int) and value.bit_length() > limits.INTEGER_BITS:
+                raise TunnelError(
+                    f"an integer of {value.bit_length()} bits, more than {limits.INTEGER_BITS}",
+                    where=where,
+                    remedy=remedy,
+                )
+        level = following
+        if not level:
+            return
+    raise TunnelError(f"nested deeper than {limits.NESTING} levels", where=where, remedy=remedy)
+
+
+def frame_schema(
+    content: bytes, where: str, remedy: str, *, rows: int, counted: str = "rows"
+) -> dict[str, pl.DataType]:
+    """The columns of a Parquet file, once its metadata says that it is not too large.
+
+    Args:
+        content: of the file.
+        where: what to call it in messages.
+        remedy: what to do where it is malformed.
+        rows: the most it may hold.
+        counted: what its rows are, in the plural.
+
+    Returns:
+        Types by name; no row has been read.
+
+    Raises:
+        TunnelError: not a readable Parquet file, or too many rows or columns.
+    """
+    import polars as pl
+
+    with _parquet_faults(where, remedy):
+        schema = dict(pl.read_parquet_schema(io.BytesIO(content)))
+        count = int(pl.scan_parquet(io.BytesIO(content)).select(pl.len()).collect().item())
+    check_count(len(schema), limits.COLUMNS, "columns", where, "leave out columns that nobody reads")
+    check_count(count, rows, counted, where, "split the file, or thin it out")
+    return schema
+
+
+def read_frame(content: bytes, where: str, remedy: str, columns: Sequence[str]) -> pl.DataFrame:
+    """Columns of a Parquet file that `frame_schema` has looked at.
+
+    Args:
+        content: of the file.
+        where: what to call it in messages.
+        remedy: what to do where it is malformed.
+        columns: names of those wanted; the file has them.
+
+    Returns:
+        The table.
+
+    Raises:
+        TunnelError: not a readable Parquet file.
+    """
+    import polars as pl
+
+    with _parquet_faults(where, remedy):
+        return pl.read_parquet(io.BytesIO(content), columns=list(columns))
+
+
+@contextmanager
+def _parquet_faults(where: str, remedy: str) -> Iterator[None]:
+    """Whatever the Parquet decoder raises, as a `TunnelError`."""
+    import polars as pl
+
+    try:
+        yield
+    # Some broken files make the decoder panic, which is no subclass of Exception.
+    except (Exception, pl.exceptions.PanicException) as error:
+        raise TunnelError(
+            f"not a readable Parquet file ({one_line(error, 60)})", where=where, remedy=remedy
+        ) from None
+
+
+def check_count(count: float, limit: int, what: str, where: str, remedy: str) -> None:
+    """Refuse more of something than there may be, with the count and the limit.
+
+    Args:
+        count: the number, known before anything is expanded (a count).
+        limit: how many there may be, see `tunnel_sim.vocabulary.limits`.
+        what: of what, in the plural.
+        where: file or option, for the message.
+        remedy: what to do about it.
+
+    Raises:
+        TunnelError: more than the limit.
+    """
+    if not count <= limit:
+        number = f"{count:,}" if isinstance(count, int) and count < 10**15 else f"{float(count):.3g}"
+        raise TunnelError(f"{number} {what}, more than {limit:,}", where=where, remedy=remedy)
+
+
+@contextmanager
+def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
+    """Turn what malformed content makes of a parser into one `TunnelError`.
+
+    Args:
+        what: what is wrong then, such as ``is no estimate``.
+        where: what to call the content.
+        remedy: what to do about it.
+
+    Raises:
+        TunnelError: for any fault of the content; a `TunnelError` of the parser itself passes.
+    """
+    try:
+        yield
+    except _FAULTS as error:
+        reason = f"{type(error).__name__}: {one_line(error, 60)}"
+        raise TunnelError(f"{what} ({reason})", where=where, remedy=remedy) from None
+
+
+def _check_kind(state: os.stat_result, limit: int, where: str, remedy: str) -> None:
+    if not stat.S_ISREG(state.st_mode):
+        kind = "it is a folder" if stat.S_ISDIR(state.st_mode) else "it is no regular file"
+        raise TunnelError(f"cannot be read ({kind})", where=where, remedy=remedy)
+    check_count(state.st_size, limit, "bytes", where, "split the file, or name the right one")
+
+
+def _content(descriptor: int, limit: int, where: str) -> bytes:
+    """What is read, which may be more than the file's stated size."""
+    found = bytearray()
+    while part := os.read(descriptor, _CHUNK):
+        found += part
+        check_count(len(found), limit, "bytes", where, "split the file, or name the right one")
+    return bytes(found)
+
+
+def _unreadable(error: Exception, where: str, remedy: str) -> TunnelError:
+    reason = getattr(error, "strerror", None) or error
+    return TunnelError(f"cannot be read ({one_line(reason)})", where=where, remedy=remedy)
+
+
+def _no_constant(text: str) -> float:
+    raise ValueError(f"{text} is no number of JSON")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not abs(value) < float("inf"):
+        raise ValueError(f"{one_line(text, 20)} is beyond all floats")
+    return value

@@ -1,0 +1,216 @@
+"""Reading a TOML file strictly: every slip becomes one line that names file, place and remedy."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from tunnel_sim.files.reading import check_shape, read_text
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.errors import one_line as one_line
+from tunnel_sim.vocabulary.errors import shown as shown
+
+SCHEMA_VERSION = 1
+
+
+class StrictModel(BaseModel):
+    """A table of a TOML file: unknown keys, wrong types, NaN and infinities are refused.
+
+    The description of each field is the remedy shown to the user: ``give <key> as <description>``.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+ModelT = TypeVar("ModelT", bound=StrictModel)
+
+
+def _printable(text: str) -> str:
+    if not text.strip() or not text.isprintable():
+        raise ValueError("is blank or has line breaks or control characters")
+    return text
+
+
+OneLine = Annotated[str, AfterValidator(_printable)]
+"""A text that can stand in a message of one line."""
+SampleRate = Annotated[float, Field(ge=limits.SLOWEST_RATE, le=limits.FASTEST_RATE)]
+"""Hz."""
+
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{limits.KEY_PARTS},}}", re.ASCII)
+
+
+def load_toml(path: Path, *, missing: str) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Args:
+        path: the file.
+        missing: the remedy when there is no such file.
+
+    Returns:
+        The document, not yet validated.
+
+    Raises:
+        TunnelError: no file, not a regular one, not readable, too large, not UTF-8, not TOML, nested too deep, or
+            a number beyond what can be computed with.
+    """
+    where = shown(path)
+    text = read_text(path, limits.DOCUMENT_BYTES, missing=missing)
+    if not text.strip():
+        raise TunnelError("the file is empty", where=where, remedy=missing)
+    document = _parsed(text, where)
+    check_shape(document, where, "correct the file at that place")
+    _check_magnitudes(document, where)
+    return document
+
+
+def _parsed(text: str, where: str) -> dict[str, Any]:
+    if _LONG_KEY.search(text):
+        raise TunnelError(
+            f"a key of more than {limits.KEY_PARTS} parts",
+            where=where,
+            remedy="correct the file at that place",
+        )
+    try:
+        # tomllib raises ValueError itself for numbers and dates Python cannot hold.
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise TunnelError(
+            f"not valid TOML: {one_line(error)}", where=where, remedy="correct the file at that place"
+        ) from None
+
+
+def _check_magnitudes(value: object, where: str, key: str = "") -> None:
+    """Refuse numbers whose powers no float can hold; NaN and infinities are the schema's to refuse."""
+    if isinstance(value, Mapping):
+        for name, one in value.items():
+            _check_magnitudes(one, where, name)
+    elif isinstance(value, list):
+        for one in value:
+            _check_magnitudes(one, where, key)
+    elif isinstance(value, float) and value and isfinite(value) and not _is_computable(value):
+        raise TunnelError(
+            f"'{one_line(key)}' = {value:g} is beyond {limits.SMALLEST_NUMBER:g} to "
+            f"{limits.LARGEST_NUMBER:g} in magnitude",
+            where=where,
+            remedy="correct it (SI units)",
+        )
+
+
+def _is_computable(value: float) -> bool:
+    return limits.SMALLEST_NUMBER <= abs(value) <= limits.LARGEST_NUMBER
+
+
+def check_version(document: Mapping[str, Any], path: Path) -> None:
+    """Refuse a document whose ``schema_version`` is not the one this program reads.
+
+    Args:
+        document: the document of :func:`load_toml`.
+        path: its file, for the message.
+
+    Raises:
+        TunnelError: the version is absent or another one.
+    """
+    remedy = f"put schema_version = {SCHEMA_VERSION} at the top of the file"
+    if "schema_version" not in document:
+        raise TunnelError("no schema_version", where=shown(path), remedy=remedy)
+    version = document["schema_version"]
+    if type(version) is not int or version != SCHEMA_VERSION:
+        what = f"schema_version is {one_line(repr(version))}, but this program reads version {SCHEMA_VERSION}"
+        raise TunnelError(what, where=shown(path), remedy=remedy)
+
+
+def validate(model: type[ModelT], document: Mapping[str, Any], path: Path) -> ModelT:
+    """Validate a document against its model.
+
+    Args:
+        model: the model of the whole file.
+        document: the document of :func:`load_toml`.
+        path: its file, for the message.
+
+    Returns:
+        The validated document.
+
+    Raises:
+        TunnelError: for the first thing that is wrong.
+    """
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        # An unknown key comes first: it is the usual cause of the missing one beside it.
+        problems = error.errors(include_url=False)
+        first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
+        raise _as_tunnel_error(model, document, first, path) from None
+
+
+def _as_tunnel_error(
+    model: type[StrictModel], document: Mapping[str, Any], problem: Any, path: Path
+) -> TunnelError:
+    loc: Sequence[str | int] = problem["loc"]
+    place = _place(document, loc)
+    where = f"{shown(path)}, {place}" if place else shown(path)
+    key_at = max((i for i, part in enumerate(loc) if isinstance(part, str)), default=0)
+    key = str(loc[key_at])
+    table = _table_model(model, loc[:key_at])
+    if problem["type"] == "extra_forbidden":
+        known = table.model_fields if table else ()
+        return TunnelError(f"unknown key '{one_line(key)}'", where=where, remedy=did_you_mean(key, known))
+    what = f"'{key}' is missing" if problem["type"] == "missing" else _wrong_value(key, problem)
+    description = table.model_fields[key].description if table and key in table.model_fields else None
+    return TunnelError(what, where=where, remedy=f"give {one_line(key)} as {description or 'documented'}")
+
+
+def _wrong_value(key: str, problem: Any) -> str:
+    reason = {
+        "finite_number": "is not a finite number",
+        "float_type": "is not a number",
+        "int_type": "is not a whole number",
+        "string_type": "is not text",
+        "list_type": "is not a list",
+        "model_type": "is not a table",
+        "dict_type": "is not a table",
+        "too_short": "is empty",
+    }.get(problem["type"])
+    if problem["type"] == "too_short":
+        return f"'{key}' {reason}"
+    if reason is None:
+        said = one_line(problem["msg"]).removeprefix("Value error, ")
+        reason = said.replace("Input should be", "should be", 1)
+    return f"'{key}' = {one_line(repr(problem['input']), limit=40)} {reason}"
+
+
+def _place(document: Mapping[str, Any], loc: Sequence[str | int]) -> str:
+    """Where in the document a location is: ``run 'r01'``, ``[rig]`` or nothing for the top level."""
+    if len(loc) >= 2 and loc[0] == "runs" and isinstance(loc[1], int):
+        entry = document["runs"][loc[1]]
+        name = entry.get("id") if isinstance(entry, Mapping) else None
+        named = isinstance(name, str) and bool(name.strip())
+        return f"run '{one_line(name)}'" if named else f"run number {loc[1] + 1}"
+    several = isinstance(document.get(str(loc[0])), list)
+    if len(loc) >= 2 and isinstance(loc[0], str) and isinstance(loc[1], int) and several:
+        return f"[[{loc[0]}]] number {loc[1] + 1}"
+    return f"[{loc[0]}]" if len(loc) >= 2 else ""
+
+
+def _table_model(model: type[StrictModel], loc: Sequence[str | int]) -> type[StrictModel] | None:
+    """The model of the table that a location lies in."""
+    current: type[StrictModel] | None = model
+    for part in loc:
+        if isinstance(part, int) or current is None:
+            continue
+        field = current.model_fields.get(part)
+        current = _model_in(field.annotation) if field else None
+    return current
+
+
+def _model_in(annotation: Any) -> type[StrictModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, StrictModel):
+        return annotation
+    return next((found for a in get_args(annotation) if (found := _model_in(a)) is not None), None)

@@ -1,0 +1,124 @@
+"""The compiled forward integrator: the moment law of the plugin without MuJoCo, for fits of many runs.
+
+Its steps are RK4 with the plugin's own treatment of the aerodynamic lag; reversals under Coulomb friction are
+located. Tests hold it against the MuJoCo model for every term. Calls release the interpreter's lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_sim.physics.moment_law import forward_library, parameter_names, parameter_vector, run_dtype
+from tunnel_sim.physics.motion import Motion, sampling
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import Rig
+
+
+def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, Array, int]:
+    """Integrate runs of equal length.
+
+    Args:
+        law: the moment law's parameters, shape (n, number of parameters), in the law's order.
+        runs: shape (n,), of `run_dtype`; what ``wind`` and ``forcing`` point at must stay alive.
+        samples: samples per run, the first at time 0.
+
+    Returns:
+        Angle (rad) and rate (rad/s) of the spring's end, each of shape (n, samples), and a status: 0, or
+        one more than the index of the first run that left the finite range (it and those after are unset).
+    """
+    count = len(runs)
+    law = np.ascontiguousarray(law, dtype=np.float64)
+    if law.shape != (count, len(parameter_names())):
+        raise ValueError(f"law has shape {law.shape}, not {(count, len(parameter_names()))}")
+    runs = np.ascontiguousarray(runs)
+    runs["samples"] = samples
+    angle, rate = np.zeros((count, samples)), np.zeros((count, samples))
+    pointers = [_row_pointers(array) for array in (angle, rate)]
+    status = forward_library().vwt_forward(
+        count, law.ctypes.data, runs.ctypes.data, pointers[0].ctypes.data, pointers[1].ctypes.data
+    )
+    return angle, rate, int(status)
+
+
+def _row_pointers(array: Array) -> NDArray[np.uintp]:
+    return (array.ctypes.data + np.arange(len(array)) * array.strides[0]).astype(np.uintp)
+
+
+def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motion:
+    """Integrate one run; arguments and result as in ``tunnel_sim.engine.simulate.simulate_motion``.
+
+    Args:
+        rig: gives frontal area, reference length and width.
+        settings: the run's physics; its timestep is the integrator's.
+        sample_rate: Hz.
+
+    Returns:
+        The motion from the release on.
+
+    Raises:
+        ValueError: when the motion grows without bound.
+    """
+    samples, steps = sampling(settings, sample_rate)
+    run, keep_alive = forward_run(settings)
+    run["steps"] = steps
+    angle, rate, status = integrate(parameter_vector(settings.law(rig))[None], run, samples)
+    del keep_alive
+    if status:
+        raise ValueError("the motion grows without bound")
+    return Motion(np.arange(samples) / sample_rate, angle[0], rate[0])
+
+
+def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array]]:
+    """A run's conditions as the compiled code takes them.
+
+    Args:
+        settings: the run's physics.
+
+    Returns:
+        Array of shape (1,) and `run_dtype`, at the release (see ``Model.release_state``), and the arrays it
+        points at, which the caller keeps alive.
+    """
+    run = np.zeros(1, dtype=run_dtype())
+    wind = settings.series.get("wind_speed")
+    forcing = settings.series.get("forcing")
+    values = np.array(wind.values if wind is not None else [settings.wind_speed], dtype=np.float64)
+    imposed = np.array(forcing.values if forcing is not None else [], dtype=np.float64)
+    run["wind"], run["wind_count"] = values.ctypes.data, values.size
+    run["wind_interval"] = wind.interval if wind is not None else 0.0
+    run["forcing"], run["forcing_count"] = imposed.ctypes.data, imposed.size
+    run["forcing_interval"] = forcing.interval if forcing is not None else 0.0
+    run["angle"], run["rate"], run["lagged"] = (
+        settings.release_angle,
+        settings.release_rate,
+        settings.release_angle,
+    )
+    run["step"], run["steps"] = settings.timestep, 1
+    if settings.rod_twist is not None:
+        twist = settings.rod_twist
+        end = settings.release_angle / (1.0 + settings.spring_stiffness * twist.compliance)
+        run["angle"], run["twist"] = end, settings.release_angle - end
+        run["twist_stiffness"] = 1.0 / twist.compliance
+        run["twist_damping"] = twist.damping(settings.yaw_inertia)
+        run["inertia_share"] = twist.inertia_share
+    return run, (values, imposed)
+
+
+def backlash(angle: Array, half_width: float, start: float) -> Array:
+    """The reading behind a backlash: it moves only when pushed.
+
+    Args:
+        angle: of the driving side, rad, shape (n,).
+        half_width: rad.
+        start: the reading before the first sample, rad.
+
+    Returns:
+        The reading, rad, shape (n,).
+    """
+    source = np.ascontiguousarray(angle, dtype=np.float64)
+    result = np.empty_like(source)
+    forward_library().vwt_backlash(source.size, source.ctypes.data, half_width, start, result.ctypes.data)
+    return result

@@ -1,0 +1,185 @@
+"""The physics of one run as numbers: what the MuJoCo model and the forward integrator are both built from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf, isfinite, sqrt
+from types import MappingProxyType
+
+from tunnel_sim.physics.moment_law import parameter_names
+from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.rig import Rig
+
+_OWNED = frozenset(
+    {
+        "air_density", "frontal_area", "reference_length", "width", "cn_beta", "cn_r",
+        "spring_stiffness", "mechanical_damping", "yaw_inertia",
+    }
+)  # fmt: skip
+
+
+def _check(name: str, value: float, *, above: float = -inf, least: float = -inf) -> None:
+    if not (isfinite(value) and value > above and value >= least):
+        bound = f" above {above:g}" if above > -inf else f" of {least:g} or more" if least > -inf else ""
+        raise TunnelError(
+            f"{name} = {value!r} must be a finite number{bound}", remedy="correct the run's settings"
+        )
+
+
+@dataclass(frozen=True)
+class Series:
+    """A sampled input, linear between samples and held beyond its ends.
+
+    Args:
+        values: samples from the run's start on.
+        interval: s between samples, positive.
+    """
+
+    values: tuple[float, ...]
+    interval: float
+
+    def __post_init__(self) -> None:
+        """Check the samples.
+
+        Raises:
+            TunnelError: when there are none, one is not finite, or the interval is not positive.
+        """
+        if not self.values or not all(map(isfinite, self.values)):
+            raise TunnelError("a series needs samples, all finite", remedy="correct the sampled input")
+        _check("interval of a series", self.interval, above=0.0)
+
+
+@dataclass(frozen=True)
+class RodTwist:
+    """A rod that twists between the spring's and sensor's end and the body.
+
+    Args:
+        compliance: 1/Krod, rad/(N m), positive.
+        inertia_share: share of Izz that moves with the spring's end, 0 < share < 1.
+        damping_ratio: of the twist, as a fraction of critical.
+    """
+
+    compliance: float
+    inertia_share: float
+    damping_ratio: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            TunnelError: when one is out of range.
+        """
+        _check("compliance of the rod", self.compliance, above=0.0)
+        _check("inertia_share of the rod", self.inertia_share, above=0.0)
+        _check("inertia share of the body", 1.0 - self.inertia_share, above=0.0)
+        _check("damping_ratio of the rod", self.damping_ratio, least=0.0)
+
+    def damping(self, yaw_inertia: float) -> float:
+        """Damping of the rod's twist, N m s/rad, for the whole Izz in kg m²."""
+        share = self.inertia_share
+        return 2.0 * self.damping_ratio * sqrt(yaw_inertia * share * (1.0 - share) / self.compliance)
+
+    def frequency(self, yaw_inertia: float, spring_stiffness: float) -> float:
+        """A bound from above on the rod's own frequency.
+
+        Args:
+            yaw_inertia: the whole Izz, kg m².
+            spring_stiffness: Kr, N m/rad.
+
+        Returns:
+            rad/s.
+        """
+        share = self.inertia_share
+        return sqrt((1.0 / (self.compliance * (1.0 - share)) + spring_stiffness) / (yaw_inertia * share))
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """The physics of one run.
+
+    Args:
+        spring_stiffness: Kr, N m/rad.
+        derivatives: Cnβ and Cnr, 1/rad.
+        yaw_inertia: Izz, kg m².
+        mechanical_damping: Cr, N m s/rad.
+        wind_speed: V, m/s; ignored where ``series`` gives it.
+        air_density: ρ, kg/m³.
+        release_angle: rad, of the body.
+        release_rate: rad/s; the rig itself releases from rest.
+        duration: s.
+        timestep: integration step, s.
+        parameters: further parameters of the moment law by name (see ``mjcf/plugin/README.md``), zero where
+            not given.
+        series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient.
+        rod_twist: None for a rigid rod.
+    """
+
+    spring_stiffness: float
+    derivatives: AeroDerivatives
+    yaw_inertia: float
+    mechanical_damping: float
+    wind_speed: float = 0.0
+    air_density: float = 0.0
+    release_angle: float = 0.0
+    release_rate: float = 0.0
+    duration: float = 10.0
+    timestep: float = 1e-3
+    parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    series: Mapping[str, Series] = field(default_factory=lambda: MappingProxyType({}))
+    rod_twist: RodTwist | None = None
+
+    def __post_init__(self) -> None:
+        """Check names and numbers; bounds of the law's parameters are the plugin's to check.
+
+        Raises:
+            TunnelError: when a name is unknown or belongs to another field, or a number is out of range.
+        """
+        for name in ("yaw_inertia", "duration", "timestep"):
+            _check(name, getattr(self, name), above=0.0)
+        for name in ("spring_stiffness", "wind_speed", "air_density"):
+            _check(name, getattr(self, name), least=0.0)
+        for name in ("mechanical_damping", "release_angle", "release_rate"):
+            _check(name, getattr(self, name))
+        wind = self.series.get("wind_speed")
+        if wind is not None:
+            _check("least wind_speed of the series", min(wind.values), least=0.0)
+        known = [name for name in parameter_names() if name not in _OWNED]
+        for name in self.parameters:
+            if name not in known:
+                raise TunnelError(
+                    f"unknown parameter {name!r} of the moment law", remedy=did_you_mean(name, known)
+                )
+
+    def layout(self) -> tuple[object, ...]:
+        """What runs must have in common for one compiled model to serve them all.
+
+        Returns:
+            Timestep, names and lengths of the series, and whether the rod is rigid.
+        """
+        series = tuple((name, len(series.values)) for name, series in self.series.items())
+        return (self.timestep, series, self.rod_twist is None)
+
+    def law(self, rig: Rig) -> dict[str, float]:
+        """Every parameter of the moment law.
+
+        Args:
+            rig: gives frontal area, reference length and width.
+
+        Returns:
+            Value by name, in the law's order and units.
+        """
+        given = {
+            "air_density": self.air_density,
+            "frontal_area": rig.body.frontal_area,
+            "reference_length": rig.body.length,
+            "width": rig.body.width,
+            "cn_beta": self.derivatives.cn_beta,
+            "cn_r": self.derivatives.cn_r,
+            "spring_stiffness": self.spring_stiffness,
+            "mechanical_damping": self.mechanical_damping,
+            "yaw_inertia": self.yaw_inertia,
+            **self.parameters,
+        }
+        return {name: float(given.get(name, 0.0)) for name in parameter_names()}

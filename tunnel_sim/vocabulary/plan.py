@@ -1,0 +1,104 @@
+"""What to simulate: the plan of a campaign, and the conditions it stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import pi
+
+DEFAULT_SAMPLE_RATE = 1000.0
+"""Of the potentiometer, Hz."""
+
+POTENTIOMETER_RESOLUTION = 2.0 * pi / 3.0 / 4096.0
+"""12 bit over ±60°, rad."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The coefficients that are injected.
+
+    Args:
+        cn_beta: Cnβ, 1/rad.
+        cn_r: Cnr, 1/rad.
+        yaw_inertia: Izz of model and support, kg m².
+        mechanical_damping: Cr, N m s/rad.
+    """
+
+    cn_beta: float
+    cn_r: float
+    yaw_inertia: float
+    mechanical_damping: float
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One run to make.
+
+    Args:
+        id: unique in the campaign; tells spring, speed, angle and repeat.
+        spring_stiffness: Kr, N m/rad.
+        wind_speed: V, m/s; 0 is wind-off.
+        air_density: ρ, kg/m³.
+        release_angle: rad, nose-right positive.
+        duration: of the record, s.
+    """
+
+    id: str
+    spring_stiffness: float
+    wind_speed: float
+    air_density: float
+    release_angle: float
+    duration: float
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """The potentiometer: zero, then noise, then quantisation.
+
+    Args:
+        sample_rate: Hz.
+        noise_std: standard deviation of the noise, rad.
+        resolution: step of the reading, rad; 0 does not quantise.
+        zero: added to the angle, rad; common to the campaign and unknown to the estimators.
+    """
+
+    sample_rate: float = DEFAULT_SAMPLE_RATE
+    noise_std: float = 0.0005
+    resolution: float = POTENTIOMETER_RESOLUTION
+    zero: float = 0.0
+
+
+@dataclass(frozen=True)
+class EffectSetting:
+    """One effect beyond the nominal model, by name; the registry of effects validates it.
+
+    Args:
+        name: name of the effect.
+        parameters: its parameters by name, SI units.
+    """
+
+    name: str
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CampaignPlan:
+    """All that a simulated campaign depends on, besides the rig.
+
+    Args:
+        name: short name of the campaign.
+        seed: of the random numbers.
+        truth: coefficients to inject.
+        conditions: the runs, at least one, with unique ids.
+        sensor: the potentiometer.
+        effects: what is added to the nominal model.
+        description: free text.
+    """
+
+    name: str
+    seed: int
+    truth: Truth
+    conditions: tuple[Condition, ...]
+    sensor: SensorModel = SensorModel()
+    effects: tuple[EffectSetting, ...] = ()
+    description: str = ""
