@@ -15,7 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects import effect_class
+from tunnel_sim.effects import ALL_EFFECTS
+
+_EXACT = frozenset(kind.name for kind in ALL_EFFECTS if kind.exact)
 
 #: Exponent of the share left open.
 STEEPNESS = 3.0
@@ -64,8 +66,7 @@ def form_floor(excess: float, effects: Sequence[str] = ()) -> float:
     Returns:
         The share.
     """
-    exact = bool(effects) and all(effect_class(name).exact for name in effects)
-    misfit = EXACT_MISFIT if exact else FORM_MISFIT
+    misfit = EXACT_MISFIT if effects and _EXACT.issuperset(effects) else FORM_MISFIT
     return misfit * min(1.0, FORM_MISFIT_UP_TO / max(excess, 1e-9))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
-from identification.campaign.derivatives import loads
 from identification.decay.run_fit import NO_WINDOWS, identify_run
 from identification.estimate import Status
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -21,10 +20,8 @@ def refuse_hopeless(campaign: Campaign) -> None:
         campaign: the runs.
 
     Raises:
-        TunnelError: for the first such run, and for a stated value that cannot be computed with.
+        TunnelError: for the first such run.
     """
-    for run in campaign.runs:
-        loads(run, campaign.rig)
     for run in campaign.runs:
         status = identify_run(run, campaign.sensor, cycles_per_window=NO_WINDOWS).estimate.status
         if status in _HOPELESS:

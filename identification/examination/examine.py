@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from identification.campaign.derivatives import loads
 from identification.examination.growth import growing_runs
 from identification.examination.labels import exchanged_labels
 from identification.examination.release import find_release
@@ -27,7 +28,12 @@ def examine(campaign: Campaign) -> Examined:
 
     Returns:
         The campaign to go on with and the remarks; the very campaign given where nothing is wrong.
+
+    Raises:
+        TunnelError: when a wind-on run states no air density, or a stated value cannot be computed with.
     """
+    for run in campaign.runs:
+        loads(run, campaign.rig)
     kept, repeats = without_repeats(campaign)
     if any(remark.outcome is Outcome.REFUSED for remark in repeats):
         return Examined(campaign, repeats)

@@ -12,8 +12,8 @@ from tunnel_sim.effects import ALL_EFFECTS
 ROOT = Path(__file__).parents[2]
 NAMES = {kind.name for kind in ALL_EFFECTS}
 PACKAGES = ("tunnel_sim", "identification", "diagnosis", "tunnel_lab")
-#: The effects themselves, and the independent simulator that has forms of its own for them.
-HOMES = (ROOT / "tunnel_sim" / "effects", ROOT / "tunnel_sim" / "reference")
+#: The effects themselves. The independent simulator, `tunnel_reference`, has forms of its own for them.
+HOMES = (ROOT / "tunnel_sim" / "effects",)
 FILES = [
     path
     for package in PACKAGES

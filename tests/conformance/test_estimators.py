@@ -191,6 +191,8 @@ def test_records_without_a_decay_fail_with_a_remedy(name, kind):
     rng = np.random.default_rng(2)
     level = 0.0 if kind == "constant" else 5e-4
     dead = with_records(campaign(TWELVE[:2]), lambda time, _: 0.1 + level * rng.standard_normal(time.size))
+    if kind == "constant":  # one dead run twice would be one record under two springs
+        dead = replace(dead, runs=dead.runs[:1])
     with pytest.raises(TunnelError, match="no run could be identified; check"):
         identify(dead, name)
     estimate = checked(identify(dead, name, throw=False), dead)

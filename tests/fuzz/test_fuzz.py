@@ -60,10 +60,6 @@ def refused(_folder: Path, _rng: np.random.Generator) -> None:
     raise TunnelError("wrong")
 
 
-def refused_at_length(_folder: Path, _rng: np.random.Generator) -> None:
-    raise TunnelError("wrong\nand more")
-
-
 def warned(_folder: Path, _rng: np.random.Generator) -> None:
     np.float64(1e300) * np.float64(1e300)
 
@@ -82,7 +78,6 @@ def waiting(_folder: Path, _rng: np.random.Generator) -> None:
     [
         (planted, "finding", "ZeroDivisionError"),
         (refused, "refused", ""),
-        (refused_at_length, "finding", "message of several lines"),
         (warned, "finding", "RuntimeWarning"),
         (endless, "finding", "Hang"),
         (waiting, "finding", "Hang"),

@@ -30,12 +30,11 @@ def accepted_campaign(folder: Path, rng: Rng) -> Campaign:
 
 def identify_campaign(folder: Path, rng: Rng) -> None:
     """One estimator on one campaign: the estimate holds finite numbers, is written, read and shown."""
-    from tunnel_lab.files import json_text
-
     from identification import identify
     from identification.estimate import Estimate
     from identification.estimators import ALL_ESTIMATORS
     from tunnel_lab.commands.identify import show
+    from tunnel_sim.files.json_text import json_text
 
     campaign = accepted_campaign(folder, rng)
     name = ALL_ESTIMATORS[rng.integers(len(ALL_ESTIMATORS))]
@@ -62,12 +61,11 @@ def draw(campaign: Campaign, found: Any, folder: Path) -> None:
 
 def diagnose_campaign(folder: Path, rng: Rng) -> None:
     """A diagnosis with a small vocabulary: shown, written and, now and then, reported."""
-    from tunnel_lab.files import json_text
-
     from diagnosis._diagnose import diagnose
     from tunnel_lab.commands.diagnose import show
     from tunnel_lab.diagnosis_view import write_report
     from tunnel_sim.effects import ALL_EFFECTS
+    from tunnel_sim.files.json_text import json_text
 
     campaign = accepted_campaign(folder, rng)
     chosen = sorted(rng.choice(len(ALL_EFFECTS), size=int(rng.integers(1, 4)), replace=False))

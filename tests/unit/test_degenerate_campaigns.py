@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.estimators import ALL_ESTIMATORS
+from identification.estimators import ALL_ESTIMATORS, make_estimator
 from identification.status import Status
 from tests.unit.degenerate_campaigns import degenerate_campaign, same_runs
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -60,7 +60,9 @@ def test_a_degenerate_campaign_gives_finite_numbers_or_a_refusal(seed, estimator
 def test_runs_that_are_one_file_are_no_traceback(estimator):
     springs = (16.12, 44.84, 16.12)
     runs = tuple(Run(f"r{k}", _swing(16.12, 0), 0.0, spring) for k, spring in enumerate(springs))
-    found = identify(_campaign(*runs), estimator, throw=False)
+    with pytest.raises(TunnelError, match="the same samples under another spring"):
+        identify(_campaign(*runs), estimator, throw=False)
+    found = make_estimator(estimator).estimate(_campaign(*runs))
     json.dumps(found.to_json_dict(), allow_nan=False)
     same = same_runs(_campaign(*runs), 3)
     assert identify(same, estimator, throw=False).yaw_inertia is not None
@@ -79,7 +81,10 @@ def test_springs_hardly_apart_are_one(estimator, apart):
 @pytest.mark.parametrize("estimator", ["output_error", "conventional", "matrix_pencil"])
 def test_an_inertia_is_never_negative(estimator):
     runs = [Run("soft", _swing(44.84, 0), 0.0, 16.12), Run("stiff", _swing(16.12, 1), 0.0, 44.84)]
-    found = identify(_campaign(*runs, Run("on", _swing(40.0, 2), 20.0, 16.12, 1.2)), estimator, throw=False)
+    swapped = _campaign(*runs, Run("on", _swing(40.0, 2), 20.0, 16.12, 1.2))
+    with pytest.raises(TunnelError, match="contradicts the frequencies"):
+        identify(swapped, estimator, throw=False)
+    found = make_estimator(estimator).estimate(swapped)
     for inertia in (found.yaw_inertia, found.wind_off_inertia):
         assert inertia is None or inertia.value > 0.0
 

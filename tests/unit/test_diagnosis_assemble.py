@@ -38,8 +38,9 @@ class Strict(BaseModel):
 
 class Value(Strict):
     value: float
-    std: Annotated[float, Field(ge=0.0)]
+    std: Annotated[float, Field(ge=0.0)] | None
     unit: str
+    bound: Literal["lower", "upper"] | None = None
 
 
 class RunGap(Strict):

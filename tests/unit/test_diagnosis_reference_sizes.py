@@ -72,13 +72,13 @@ def test_units_without_springs_and_sizes(data):
         "sensor_drift.drift": ("rad", "rad", "rad"),
     }
     for name, units in cases.items():
-        assert tuple(parameter_unit(name, units[0], d) for d in (data, bare, small)) == units
+        assert tuple(parameter_unit(name, d) for d in (data, bare, small)) == units
     nothing = replace(bare, rig=RigProperties())
-    assert parameter_unit("buffeting.intensity", "1", nothing) == "m/kg"
+    assert parameter_unit("buffeting.intensity", nothing) == "m/kg"
 
 
 def test_no_unit_of_a_moment_is_left_in_normalised_form(data):
     bare = replace(data, runs=tuple(replace(run, spring_stiffness=None) for run in data.runs))
     for kind in ALL_EFFECTS:
         for info in kind.parameters():
-            assert "N m" not in parameter_unit(f"{kind.name}.{info.name}", info.unit, bare)
+            assert "N m" not in parameter_unit(f"{kind.name}.{info.name}", bare)

@@ -33,6 +33,8 @@ AXES = {
 """Columns a summary is drawn along, each with its name and unit."""
 NOT_ASKED = (
     "ok",
+    "model_departs",
+    "noise_disagrees",
     "no_stiffness",
     "no_wind_on",
     "no_wind_off_pair",

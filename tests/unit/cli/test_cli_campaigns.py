@@ -84,7 +84,7 @@ def test_json_that_cannot_be_written_is_bad_input(
     status, _, err = tunnel("identify", tiny_campaign, "--json", tmp_path / "missing" / "estimate.json")
     assert status == 2
     assert err.count("\n") == 1
-    assert "missing/estimate.json: cannot be written" in err
+    assert "missing/estimate.json: its folder does not exist" in err
     assert not (tmp_path / "missing").exists()
 
 

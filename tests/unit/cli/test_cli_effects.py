@@ -115,7 +115,7 @@ def test_a_word_of_another_form_is_refused(text: str, part: str) -> None:
     with pytest.raises(TunnelError) as refusal:
         parse_effect(text)
     assert part in str(refusal.value)
-    assert str(refusal.value).startswith(f"--effect {text}: ")
+    assert str(refusal.value).startswith(f"--effect {text}".rstrip() + ": ")
 
 
 def test_effects_are_added_to_the_plans(tunnel: Tunnel, tmp_path: Path) -> None:

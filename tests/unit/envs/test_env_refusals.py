@@ -31,7 +31,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
         ({"effect_probability": 1.5}, ["probability"]),
         ({"prior": {"cn_bta": 0.1}}, ["did you mean 'cn_beta'"]),
         ({"prior": {"cn_r": 0.0}}, ["cn_r = 0.0"]),
-        ({"rig_file": "nowhere.toml"}, ["nowhere.toml", "cannot be read"]),
+        ({"rig_file": "nowhere.toml"}, ["nowhere.toml", "no such file"]),
     ],
 )
 def test_arguments(arguments: dict[str, Any], parts: list[str]) -> None:
