@@ -30,6 +30,8 @@ ROD_TURN = 0.5
 #: Steps in place of one at the most: a run then takes hundreds of times as long as usual, and as much memory.
 MOST_SUBSTEPS = 320
 USUAL_RATE = 1000.0  # steps in a second where nothing asks for more
+#: Shortest step, s; by a rounding less than `MOST_SUBSTEPS` of the usual one.
+LEAST_STEP = 0.999 / (USUAL_RATE * MOST_SUBSTEPS)
 
 _UNSTABLE = 2.5  # rad in one step; the method diverges beyond 2.8
 _LARGEST = 700.0  # logarithm near that of the largest number
@@ -93,11 +95,11 @@ def follow_fastest(rig: Rig, run: RunSettings) -> RunSettings:
         The run with its timestep divided by a whole number.
 
     Raises:
-        TunnelError: when that number would pass `MOST_SUBSTEPS`.
+        TunnelError: when the steps would be shorter than `LEAST_STEP`.
     """
     body, rod = body_rate(rig, run), _rod_rate(run)
     number = max(_substeps(body * run.timestep, BODY_TURN), _substeps(rod * run.timestep, ROD_TURN))
-    if number > MOST_SUBSTEPS:
+    if number > 1 and run.timestep / number < LEAST_STEP:
         raise _too_fast(run, body, rod)
     return _divided(run, number)
 
