@@ -12,7 +12,8 @@ from tunnel_sim.effects import ALL_EFFECTS
 ROOT = Path(__file__).parents[2]
 NAMES = {kind.name for kind in ALL_EFFECTS}
 PACKAGES = ("tunnel_sim", "identification", "diagnosis", "tunnel_lab")
-#: The effects themselves, and the moment law, some of whose terms bear the same names. The independent simulator, `tunnel_reference`, has forms of its own for them.
+#: The effects themselves, and the moment law, some of whose terms bear the same names.
+#: The independent simulator, `tunnel_reference`, has forms of its own for them.
 HOMES = (ROOT / "tunnel_sim" / "effects", ROOT / "tunnel_sim" / "physics")
 FILES = [
     path
