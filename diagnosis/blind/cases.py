@@ -142,10 +142,11 @@ class Case:
             Estimate minus truth, in standard deviations and as a share of the truth; None where there is none.
         """
         found = self.answer.get("coefficients", {}).get(when, {}).get(name)
-        if found is None or name not in self.coefficients or not found["std"] > 0.0:
+        truth = self.coefficients.get(name)
+        if found is None or not truth or not found["std"] > 0.0:
             return None
-        error = found["value"] - self.coefficients[name]
-        return error / found["std"], error / abs(self.coefficients[name])
+        error = found["value"] - truth
+        return error / found["std"], error / abs(truth)
 
 
 def case(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -221,7 +221,7 @@ def score_set(folder: Path, *, excluded: Sequence[str] = (), key: Path | None = 
         with as_described(
             "is no key", shown(folder / KEY if key is None else key), "name the key with --key"
         ):
-            truths, made_with = dict(document["truths"]), dict(document["made_with"])
+            truths, made_with = dict(document["truths"]), _made_with(document["made_with"])
     else:
         open_truth = "seal the set (tunnel blind make) or put a truth.json into every campaign"
         truths = {path.name: read_document(path / "truth.json", open_truth) for path in campaigns}
@@ -234,6 +234,20 @@ def score_set(folder: Path, *, excluded: Sequence[str] = (), key: Path | None = 
     return Score(
         tuple(cases), tuple(sorted(set(excluded))), key_sha256, answers_sha256, made_with, bool(key_sha256)
     )
+
+
+def _made_with(document: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments a set was made with, each of its kind; empty where the key holds none."""
+    if not document:
+        return {}
+    return {
+        **document,
+        "count": int(document["count"]),
+        "seed": int(document["seed"]),
+        "kinds": {str(kind): float(share) for kind, share in document["kinds"].items()},
+        "textbook": float(document["textbook"]),
+        "rare": float(document["rare"]),
+    }
 
 
 def _checked_answers(

@@ -164,6 +164,8 @@ def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
             raise ValueError("a row without its truth or status")
         if (row["value"] is None) != (row["std"] is None):
             raise ValueError("a value without its standard deviation")
+        if any(abs(row[name] or 0.0) > limits.LARGEST_NUMBER for name in ("value", "std", "truth", "bound")):
+            raise ValueError("a number out of all range")
     if not found or any(cells != wanted for cells in found.values()):
         raise ValueError("cells that are not those of the grid")
 

@@ -16,7 +16,8 @@ from identification.scoring.accuracy import Proportion, Score, Trials, score
 from tunnel_lab.sweep.product import NO_EFFECT
 from tunnel_lab.sweep.store import TIMINGS, Store
 from tunnel_sim.effects import effect_class
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.files.reading import as_described
+from tunnel_sim.vocabulary.errors import TunnelError, shown
 from tunnel_sim.vocabulary.record import read_only
 
 if TYPE_CHECKING:
@@ -188,14 +189,15 @@ def paces(store: Store) -> Sequence[Pace]:
 
     Returns:
         One for each step, in the order of the work.
+
+    Raises:
+        TunnelError: when the timings are damaged.
     """
     import polars as pl
 
     each = pl.col("seconds") / pl.col("runs")
-    table = (
-        store.scan(TIMINGS)
-        .group_by("step", maintain_order=True)
-        .agg(*(each.quantile(share, "linear").alias(str(share)) for share in (0.5, 0.25, 0.75)))
-        .collect()
-    )
-    return [Pace(*row) for row in table.iter_rows()]
+    wanted = [each.quantile(share, "linear").alias(str(share)) for share in (0.5, 0.25, 0.75)]
+    folder = shown(store.folder / TIMINGS)
+    with as_described("cannot be read as a sweep's timings", folder, "remove it: no result depends on it"):
+        table = store.scan(TIMINGS).group_by("step", maintain_order=True).agg(*wanted).collect()
+        return [Pace(str(step), float(a), float(b), float(c)) for step, a, b, c in table.iter_rows()]

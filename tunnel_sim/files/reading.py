@@ -271,7 +271,10 @@ def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
     """
     try:
         yield
-    except _FAULTS as error:
+    except Exception as error:
+        by_polars = type(error).__module__.startswith("polars.")  # known by name: Polars is slow to load
+        if not (by_polars or isinstance(error, _FAULTS)):
+            raise
         reason = f"{type(error).__name__}: {one_line(error, 60)}"
         raise TunnelError(f"{what} ({reason})", where=where, remedy=remedy) from None
 

@@ -23,6 +23,8 @@ KEY_PARTS = 32
 """Most parts of a dotted TOML key: the time to parse one grows with the square of their number."""
 INTEGER_BITS = 128
 """Longest integer, bits: a seed of NumPy has 128; a float holds no more than 1024."""
+NAME_CHARACTERS = 200
+"""Longest name of a spring, characters: two lines of a table."""
 SMALLEST_NUMBER = 1e-100
 """Smallest magnitude above zero in a TOML file or table, SI: squares and cubes of it are still numbers."""
 LARGEST_NUMBER = 1e100
