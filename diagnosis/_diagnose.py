@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from diagnosis.answer.assemble import assemble, chosen_fit
+from diagnosis.answer.assemble import assemble
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.refusal import refuse_hopeless
+from diagnosis.investigate import Progress, investigate
 from diagnosis.localisation.localise import localise
 from diagnosis.result import Diagnosis
-from diagnosis.study import Progress, study
 from identification.examination.examine import examine
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -37,12 +37,11 @@ def diagnose(
     examined = examine(campaign).accepted()
     refuse_hopeless(examined.campaign)
     campaign, left_out = comparable_runs(examined.campaign)
-    found = study(campaign, kinds, progress)
+    study = investigate(campaign, kinds, progress)
     if progress is not None:
         progress("where, and how far it closes")
-    best = chosen_fit(found)
-    where, maps = localise(campaign, found.nominal, None if best is found.nominal else best, found.causes)
-    return replace(assemble(found, where, maps, left_out), remarks=examined.remarks)
+    where, maps = localise(study)
+    return replace(assemble(study, where, maps, left_out), remarks=examined.remarks)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

@@ -48,12 +48,12 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
         The diagnosis.
     """
     base = excess_base(study)
-    chosen = chosen_fit(study)
+    chosen = study.chosen
     nominal_out = predict_held_out(study.nominal)
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
     begun = time.perf_counter()
     shown = report_fits(study.nominal, chosen, nominal_out, chosen_out)
-    study.seconds["confirmation"] = time.perf_counter() - begun
+    seconds = {**study.seconds, "confirmation": time.perf_counter() - begun}
     gap = gap_summary(study, base, shown)
     weighed = candidates(study, base)
     data = study.nominal.problem.data
@@ -84,7 +84,7 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
             wind_on=data.wind_on,
             normalised=data.normalised,
         ),
-        seconds=study.seconds,
+        seconds=seconds,
         provenance={"versions": {name: version(name) for name in _PACKAGES}},
         cautions=(
             *left_out,
@@ -108,16 +108,6 @@ def _outside(study: Study) -> tuple[str, ...]:
         return ()
     closed = 100.0 * (1.0 - outsider.share)
     return (f"{outsider.words}, which the vocabulary does not hold, would close {closed:.0f} % of the gap",)
-
-
-def chosen_fit(study: Study) -> Fit:
-    """The fit of the answer; the nominal one where nothing fitted is part of it."""
-    fitted = tuple(name for name in study.fitted if name != "unknown")
-    random = study.random_answer(fitted)
-    if random is not None:
-        return study.nominal if random.beside is None else random.beside.fit
-    hypothesis = study.hypothesis(fitted) if fitted else None
-    return study.nominal if hypothesis is None else hypothesis.fit
 
 
 def _coefficients(study: Study, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Coefficients:

@@ -21,6 +21,7 @@ from diagnosis.localisation.excess import (
 from diagnosis.localisation.lines import residual_lines
 from diagnosis.localisation.maps import GroupExcess, Maps, RunMap, Trace
 from diagnosis.localisation.phase_plane import apparent_moment, motion, phase_plane
+from diagnosis.study import Study
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
@@ -51,22 +52,20 @@ class Survey:
     moment_z: float
 
 
-def survey(
-    campaign: Campaign, nominal: Fit, scaled: Fit, best: Fit | None, chosen: tuple[str, ...]
-) -> Survey:
+def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[str, ...]) -> Survey:
     """Draw up all maps.
 
     Args:
-        campaign: the records.
-        nominal: fit of the nominal model.
-        scaled: the same with residuals in units of the noise that counts.
-        best: fit with the causes added, if any.
+        study: gives the records and the fits.
+        scaled: the nominal fit with residuals in units of the noise that counts.
+        excesses: its squared residuals, by run.
         chosen: ids of the runs the phase plane is taken over; all where empty.
 
     Returns:
         The survey.
     """
-    excesses = run_excesses(campaign, scaled)
+    campaign, nominal = study.campaign, study.nominal
+    best = None if study.chosen is nominal else study.chosen
     bands = band_excesses(excesses)
     inside = [
         within_bands(r, run, telling_bands(bands)) for r, run in zip(scaled.residuals, excesses, strict=True)

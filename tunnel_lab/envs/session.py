@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.detection.gap import FALSE_ALARM_RATE
-from diagnosis.study import Study, study
+from diagnosis.investigate import investigate
+from diagnosis.study import Study
 from identification.campaign.belief import Belief, prior_belief, run_link, update_belief
 from identification.decay.decay_fit import Reading, RunFit
 from identification.decay.residual_noise import stated_noise
@@ -213,7 +214,7 @@ def _diagnosed(known: Knowledge) -> Knowledge:
     """Diagnose all runs so far."""
     kinds = [effect_class(name) for name in known.conditions.effects]
     try:
-        return replace(known, study=study(known.campaign, kinds))
+        return replace(known, study=investigate(known.campaign, kinds))
     except TunnelError as error:
         return replace(known, status=f"not diagnosed: {error.what}")
 
