@@ -15,14 +15,13 @@ from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
+from tunnel_sim.physics.release import released_by_spring_end
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.steps import fit_substeps
 from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
-_LONGEST_STEP = 4.001e-3  # s
-_RESOLUTION = 0.055  # rad of the oscillation in one step: RK4 then errs by some 1e-6 rad over 10 s
-_ROD_RESOLUTION = 0.5  # rad of the rod's own oscillation in one step
 _THREADS = 2
 _SOFT_ROD = 2e-5  # rad/(N m): a stiffer rod's ringing at the release stays below the noise
 _POOL = ThreadPoolExecutor(_THREADS)
@@ -179,10 +178,10 @@ class _Job:
         self.run = run
         self.zero = float(point.common[problem.nominal_names.index("zero")])
         self.chain = problem.chain(point.common, point.release[run_index], run)
-        physics = held_end(condensed(self.chain.physics(), problem.data))
+        physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         self.row, self.keep_alive = forward_run(physics)
         self.law = parameter_vector(physics.law(campaign_rig(problem.data)))
-        substeps = int(np.ceil(run.interval / _longest_step(physics)))
+        substeps = fit_substeps(physics, run.interval)
         self.row["step"], self.row["steps"] = run.interval / substeps, substeps
 
     def reading(self, angle: Array, rate: Array) -> Array:
@@ -225,32 +224,6 @@ def condensed(physics: RunSettings, data: Data) -> RunSettings:
     )
     inertia = physics.yaw_inertia * (1.0 + (1.0 - share) * lead)
     return dataclasses.replace(physics, rod_twist=None, derivatives=air_seen, yaw_inertia=inertia)
-
-
-def held_end(physics: RunSettings) -> RunSettings:
-    """Take the release as that of the sensor's end, which is what a record shows.
-
-    Args:
-        physics: whose release angle is the sensor's end's.
-
-    Returns:
-        The same with the body's release angle.
-    """
-    if physics.rod_twist is None:
-        return physics
-    body = physics.release_angle * (1.0 + physics.spring_stiffness * physics.rod_twist.compliance)
-    return dataclasses.replace(physics, release_angle=body)
-
-
-def _longest_step(physics: RunSettings) -> float:
-    twist = physics.rod_twist
-    omega = np.sqrt(physics.spring_stiffness / physics.yaw_inertia)
-    longest = min(_LONGEST_STEP, _RESOLUTION / max(omega, 1e-9))
-    if twist is None:
-        return float(longest)
-    share = twist.inertia_share
-    own = np.sqrt(1.0 / (twist.compliance * physics.yaw_inertia * share * (1.0 - share)))
-    return float(min(longest, max(_ROD_RESOLUTION / own, 2e-4)))
 
 
 def campaign_rig(data: Data) -> Rig:

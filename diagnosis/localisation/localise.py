@@ -1,4 +1,4 @@
-"""Where the gap is: in which runs, at which times, amplitudes and frequencies, on which channel, in which condition."""
+"""Where the gap is: the runs, times, amplitudes and frequencies that show it, its channel and its condition."""
 
 from __future__ import annotations
 
