@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.attribution.decide import UNKNOWN_SHARE, Weighed, form_floor, weigh
+from diagnosis.attribution.decide import Weighed, form_floor, weigh
 from diagnosis.attribution.outsiders import weigh_outsiders
 from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
 from diagnosis.attribution.rank import Hypothesis, polish, rank_pairs, rank_singles
@@ -21,21 +21,13 @@ from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.run_data import Data, prepare, without_start
 from diagnosis.fitting.starting_points import is_gross, nominal_start
+from diagnosis.policy import COARSE_STEP_POWER, COARSER_STEP, HUM_LEFT, NOISE_EXPLAINS_UP_TO, UNKNOWN_SHARE
 from diagnosis.study import COARSE_STEP, HUM, Study
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 Progress = Callable[[str], None]
-
-#: A reading's step beyond this multiple of the stated resolution is coarser than stated.
-COARSER = 1.5
-#: Power that a coarse step's error may leave outside the noise floor, in step²/12 (at most all of it, and chance).
-_STEP_POWER = 1.2
-#: Share of a hum's power that may be left once the line and its harmonics are out.
-_HUM_SHARE = 0.02
-#: Gap, in noise variances of a sample, below which a misbehaving noise explains all of it.
-_NOISY_GAP = 1.0
 
 
 def investigate(
@@ -89,7 +81,7 @@ def _test(campaign: Campaign, allowed: set[str], clock: _Clock) -> Study:
     with clock.step("noise"):
         noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
-        coarse = COARSE_STEP.name in allowed and stated is not None and step > COARSER * stated
+        coarse = COARSE_STEP.name in allowed and stated is not None and step > COARSER_STEP * stated
     with clock.step("nominal fit"):
         nominal = fit_nominal(prepare(campaign, noise.variance))
         cleaned, hum = campaign, None
@@ -179,15 +171,15 @@ def _read_off_explains(found: Study) -> bool:
     """
     left = found.nominal.excess / found.nominal.problem.data.runs[0].block
     variance = float(np.mean(list(found.noise.variance.values())))
-    if found.coarse and left * variance < _STEP_POWER * found.step**2 / 12.0:
+    if found.coarse and left * variance < COARSE_STEP_POWER * found.step**2 / 12.0:
         return True
-    return found.hum is not None and left < _HUM_SHARE * found.hum.excess
+    return found.hum is not None and left < HUM_LEFT * found.hum.excess
 
 
 def _noise_explains(found: Study) -> bool:
     """Whether the gap is so small that the noise, which misbehaves, is all of it."""
     block = found.nominal.problem.data.runs[0].block
-    return found.test.noisy and found.nominal.excess < _NOISY_GAP * block
+    return found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block
 
 
 class _Clock:

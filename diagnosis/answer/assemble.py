@@ -17,9 +17,10 @@ from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reference_sizes import size_note, sized_coefficients
 from diagnosis.answer.reported import excess_base, gap_summary, report_fits
 from diagnosis.answer.verdict import blind_spots, cnr_note, verdict
-from diagnosis.attribution.decide import RIVAL_PROBABILITY, UNKNOWN_SHARE, Weighed
+from diagnosis.attribution.decide import Weighed
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.localisation.maps import Maps
+from diagnosis.policy import RIVAL_PROBABILITY, UNKNOWN_SHARE
 from diagnosis.result import (
     Coefficients,
     Diagnosis,

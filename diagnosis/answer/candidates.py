@@ -9,10 +9,10 @@ import numpy as np
 
 from diagnosis.answer.reference_sizes import parameter_unit
 from diagnosis.answer.reported import Base
-from diagnosis.attribution.decide import LAPSE, Weighed
+from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.process_noise import LONGEST_BANDWIDTH
 from diagnosis.attribution.random_moments import RandomAnswer
-from diagnosis.detection.gap import FALSE_ALARM_RATE
+from diagnosis.policy import EVEN_SHARE, GAP_FALSE_ALARM_RATE
 from diagnosis.result import Candidate, ParameterEstimate
 from diagnosis.study import COARSE_STEP, HUM, Study
 
@@ -32,8 +32,8 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
     found = []
     if not study.causes:
         return (
-            Candidate("none", 1.0 - FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
-            Candidate("unknown", FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
+            Candidate("none", 1.0 - GAP_FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
+            Candidate("unknown", GAP_FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
         )
     before = max(study.nominal.excess, 1e-9)
     for answer in study.weighed:
@@ -52,11 +52,15 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         closed = 1.0 - max(left, 0.0) / max(left + base.hum + base.extra, 1e-9)
         found.append(
             Candidate(
-                name, 1.0 - LAPSE, left, float(np.clip(closed, 0.0, 1.0)), _short(_read_parameters(study))
+                name,
+                1.0 - EVEN_SHARE,
+                left,
+                float(np.clip(closed, 0.0, 1.0)),
+                _short(_read_parameters(study)),
             )
         )
-        found.append(Candidate("unknown", LAPSE, left + base.hum + base.extra, 0.0))
-    none = 0.0 if study.read_off else min(study.test.p_value, FALSE_ALARM_RATE)
+        found.append(Candidate("unknown", EVEN_SHARE, left + base.hum + base.extra, 0.0))
+    none = 0.0 if study.read_off else min(study.test.p_value, GAP_FALSE_ALARM_RATE)
     found.append(Candidate("none", none, before / _block(study), 0.0))
     return _normalised(found)
 

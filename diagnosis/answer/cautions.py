@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnosis.detection.sensor_noise import Noise
+from diagnosis.policy import FEW_RUNS, NOISE_CONTRADICTED
 from diagnosis.result import Confirmation, RunGap
 from tunnel_sim.vocabulary.campaign import Campaign
-
-_FEW = 3
-#: Stated noise this many times too small or too large is said; its rounding to one digit reaches half of that.
-_CONTRADICTED = 3.0
 
 
 def cautions(
@@ -29,7 +26,7 @@ def cautions(
         Sentences; none where nothing is missing.
     """
     found = [*_stiffness(campaign), *_noise(noise), *_integrators(confirmation)]
-    if len(campaign.runs) < _FEW:
+    if len(campaign.runs) < FEW_RUNS:
         number = "one run" if len(campaign.runs) == 1 else f"{len(campaign.runs)} runs"
         found.append(
             f"There {'is' if len(campaign.runs) == 1 else 'are'} {number} only: causes are told apart by the form "
@@ -69,7 +66,7 @@ def _noise(noise: Noise) -> list[str]:
     if noise.stated_variance is None:
         return []
     ratio = std / noise.stated_variance**0.5
-    if 1.0 / _CONTRADICTED < ratio < _CONTRADICTED:
+    if 1.0 / NOISE_CONTRADICTED < ratio < NOISE_CONTRADICTED:
         return []
     said = f"The records' noise is {ratio:.3g} times what noise_std and resolution state"
     if ratio < 1.0:

@@ -9,21 +9,17 @@ from decimal import Decimal
 import numpy as np
 
 from diagnosis.answer.held_out import HeldOut
-from diagnosis.attribution.decide import LAPSE, Weighed
+from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.rank import Hypothesis
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import linear_coefficients
+from diagnosis.policy import COLOURED_EXCESS, EVEN_SHARE, FORM_CHANGE_STD
 from diagnosis.result import ParameterEstimate
 from identification.statistics.widening import scatter_of_runs
 from tunnel_sim.effects.base import WindOnRun
 from tunnel_sim.vocabulary.campaign import Campaign
 
 _UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1"}
-#: Excess of block means beyond which the residuals are no longer white, and runs must speak for the scatter.
-_COLOURED = 0.03
-#: Share of what freeing the forms has moved a coefficient by that counts as its standard deviation: a judgement,
-#: made when a sealed set had shown Cnβ's intervals too narrow, and held against campaigns drawn afterwards.
-_FORM_MOVES = 0.5
 
 
 def coefficients(
@@ -61,7 +57,7 @@ def coefficients(
         rounding = abs(value) * _density_rounding(campaign) if name.startswith("cn_") else 0.0
         unseen = _unseen_form(fit, name) if name.startswith("cn_") else 0.0
         straight = None if textbook is None else _value_only(textbook, name)
-        moved = 0.0 if straight is None else _FORM_MOVES * (value - straight)
+        moved = 0.0 if straight is None else FORM_CHANGE_STD * (value - straight)
         variance = std**2 + rounding**2 + unseen**2 + moved**2 + spread
         result[name] = ParameterEstimate(value, math.sqrt(variance), _UNITS[name])
     return result
@@ -107,7 +103,7 @@ def rival_fits(
         a rival the runs refute.
     """
     found = []
-    even = LAPSE / max(len(weighed), 1)
+    even = EVEN_SHARE / max(len(weighed), 1)
     for answer in weighed:
         for hypothesis in hypotheses:
             if hypothesis.names == answer.effects and hypothesis.fit is not chosen:
@@ -121,12 +117,12 @@ def _value(fit: Fit, held_out: HeldOut, name: str) -> tuple[float | None, float]
         return None, 0.0
     scale = math.sqrt(1.0 + max(fit.excess, 0.0))
     std = _formal_std(fit, name) * scale
-    if fit.excess > _COLOURED and len(held_out.common) > 1:
+    if fit.excess > COLOURED_EXCESS and len(held_out.common) > 1:
         values = [_derived(held_out.names, row, name) for row in held_out.common]
         count = len(values)
         jackknife = math.sqrt((count - 1.0) / count * sum((v - value) ** 2 for v in values if v is not None))
         std = max(std, jackknife)
-    if fit.excess > _COLOURED and name in fit.problem.names:
+    if fit.excess > COLOURED_EXCESS and name in fit.problem.names:
         std = max(std, _scatter_of_runs(fit, name))
     return value, std
 

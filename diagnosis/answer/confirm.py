@@ -11,15 +11,13 @@ from scipy.interpolate import CubicHermiteSpline
 
 from diagnosis.fitting.problem import Point, Problem, campaign_rig, condensed
 from diagnosis.fitting.run_data import RunData
+from diagnosis.policy import CONFIRMATION_TOLERANCE
 from diagnosis.result import Confirmation
 from tunnel_sim.physics.motion import Motion
 from tunnel_sim.physics.release import released_by_spring_end
 from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
-
-#: The two may differ by this share of a block mean's noise, root mean square over a run: a hundredth of its power.
-TOLERANCE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +94,9 @@ def confirm(comparisons: Sequence[Comparison]) -> Confirmation:
             largest = max(largest, float(np.max(np.abs(difference))))
             rms = float(np.sqrt(np.mean(difference**2)))
             if rms / noise > worst:
-                worst, found = rms / noise, (run, rms, TOLERANCE * noise)
+                worst, found = rms / noise, (run, rms, CONFIRMATION_TOLERANCE * noise)
     failure = next((c.failure for c in comparisons if c.failure), "")
-    return Confirmation(worst <= TOLERANCE and not failure, largest, *found, failure=failure)
+    return Confirmation(worst <= CONFIRMATION_TOLERANCE and not failure, largest, *found, failure=failure)
 
 
 def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array]:

@@ -9,8 +9,8 @@ import numpy as np
 
 from diagnosis.answer.confirm import Comparison, compare, confirm
 from diagnosis.answer.held_out import HeldOut
-from diagnosis.detection.gap import FALSE_ALARM_RATE
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from diagnosis.result import Confirmation, GapSummary, RunGap
 from diagnosis.study import COARSE_STEP, Study
 from tunnel_sim.vocabulary.record import Array
@@ -154,7 +154,7 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
         excess_after=total_after if named else total_before,
         closed=_closed(sum(before_out), sum(after_out), total_before, total_after) if named else 0.0,
         runs=tuple(runs) if named else tuple(replace(run, after=run.before) for run in runs),
-        false_alarm_rate=FALSE_ALARM_RATE,
+        false_alarm_rate=GAP_FALSE_ALARM_RATE,
         p_value=0.0 if study.read_off else study.test.p_value,
         tests=study.test.tests,
     )

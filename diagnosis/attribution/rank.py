@@ -8,20 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.attribution.decide import FORM_SHARE
 from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_growing
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
+from diagnosis.policy import (
+    ALWAYS_FITTED,
+    FORM_SHARE,
+    FREED_FROM,
+    FREED_HYPOTHESES,
+    PAIR_BASES,
+    PAIR_SECONDS,
+    PREDICTED_SHARE,
+)
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import ParameterInfo
 
-_ALWAYS_FITTED = 7  # starting points fitted whatever linear theory predicts: it ranks well but cannot judge
-_PREDICTED_SHARE = 0.01  # predicted drop, as a share of χ², beyond which others are fitted too
-_BASES = 3  # single effects to which a second is added
-_SECONDS = 4  # second effects refitted for each
 _POLISH = 1e-7  # drop of χ², as a share of it, below which a polished fit is at its end
-_BENT = 3  # hypotheses whose forms are freed
-_BEND_FROM = 0.02  # share left open from which they are
 
 Progress = Callable[[str], None]
 
@@ -66,7 +68,7 @@ def rank_singles(
         Fitted hypotheses, best first. Effects from which linear theory expects next to nothing are left out.
     """
     found = []
-    for kind, starts in _worth_fitting(nominal, kinds, _ALWAYS_FITTED):
+    for kind, starts in _worth_fitting(nominal, kinds, ALWAYS_FITTED):
         if progress is not None:
             progress(kind.name)
         best = _best_fit(_tried(kind, starts, nominal), nominal)
@@ -89,9 +91,9 @@ def rank_pairs(
         Fitted pairs, best first.
     """
     found: dict[tuple[str, ...], Hypothesis] = {}
-    for single in singles[:_BASES]:
+    for single in singles[:PAIR_BASES]:
         others = [kind for kind in kinds if kind.name not in single.effects]
-        for kind, starts in _worth_fitting(single.fit, others, 0)[:_SECONDS]:
+        for kind, starts in _worth_fitting(single.fit, others, 0)[:PAIR_SECONDS]:
             if progress is not None:
                 progress(f"{single.effects[0]} + {kind.name}")
             best = _best_fit(_tried(kind, starts, single.fit), single.fit)
@@ -107,13 +109,13 @@ def _with_forms(found: list[Hypothesis], base: Fit) -> list[Hypothesis]:
     """Free the forms of the best hypotheses where the textbook's leave a good part open; best first."""
     ranked = sorted(found, key=lambda h: h.fit.total)
     bent = []
-    for hypothesis in ranked[:_BENT]:
+    for hypothesis in ranked[:FREED_HYPOTHESES]:
         fitted = hypothesis.fit
-        freed = _bend(fitted) if fitted.excess > _BEND_FROM * max(base.excess, 0.0) else None
+        freed = _bend(fitted) if fitted.excess > FREED_FROM * max(base.excess, 0.0) else None
         bend = None if freed is None else Hypothesis(hypothesis.effects, freed)
         pays = bend is not None and bend.fit.excess < FORM_SHARE**bend.forms * fitted.excess
         bent.append(bend if bend is not None and pays else hypothesis)
-    return sorted([*bent, *ranked[_BENT:]], key=lambda h: h.fit.total)
+    return sorted([*bent, *ranked[FREED_HYPOTHESES:]], key=lambda h: h.fit.total)
 
 
 def polish(chosen: Hypothesis) -> Hypothesis:
@@ -174,7 +176,7 @@ def _worth_fitting(
 ) -> list[tuple[type[Effect], list[StartingPoint]]]:
     scored = [(kind, starts) for kind in kinds if (starts := starting_points(base, kind))]
     scored.sort(key=lambda item: -item[1][0].predicted_drop)
-    limit = 0.0 if always == 0 else _PREDICTED_SHARE * base.total
+    limit = 0.0 if always == 0 else PREDICTED_SHARE * base.total
     return [item for i, item in enumerate(scored) if i < always or item[1][0].predicted_drop > limit]
 
 

@@ -21,12 +21,9 @@ from diagnosis.blind.files import (
     read_hashes,
 )
 from diagnosis.blind.statistics import CalibrationBin, Share, calibration, share_of
+from diagnosis.policy import BLIND_CLOSED, BLIND_WITHIN
 from tunnel_sim.files.reading import as_described
 from tunnel_sim.vocabulary.errors import TunnelError, shown
-
-CLOSED = 0.95
-WITHIN = 3.0
-"""Errors of coefficients are counted within this many standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +122,7 @@ class Score:
         if not closed:
             return Share(0, 0), 0.0, 0.0
         return (
-            share_of([v >= CLOSED for v in closed]),
+            share_of([v >= BLIND_CLOSED for v in closed]),
             float(np.median(closed)),
             float(np.quantile(closed, 0.05)),
         )
@@ -146,7 +143,7 @@ class Score:
                 for when in ("before", "after"):
                     errors = [e for c in cases if (e := c.error(name, when)) is not None]
                     if errors:
-                        within = share_of([abs(stds) <= WITHIN for stds, _ in errors])
+                        within = share_of([abs(stds) <= BLIND_WITHIN for stds, _ in errors])
                         median = float(np.median([abs(share) for _, share in errors]))
                         found.append(CoefficientErrors(group, name, when, within, median))
         return found

@@ -9,12 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.policy import SAME_SPRING
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Record
 
-#: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
-#: fifth apart. What depends on amplitude moves a frequency gradually, and seldom as far.
-_SAME_SPRING = 1.1
 _PADDING = 8  # times the record, which places the peak of a few cycles within some per cent
 
 
@@ -82,7 +80,7 @@ def _by_frequency(runs: Sequence[Run]) -> list[list[Run]]:
     found = sorted(((frequency(run.record), run) for run in runs), key=lambda pair: pair[0])
     groups = [[found[0][1]]]
     for (last, _), (now, run) in itertools.pairwise(found):
-        if now > _SAME_SPRING * last:
+        if now > SAME_SPRING * last:
             groups.append([])
         groups[-1].append(run)
     return groups

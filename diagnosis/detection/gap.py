@@ -12,11 +12,8 @@ from diagnosis.detection.noise_under_null import level_p_value, trend_p_values
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import resonance
+from diagnosis.policy import FLOOR_TOLERANCE, GAP_FALSE_ALARM_RATE, NOISE_FALSE_ALARM_SHARE
 
-#: Rate at which a campaign without a gap is said to have one, all tests together.
-FALSE_ALARM_RATE = 1e-3
-#: The floor below 60 Hz may differ by this share from the one measured above it (quantisation colours it).
-_FLOOR_TOLERANCE = 0.03
 BANDS = ("below", "f0", "2f0", "3f0", "above")
 
 
@@ -49,10 +46,10 @@ def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
             then say nothing more.
 
     Returns:
-        The verdict at `FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
+        The verdict at `GAP_FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
     """
     # stated noise that the records bear out may still lie a little below theirs
-    floor = (1.0 + _FLOOR_TOLERANCE) * max(noise.estimated / noise.used, 1.0)
+    floor = (1.0 + FLOOR_TOLERANCE) * max(noise.estimated / noise.used, 1.0)
     tests = dict(zip(BANDS, band_p_values(fit, floor), strict=True)) | {"offset": offset_p_value(fit, floor)}
     noisy: dict[str, float] = {}
     if not coarse_step and noise.source != "floor":
@@ -60,13 +57,13 @@ def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
         if noise.stated_variance is not None:
             noisy["noise level"] = level_p_value(fit, noise)
     everything = tests | noisy
-    limit = FALSE_ALARM_RATE / len(everything)
+    limit = GAP_FALSE_ALARM_RATE / len(everything)
     smallest = min(everything.values())
     return GapTest(
         smallest < limit,
         min(1.0, smallest * len(everything)),
         everything,
-        any(p < limit * 0.01 for p in noisy.values()),
+        any(p < limit * NOISE_FALSE_ALARM_SHARE for p in noisy.values()),
     )
 
 

@@ -12,20 +12,13 @@ from scipy.stats import chi2
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import mains_line, smooth_spectra
+from diagnosis.policy import HUM_CONTRAST, HUM_RUN_DROP, HUM_RUNS, SWELL_FALSE_ALARM_RATE
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
 
 _HARMONICS = 5
-#: A run shows the line when taking it out lowers χ² by this much: at one given frequency,
-#: by chance in one run of 1800.
-_RUN_DROP = 15.0
-#: Share of the runs that must show it: the mains hum in every run.
-_RUN_SHARE = 0.75
-#: Fastest swelling of its amplitude that is looked for, Hz, and how seldom one is found in a steady hum.
+#: Fastest swelling of its amplitude that is sought, Hz.
 _SWELL_UP_TO = 0.6
-_SWELL_RATE = 1e-6
-#: Drop of χ² at the line over the largest beside it, all runs together.
-_CONTRAST = 4.0
 
 
 @dataclass(frozen=True)
@@ -58,10 +51,10 @@ def find_hum(nominal: Fit) -> float | None:
         corners raise the spectrum beside the line as well, and do not pass.
     """
     line = mains_line(nominal)
-    if line is None or line.contrast < _CONTRAST:
+    if line is None or line.contrast < HUM_CONTRAST:
         return None
-    shown = [spectrum.power(line.parameter) > _RUN_DROP for spectrum in smooth_spectra(nominal)]
-    return line.parameter if np.mean(shown) >= _RUN_SHARE else None
+    shown = [spectrum.power(line.parameter) > HUM_RUN_DROP for spectrum in smooth_spectra(nominal)]
+    return line.parameter if np.mean(shown) >= HUM_RUNS else None
 
 
 def refine_frequency(campaign: Campaign, frequency: float) -> float:
@@ -174,7 +167,7 @@ def _swell(record: Record, frequency: float) -> Array:
 
 
 def _swells(records: list[Record], frequency: float, variance: float) -> bool:
-    """Whether the hum's amplitude varies within the runs beyond chance (false-alarm rate `_SWELL_RATE`)."""
+    """Whether the hum's amplitude varies within the runs beyond chance (`SWELL_FALSE_ALARM_RATE`)."""
     power, count = 0.0, 0
     for record in records:
         if int(2.0 * _SWELL_UP_TO * (record.time_s[-1] - record.time_s[0])) < 1:
@@ -187,7 +180,7 @@ def _swells(records: list[Record], frequency: float, variance: float) -> bool:
         found = both.T @ (_detrended(record.yaw_rad) * window[:, 0])
         power += float(found @ np.linalg.solve(share, found)) / variance
         count += swelling.shape[1]
-    return count > 0 and power > float(chi2.isf(_SWELL_RATE, count))
+    return count > 0 and power > float(chi2.isf(SWELL_FALSE_ALARM_RATE, count))
 
 
 def _windowed_fit(record: Record, design: Array, window: Array) -> Array:

@@ -11,12 +11,9 @@ from scipy.stats import binom, t
 
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend, trend_statistics
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.policy import NOISE_TAILS, ROUNDED_NOISE
 from tunnel_sim.vocabulary.record import Array
 
-#: Heavier tails than white noise has by this factor are let pass: a sensor's noise is not quite normal.
-_TAILS = 1.15
-#: Stated noise is often rounded to one digit, which moves its square by up to this factor.
-_ROUNDED_NOISE = 1.5
 #: Repetitions of the campaign, fewer where it is long, never below the least.
 _REPETITIONS, _FEWEST, _SAMPLES = 32, 16, 2.5e6
 #: A step this many times the noise beside it makes that noise uncertain; several are tried then.
@@ -56,7 +53,7 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
 def _p_values(trend: NoiseTrend, chance: Array) -> Array:
     count = len(chance)
     mean, scatter = chance.mean(axis=0), np.maximum(chance.std(axis=0, ddof=1), 1e-9)
-    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(_TAILS)])
+    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(NOISE_TAILS)])
     score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / count))
     two_sided = 2.0 * t.sf(np.abs(score[:2]), count - 1)
     return np.append(two_sided, t.sf(score[2], count - 1))
@@ -103,7 +100,7 @@ def level_p_value(fit: Fit, noise: Noise) -> float:
         median found, each with the chance that the largest noise the statement allows gives it.
     """
     assert noise.stated_variance is not None
-    level = noise.estimated / (_ROUNDED_NOISE * noise.stated_variance)
+    level = noise.estimated / (ROUNDED_NOISE * noise.stated_variance)
     samples = sum(run.reading.size * run.block for run in fit.problem.data.runs)
     ordinates = max(int(_ABOVE * 0.5 * samples / _HANN), 1)
     return float(binom.sf((ordinates - 1) // 2, ordinates, 2.0**-level))

@@ -8,16 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.fitting.run_data import BLOCK_INTERVAL
+from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
 _FLOOR_FROM = 60.0  # Hz: above the motion, the rod's ringing and the mains
 _LN2 = float(np.log(2.0))  # median of a unit exponential: the periodogram of white noise
-_AGREES = 3.0  # standard deviations of the estimate at which the stated noise is borne out
 #: Share of the swing that block means and step leave in a fit of the nominal model's closed form, and its bands
 #: still pass for white.
 _ACCURACY = 4e-5
-_APART = 4.065  # standard deviations from the mean at which a run's noise is its own
 
 
 @dataclass(frozen=True)
@@ -92,8 +91,8 @@ def campaign_noise(campaign: Campaign) -> Noise:
         campaign: the runs.
 
     Returns:
-        The stated noise where runs agree with one another and their mean with it, within `_AGREES` standard
-        deviations of the estimate; else the estimate, pooled over runs where they agree with one another.
+        The stated noise where the runs agree with one another and their mean agrees with it, within `NOISE_AGREES`
+        standard deviations of the estimate; else the estimate, pooled over runs where they agree with one another.
     """
     estimates = {run.id: estimate_variance(run.record) for run in campaign.runs}
     variances = np.array([value for value, _ in estimates.values()])
@@ -102,7 +101,7 @@ def campaign_noise(campaign: Campaign) -> Noise:
     floors = {run.id: accuracy(run.record) ** 2 for run in campaign.runs}
     if any(floors[run] > value for run, (value, _) in estimates.items()):
         return _floor(campaign, {run: value for run, (value, _) in estimates.items()}, floors)
-    uniform = bool(np.all(np.abs(variances / pooled - 1.0) < _APART * relative))
+    uniform = bool(np.all(np.abs(variances / pooled - 1.0) < NOISE_OF_ITS_OWN * relative))
     estimated = {run.id: pooled if uniform else estimates[run.id][0] for run in campaign.runs}
     stated = _stated_variance(campaign.sensor, pooled)
     found = f"{np.sqrt(pooled):.3g} ± {0.5 * uncertainty * np.sqrt(pooled):.1g} rad"
@@ -110,7 +109,7 @@ def campaign_noise(campaign: Campaign) -> Noise:
         return Noise(estimated, None, "estimated", "the campaign states no noise", pooled)
     if not uniform:
         said = f"its runs differ, {np.sqrt(variances.min()):.3g} to {np.sqrt(variances.max()):.3g} rad"
-    elif abs(pooled / stated - 1.0) < _AGREES * uncertainty:
+    elif abs(pooled / stated - 1.0) < NOISE_AGREES * uncertainty:
         used = dict.fromkeys(estimated, stated)
         return Noise(used, stated, "stated", f"the records agree: {found}", pooled)
     else:

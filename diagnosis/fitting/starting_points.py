@@ -12,11 +12,11 @@ from diagnosis.fitting.least_squares import Fit, clip, normal_equations, scaled_
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.spectra import Line, mains_line, shedding_line
+from diagnosis.policy import GROSS_MISFIT
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import Circumstances, Trial
 from tunnel_sim.vocabulary.record import Array
 
-_GROSS = 0.01  # share of the reading's power
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
@@ -125,7 +125,7 @@ def is_gross(fit: Fit) -> bool:
     readings = sum(
         float(np.sum((r.reading - np.mean(r.reading)) ** 2 / r.noise_variance)) for r in fit.problem.data.runs
     )
-    return fit.total > _GROSS * readings
+    return fit.total > GROSS_MISFIT * readings
 
 
 def _balanced_start(base: Fit, kind: type[Effect]) -> StartingPoint | None:

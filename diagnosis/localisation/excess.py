@@ -16,11 +16,10 @@ from scipy.stats import chi2
 from diagnosis.detection.sensor_noise import estimate_variance
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import resonance
+from diagnosis.policy import FLOOR_STD, INTERVAL_SHARE, PLACE_FALSE_ALARM_RATE
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
-#: Chance that the runs or bands of a campaign without a gap are said to hold one, all tests together.
-FALSE_ALARM_RATE = 0.01
 #: Bands by their upper edges in multiples of the run's own frequency.
 BANDS: tuple[tuple[str, float], ...] = (
     ("0", 0.5),
@@ -29,8 +28,6 @@ BANDS: tuple[tuple[str, float], ...] = (
     ("3f0", 3.5),
     ("above", np.inf),
 )
-_SHARE = 0.8  # of the excess that a stated interval holds
-_FLOOR = 0.015  # the floor below 60 Hz may differ by so much from the one measured above it
 _OWN = 2.0  # parameters of a run that soak up residual: its angle and rate at the release
 
 
@@ -114,7 +111,7 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
     levels = [run.noise_variance * run.block for run in data.runs]
     if np.allclose(levels, levels[0], rtol=1e-9):
         relative = [float(np.mean(relative)) / np.sqrt(len(relative))] * len(relative)
-    relative = [float(np.hypot(value, _FLOOR)) for value in relative]
+    relative = [float(np.hypot(value, FLOOR_STD)) for value in relative]
     shared = len(fit.problem.names) / len(data.runs)
     return [
         RunExcess(
@@ -183,7 +180,7 @@ def telling_bands(bands: tuple[BandExcess, ...]) -> tuple[str, ...]:
     Returns:
         Names.
     """
-    level = FALSE_ALARM_RATE / max(len(bands), 1)
+    level = PLACE_FALSE_ALARM_RATE / max(len(bands), 1)
     found = tuple(band.band for band in bands if band.p_value < level and band.excess > 0.0)
     return found or tuple(band.band for band in bands)
 
@@ -221,7 +218,7 @@ class Profile:
     mean: Array
     std: Array
 
-    def interval(self, share: float = _SHARE) -> tuple[float, float] | None:
+    def interval(self, share: float = INTERVAL_SHARE) -> tuple[float, float] | None:
         """The shortest interval that holds a share of the excess; None where there is no excess."""
         return shortest_interval(self.edges, self.energy, share)
 

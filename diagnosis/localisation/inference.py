@@ -10,18 +10,20 @@ from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.starting_points import nominal_start
 from diagnosis.localisation.backbone import Backbone, drift
-from diagnosis.localisation.excess import FALSE_ALARM_RATE, band_excesses, run_excesses, shortest_interval
+from diagnosis.localisation.excess import band_excesses, run_excesses, shortest_interval
 from diagnosis.localisation.mapping import Survey
+from diagnosis.policy import (
+    BETWEEN_RUNS_SHARE,
+    BLOW_SHARE,
+    CLEAR_MOMENT,
+    DOMINANT_SHARE,
+    DRIFT_RATIO,
+    FASTEST_MOMENT,
+    PLACE_FALSE_ALARM_RATE,
+    SECOND_HARMONIC_SHARE,
+    SINGLE_RUN_SHARE,
+)
 from tunnel_sim.vocabulary.campaign import Campaign
-
-_MOST = 0.6  # share of the excess that makes a band or a run the place of the gap
-_COMPANION = 0.05  # likewise, of a second harmonic that goes with a shifted centre
-_LONE = 0.85  # likewise, of one run among three or more
-_BETWEEN = 0.2  # of the excess at most is left by fits to single runs where the gap lies between runs
-_BLOW = 0.1  # of the record: half the missing moment within so little time is a blow
-_CLEAR = 5.0  # standard deviations of the missing moment's energy
-_RATIO = 1.5  # of the two drifts, for one of them to be said to lead
-_MECHANICAL = 30.0  # Hz: the rig's inertia holds moments faster than this below any noise
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
         return Finding("always", "it shows with the wind off")
     if not off:
         return Finding(None, "with the wind on in every run, they cannot say whether it needs wind")
-    if min(run.p_value for run in found.maps.runs) * len(runs) > FALSE_ALARM_RATE:
+    if min(run.p_value for run in found.maps.runs) * len(runs) > PLACE_FALSE_ALARM_RATE:
         return Finding(None, "no run shows it by itself")
     lone = _lone_run(found)
     if lone is not None and lone not in off:
@@ -68,7 +70,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     tests = [run.p_value() for run in excesses]
     tests += [band.p_value for band in band_excesses(excesses)]
     count = "the wind-off run" if len(off) == 1 else f"the {len(off)} wind-off runs"
-    if min(tests) * len(tests) < FALSE_ALARM_RATE:
+    if min(tests) * len(tests) < PLACE_FALSE_ALARM_RATE:
         return Finding("always", f"{count}, fitted alone, show{'s' * (len(off) == 1)} it too")
     return Finding("wind_on", f"{count}, fitted alone, leave{'s' * (len(off) == 1)} nothing beyond noise")
 
@@ -76,7 +78,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
 def _lone_run(found: Survey) -> str | None:
     runs = found.maps.runs
     top = max(runs, key=lambda run: run.share)
-    return top.id if len(runs) >= 3 and top.share > _LONE else None
+    return top.id if len(runs) >= 3 and top.share > SINGLE_RUN_SHARE else None
 
 
 def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | None:
@@ -91,10 +93,10 @@ def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | No
     """
     edges = found.maps.time.edges
     interval = shortest_interval(edges, found.moment_energy, share)
-    if interval is None or found.moment_z < _CLEAR:
+    if interval is None or found.moment_z < CLEAR_MOMENT:
         return None
     length = float(edges[-1])
-    brief = interval[1] - interval[0] <= _BLOW * length
+    brief = interval[1] - interval[0] <= BLOW_SHARE * length
     return interval if brief and interval[0] > 0.05 * length else None
 
 
@@ -118,20 +120,20 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
 def _by_band(found: Survey, condition: str | None) -> Finding | None:
     excess = {band.band: max(band.excess, 0.0) for band in found.maps.bands}
     whole = max(sum(excess.values()), 1e-300)
-    lines = [line for line in found.maps.lines if line.share > 0.5 * _MOST]
+    lines = [line for line in found.maps.lines if line.share > 0.5 * DOMINANT_SHARE]
     if lines and len(lines) >= max(1, len(found.maps.runs) // 3):
         frequency = float(np.median([line.frequency for line in lines]))
-        channel = "forcing" if frequency < _MECHANICAL else "sensor"
+        channel = "forcing" if frequency < FASTEST_MOMENT else "sensor"
         return Finding(channel, f"it is a spectral line near {frequency:.3g} Hz")
-    if excess.get("above", 0.0) > _MOST * whole:
+    if excess.get("above", 0.0) > DOMINANT_SHARE * whole:
         return Finding("sensor", "most of it is faster than the rig can move")
-    if excess.get("0", 0.0) > _MOST * whole:
-        if excess.get("2f0", 0.0) > _COMPANION * whole:
+    if excess.get("0", 0.0) > DOMINANT_SHARE * whole:
+        if excess.get("2f0", 0.0) > SECOND_HARMONIC_SHARE * whole:
             return Finding("stiffness", "the centre shifts together with the second harmonic of the motion")
         if condition == "wind_on":
             return Finding("forcing", "most of it is a slow shift of the centre that needs wind")
         return Finding("sensor", "most of it is a slow shift of the centre")
-    if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > _MOST * whole:
+    if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > DOMINANT_SHARE * whole:
         return Finding("sensor", "it has the motion's harmonics without its frequency or damping shifting")
     return None
 
@@ -145,7 +147,7 @@ def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
         return None
     left = sum(max(v or 0.0, 0.0) * n for v, n in zip(alone, sizes, strict=True))
     whole = sum(max(run.excess, 0.0) * n for run, n in zip(found.excesses, sizes, strict=True))
-    if left > _BETWEEN * whole:
+    if left > BETWEEN_RUNS_SHARE * whole:
         return None
     shifts = np.array([_shift(curve) for curve in curves])
     frequency, damping = np.sum(shifts**2, axis=0)
@@ -163,8 +165,8 @@ def _shift(curve: Backbone) -> tuple[float, float]:
 
 def _by_drift(found: Survey) -> Finding:
     frequency, damping = drift(list(found.maps.backbones))
-    if frequency > _RATIO * max(damping, 0.0) and frequency > 0.0:
+    if frequency > DRIFT_RATIO * max(damping, 0.0) and frequency > 0.0:
         return Finding("stiffness", "the frequency shifts along the decay more than the damping does")
-    if damping > _RATIO * max(frequency, 0.0) and damping > 0.0:
+    if damping > DRIFT_RATIO * max(frequency, 0.0) and damping > 0.0:
         return Finding("damping", "the damping shifts along the decay more than the frequency does")
     return Finding(None, "frequency and damping shift alike, so these runs do not say on what it acts")

@@ -9,18 +9,17 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import prepare
-from diagnosis.localisation.excess import FALSE_ALARM_RATE, RunExcess, run_excesses, telling_bands
+from diagnosis.localisation.excess import RunExcess, run_excesses, telling_bands
 from diagnosis.localisation.inference import Finding, blow_interval, infer_channel, infer_condition
 from diagnosis.localisation.mapping import Survey, survey
 from diagnosis.localisation.maps import Maps
 from diagnosis.localisation.words import describe, nowhere
 from diagnosis.names import plain
+from diagnosis.policy import NAMED_RUN_SHARE, PLACE_FALSE_ALARM_RATE
 from diagnosis.result import Where
 from diagnosis.study import COARSE_STEP, Study
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.record import Array
-
-_LITTLE = 0.1  # of the largest excess: runs with less are not named
 
 
 def localise(study: Study) -> tuple[Where, Maps]:
@@ -62,8 +61,8 @@ def telling_runs(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
         Ids of the runs beyond chance (false-alarm rate 1 % over all of them) that have a tenth or more of the
         largest excess among them, in the campaign's order.
     """
-    clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < FALSE_ALARM_RATE}
-    least = _LITTLE * max(clear.values(), default=0.0)
+    clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < PLACE_FALSE_ALARM_RATE}
+    least = NAMED_RUN_SHARE * max(clear.values(), default=0.0)
     return tuple(name for name, excess in clear.items() if excess > least)
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from diagnosis.localisation.excess import FALSE_ALARM_RATE
 from diagnosis.localisation.inference import Finding
 from diagnosis.localisation.mapping import Survey
+from diagnosis.policy import LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
 from diagnosis.result import Where
 
-_SPREAD = 0.7  # of the whole: an interval as long as this says no place
 _LISTED = 12  # ids a sentence bears
 _BAND_WORDS = {
     "0": "slower than the oscillation",
@@ -67,9 +66,10 @@ def describe(
 def _runs(where: Where, found: Survey) -> str:
     count = len(found.maps.runs)
     if not where.runs:
+        rate = 100.0 * PLACE_FALSE_ALARM_RATE
         return (
-            f"No run by itself is beyond chance (false-alarm rate {100.0 * FALSE_ALARM_RATE:.0f} % over all runs); "
-            "what is found shows in all of them together."
+            f"No single run is beyond chance (false-alarm rate {rate:.0f} % over all runs); "
+            "the gap shows only in all of them together."
         )
     share = sum(run.share for run in found.maps.runs if run.id in where.runs)
     named = f" ({', '.join(where.runs)})" if len(where.runs) <= _LISTED else ""
@@ -93,11 +93,11 @@ def _extent(where: Where, found: Survey) -> str:
     """Time, amplitude and frequency."""
     places = []
     length = float(found.maps.time.edges[-1])
-    if where.time_s is not None and where.time_s[1] - where.time_s[0] < _SPREAD * length:
+    if where.time_s is not None and where.time_s[1] - where.time_s[0] < LOCATES_UP_TO * length:
         places.append(f"between {where.time_s[0]:.1f} and {where.time_s[1]:.1f} s of the record")
     greatest = float(found.maps.amplitude.edges[-1])
     amplitude = where.amplitude_rad
-    if amplitude is not None and amplitude[1] - amplitude[0] < _SPREAD * greatest:
+    if amplitude is not None and amplitude[1] - amplitude[0] < LOCATES_UP_TO * greatest:
         places.append(f"at amplitudes from {amplitude[0]:.2f} to {amplitude[1]:.2f} rad")
     if where.frequency_hz is not None:
         places.append(f"at {where.frequency_hz[0]:.2f} to {where.frequency_hz[1]:.2f} Hz")

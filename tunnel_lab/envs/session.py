@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.detection.gap import FALSE_ALARM_RATE
 from diagnosis.investigate import investigate
+from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from diagnosis.study import Study
 from identification.campaign.belief import Belief, prior_belief, run_link, update_belief
 from identification.decay.decay_fit import Reading, RunFit
@@ -250,7 +250,7 @@ def probabilities(known: Knowledge) -> Array:
     if known.study is None:
         return np.full(len(names), 1.0 / len(names))
     if not known.study.weighed:
-        found[0], found[-1] = 1.0 - FALSE_ALARM_RATE, FALSE_ALARM_RATE
+        found[0], found[-1] = 1.0 - GAP_FALSE_ALARM_RATE, GAP_FALSE_ALARM_RATE
         return found
     for answer in known.study.weighed:
         name = answer.effects[0] if len(answer.effects) == 1 else "several"
