@@ -66,8 +66,8 @@ FREED_HYPOTHESES, FREED_FROM = 3, 0.02
 
 #: Exponent of the share left open. Tuned.
 STEEPNESS = 3.0
-#: Exponent beside it of a share beyond `UNKNOWN_SHARE`, three times as steep together. Tuned: many effects that close
-#: little must not together outweigh ``unknown``.
+#: Exponent beside it of a share beyond `UNKNOWN_SHARE`, three times as steep together. Tuned: many effects that
+#: close little must not together outweigh ``unknown``.
 STEEPNESS_BEYOND = 6.0
 #: Misfit of form that counts as none, as a share of the gap. Tuned.
 FORM_MISFIT = 0.005

@@ -115,8 +115,8 @@ def _coefficients(study: Study, chosen: Fit, nominal_out: HeldOut, chosen_out: H
     campaign = study.campaign
     before = coefficients(study.nominal, nominal_out, campaign, [(chosen, 1.0)] if study.causes else ())
     rivals = rival_fits(study.weighed, study.hypotheses, chosen)
-    straight = next((h.textbook for h in study.hypotheses if h.fit is chosen), None)
-    after = coefficients(chosen, chosen_out, campaign, rivals, straight)
+    textbook = next((h.textbook for h in study.hypotheses if h.fit is chosen), None)
+    after = coefficients(chosen, chosen_out, campaign, rivals, textbook)
     notes = (cnr_note(study.causes), size_note(campaign.rig, windy="cn_beta" in before))
     return Coefficients(
         before=sized_coefficients(before, campaign.rig),

@@ -36,14 +36,14 @@ def coefficients(
         held_out: the same without groups of runs.
         campaign: for the digits to which air density is stated.
         rivals: other fits and their probabilities.
-        textbook: the same effects with the textbook's forms, where the fit freed them.
+        textbook: the same effects in textbook form, where the fit freed their forms.
 
     Returns:
         ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` in normalised form. The variance is that of the
         fit scaled by its excess, or where the residuals are coloured the greatest of that, the delete-a-group
         jackknife (Kott, J. Off. Stat. 17 (2001) 521) and the scatter of the runs; plus the rounding of the air
-        density, plus what the form of a cause leaves open that no free decay shows, plus half of what freeing
-        the forms has moved (another family of forms may move as much), plus the spread over rivals.
+        density, plus the part of a cause's form that no free decay shows, plus half the change made by freeing
+        the forms (another family of forms may change as much), plus the spread over rivals.
     """
     names = ("omega_n", "zeta") if fit.problem.data.normalised else ("cn_beta", "cn_r")
     result = {}
@@ -56,8 +56,8 @@ def coefficients(
         )
         rounding = abs(value) * _density_rounding(campaign) if name.startswith("cn_") else 0.0
         unseen = _unseen_form(fit, name) if name.startswith("cn_") else 0.0
-        straight = None if textbook is None else _value_only(textbook, name)
-        moved = 0.0 if straight is None else FORM_CHANGE_STD * (value - straight)
+        unfreed = None if textbook is None else _value_only(textbook, name)
+        moved = 0.0 if unfreed is None else FORM_CHANGE_STD * (value - unfreed)
         variance = std**2 + rounding**2 + unseen**2 + moved**2 + spread
         result[name] = ParameterEstimate(value, math.sqrt(variance), _UNITS[name])
     return result
@@ -99,8 +99,8 @@ def rival_fits(
         chosen: the fit of the answer.
 
     Returns:
-        Fit and probability of each fitted rival, without the lapse: it stands for what nobody thought of, not for
-        a rival the runs refute.
+        Fit and probability of each fitted rival, without its part of `EVEN_SHARE`: that stands for causes not
+        considered, not for a rival that the runs refute.
     """
     found = []
     even = EVEN_SHARE / max(len(weighed), 1)

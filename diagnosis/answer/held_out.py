@@ -141,7 +141,7 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
 
 
 def _restricted(problem: Problem, ids: list[str]) -> Problem:
-    return Problem(problem.data.subset(tuple(ids)), problem.effects, problem.fixed, problem.bent)
+    return Problem(problem.data.subset(tuple(ids)), problem.effects, problem.fixed, problem.free_forms)
 
 
 def _sliced(whole: Fit, keep: list[int]) -> Fit:

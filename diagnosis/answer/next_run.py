@@ -135,7 +135,7 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
     What a periodic effect adds is of first order in its size, so that it turns with its phase as a pointer.
     """
     problem = Problem(
-        fit.problem.data.with_runs((run,)), fit.problem.effects, fit.problem.fixed, fit.problem.bent
+        fit.problem.data.with_runs((run,)), fit.problem.effects, fit.problem.fixed, fit.problem.free_forms
     )
     count = len(problem.phased)
     steps = np.array([1e-4 * angle, 1e-3 * angle])

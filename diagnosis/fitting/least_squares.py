@@ -143,7 +143,7 @@ def fit_growing(problem: Problem, start: Point) -> Fit:
             for run in problem.data.runs
         )
         shorter = Problem(
-            dataclasses.replace(problem.data, runs=runs), problem.effects, problem.fixed, problem.bent
+            dataclasses.replace(problem.data, runs=runs), problem.effects, problem.fixed, problem.free_forms
         )
         point = fit(shorter, point, tolerance=1e-3, max_iterations=15).point
     return fit(problem, point)

@@ -49,13 +49,13 @@ class Problem:
         data: the runs.
         effects: effect classes whose parameters are free.
         fixed: value of effect parameters that are held, as ``effect.parameter``.
-        bent: names of effects whose form is free; the others keep the textbook's.
+        free_forms: names of the effects whose form parameters are free; the others keep the textbook form.
     """
 
     data: Data
     effects: tuple[type[Effect], ...] = ()
     fixed: tuple[tuple[str, float], ...] = ()
-    bent: tuple[str, ...] = ()
+    free_forms: tuple[str, ...] = ()
 
     @cached_property
     def nominal_names(self) -> tuple[str, ...]:
@@ -71,7 +71,7 @@ class Problem:
             f"{kind.name}.{info.name}"
             for kind in self.effects
             for info in kind.parameters()
-            if not info.form or kind.name in self.bent
+            if not info.form or kind.name in self.free_forms
         ]
         held = dict(self.fixed)
         return tuple(name for name in names if name not in held)

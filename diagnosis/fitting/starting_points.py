@@ -132,7 +132,7 @@ def _balanced_start(base: Fit, kind: type[Effect]) -> StartingPoint | None:
     held = {f"{kind.name}.{name}": value for name, value in kind.regressed_at.items()}
     fixed = dict(base.problem.fixed) | held
     problem = Problem(
-        base.problem.data, (*base.problem.effects, kind), tuple(fixed.items()), base.problem.bent
+        base.problem.data, (*base.problem.effects, kind), tuple(fixed.items()), base.problem.free_forms
     )
     point = equation_error_start(problem)
     if point is None:
@@ -143,7 +143,9 @@ def _balanced_start(base: Fit, kind: type[Effect]) -> StartingPoint | None:
 
 
 def _line_start(base: Fit, kind: type[Effect], line: Line) -> StartingPoint:
-    problem = Problem(base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.bent)
+    problem = Problem(
+        base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.free_forms
+    )
     severity, place = kind.parameters()
     lower, upper = severity.lower, severity.upper
     values = np.array(
@@ -163,7 +165,7 @@ def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint 
     held = {} if spring is None else {spring: trial.values[spring]}
     fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
     freed = any(info.form and info.name in trial.values for info in kind.parameters())
-    with_free_form = (*base.problem.bent, kind.name) if freed else base.problem.bent
+    with_free_form = (*base.problem.free_forms, kind.name) if freed else base.problem.free_forms
     problem = Problem(base.problem.data, (*base.problem.effects, kind), fixed, with_free_form)
     infos = [info for info in kind.parameters() if info.name not in held and (freed or not info.form)]
     scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)

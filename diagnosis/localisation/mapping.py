@@ -150,7 +150,7 @@ def _groups(fit: Fit, excesses: list[RunExcess]) -> tuple[GroupExcess, ...]:
     }
     result = []
     for by, labels in keys.items():
-        distinct = sorted(set(labels), key=_leading_number)
+        distinct = sorted(set(labels), key=_first_number)
         if len(distinct) < 2:
             continue
         for label in distinct:
@@ -161,7 +161,7 @@ def _groups(fit: Fit, excesses: list[RunExcess]) -> tuple[GroupExcess, ...]:
     return tuple(result)
 
 
-def _leading_number(label: str) -> tuple[float, str]:
+def _first_number(label: str) -> tuple[float, str]:
     head = label.split(" ")[0]
     return (float(head) if head.replace(".", "", 1).isdigit() else 0.0, label)
 

@@ -144,7 +144,7 @@ def test_rivals_are_the_fits_that_were_not_chosen(base, best):
     hypotheses = [Hypothesis((CAUSE,), best), Hypothesis(("free_play",), base)]
     ((fit, probability),) = rival_fits(weighed, hypotheses, best)
     assert fit is base
-    assert probability == pytest.approx(0.15 - EVEN_SHARE / 3)  # no less than nothing, and without the lapse
+    assert probability == pytest.approx(0.15 - EVEN_SHARE / 3)  # without its part of the even share
 
 
 def test_normalised_runs_have_frequency_and_damping_ratio(data):
