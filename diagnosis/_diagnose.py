@@ -20,15 +20,15 @@ from tunnel_sim.vocabulary.errors import TunnelError
 def diagnose(
     campaign: Campaign, *, kinds: Sequence[type[Effect]] = ALL_EFFECTS, progress: Progress | None = None
 ) -> Diagnosis:
-    """Say where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
+    """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
     Args:
         campaign: measured or simulated runs.
-        kinds: the vocabulary to answer in.
-        progress: told what is being done.
+        kinds: the effects to answer with.
+        progress: called with the name of each step.
 
     Returns:
-        The answer, for the runs that one model can be fitted to; its cautions name any others.
+        The answer, for the runs that one model can be fitted to; its cautions name the others.
 
     Raises:
         TunnelError: when the examination refuses the records, a run shows no decaying motion, or the nominal model
@@ -45,7 +45,7 @@ def diagnose(
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:
-    """The effects to answer in.
+    """The effects to answer with.
 
     Args:
         include: names to restrict to; empty: all.

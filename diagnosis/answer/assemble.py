@@ -1,4 +1,4 @@
-"""From a study to the answer: figures on held-out runs, coefficients, rivals, words."""
+"""From a study to the answer: the gap on held-out runs, coefficients, rivals and text."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ from diagnosis.result import (
 from diagnosis.study import Study
 
 _LATE_START = (
-    "the nominal model misses the motion grossly, so records are read from their second passage through the middle "
-    "on: a start driven by hand is no free decay"
+    "The nominal model misses the motion grossly, so each record is used only from its second passage through the "
+    "middle on: a start driven by hand is not a free decay."
 )
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
@@ -42,7 +42,7 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
     Args:
         study: what was found.
         where: where the gap is.
-        maps: the pictures' data.
+        maps: data of the figures.
         left_out: sentences on runs that were left out.
 
     Returns:
@@ -103,12 +103,13 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
 
 
 def _outside(study: Study) -> tuple[str, ...]:
-    """What outside the vocabulary would explain a gap of unknown cause."""
+    """The cause outside the vocabulary that would explain a gap of unknown cause."""
     outsider = study.outsider
     if study.causes != ("unknown",) or outsider is None or outsider.share >= UNKNOWN_SHARE:
         return ()
     closed = 100.0 * (1.0 - outsider.share)
-    return (f"{outsider.words}, which the vocabulary does not hold, would close {closed:.0f} % of the gap",)
+    words = outsider.words[0].upper() + outsider.words[1:]
+    return (f"{words}, which is not in the vocabulary, would close {closed:.0f} % of the gap.",)
 
 
 def _coefficients(study: Study, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Coefficients:

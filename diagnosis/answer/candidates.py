@@ -1,4 +1,4 @@
-"""The answers weighed, with their parameters."""
+"""The answers with their probabilities and parameters."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from diagnosis.policy import EVEN_SHARE, GAP_FALSE_ALARM_RATE
 from diagnosis.result import Candidate, ParameterEstimate
 from diagnosis.study import COARSE_STEP, HUM, Study
 
-_AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends there was stopped
+_AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends above it was stopped by the bound
 
 
 def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
-    """The answers weighed, with what they leave in the fitted runs by the fits' own integrator.
+    """The answers, with what they leave of the gap in the fitted runs by the fits' own integrator.
 
     Args:
         study: what was found.
@@ -73,7 +73,7 @@ def _normalised(found: Sequence[Candidate]) -> tuple[Candidate, ...]:
 
 
 def _block(study: Study) -> int:
-    """Samples in a block mean: a structural excess of block means is as many times that of samples."""
+    """Samples in a block mean: a model's misfit has so many times the excess in block means as in samples."""
     return study.nominal.problem.data.runs[0].block
 
 
@@ -100,7 +100,7 @@ def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
 
 
 def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
-    """Of a random moment; its size is known as well as the number of its correlation times allows."""
+    """Parameters of a random moment; their spread follows from the number of correlation times in the runs."""
     process, spectrum = answer.process, answer.process.spectrum
     kind = answer.kind
     severity, place = kind.parameters()
@@ -116,7 +116,7 @@ def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
                 spectrum.strouhal_number, spectrum.strouhal_number * width * relative, "1"
             ),
         }
-    # a corner beyond the rig's own frequencies is seen as white: only the size over its root is known there
+    # a corner above the rig's frequencies looks white: only the size over its square root is known there
     return {
         f"{kind.name}.{severity.name}": ParameterEstimate(
             spectrum.intensity, spectrum.intensity * relative, "1"

@@ -1,4 +1,4 @@
-"""Coefficients before and after the causes are added, with intervals that remain valid under model error."""
+"""Coefficients before and after the causes are added, with intervals that hold under model error."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def coefficients(
     Args:
         fit: nominal, or with causes added.
         held_out: the same without groups of runs.
-        campaign: for the digits to which air density is stated.
+        campaign: gives the digits to which the air density is stated.
         rivals: other fits and their probabilities.
         textbook: the same effects in textbook form, where the fit freed their forms.
 
@@ -64,7 +64,7 @@ def coefficients(
 
 
 def _unseen_form(fit: Fit, name: str) -> float:
-    """Standard deviation of Cnβ or Cnr, 1/rad, from what no free decay shows of the causes' forms."""
+    """Standard deviation of Cnβ or Cnr, 1/rad, from the part of the causes' forms that no free decay shows."""
     runs = _wind_on_runs(fit)
     place = 0 if name == "cn_beta" else 1
     effects = fit.problem.effects_at(fit.point.common)
@@ -172,7 +172,7 @@ def _formal_std(fit: Fit, name: str) -> float:
 
 
 def _density_rounding(campaign: Campaign) -> float:
-    """Relative standard deviation that the stated digits of the air density leave."""
+    """Relative standard deviation from the rounding of the stated air density."""
     worst = 0.0
     for run in campaign.runs:
         if run.wind_on and run.air_density:

@@ -1,4 +1,4 @@
-"""The figures reported, from the MuJoCo model: fitted runs predicted once more, to half the fits' step."""
+"""Prediction of the fitted runs by the MuJoCo model, for what is reported, in half the steps of the fits."""
 
 from __future__ import annotations
 
@@ -81,10 +81,10 @@ def confirm(comparisons: Sequence[Comparison]) -> Confirmation:
     """Judge whether the two models agree.
 
     Args:
-        comparisons: of everything that is reported; one at least.
+        comparisons: of all fits that are reported; at least one.
 
     Returns:
-        The largest difference, and the root mean square of the run that is closest to its tolerance.
+        The largest difference, and the root mean square difference of the run closest to its tolerance.
     """
     largest, worst, found = 0.0, -1.0, ("", 0.0, 0.0)
     for comparison in comparisons:
@@ -133,7 +133,7 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
 
 
 class _Case:
-    """One run at one point, as MuJoCo takes it."""
+    """One run at one point, as MuJoCo simulates it."""
 
     def __init__(self, problem: Problem, common: Array, own: Array, run: RunData) -> None:
         self.run = run

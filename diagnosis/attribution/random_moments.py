@@ -1,4 +1,4 @@
-"""Random moments weighed last: they absorb almost anything, so they must pass for what they claim to be."""
+"""Random moments, weighed last: they absorb almost any gap, so they must pass tests of their own."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class RandomAnswer:
 def weigh_random_moments(
     nominal: Fit, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], allowed: Collection[str]
 ) -> list[RandomAnswer]:
-    """Try turbulence, and vortices whose phase wanders, alone and beside the best single effects.
+    """Try turbulence, and vortices with a wandering phase, alone and beside the best single effects.
 
     Args:
         nominal: the nominal fit.
@@ -63,9 +63,9 @@ def weigh_random_moments(
         allowed: names of the vocabulary to answer in.
 
     Returns:
-        Of each kind the likeliest that passes, alone unless the evidence for an effect beside it is strong. To
-        pass, innovations must be white by band and steady in time, and wind-off runs without a gap. Empty where
-        none passes, or one or two deterministic effects close the gap already.
+        The most likely answer of each kind that passes, alone unless the evidence for an effect beside it is
+        strong. To pass, the innovations must be white by band and steady in time, and the wind-off runs free of a
+        gap. Empty where none passes, or where one or two deterministic effects close the gap.
     """
     if any(
         max(hypothesis.fit.excess, 0.0) < CLOSED_WITHOUT_RANDOM * nominal.excess

@@ -47,7 +47,7 @@ class CoefficientErrors:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """A set scored.
+    """The score of a set.
 
     Args:
         cases: truth and answer of every campaign.
@@ -55,7 +55,7 @@ class Score:
         key_sha256: hash of the key, as published before; empty for an open set.
         answers_sha256: hash over the answers, as published before the key was opened.
         made_with: arguments the set was made with; empty where unknown.
-        sealed: whether the truth was sealed; else it lay beside the data and this is no blind check.
+        sealed: whether the truth was sealed; else it was beside the data, and this is not a blind test.
     """
 
     cases: tuple[Case, ...]
@@ -88,7 +88,7 @@ class Score:
         return found
 
     def pairs(self) -> dict[str, int]:
-        """What was answered where two effects act."""
+        """The answers where two effects act."""
         found = dict.fromkeys(
             ("both", "one of them", "one of them and another", "unknown", "none", "others"), 0
         )
@@ -108,11 +108,11 @@ class Score:
         return share_of([not c.right for c in self.cases if c.kind == "none"])
 
     def missed(self) -> Share:
-        """How many campaigns with a gap were said to have none."""
+        """How many campaigns with a gap were answered with ``none``."""
         return share_of([c.causes == () for c in self.cases if c.kind != "none"])
 
     def rivals(self) -> Share:
-        """Of wrong answers to one or two effects, how many name the truth as what they cannot be told from."""
+        """Of wrong answers to one or two effects, how many name the truth as a possible confusion."""
         wrong = [c for c in self.cases if c.kind in ("single", "pair") and not c.right]
         return share_of([c.rival for c in wrong])
 

@@ -1,4 +1,4 @@
-"""The hum of the mains: found as a line, taken out before anything else is fitted."""
+"""The hum of the mains: found as a spectral line, and removed before any effect is fitted."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Hum:
         frequency: Hz.
         amplitude: of the fundamental, rad, root mean square over the runs.
         std: its standard deviation, rad.
-        frequency_std: standard deviation of the frequency, Hz; None where no amplitude stands out.
+        frequency_std: standard deviation of the frequency, Hz; None where the amplitude is not above the noise.
         excess: what it adds to the mean squared residual over the noise variance, a ratio.
     """
 
@@ -47,8 +47,8 @@ def find_hum(nominal: Fit) -> float | None:
         nominal: its residuals.
 
     Returns:
-        Its frequency, Hz; None where there is none beyond chance. A ringing rod and harmonics of a motion with
-        corners raise the spectrum beside the line as well, and do not pass.
+        Its frequency, Hz; None where there is none beyond chance. A ringing rod and the harmonics of a motion with
+        corners also raise the spectrum beside the line, and are therefore rejected.
     """
     line = mains_line(nominal)
     if line is None or line.contrast < HUM_CONTRAST:
@@ -58,14 +58,14 @@ def find_hum(nominal: Fit) -> float | None:
 
 
 def refine_frequency(campaign: Campaign, frequency: float) -> float:
-    """The mains' frequency to a small part of a spectral bin.
+    """The frequency of the mains, to a small fraction of a spectral bin.
 
     Args:
         campaign: the runs.
         frequency: Hz, to within 0.02 Hz.
 
     Returns:
-        The frequency at which sines and their harmonics take most out of all records, Hz.
+        The frequency at which a sine and its harmonics remove most power from all records, Hz.
     """
 
     def left(trial: float) -> float:
@@ -78,7 +78,7 @@ def refine_frequency(campaign: Campaign, frequency: float) -> float:
 
 
 def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[Campaign, Hum]:
-    """Take a hum and its harmonics out of every record.
+    """Remove a hum and its harmonics from every record.
 
     Args:
         campaign: the runs.
@@ -86,7 +86,7 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
         variance: of the noise of one sample, rad².
 
     Returns:
-        The campaign without it, and what was taken out.
+        The campaign without it, and the hum that was removed.
     """
     cleaned, squares, powers = [], [], []
     swells = _swells([run.record for run in campaign.runs], frequency, variance)
@@ -105,7 +105,7 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
 
 
 def _frequency_std(records: list[Record], amplitude: float, variance: float) -> float | None:
-    """Of the peak of the windowed spectra of all records, Hz, by what white noise moves it, harmonics left out.
+    """Standard deviation of the peak of all records' windowed spectra under white noise, Hz; fundamental only.
 
     Of one record of window w the variance of ω is 2 S² Σw²τ²/(a Σwτ²)², τ from its middle: with a flat window that
     is the bound 24 S²/(a² n T²) (Rife & Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591,
@@ -138,7 +138,7 @@ def _line_power(record: Record, frequency: float) -> float:
 def _remove(record: Record, frequency: float, swells: bool) -> tuple[Record, float, float]:
     """A record without the line and its harmonics, the fundamental's amplitude and the mean square removed."""
     design = np.column_stack([_lines(record, frequency), *([_swell(record, frequency)] if swells else [])])
-    # the ends of a swelling hum must be seen to be taken out
+    # a window that keeps the ends, where a swelling hum may be strongest
     window = tukey(record.time_s.size, 0.3) if swells else np.hanning(record.time_s.size)
     coefficients = _windowed_fit(record, design, window)
     wave: Array = design @ coefficients
@@ -175,7 +175,7 @@ def _swells(records: list[Record], frequency: float, variance: float) -> bool:
         steady, swelling = _lines(record, frequency), _swell(record, frequency)
         window = np.hanning(record.time_s.size)[:, None]
         both = np.linalg.qr(np.column_stack([steady, swelling]) * window)[0][:, steady.shape[1] :]
-        # white noise seen through the window has the window's mean square
+        # windowed white noise has the window's mean square
         share = both.T @ (both * window**2)
         found = both.T @ (_detrended(record.yaw_rad) * window[:, 0])
         power += float(found @ np.linalg.solve(share, found)) / variance
@@ -184,7 +184,7 @@ def _swells(records: list[Record], frequency: float, variance: float) -> bool:
 
 
 def _windowed_fit(record: Record, design: Array, window: Array) -> Array:
-    """Coefficients of the columns; windowed, the slow motion leaks little into a line 40 times its frequency."""
+    """Coefficients of the columns; the window keeps the slow motion from leaking into a line far above it."""
     return np.asarray(
         np.linalg.lstsq(design * window[:, None], _detrended(record.yaw_rad) * window, rcond=None)[0]
     )

@@ -1,4 +1,4 @@
-"""Records that no diagnosis can begin from: said in one line, before any fit of many runs."""
+"""Campaigns that cannot be diagnosed are refused in one line, before the runs are fitted together."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def refuse_hopeless(campaign: Campaign) -> None:
         campaign: the runs.
 
     Raises:
-        TunnelError: for the first such run, and for a stated value that cannot be computed with.
+        TunnelError: for the first such run, and for a stated value that cannot be used.
     """
     for run in campaign.runs:
         loads(run, campaign.rig)

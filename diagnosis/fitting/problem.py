@@ -23,7 +23,7 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
 _THREADS = 2
-_SOFT_ROD = 2e-5  # rad/(N m): a stiffer rod's ringing at the release stays below the noise
+_SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
 _POOL = ThreadPoolExecutor(_THREADS)
 
 
@@ -200,7 +200,7 @@ class _Job:
 
 
 def condensed(physics: RunSettings, data: Data) -> RunSettings:
-    """Replace a rod too stiff to ring visibly by its first-order effect on the slow motion.
+    """Replace a rod that is too stiff to ring visibly by its first-order effect on the slow motion.
 
     With compliance c, the body leads the sensor's end by φ = a θ, a = c (s Ka + (1 − s) Kr): the inertia at the
     sensor's end grows by the share (1 − s) a, and the air sees (1 + a) θ. What is dropped is of order (c Kr)².

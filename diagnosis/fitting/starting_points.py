@@ -1,4 +1,4 @@
-"""Where fits start: the nominal model from the record alone, and an effect's severity from its signature."""
+"""Where fits start: the nominal model from the records alone, and an effect's severity from its signature."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def nominal_start(data: Data) -> Point:
     pressure = np.array(
         [0.5 * r.air_density * r.wind_speed**2 * data.frontal_area * data.reference_length for r in data.runs]
     )
-    # Kr = Izz ω² + pressure Cnβ, relative errors alike
+    # Kr = Izz ω² + pressure Cnβ, with equal relative errors
     design = np.column_stack([omega2, pressure]) / spring[:, None]
     if not data.wind_on:
         design = design[:, :1]
@@ -72,7 +72,7 @@ def _frequency(run: RunData) -> float:
 
 @dataclass(frozen=True)
 class StartingPoint:
-    """Where the fit of an effect starts, and what linear theory predicts of it.
+    """Where the fit of an effect starts, and how much linear theory predicts that it closes.
 
     Args:
         problem: the fit with the effect added.
@@ -114,7 +114,7 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
 
 
 def is_gross(fit: Fit) -> bool:
-    """Whether a fit misses the motion itself, so that its sensitivities say little.
+    """Whether a fit misses the motion itself, so that its sensitivities are of little use.
 
     Args:
         fit: any fit.
@@ -212,7 +212,7 @@ def _moderate_change(base: Fit, problem: Problem, values: Array, scaled: int | N
 
 
 def project_out(base: Fit, columns: list[Array]) -> list[Array]:
-    """What of a change of the prediction the fitted parameters cannot absorb.
+    """The part of a change of the prediction that the fitted parameters cannot absorb.
 
     Args:
         base: a fit, whose common parameters and releases absorb.

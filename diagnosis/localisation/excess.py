@@ -1,8 +1,8 @@
-"""How the squared residual is shared out over frequency, time and amplitude.
+"""How the squared residual is distributed over frequency, time and amplitude.
 
-Residuals are taken apart by the orthonormal cosine transform (Ahmed, Natarajan & Rao, IEEE Trans. Comput. 23
+Residuals are decomposed by the orthonormal cosine transform (Ahmed, Natarajan & Rao, IEEE Trans. Comput. 23
 (1974) 90, doi 10.1109/T-C.1974.223784): it keeps the sum of squares, so that under white noise every squared
-coefficient is χ² with one degree of freedom, and it does not take a record's two ends for neighbours.
+coefficient is χ² with one degree of freedom, and it does not treat a record's two ends as neighbours.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ BANDS: tuple[tuple[str, float], ...] = (
     ("3f0", 3.5),
     ("above", np.inf),
 )
-_OWN = 2.0  # parameters of a run that soak up residual: its angle and rate at the release
+_OWN = 2.0  # parameters of a run that absorb residual: its angle and rate at the release
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class RunExcess:
         return np.searchsorted([edge for _, edge in BANDS], self.frequency / self.resonance, side="right")
 
     def p_value(self) -> float:
-        """Chance of a run as far from white noise without a gap: the least over all power and every band."""
+        """Probability of as much power without a gap: the least of the tests, times their number."""
         tests = [chance(float(self.power.sum()), self.power.size - self.absorbed, self.relative)]
         for index, (name, _) in enumerate(BANDS):
             power = self.power[self.band == index]
@@ -78,7 +78,7 @@ class RunExcess:
 
 
 def chance(total: float, freedom: float, relative: float) -> float:
-    """Chance that white noise reaches a sum of squares.
+    """Probability that white noise reaches a sum of squares.
 
     Args:
         total: sum of squares, in units of the noise variance.
@@ -86,7 +86,7 @@ def chance(total: float, freedom: float, relative: float) -> float:
         relative: standard deviation of the noise variance, as a share of it.
 
     Returns:
-        The upper tail of a χ² variable stretched to the wider spread that an estimated noise level gives.
+        The upper tail of a χ² variable, widened for the uncertainty of the noise level.
     """
     if freedom <= 0.0:
         return 1.0
@@ -98,8 +98,8 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
     """Every run's squared residual by frequency.
 
     Args:
-        campaign: the records, for how well their noise is known.
-        fit: whose residuals.
+        campaign: the records, which give the uncertainty of the noise.
+        fit: gives the residuals.
 
     Returns:
         One per run, in order.
@@ -134,7 +134,7 @@ class BandExcess:
         band: its name in `BANDS`.
         excess: sum of power beyond that of white noise, in units of the noise variance.
         mean: the same by coefficient, a ratio.
-        p_value: chance of as much without a gap, a probability.
+        p_value: probability of as much without a gap.
     """
 
     band: str

@@ -1,4 +1,4 @@
-"""What the residuals say of channel and condition where no known effect names them."""
+"""Channel and condition of a gap from its residuals, where no known effect gives them."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from tunnel_sim.vocabulary.campaign import Campaign
 
 @dataclass(frozen=True)
 class Finding:
-    """An answer with its reason.
+    """A conclusion with its reason.
 
     Args:
-        value: the answer; None where the runs do not say.
-        reason: a clause.
+        value: the conclusion; None where the runs do not allow one.
+        reason: why, a clause.
     """
 
     value: str | None
@@ -48,24 +48,27 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
         found: the maps.
 
     Returns:
-        ``wind_on`` where the wind-off runs, fitted by themselves, show no gap.
+        ``wind_on`` where the wind-off runs, fitted alone, show no gap.
     """
     runs = nominal.problem.data.runs
     off = tuple(run.id for run in runs if not run.wind_on)
     if len(off) == len(runs):
-        return Finding("always", "it shows with the wind off")
+        return Finding("always", "it is there with the wind off")
     if not off:
-        return Finding(None, "with the wind on in every run, they cannot say whether it needs wind")
+        return Finding(None, "whether it needs wind cannot be determined, since the wind is on in every run")
     if min(run.p_value for run in found.maps.runs) * len(runs) > PLACE_FALSE_ALARM_RATE:
-        return Finding(None, "no run shows it by itself")
+        return Finding(None, "whether it needs wind cannot be determined, since no single run shows it")
     lone = _lone_run(found)
     if lone is not None and lone not in off:
-        return Finding(None, f"one run alone ({lone}) cannot say whether it needs wind")
+        return Finding(None, f"whether it needs wind cannot be determined from one run alone ({lone})")
     data = replace(nominal.problem.data.subset(off), windy=False)  # without coefficients these runs lack
     try:
         alone = fit(Problem(data), nominal_start(data))
     except FitError:
-        return Finding(None, "the wind-off runs could not be fitted by themselves")
+        return Finding(
+            None,
+            "whether it needs wind cannot be determined, since the wind-off runs could not be fitted alone",
+        )
     excesses = run_excesses(campaign, alone)
     tests = [run.p_value() for run in excesses]
     tests += [band.p_value for band in band_excesses(excesses)]
@@ -82,14 +85,15 @@ def _lone_run(found: Survey) -> str | None:
 
 
 def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | None:
-    """When most of the missing moment acts, where that is a small part of the record.
+    """The time in which most of the missing moment acts, where that is a small part of the record.
 
     Args:
         found: the maps.
         share: of the moment's energy, a fraction.
 
     Returns:
-        Since the start of the record, s; None where the moment is spread out, at the release, or in the noise.
+        Start and end since the start of the record, s; None where the moment is spread out, acts at the release,
+        or is not clear of the noise.
     """
     edges = found.maps.time.edges
     interval = shortest_interval(edges, found.moment_energy, share)
@@ -101,7 +105,7 @@ def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | No
 
 
 def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding:
-    """On what the gap acts, by the residual's own marks.
+    """What the gap acts on, from features of the residual.
 
     Args:
         nominal: fit of the nominal model.
@@ -109,11 +113,13 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
         condition: as inferred.
 
     Returns:
-        The channel; None where no mark leads.
+        The channel; None where no feature decides.
     """
     blow = blow_interval(found)
     if blow is not None:
-        return Finding("forcing", f"the moment that is missing acts within {blow[0]:.1f} to {blow[1]:.1f} s")
+        return Finding(
+            "forcing", f"most of the missing moment acts between {blow[0]:.1f} and {blow[1]:.1f} s"
+        )
     return _by_band(found, condition) or _between_runs(nominal, found) or _by_drift(found)
 
 
@@ -134,12 +140,14 @@ def _by_band(found: Survey, condition: str | None) -> Finding | None:
             return Finding("forcing", "most of it is a slow shift of the centre that needs wind")
         return Finding("sensor", "most of it is a slow shift of the centre")
     if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > DOMINANT_SHARE * whole:
-        return Finding("sensor", "it has the motion's harmonics without its frequency or damping shifting")
+        return Finding(
+            "sensor", "it contains harmonics of the motion, without a shift of frequency or damping"
+        )
     return None
 
 
 def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
-    """Where every run by itself is linear but the runs do not agree on the coefficients."""
+    """The channel where every run alone is linear, but the runs do not agree on the coefficients."""
     curves = found.maps.backbones
     sizes = [run.reading.size for run in nominal.problem.data.runs]
     alone = [curve.alone_excess for curve in curves]
@@ -152,12 +160,14 @@ def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
     shifts = np.array([_shift(curve) for curve in curves])
     frequency, damping = np.sum(shifts**2, axis=0)
     if frequency >= damping:
-        return Finding("calibration", "each run alone is linear, but their frequencies do not agree")
-    return Finding("damping", "each run alone is linear, but their damping does not agree")
+        return Finding(
+            "calibration", "each run alone is linear, but the runs' frequencies do not agree with one model"
+        )
+    return Finding("damping", "each run alone is linear, but the runs' damping does not agree with one model")
 
 
 def _shift(curve: Backbone) -> tuple[float, float]:
-    """Relative departure of a run's own frequency from the nominal model's, and of its damping, alike in ω."""
+    """Departure of a run's own frequency (relative) and damping ratio from those of the nominal model."""
     assert curve.alone_frequency is not None
     assert curve.alone_zeta is not None
     return curve.alone_frequency / curve.nominal_frequency - 1.0, curve.alone_zeta - curve.nominal_zeta

@@ -11,11 +11,11 @@ from diagnosis.policy import LINE_CONTRAST, PLACE_FALSE_ALARM_RATE
 from tunnel_sim.vocabulary.record import Array
 
 _WIDTH = 5  # coefficients a line spreads over
-_AROUND = 60  # coefficients on either side that show what a line stands out from
-_HARMONIC = 0.2  # of the run's frequency: nearer to a harmonic it is the motion's own
-_OWN = 0.4  # likewise of the motion itself, whose frequency may drift
+_AROUND = 60  # coefficients on either side, whose median a line must exceed
+_HARMONIC = 0.2  # of the run's frequency: a line nearer to a harmonic belongs to the motion
+_OWN = 0.4  # of the run's frequency: the same for the motion itself, whose frequency may drift
 _LOWEST = 0.5  # of the run's frequency: below, drifts look like lines
-_APART = 0.5  # of the run's frequency, between two lines: nearer, it is the same line's skirt
+_APART = 0.5  # of the run's frequency, between two lines: a nearer one is the skirt of the first
 _PER_RUN = 2
 
 

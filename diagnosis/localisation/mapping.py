@@ -35,14 +35,14 @@ _TRACE_POINTS = 600
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Maps, and what the words about them need besides.
+    """Maps, and what else the text about them needs.
 
     Args:
         maps: the maps.
         excesses: by run.
         frequency_interval: shortest interval of frequency that holds most of the excess, Hz.
-        moment_energy: of the apparent moment beyond that of noise by bin of time, shape (n,), in variances.
-        moment_z: its sum over the standard deviation white noise gives it, a ratio.
+        moment_energy: energy of the apparent moment beyond that of noise, by bin of time, shape (n,), in variances.
+        moment_z: the sum of that over its standard deviation under white noise, a ratio.
     """
 
     maps: Maps
@@ -167,7 +167,7 @@ def _first_number(label: str) -> tuple[float, str]:
 
 
 def record_starts(campaign: Campaign, fit: Fit) -> list[float]:
-    """What the fit left out at the start of every record.
+    """The time that the fit left out at the start of every record.
 
     Args:
         campaign: the records.
@@ -194,13 +194,14 @@ def _time_profile(fit: Fit, inside: list[tuple[Array, float]], times: list[Array
 def _by_sample(fit: Fit, inside: list[tuple[Array, float]]) -> tuple[list[Array], list[float], list[float]]:
     """Squared residuals, their mean and variance under noise, as shares of the variance of one sample.
 
-    What a model lacks is the same in a block mean as in its samples, and the noise is less by the block's size.
+    The misfit of a model is the same in a block mean as in its samples; the noise variance is less by the block's
+    size.
     """
     blocks = [run.block for run in fit.problem.data.runs]
     return (
         [r**2 / block for (r, _), block in zip(inside, blocks, strict=True)],
         [share / block for (_, share), block in zip(inside, blocks, strict=True)],
-        # squares of filtered noise go together: as many count as independent as coefficients pass
+        # squares of filtered noise are correlated: as many are independent as coefficients pass
         [2.0 * share / block**2 for (_, share), block in zip(inside, blocks, strict=True)],
     )
 
@@ -230,7 +231,7 @@ def _moment_energy(fit: Fit, times: list[Array], edges: Array) -> tuple[Array, f
         spread = float(found.kernel @ found.kernel) * found.noise_std**2
         time = whole[found.start : found.start + found.moment.size]
         energy += np.histogram(time, edges, weights=found.moment**2 / spread - 1.0)[0]
-        variance += 2.0 * found.moment.size * found.kernel.size  # neighbours within the kernel go together
+        variance += 2.0 * found.moment.size * found.kernel.size  # neighbours within the kernel are correlated
     return energy, float(energy.sum()) / float(np.sqrt(max(variance, 1.0)))
 
 
@@ -249,7 +250,7 @@ def _spectrum(excesses: list[RunExcess], edges: Array) -> Profile:
 
 
 def _frequency_interval(excesses: list[RunExcess]) -> tuple[float, float] | None:
-    """Shortest interval in Hz that holds most of the excess, of the bands where there is any."""
+    """Shortest interval in Hz that holds most of the excess of the bands that show the gap."""
     names = telling_bands(band_excesses(excesses))
     index = [i for i, name in enumerate(("0", "f0", "2f0", "3f0", "above")) if name in names]
     kept = [np.where(np.isin(run.band, index), run.power, 1.0) for run in excesses]

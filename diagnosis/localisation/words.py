@@ -1,4 +1,4 @@
-"""The place of a gap in sentences."""
+"""Where a gap is, in sentences."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from diagnosis.localisation.mapping import Survey
 from diagnosis.policy import LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
 from diagnosis.result import Where
 
-_LISTED = 12  # ids a sentence bears
+_LISTED = 12  # ids listed in a sentence at most
 _BAND_WORDS = {
     "0": "slower than the oscillation",
     "f0": "at the oscillation itself",
@@ -18,9 +18,9 @@ _BAND_WORDS = {
 _CHANNEL_WORDS = {
     "stiffness": "the restoring moment (stiffness)",
     "damping": "the damping",
-    "forcing": "the rig as a moment that does not come from its motion (forcing)",
-    "sensor": "the reading (sensor)",
-    "calibration": "what is stated of the runs (calibration)",
+    "forcing": "the rig as a moment that does not depend on its motion (forcing)",
+    "sensor": "the reading of the sensor",
+    "calibration": "a value stated for the runs (calibration)",
 }
 _CONDITION_WORDS = {"always": "with the wind on and off", "wind_on": "only with the wind on"}
 
@@ -37,22 +37,22 @@ def nowhere(found: Survey) -> str:
     count = len(found.maps.runs)
     least = min(1.0, count * min(run.p_value for run in found.maps.runs))
     return (
-        f"Nowhere: over {count} runs the residual is that of the noise "
-        f"(p = {least:.2g} for the run farthest from it, all runs considered)."
+        f"Nowhere: in {count} {'run' if count == 1 else 'runs'} the residual is consistent with the noise "
+        f"(p = {least:.2g} for the run that differs most, corrected for their number)."
     )
 
 
 def describe(
     where: Where, found: Survey, bands: tuple[str, ...], channel: Finding, condition: Finding
 ) -> str:
-    """The place in sentences.
+    """Where the gap is, in sentences.
 
     Args:
-        where: its fields.
+        where: the same in fields.
         found: the maps.
-        bands: names of the bands that show it.
-        channel: with its reason.
-        condition: likewise.
+        bands: names of the bands that show the gap.
+        channel: what it acts on, with the reason.
+        condition: when it acts, with the reason.
 
     Returns:
         A few sentences.

@@ -93,7 +93,7 @@ def test_stated_noise_that_the_records_contradict_is_not_used(factor):
     found = campaign_noise(decays(stated_noise=factor * NOISE))
     assert (found.source, found.stated_variance) == ("estimated", pytest.approx((factor * NOISE) ** 2))
     assert found.used == found.estimated == pytest.approx(NOISE**2, rel=0.1)
-    assert f"contradict the stated {factor * NOISE:.3g} rad: they hold 0.000" in found.reason
+    assert f"contradict the stated {factor * NOISE:.3g} rad: they contain 0.000" in found.reason
 
 
 def test_where_no_noise_is_stated_it_is_estimated():
