@@ -1,4 +1,4 @@
-"""Prediction of the fitted runs by the MuJoCo model, for what is reported, in half the steps of the fits."""
+"""Prediction of the fitted runs by the MuJoCo model, for what is reported, in short steps."""
 
 from __future__ import annotations
 

@@ -44,9 +44,9 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
         if len(same) < len(bare):
             other = [run for run in bare if run not in same]
             said.append(
-                f"Left out, since different frequencies at one wind speed show more than one spring, and these runs "
-                f"may not have the spring of the rest: {_ids(other)}. State spring_stiffness, or diagnose these "
-                f"separately."
+                f"Left out, since different frequencies at one wind speed show more than one spring, and these "
+                f"runs may not have the spring of the rest: {_ids(other)}. State spring_stiffness, or diagnose "
+                f"these separately."
             )
         kept = same
     order = {run.id for run in kept}

@@ -120,7 +120,7 @@ def test_records_without_noise_are_held_to_the_fits_own_accuracy(rate, stated):
     data = free_decays.campaign(rate=rate, stated_noise=stated)
     found = campaign_noise(data)
     assert found.source == "floor"
-    assert "less than the fits' own accuracy" in found.reason
+    assert "less than the accuracy of the fits" in found.reason
     assert np.sqrt(found.estimated) < 1e-7 < 1e-5 < np.sqrt(found.used) < 1e-4
     assert [accuracy(run.record) ** 2 for run in data.runs] == list(found.variance.values())
 
