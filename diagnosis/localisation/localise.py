@@ -105,7 +105,7 @@ def _nature(study: Study, found: Survey, main: str | None) -> tuple[Finding, Fin
     others = [name for name in study.causes if name != main]
     reason = f"as {plain([main])} does"
     if others:
-        reason += f", the larger part of the gap; the rest is of {plain(others)}"
+        reason += f", which causes the larger part of the gap; the rest is due to {plain(others)}"
     return Finding(kind.condition, reason), Finding(kind.channel, reason)
 
 

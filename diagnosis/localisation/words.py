@@ -86,7 +86,8 @@ def _wind_contrast(found: Survey) -> str:
     groups = {group.label: group for group in found.maps.groups if group.by == "wind"}
     if len(groups) < 2:
         return ""
-    return f"; mean excess {groups['on'].excess:.2g} with the wind on, {groups['off'].excess:.2g} with it off"
+    on, off = (f"{float(f'{groups[wind].excess:.2g}'):g}" for wind in ("on", "off"))
+    return f"; mean excess {on} with the wind on, {off} with it off"
 
 
 def _extent(where: Where, found: Survey) -> str:

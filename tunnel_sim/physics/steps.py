@@ -9,8 +9,8 @@ there, and a frequency too low by (ωh)⁴/120 of itself. From these come the tu
 - for any mode: `_UNSTABLE`, beyond which the method diverges.
 
 Fits predict thousands of runs and may err up to the noise of a block mean: their steps are longer
-(`fit_substeps`). What is reported is predicted once more in steps of `REPORT_STEP` at most (`report_substeps`): half
-those of a fit of a body below 14 rad/s, in which the method errs a sixteenth as much.
+(`fit_substeps`). What is reported is predicted once more in steps of `REPORT_STEP` at most (`report_substeps`):
+half those of a fit of a body below 14 rad/s, in which the method errs a sixteenth as much.
 
 A step is only ever divided by a whole number, so that a sample interval remains a whole number of steps.
 """
