@@ -24,12 +24,13 @@ from rich.table import Table
 from diagnosis._diagnose import diagnose
 from diagnosis.detection.sensor_noise import campaign_noise
 from diagnosis.fitting.least_squares import Fit, fit
-from diagnosis.fitting.problem import Problem, campaign_rig, held_end
+from diagnosis.fitting.problem import Problem, campaign_rig
 from diagnosis.fitting.run_data import prepare
 from diagnosis.fitting.starting_points import StartingPoint, nominal_start, starting_points
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.engine.model import Model, build_model
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
+from tunnel_sim.physics.release import released_by_spring_end
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
@@ -126,7 +127,7 @@ class SysidFit:
         stated = self.problem.stated(common, own, self._runs[index])
         stated = dataclasses.replace(stated, timestep=STEP)
         chain = dataclasses.replace(self.problem.chain(common, own, self._runs[index]), stated=stated)
-        return held_end(chain.physics())
+        return released_by_spring_end(chain.physics())
 
     def _model(self, params: Any, index: int) -> Model:
         return self.models[index].with_settings(self._settings(params, index))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from diagnosis.answer.assemble import assemble, chosen_fit
+from diagnosis.answer.assemble import assemble
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.refusal import refuse_hopeless
+from diagnosis.investigate import Progress, investigate
 from diagnosis.localisation.localise import localise
 from diagnosis.result import Diagnosis
-from diagnosis.study import Progress, study
 from identification.examination.examine import examine
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -20,15 +20,15 @@ from tunnel_sim.vocabulary.errors import TunnelError
 def diagnose(
     campaign: Campaign, *, kinds: Sequence[type[Effect]] = ALL_EFFECTS, progress: Progress | None = None
 ) -> Diagnosis:
-    """Say where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
+    """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
     Args:
         campaign: measured or simulated runs.
-        kinds: the vocabulary to answer in.
-        progress: told what is being done.
+        kinds: the effects to answer with.
+        progress: called with the name of each step.
 
     Returns:
-        The answer, for the runs that one model can be fitted to; its cautions name any others.
+        The answer, for the runs that one model can be fitted to; its cautions name the others.
 
     Raises:
         TunnelError: when the examination refuses the records, a run shows no decaying motion, or the nominal model
@@ -37,16 +37,15 @@ def diagnose(
     examined = examine(campaign).accepted()
     refuse_hopeless(examined.campaign)
     campaign, left_out = comparable_runs(examined.campaign)
-    found = study(campaign, kinds, progress)
+    study = investigate(campaign, kinds, progress)
     if progress is not None:
         progress("where, and how far it closes")
-    best = chosen_fit(found)
-    where, maps = localise(campaign, found.nominal, None if best is found.nominal else best, found.causes)
-    return replace(assemble(found, where, maps, left_out), remarks=examined.remarks)
+    where, maps = localise(study)
+    return replace(assemble(study, where, maps, left_out), remarks=examined.remarks)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:
-    """The effects to answer in.
+    """The effects to answer with.
 
     Args:
         include: names to restrict to; empty: all.

@@ -6,5 +6,6 @@ from collections.abc import Sequence
 
 
 def plain(names: Sequence[str]) -> str:
-    """Effect names as words: ``coulomb friction and mains hum``."""
-    return " and ".join(name.replace("_", " ") for name in names)
+    """Effect names as words: ``mains hum, free play and coulomb friction``."""
+    *first, last = (name.replace("_", " ") for name in names)
+    return f"{', '.join(first)} and {last}" if first else last

@@ -1,4 +1,4 @@
-"""From a study to the answer: figures on held-out runs, coefficients, rivals, words."""
+"""From a study to the answer: the gap on held-out runs, coefficients, rivals and text."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reference_sizes import size_note, sized_coefficients
 from diagnosis.answer.reported import excess_base, gap_summary, report_fits
 from diagnosis.answer.verdict import blind_spots, cnr_note, verdict
-from diagnosis.attribution.decide import RIVAL_PROBABILITY, UNKNOWN_SHARE, Weighed
+from diagnosis.attribution.decide import Weighed
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.localisation.maps import Maps
+from diagnosis.policy import RIVAL_PROBABILITY, UNKNOWN_SHARE
 from diagnosis.result import (
     Coefficients,
     Diagnosis,
@@ -29,8 +30,8 @@ from diagnosis.result import (
 from diagnosis.study import Study
 
 _LATE_START = (
-    "the nominal model misses the motion grossly, so records are read from their second passage through the middle "
-    "on: a start driven by hand is no free decay"
+    "The nominal model misses the motion grossly, so each record is used only from its second passage through the "
+    "middle on: a start driven by hand is not a free decay."
 )
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
@@ -41,19 +42,19 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
     Args:
         study: what was found.
         where: where the gap is.
-        maps: the pictures' data.
+        maps: data of the figures.
         left_out: sentences on runs that were left out.
 
     Returns:
         The diagnosis.
     """
     base = excess_base(study)
-    chosen = chosen_fit(study)
+    chosen = study.chosen
     nominal_out = predict_held_out(study.nominal)
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
     begun = time.perf_counter()
     shown = report_fits(study.nominal, chosen, nominal_out, chosen_out)
-    study.seconds["confirmation"] = time.perf_counter() - begun
+    seconds = {**study.seconds, "confirmation": time.perf_counter() - begun}
     gap = gap_summary(study, base, shown)
     weighed = candidates(study, base)
     data = study.nominal.problem.data
@@ -84,7 +85,7 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
             wind_on=data.wind_on,
             normalised=data.normalised,
         ),
-        seconds=study.seconds,
+        seconds=seconds,
         provenance={"versions": {name: version(name) for name in _PACKAGES}},
         cautions=(
             *left_out,
@@ -102,30 +103,21 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
 
 
 def _outside(study: Study) -> tuple[str, ...]:
-    """What outside the vocabulary would explain a gap of unknown cause."""
+    """The cause outside the vocabulary that would explain a gap of unknown cause."""
     outsider = study.outsider
     if study.causes != ("unknown",) or outsider is None or outsider.share >= UNKNOWN_SHARE:
         return ()
     closed = 100.0 * (1.0 - outsider.share)
-    return (f"{outsider.words}, which the vocabulary does not hold, would close {closed:.0f} % of the gap",)
-
-
-def chosen_fit(study: Study) -> Fit:
-    """The fit of the answer; the nominal one where nothing fitted is part of it."""
-    fitted = tuple(name for name in study.fitted if name != "unknown")
-    random = study.random_answer(fitted)
-    if random is not None:
-        return study.nominal if random.beside is None else random.beside.fit
-    hypothesis = study.hypothesis(fitted) if fitted else None
-    return study.nominal if hypothesis is None else hypothesis.fit
+    words = outsider.words[0].upper() + outsider.words[1:]
+    return (f"{words}, which is not in the vocabulary, would close {closed:.0f} % of the gap.",)
 
 
 def _coefficients(study: Study, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Coefficients:
     campaign = study.campaign
     before = coefficients(study.nominal, nominal_out, campaign, [(chosen, 1.0)] if study.causes else ())
     rivals = rival_fits(study.weighed, study.hypotheses, chosen)
-    straight = next((h.textbook for h in study.hypotheses if h.fit is chosen), None)
-    after = coefficients(chosen, chosen_out, campaign, rivals, straight)
+    textbook = next((h.textbook for h in study.hypotheses if h.fit is chosen), None)
+    after = coefficients(chosen, chosen_out, campaign, rivals, textbook)
     notes = (cnr_note(study.causes), size_note(campaign.rig, windy="cn_beta" in before))
     return Coefficients(
         before=sized_coefficients(before, campaign.rig),

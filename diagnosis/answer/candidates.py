@@ -1,4 +1,4 @@
-"""The answers weighed, with their parameters."""
+"""The answers with their probabilities and parameters."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 
 from diagnosis.answer.reference_sizes import parameter_unit
 from diagnosis.answer.reported import Base
-from diagnosis.attribution.decide import LAPSE, Weighed
+from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.process_noise import LONGEST_BANDWIDTH
 from diagnosis.attribution.random_moments import RandomAnswer
-from diagnosis.detection.gap import FALSE_ALARM_RATE
+from diagnosis.policy import EVEN_SHARE, GAP_FALSE_ALARM_RATE
 from diagnosis.result import Candidate, ParameterEstimate
 from diagnosis.study import COARSE_STEP, HUM, Study
 
-_AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends there was stopped
+_AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends above it was stopped by the bound
 
 
 def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
-    """The answers weighed, with what they leave in the fitted runs by the fits' own integrator.
+    """The answers, with what they leave of the gap in the fitted runs by the fits' own integrator.
 
     Args:
         study: what was found.
@@ -32,8 +32,8 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
     found = []
     if not study.causes:
         return (
-            Candidate("none", 1.0 - FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
-            Candidate("unknown", FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
+            Candidate("none", 1.0 - GAP_FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
+            Candidate("unknown", GAP_FALSE_ALARM_RATE, study.nominal.excess / _block(study), 0.0),
         )
     before = max(study.nominal.excess, 1e-9)
     for answer in study.weighed:
@@ -52,11 +52,15 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         closed = 1.0 - max(left, 0.0) / max(left + base.hum + base.extra, 1e-9)
         found.append(
             Candidate(
-                name, 1.0 - LAPSE, left, float(np.clip(closed, 0.0, 1.0)), _short(_read_parameters(study))
+                name,
+                1.0 - EVEN_SHARE,
+                left,
+                float(np.clip(closed, 0.0, 1.0)),
+                _short(_read_parameters(study)),
             )
         )
-        found.append(Candidate("unknown", LAPSE, left + base.hum + base.extra, 0.0))
-    none = 0.0 if study.read_off else min(study.test.p_value, FALSE_ALARM_RATE)
+        found.append(Candidate("unknown", EVEN_SHARE, left + base.hum + base.extra, 0.0))
+    none = 0.0 if study.read_off else min(study.test.p_value, GAP_FALSE_ALARM_RATE)
     found.append(Candidate("none", none, before / _block(study), 0.0))
     return _normalised(found)
 
@@ -69,7 +73,7 @@ def _normalised(found: Sequence[Candidate]) -> tuple[Candidate, ...]:
 
 
 def _block(study: Study) -> int:
-    """Samples in a block mean: a structural excess of block means is as many times that of samples."""
+    """Samples in a block mean: a model's misfit has so many times the excess in block means as in samples."""
     return study.nominal.problem.data.runs[0].block
 
 
@@ -96,7 +100,7 @@ def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
 
 
 def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
-    """Of a random moment; its size is known as well as the number of its correlation times allows."""
+    """Parameters of a random moment; their spread follows from the number of correlation times in the runs."""
     process, spectrum = answer.process, answer.process.spectrum
     kind = answer.kind
     severity, place = kind.parameters()
@@ -112,7 +116,7 @@ def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
                 spectrum.strouhal_number, spectrum.strouhal_number * width * relative, "1"
             ),
         }
-    # a corner beyond the rig's own frequencies is seen as white: only the size over its root is known there
+    # a corner above the rig's frequencies looks white: only the size over its square root is known there
     return {
         f"{kind.name}.{severity.name}": ParameterEstimate(
             spectrum.intensity, spectrum.intensity * relative, "1"

@@ -1,4 +1,4 @@
-"""Coefficients before and after the causes are added, with intervals that remain valid under model error."""
+"""Coefficients before and after the causes are added, with intervals that hold under model error."""
 
 from __future__ import annotations
 
@@ -9,21 +9,17 @@ from decimal import Decimal
 import numpy as np
 
 from diagnosis.answer.held_out import HeldOut
-from diagnosis.attribution.decide import LAPSE, Weighed
+from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.rank import Hypothesis
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import linear_coefficients
+from diagnosis.policy import COLOURED_EXCESS, EVEN_SHARE, FORM_CHANGE_STD
 from diagnosis.result import ParameterEstimate
 from identification.statistics.widening import scatter_of_runs
 from tunnel_sim.effects.base import WindOnRun
 from tunnel_sim.vocabulary.campaign import Campaign
 
 _UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1"}
-#: Excess of block means beyond which the residuals are no longer white, and runs must speak for the scatter.
-_COLOURED = 0.03
-#: Share of what freeing the forms has moved a coefficient by that counts as its standard deviation: a judgement,
-#: made when a sealed set had shown Cnβ's intervals too narrow, and held against campaigns drawn afterwards.
-_FORM_MOVES = 0.5
 
 
 def coefficients(
@@ -38,16 +34,16 @@ def coefficients(
     Args:
         fit: nominal, or with causes added.
         held_out: the same without groups of runs.
-        campaign: for the digits to which air density is stated.
+        campaign: gives the digits to which the air density is stated.
         rivals: other fits and their probabilities.
-        textbook: the same effects with the textbook's forms, where the fit freed them.
+        textbook: the same effects in textbook form, where the fit freed their forms.
 
     Returns:
         ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` in normalised form. The variance is that of the
         fit scaled by its excess, or where the residuals are coloured the greatest of that, the delete-a-group
         jackknife (Kott, J. Off. Stat. 17 (2001) 521) and the scatter of the runs; plus the rounding of the air
-        density, plus what the form of a cause leaves open that no free decay shows, plus half of what freeing
-        the forms has moved (another family of forms may move as much), plus the spread over rivals.
+        density, plus the part of a cause's form that no free decay shows, plus half the change made by freeing
+        the forms (another family of forms may change as much), plus the spread over rivals.
     """
     names = ("omega_n", "zeta") if fit.problem.data.normalised else ("cn_beta", "cn_r")
     result = {}
@@ -60,15 +56,15 @@ def coefficients(
         )
         rounding = abs(value) * _density_rounding(campaign) if name.startswith("cn_") else 0.0
         unseen = _unseen_form(fit, name) if name.startswith("cn_") else 0.0
-        straight = None if textbook is None else _value_only(textbook, name)
-        moved = 0.0 if straight is None else _FORM_MOVES * (value - straight)
+        unfreed = None if textbook is None else _value_only(textbook, name)
+        moved = 0.0 if unfreed is None else FORM_CHANGE_STD * (value - unfreed)
         variance = std**2 + rounding**2 + unseen**2 + moved**2 + spread
         result[name] = ParameterEstimate(value, math.sqrt(variance), _UNITS[name])
     return result
 
 
 def _unseen_form(fit: Fit, name: str) -> float:
-    """Standard deviation of Cnβ or Cnr, 1/rad, from what no free decay shows of the causes' forms."""
+    """Standard deviation of Cnβ or Cnr, 1/rad, from the part of the causes' forms that no free decay shows."""
     runs = _wind_on_runs(fit)
     place = 0 if name == "cn_beta" else 1
     effects = fit.problem.effects_at(fit.point.common)
@@ -103,11 +99,11 @@ def rival_fits(
         chosen: the fit of the answer.
 
     Returns:
-        Fit and probability of each fitted rival, without the lapse: it stands for what nobody thought of, not for
-        a rival the runs refute.
+        Fit and probability of each fitted rival, without its part of `EVEN_SHARE`: that stands for causes not
+        considered, not for a rival that the runs refute.
     """
     found = []
-    even = LAPSE / max(len(weighed), 1)
+    even = EVEN_SHARE / max(len(weighed), 1)
     for answer in weighed:
         for hypothesis in hypotheses:
             if hypothesis.names == answer.effects and hypothesis.fit is not chosen:
@@ -121,12 +117,12 @@ def _value(fit: Fit, held_out: HeldOut, name: str) -> tuple[float | None, float]
         return None, 0.0
     scale = math.sqrt(1.0 + max(fit.excess, 0.0))
     std = _formal_std(fit, name) * scale
-    if fit.excess > _COLOURED and len(held_out.common) > 1:
+    if fit.excess > COLOURED_EXCESS and len(held_out.common) > 1:
         values = [_derived(held_out.names, row, name) for row in held_out.common]
         count = len(values)
         jackknife = math.sqrt((count - 1.0) / count * sum((v - value) ** 2 for v in values if v is not None))
         std = max(std, jackknife)
-    if fit.excess > _COLOURED and name in fit.problem.names:
+    if fit.excess > COLOURED_EXCESS and name in fit.problem.names:
         std = max(std, _scatter_of_runs(fit, name))
     return value, std
 
@@ -176,7 +172,7 @@ def _formal_std(fit: Fit, name: str) -> float:
 
 
 def _density_rounding(campaign: Campaign) -> float:
-    """Relative standard deviation that the stated digits of the air density leave."""
+    """Relative standard deviation from the rounding of the stated air density."""
     worst = 0.0
     for run in campaign.runs:
         if run.wind_on and run.air_density:

@@ -1,4 +1,4 @@
-"""The figures reported, from the MuJoCo model: fitted runs predicted once more, to half the fits' step."""
+"""Prediction of the fitted runs by the MuJoCo model, for what is reported, in short steps."""
 
 from __future__ import annotations
 
@@ -9,18 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from diagnosis.fitting.problem import Point, Problem, campaign_rig, condensed, held_end
+from diagnosis.fitting.problem import Point, Problem, campaign_rig, condensed
 from diagnosis.fitting.run_data import RunData
+from diagnosis.policy import CONFIRMATION_TOLERANCE
 from diagnosis.result import Confirmation
 from tunnel_sim.physics.motion import Motion
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.release import released_by_spring_end
+from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
-
-#: The two may differ by this share of a block mean's noise, root mean square over a run: a hundredth of its power.
-TOLERANCE = 0.1
-_TIMESTEP = 2e-3  # s at the most, half that of the fits: RK4 then errs a sixteenth as much
-_ROD_RESOLUTION = 0.25  # rad of the rod's own oscillation in one step: half of what the fits take
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +81,10 @@ def confirm(comparisons: Sequence[Comparison]) -> Confirmation:
     """Judge whether the two models agree.
 
     Args:
-        comparisons: of everything that is reported; one at least.
+        comparisons: of all fits that are reported; at least one.
 
     Returns:
-        The largest difference, and the root mean square of the run that is closest to its tolerance.
+        The largest difference, and the root mean square difference of the run closest to its tolerance.
     """
     largest, worst, found = 0.0, -1.0, ("", 0.0, 0.0)
     for comparison in comparisons:
@@ -97,9 +94,9 @@ def confirm(comparisons: Sequence[Comparison]) -> Confirmation:
             largest = max(largest, float(np.max(np.abs(difference))))
             rms = float(np.sqrt(np.mean(difference**2)))
             if rms / noise > worst:
-                worst, found = rms / noise, (run, rms, TOLERANCE * noise)
+                worst, found = rms / noise, (run, rms, CONFIRMATION_TOLERANCE * noise)
     failure = next((c.failure for c in comparisons if c.failure), "")
-    return Confirmation(worst <= TOLERANCE and not failure, largest, *found, failure=failure)
+    return Confirmation(worst <= CONFIRMATION_TOLERANCE and not failure, largest, *found, failure=failure)
 
 
 def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array]:
@@ -136,14 +133,14 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
 
 
 class _Case:
-    """One run at one point, as MuJoCo takes it."""
+    """One run at one point, as MuJoCo simulates it."""
 
     def __init__(self, problem: Problem, common: Array, own: Array, run: RunData) -> None:
         self.run = run
         self.chain = problem.chain(common, own, run)
         self.zero = float(common[problem.nominal_names.index("zero")])
-        physics = held_end(condensed(self.chain.physics(), problem.data))
-        steps = int(np.ceil(run.interval / _longest_step(physics) - 1e-9))
+        physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
+        steps = report_substeps(physics, run.interval)
         self.physics = dataclasses.replace(
             physics, timestep=run.interval / steps, duration=(run.reading.size + 1) * run.interval
         )
@@ -158,12 +155,3 @@ class _Case:
         reading = self.chain.reading(self.chain.angle(angle, time) + self.zero)
         means: Array = reading.reshape(run.reading.size, run.block).mean(axis=1)
         return means
-
-
-def _longest_step(physics: RunSettings) -> float:
-    twist = physics.rod_twist
-    if twist is None:
-        return _TIMESTEP
-    share = twist.inertia_share
-    own = np.sqrt(1.0 / (twist.compliance * physics.yaw_inertia * share * (1.0 - share)))
-    return float(np.clip(_ROD_RESOLUTION / own, 1e-4, _TIMESTEP))

@@ -12,7 +12,7 @@ from diagnosis.fitting.run_data import Data, RunData
 from tunnel_sim.vocabulary.record import Array
 
 _FOLDS = 3
-_RELEASE_STEPS = 4  # with the slopes of nearly the same parameters, two do
+_RELEASE_STEPS = 4  # two are enough where the slopes are those of nearly the same parameters
 _RELEASE_GAIN = 1e-6  # of a run's χ² that a step must save
 
 
@@ -47,9 +47,9 @@ def folds(data: Data, count: int = _FOLDS) -> list[tuple[str, ...]]:
         count: number of groups, fewer where there are few runs.
 
     Returns:
-        Ids by group. Runs alike in wind and spring go to different groups, and what is kept always has every
-        spring, wind-off runs and wind-on runs: without them nothing could be said of what is left out. A run
-        that alone stands for one of these is left out of none.
+        Ids by group. Runs with the same wind and spring go to different groups, and the runs kept always include
+        every spring, wind-off runs and wind-on runs: the others could not be predicted without them. The only run
+        of its kind is in no group.
     """
     order = sorted(data.runs, key=lambda run: (run.wind_on, run.spring_stiffness or 0.0, run.wind_speed))
     free = [run for run in order if _covers(data, [run])]
@@ -115,11 +115,11 @@ def predict_held_out(whole: Fit) -> HeldOut:
 
 
 def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple[Point, list[Array]]:
-    """Fit only what each run has of its own: release and phases.
+    """Fit only each run's own parameters: release and phases.
 
     Args:
         problem: runs and effects.
-        start: common parameters, which stay, and releases to start from.
+        start: common parameters, which are held, and releases to start from.
         slopes: derivatives of the scaled prediction to each run's own parameters, shape (n, own), from a fit of
             about the same parameters.
 
@@ -141,7 +141,7 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
 
 
 def _restricted(problem: Problem, ids: list[str]) -> Problem:
-    return Problem(problem.data.subset(tuple(ids)), problem.effects, problem.fixed, problem.bent)
+    return Problem(problem.data.subset(tuple(ids)), problem.effects, problem.fixed, problem.free_forms)
 
 
 def _sliced(whole: Fit, keep: list[int]) -> Fit:

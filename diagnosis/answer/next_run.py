@@ -1,4 +1,4 @@
-"""The run that would tell two fitted models apart."""
+"""The run that would distinguish two fitted models."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _ANGLES = (0.35, 0.14)  # rad
 _SPEEDS = (0.0, 10.0, 20.0, 30.0)  # m/s
 _STIFFNESS_FACTORS = (0.5, 1.0, 2.0)
 _DURATIONS = (10.0, 30.0)  # s
-_PHASES = 8  # of the true model's periodic effect, to mean over
+_PHASES = 8  # of the true model's periodic effect, to average over
 _PHASES_TRIED = (1, 720, 72)  # of each of the rival's none, one or two, to fit
 
 
 def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
-    """Among feasible runs, the one whose readings the two models predict most differently.
+    """The feasible run whose readings the two models predict most differently.
 
     Args:
         first: a fitted model.
@@ -56,7 +56,7 @@ def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
 def planned_run(
     fit: Fit, *, spring_stiffness: float, wind_speed: float, air_density: float, duration: float
 ) -> RunData:
-    """A run that has not been made, with the sampling and the noise of those that have.
+    """A run not yet made, with the sampling and the noise of the runs made.
 
     Args:
         fit: to the runs made.
@@ -94,7 +94,7 @@ def _designs(fit: Fit) -> list[tuple[RunData, float]]:
 
 
 def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | None:
-    """How far apart two models predict one run's readings, once what the run has of its own is refitted.
+    """How far apart two models predict one run's readings, after the run's own parameters are refitted.
 
     Args:
         first: a fitted model.
@@ -103,10 +103,11 @@ def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | N
         angle: of the release, rad.
 
     Returns:
-        Standard deviations of the noise that the rival misses by, its release and the phases of its periodic
-        effects refitted, in mean square over the phases of the true one, which no one can choose; the smaller of
-        the two, whichever is true. None where a model's motion grows without bound. Half its square is the
-        log-likelihood ratio, nats, that the run is expected to bring if one of the two is right.
+        The misfit of the rival in standard deviations of the noise, after its release and the phases of its
+        periodic effects are refitted, in root mean square over the phases of the true model, which cannot be
+        chosen. Each model is taken as the true one in turn, and the smaller misfit counts. None where a model's
+        motion grows without bound. Half the square is the expected log-likelihood ratio of the run, in nats, if
+        one of the two models is right.
     """
     one, other = _predict(first, run, angle), _predict(second, run, angle)
     if one is None or other is None:
@@ -132,10 +133,10 @@ class _Prediction:
 def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
     """Predict a run; None where it cannot be integrated.
 
-    What a periodic effect adds is of first order in its size, so that it turns with its phase as a pointer.
+    The response to a periodic effect is of first order in its size, so that it rotates with its phase.
     """
     problem = Problem(
-        fit.problem.data.with_runs((run,)), fit.problem.effects, fit.problem.fixed, fit.problem.bent
+        fit.problem.data.with_runs((run,)), fit.problem.effects, fit.problem.fixed, fit.problem.free_forms
     )
     count = len(problem.phased)
     steps = np.array([1e-4 * angle, 1e-3 * angle])
@@ -154,7 +155,7 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
 
 
 def _missed(true: _Prediction, rival: _Prediction) -> float:
-    """Root of the sum of squares, rad, that the rival leaves of the true model."""
+    """Root of the sum of squares of what the rival, refitted, misses of the true model, rad."""
     change = np.column_stack([true.reading - rival.reading, true.waves])
     left, waves = project_release(change, rival.slopes), project_release(rival.waves, rival.slopes)
     count = waves.shape[1] // 2

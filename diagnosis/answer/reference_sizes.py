@@ -50,12 +50,12 @@ def sized_coefficients(
     """Coefficients under the names of what was identified.
 
     Args:
-        found: ``cn_beta`` and ``cn_r``, with 1 in the place of every size that is not stated, or others.
+        found: ``cn_beta`` and ``cn_r``, with 1 in place of every size that is not stated; or other coefficients.
         rig: which sizes are stated.
 
     Returns:
-        The same where both sizes are stated; else Cnβ and Cnr times the missing ones, by name, Cnβ·A·l (m³/rad) as
-        ``cn_beta_area_length`` and Cnr·A·l² (m⁴/rad) as ``cn_r_area_length2``.
+        The same where both sizes are stated; else Cnβ and Cnr times the missing ones, which their names say:
+        ``cn_beta_area_length`` is Cnβ·A·l (m³/rad) and ``cn_r_area_length2`` is Cnr·A·l² (m⁴/rad).
     """
     names = _sized_names(rig)
     return {
@@ -67,7 +67,7 @@ def sized_coefficients(
 
 
 def _sized_names(rig: RigProperties) -> dict[str, tuple[str, str]]:
-    """Name and unit of what stands for each coefficient."""
+    """Name and unit of the product identified in place of each coefficient."""
     if rig.frontal_area is not None and rig.reference_length is not None:
         return {}
     if rig.reference_length is not None:
@@ -78,11 +78,11 @@ def _sized_names(rig: RigProperties) -> dict[str, tuple[str, str]]:
 
 
 def size_note(rig: RigProperties, *, windy: bool) -> str:
-    """What the coefficients are where sizes are not stated.
+    """What is identified in place of the coefficients where sizes are not stated.
 
     Args:
         rig: which sizes are stated.
-        windy: whether coefficients of the air are given at all.
+        windy: whether there are aerodynamic coefficients at all.
 
     Returns:
         A sentence; empty where they are Cnβ and Cnr.
@@ -94,6 +94,6 @@ def size_note(rig: RigProperties, *, windy: bool) -> str:
     beta = "Cnβ" + "·A" * (rig.frontal_area is None) + "·l" * (rig.reference_length is None)
     rate = "Cnr" + "·A" * (rig.frontal_area is None) + "·l²" * (rig.reference_length is None)
     return (
-        f"[rig] states no {' and no '.join(missing)}, so {beta} and {rate} are identified, not Cnβ and Cnr: state "
-        f"{'both' if len(missing) > 1 else 'it'} for these."
+        f"[rig] states no {' and no '.join(missing)}, so {beta} and {rate} are identified, not Cnβ and Cnr. State "
+        f"{'both' if len(missing) > 1 else 'it'} to get Cnβ and Cnr."
     )

@@ -1,4 +1,4 @@
-"""The gap by run, before and after: what the MuJoCo model leaves of the fitted and the held-out runs."""
+"""The gap by run, before and after: residuals of the fitted and the held-out runs from the MuJoCo model."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from diagnosis.answer.confirm import Comparison, compare, confirm
 from diagnosis.answer.held_out import HeldOut
-from diagnosis.detection.gap import FALSE_ALARM_RATE
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from diagnosis.result import Confirmation, GapSummary, RunGap
 from diagnosis.study import COARSE_STEP, Study
 from tunnel_sim.vocabulary.record import Array
@@ -22,9 +22,9 @@ class Reported:
 
     Args:
         before: of the nominal model fitted to all runs.
-        before_out: of the nominal model, of the runs that could be held out of its fit.
-        after: of the answer's model; of its fit of all runs where a run could not be held out.
-        held_out: ids of the runs that could.
+        before_out: of the nominal model, for the runs that could be held out of its fit.
+        after: of the answer's model, held out where possible, else from its fit to all runs.
+        held_out: ids of the runs that could be held out.
         confirmation: how far MuJoCo and the fits' integrator agree on these.
     """
 
@@ -45,8 +45,8 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
         chosen_out: runs held out of the second.
 
     Returns:
-        The residuals. Those of the nominal model's held-out runs are the fits' own less what MuJoCo changes
-        in the fit of all runs: the two lie close together.
+        The residuals. Those of the nominal model's held-out runs are the fits' own, corrected by MuJoCo's
+        difference in the fit of all runs, which is close to it.
     """
     before = compare(nominal.problem, nominal.point.common, nominal.point.release)
     before_out = _corrected(nominal_out, before)
@@ -82,12 +82,12 @@ def _corrected(held_out: HeldOut, fitted: Comparison) -> dict[str, Array]:
 
 @dataclass(frozen=True)
 class Base:
-    """What an excess is measured against.
+    """The noise that an excess is measured against.
 
     Args:
         variance: of one sample, rad²: noise and stated resolution.
-        extra: what a coarse step adds to that, as a share.
-        hum: what a hum adds, as a share.
+        extra: share that a coarse step adds to it.
+        hum: share that a hum adds to it.
     """
 
     variance: float
@@ -96,13 +96,13 @@ class Base:
 
 
 def excess_base(study: Study) -> Base:
-    """The noise that a perfect model would leave.
+    """The noise that would remain with a perfect model.
 
     Args:
         study: its noise, step and hum.
 
     Returns:
-        The stated noise where it is stated and the records contradict it, or the readings' step does; else the
+        The stated noise, where it is stated and contradicted by the records or by the readings' step; else the
         noise estimated from the records.
     """
     estimated = float(np.mean(list(study.noise.variance.values())))
@@ -154,7 +154,7 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
         excess_after=total_after if named else total_before,
         closed=_closed(sum(before_out), sum(after_out), total_before, total_after) if named else 0.0,
         runs=tuple(runs) if named else tuple(replace(run, after=run.before) for run in runs),
-        false_alarm_rate=FALSE_ALARM_RATE,
+        false_alarm_rate=GAP_FALSE_ALARM_RATE,
         p_value=0.0 if study.read_off else study.test.p_value,
         tests=study.test.tests,
     )

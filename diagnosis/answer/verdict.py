@@ -65,7 +65,7 @@ def _source(name: str) -> str:
 
 
 def cnr_note(causes: Sequence[str]) -> str:
-    """What the coefficients after mean, where a cause changes their meaning."""
+    """How to read the coefficients with the causes added, where a cause changes their meaning."""
     return " ".join(
         effect_class(name).caveat for name in causes if name != "unknown" and effect_class(name).caveat
     )
@@ -85,21 +85,21 @@ def blind_spots(
     """What these runs cannot show.
 
     Args:
-        springs: number of different stiffnesses.
-        speeds: number of different wind speeds above zero.
+        springs: number of distinct stiffnesses.
+        speeds: number of distinct wind speeds above zero.
         wind_off: whether there are runs with the wind off.
         wind_on: whether there are runs with the wind on.
-        normalised: whether stiffness is not stated.
+        normalised: whether the stiffness is not stated.
 
     Returns:
-        Clauses, those true of every free decay last.
+        Clauses; those that apply to every free decay come last.
     """
     found = []
     if normalised:
-        found.append("anything about single springs: the runs state no stiffness")
+        found.append("an error of a single spring: the runs state no stiffness")
     elif springs < 2:
         found.append(
-            "structural against viscous damping, gravity or a wrong spring: there is one spring only"
+            "gravity, a wrong spring, or structural as opposed to viscous damping: there is one spring only"
         )
     if not wind_on:
         found.append("any effect of the air: there is no run with the wind on")
@@ -108,7 +108,5 @@ def blind_spots(
             "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
         )
     if wind_on and not wind_off:
-        found.append(
-            "mechanical against aerodynamic versions of one effect: there is no run with the wind off"
-        )
+        found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
     return (*found, *BLIND_SPOTS)

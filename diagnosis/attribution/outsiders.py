@@ -1,9 +1,9 @@
-"""Rivals from outside the vocabulary: known ways in which a rig misleads that no effect of it stands for.
+"""Outsiders: known causes of a gap that are not in the vocabulary of effects.
 
-An effect of the vocabulary may close most of a gap it has no part in. Where something outside closes it better, the
-answer is `unknown`, with a word on what would explain it. Each outsider is linear in its size, so that the nominal
-fit's own residuals and sensitivities weigh it without a simulation. A gain that drifts in proportion to time is not
-among them: the damping absorbs it.
+An effect of the vocabulary may close most of a gap that it did not cause. Where an outsider closes more, the answer
+is `unknown`, with a caution that names the outsider. Each is linear in its size, so that the residuals and
+sensitivities of the nominal fit are enough to weigh it; no simulation is needed. A gain that drifts in proportion
+to time is not among them: the damping absorbs it.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ _TIMES = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0)  # s: how slowly a zero follows
 
 @dataclass(frozen=True)
 class Outsider:
-    """Something outside the vocabulary, weighed.
+    """A cause outside the vocabulary, and how much of the gap it leaves.
 
     Args:
-        words: what it is.
+        words: its description.
         share: share of the gap it leaves open.
     """
 
@@ -78,7 +78,7 @@ def _motions(nominal: Fit) -> list[_Motion]:
 
 
 def _zero_follows_power(motions: list[_Motion]) -> list[list[Array]]:
-    """A zero that follows the squared angle, at once or late, from rest or from the value it has settled at."""
+    """A zero that follows the squared angle, at once or with a lag, starting from zero or from a settled value."""
     trials = []
     for time, settled in product(_TIMES, (False, True)):
         columns = []

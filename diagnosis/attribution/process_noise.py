@@ -1,8 +1,8 @@
-"""A random moment on the rig: its likelihood, by the innovations of a steady Kalman filter.
+"""A random moment on the rig: its likelihood, from the innovations of a steady Kalman filter.
 
-Two kinds: turbulence, broad or about one frequency, and vortex shedding whose phase wanders, about a frequency
-that follows the wind. Åström, Introduction to Stochastic Control Theory (1970); Maine & Iliff, NASA RP-1077 (1981),
-filter error; the filter's Riccati equation by doubling: Anderson, Int. J. Control 28 (1978) 295,
+There are two kinds: turbulence, broad or about one frequency, and vortex shedding with a wandering phase, about a
+frequency that follows the wind. Åström, Introduction to Stochastic Control Theory (1970); Maine & Iliff, NASA
+RP-1077 (1981), filter error; the filter's Riccati equation by doubling: Anderson, Int. J. Control 28 (1978) 295,
 doi 10.1080/00207177808922455.
 """
 
@@ -21,8 +21,8 @@ from diagnosis.fitting.spectra import linear_coefficients
 from tunnel_sim.vocabulary.record import Array
 
 _INTERVAL = 0.012  # s between the residuals the filter sees: well above the rig's frequencies
-_SETTLE = 1.0  # s at the start left out: the filter's own transient
-LONGEST_BANDWIDTH = 20.0  # Hz: the rig cannot tell a broader spectrum from white
+_SETTLE = 1.0  # s left out at the start: the transient of the filter
+LONGEST_BANDWIDTH = 20.0  # Hz: the rig cannot distinguish a broader spectrum from a white one
 _LEAST_STROUHAL = 0.05  # bluff bodies shed at 0.1 to 0.3
 _LINE_SPACING = 0.3  # Hz, in the search for a line
 _WIDEST_LINE = 0.5  # Hz: beyond it a wandering line is turbulence
@@ -106,7 +106,7 @@ def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
 
 
 def fit_wandering_shedding(fit: Fit) -> ProcessNoise | None:
-    """Explain the residuals of the wind-on runs by vortex shedding whose phase wanders.
+    """Explain the residuals of the wind-on runs by vortex shedding with a wandering phase.
 
     Args:
         fit: the deterministic model's fit.
@@ -118,7 +118,7 @@ def fit_wandering_shedding(fit: Fit) -> ProcessNoise | None:
     fastest = max(run.wind_speed for run in data.runs)
     if data.width <= 0.0 or fastest <= 0.0:
         return None
-    # lines wide enough for one to lie on any, up to what the filter's samples show
+    # lines spaced so that any frequency lies on one, up to the highest that the filter's samples show
     reduced = fastest / data.width
     numbers = np.arange(_LEAST_STROUHAL, min(0.6, _HIGHEST_LINE / reduced), _LINE_SPACING / reduced)
     grid = [(s, _LINE_SPACING / 3.0, float(n)) for s in (0.01, 0.05) for n in numbers]
@@ -170,7 +170,7 @@ def _fit(
 
 
 def _simplex(start: Array, bounds: Array) -> Array:
-    """Half a factor of e along size and bandwidth, a tenth of it along a centre, which the grid has found."""
+    """Steps of half a logarithm in size and bandwidth, and a tenth of that in a centre found by the grid."""
     corners = np.vstack([start, start + np.diag([0.5, 0.5, 0.05][: start.size])])
     if start.size == 3 and bounds[2, 1] < 0.5:  # a Strouhal number
         corners[3, 2] = start[2] + 2e-3

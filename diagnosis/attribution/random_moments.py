@@ -1,4 +1,4 @@
-"""Random moments weighed last: they absorb almost anything, so they must pass for what they claim to be."""
+"""Random moments, weighed last: they absorb almost any gap, so they must pass tests of their own."""
 
 from __future__ import annotations
 
@@ -16,24 +16,17 @@ from diagnosis.attribution.process_noise import (
 )
 from diagnosis.attribution.rank import Hypothesis
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.policy import (
+    BESIDE_EVIDENCE,
+    CLOSED_WITHOUT_RANDOM,
+    RANDOM_PARTNERS,
+    RIVAL_EVIDENCE,
+    STEADY_IN_TIME,
+    WHITE_BY_BAND,
+    WIND_OFF_LEAST,
+    WIND_OFF_SHARE,
+)
 from tunnel_sim.effects import Effect, the_effect
-
-#: Largest departure of the innovations' power by band from white, in its standard deviations. Among 64 to 100
-#: bands the greatest is below 3.5 by chance; a real spectrum is not first-order, which adds some.
-_BAND_LIMIT = 7.0
-#: Likewise of quarters of the record in time.
-_TIME_LIMIT = 5.5
-#: Wind-off runs must be free of a gap: their excess as a share of the wind-on runs'.
-_WIND_OFF_SHARE = 0.05
-#: Single effects that a random moment is tried beside.
-_PARTNERS = 3
-#: −2 ln L by which an effect beside the random moment must improve on the moment alone: a parameter fitted by
-#: least squares to a random motion takes some ten of it for nothing.
-_EVIDENCE = 60.0
-#: −2 ln L beyond which a likelier kind of random moment rules another out: odds of e^10.
-_RIVAL_EVIDENCE = 20.0
-#: Where deterministic effects leave less than this, no random moment is needed.
-_CLOSED = 0.015
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +54,7 @@ class RandomAnswer:
 def weigh_random_moments(
     nominal: Fit, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], allowed: Collection[str]
 ) -> list[RandomAnswer]:
-    """Try turbulence, and vortices whose phase wanders, alone and beside the best single effects.
+    """Try turbulence, and vortices with a wandering phase, alone and beside the best single effects.
 
     Args:
         nominal: the nominal fit.
@@ -70,11 +63,14 @@ def weigh_random_moments(
         allowed: names of the vocabulary to answer in.
 
     Returns:
-        Of each kind the likeliest that passes, alone unless the evidence for an effect beside it is strong. To
-        pass, innovations must be white by band and steady in time, and wind-off runs without a gap. Empty where
-        none passes, or one or two deterministic effects close the gap already.
+        The most likely answer of each kind that passes, alone unless the evidence for an effect beside it is
+        strong. To pass, the innovations must be white by band and steady in time, and the wind-off runs free of a
+        gap. Empty where none passes, or where one or two deterministic effects close the gap.
     """
-    if any(max(hypothesis.fit.excess, 0.0) < _CLOSED * nominal.excess for hypothesis in (*singles, *pairs)):
+    if any(
+        max(hypothesis.fit.excess, 0.0) < CLOSED_WITHOUT_RANDOM * nominal.excess
+        for hypothesis in (*singles, *pairs)
+    ):
         return []
     kinds: tuple[tuple[str, tuple[_Kind, ...]], ...] = (
         ("broad_band", (fit_turbulence, partial(fit_turbulence, centred=True))),
@@ -84,7 +80,7 @@ def weigh_random_moments(
     tried = [_likeliest(kind, fits, nominal, singles) for kind, fits in known if kind.name in allowed]
     answers = [answer for answer in tried if answer is not None]
     least = min((answer.process.cost for answer in answers), default=0.0)
-    return [answer for answer in answers if answer.process.cost < least + _RIVAL_EVIDENCE]
+    return [answer for answer in answers if answer.process.cost < least + RIVAL_EVIDENCE]
 
 
 _Kind = Callable[[Fit], ProcessNoise | None]
@@ -95,10 +91,10 @@ def _likeliest(
 ) -> RandomAnswer | None:
     for explain in fits:  # a spectrum with more freedom only where the simpler one does not pass
         alone = _try(kind, explain, nominal, None, nominal)
-        partners = [s for s in singles if s.effects != (kind.name,)][:_PARTNERS]
+        partners = [s for s in singles if s.effects != (kind.name,)][:RANDOM_PARTNERS]
         beside = [a for s in partners if (a := _try(kind, explain, s.fit, s, nominal)) is not None]
         best = min(beside, key=lambda a: a.process.cost, default=None)
-        if alone is None or (best is not None and best.process.cost < alone.process.cost - _EVIDENCE):
+        if alone is None or (best is not None and best.process.cost < alone.process.cost - BESIDE_EVIDENCE):
             alone = best
         if alone is not None:
             return alone
@@ -109,13 +105,13 @@ def _try(
     kind: type[Effect], explain: _Kind, fit: Fit, beside: Hypothesis | None, nominal: Fit
 ) -> RandomAnswer | None:
     off = wind_off_excess(fit)
-    if off > max(_WIND_OFF_SHARE * nominal.excess, 0.1):
+    if off > max(WIND_OFF_SHARE * nominal.excess, WIND_OFF_LEAST):
         return None
     process = explain(fit)
     if process is None or process.drop <= 0.0:
         return None
     band, quarter, _ = whiteness(process)
-    if band > _BAND_LIMIT or quarter > _TIME_LIMIT:
+    if band > WHITE_BY_BAND or quarter > STEADY_IN_TIME:
         return None
     share = (abs(process.excess) + max(off, 0.0)) / max(nominal.excess, 1e-9)
     return RandomAnswer(kind, process, beside, share)

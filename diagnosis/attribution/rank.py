@@ -8,20 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.attribution.decide import FORM_SHARE
 from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_growing
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
+from diagnosis.policy import (
+    ALWAYS_FITTED,
+    FORM_SHARE,
+    FREED_FROM,
+    FREED_HYPOTHESES,
+    PAIR_BASES,
+    PAIR_SECONDS,
+    PREDICTED_SHARE,
+)
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import ParameterInfo
 
-_ALWAYS_FITTED = 7  # starting points fitted whatever linear theory predicts: it ranks well but cannot judge
-_PREDICTED_SHARE = 0.01  # predicted drop, as a share of χ², beyond which others are fitted too
-_BASES = 3  # single effects to which a second is added
-_SECONDS = 4  # second effects refitted for each
-_POLISH = 1e-7  # drop of χ², as a share of it, below which a polished fit is at its end
-_BENT = 3  # hypotheses whose forms are freed
-_BEND_FROM = 0.02  # share left open from which they are
+_POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
 
 Progress = Callable[[str], None]
 
@@ -33,7 +35,7 @@ class Hypothesis:
     Args:
         effects: names, in the order they were added.
         fit: the fit.
-        textbook: where forms were freed in the end, the fit with the textbook's; None otherwise.
+        textbook: the fit with the textbook form, where the forms were freed in the end; None otherwise.
     """
 
     effects: tuple[str, ...]
@@ -49,7 +51,7 @@ class Hypothesis:
     def forms(self) -> int:
         """How many form parameters were freed."""
         problem = self.fit.problem
-        return sum(i.form for k in problem.effects if k.name in problem.bent for i in k.parameters())
+        return sum(i.form for k in problem.effects if k.name in problem.free_forms for i in k.parameters())
 
 
 def rank_singles(
@@ -60,13 +62,14 @@ def rank_singles(
     Args:
         nominal: the fit without any.
         kinds: effects to try.
-        progress: told each effect's name.
+        progress: called with the name of each effect.
 
     Returns:
-        Fitted hypotheses, best first. Effects from which linear theory expects next to nothing are left out.
+        Fitted hypotheses, best first. Effects that linear theory predicts to close next to nothing are left
+        out.
     """
     found = []
-    for kind, starts in _worth_fitting(nominal, kinds, _ALWAYS_FITTED):
+    for kind, starts in _worth_fitting(nominal, kinds, ALWAYS_FITTED):
         if progress is not None:
             progress(kind.name)
         best = _best_fit(_tried(kind, starts, nominal), nominal)
@@ -83,15 +86,15 @@ def rank_pairs(
     Args:
         singles: best first.
         kinds: effects to try.
-        progress: told each pair's names.
+        progress: called with the names of each pair.
 
     Returns:
         Fitted pairs, best first.
     """
     found: dict[tuple[str, ...], Hypothesis] = {}
-    for single in singles[:_BASES]:
+    for single in singles[:PAIR_BASES]:
         others = [kind for kind in kinds if kind.name not in single.effects]
-        for kind, starts in _worth_fitting(single.fit, others, 0)[:_SECONDS]:
+        for kind, starts in _worth_fitting(single.fit, others, 0)[:PAIR_SECONDS]:
             if progress is not None:
                 progress(f"{single.effects[0]} + {kind.name}")
             best = _best_fit(_tried(kind, starts, single.fit), single.fit)
@@ -104,51 +107,55 @@ def rank_pairs(
 
 
 def _with_forms(found: list[Hypothesis], base: Fit) -> list[Hypothesis]:
-    """Free the forms of the best hypotheses where the textbook's leave a good part open; best first."""
+    """Free the forms of the best hypotheses where the textbook form leaves a good part open; best first."""
     ranked = sorted(found, key=lambda h: h.fit.total)
-    bent = []
-    for hypothesis in ranked[:_BENT]:
-        fitted = hypothesis.fit
-        freed = _bend(fitted) if fitted.excess > _BEND_FROM * max(base.excess, 0.0) else None
-        bend = None if freed is None else Hypothesis(hypothesis.effects, freed)
-        pays = bend is not None and bend.fit.excess < FORM_SHARE**bend.forms * fitted.excess
-        bent.append(bend if bend is not None and pays else hypothesis)
-    return sorted([*bent, *ranked[_BENT:]], key=lambda h: h.fit.total)
+    freed = [_freed_if_it_pays(h, base) for h in ranked[:FREED_HYPOTHESES]]
+    return sorted([*freed, *ranked[FREED_HYPOTHESES:]], key=lambda h: h.fit.total)
+
+
+def _freed_if_it_pays(hypothesis: Hypothesis, base: Fit) -> Hypothesis:
+    """The hypothesis with its forms free, where they close enough; else as it is."""
+    fitted = hypothesis.fit
+    freed = _free_forms(fitted) if fitted.excess > FREED_FROM * max(base.excess, 0.0) else None
+    if freed is None:
+        return hypothesis
+    found = Hypothesis(hypothesis.effects, freed)
+    return found if freed.excess < FORM_SHARE**found.forms * fitted.excess else hypothesis
 
 
 def polish(chosen: Hypothesis) -> Hypothesis:
-    """The hypothesis fitted to the end and with its forms free: what the form leaves open widens the spread.
+    """The hypothesis fitted to convergence with its forms free, so that its covariance includes the forms.
 
     Args:
         chosen: a fitted hypothesis.
 
     Returns:
-        The same effects, nowhere worse; as given where the fit cannot go on.
+        The same effects with a χ² no larger; as given where the fit cannot go on.
     """
-    better = _bend(chosen.fit, tolerance=_POLISH)
+    better = _free_forms(chosen.fit, tolerance=_POLISH)
     if better is None:
         with suppress(FitError, np.linalg.LinAlgError):
             better = fit(chosen.fit.problem, chosen.fit.point, tolerance=_POLISH)
     if better is None or better.total > chosen.fit.total:
         better = chosen.fit
-    textbook = _straight(better, chosen.fit) if better.problem.bent else None
+    textbook = _textbook(better, chosen.fit) if better.problem.free_forms else None
     return Hypothesis(chosen.effects, better, textbook)
 
 
-def _straight(bent: Fit, first: Fit) -> Fit | None:
-    """The same effects in the textbook's form: as fitted at first where it was, else from the bent ones."""
-    if not first.problem.bent:
+def _textbook(freed: Fit, first: Fit) -> Fit | None:
+    """The same effects in textbook form: the first fit where it had that, else one from the freed values."""
+    if not first.problem.free_forms:
         return first
-    problem = Problem(bent.problem.data, bent.problem.effects, bent.problem.fixed)
-    values = dict(zip(bent.problem.names, bent.point.common.tolist(), strict=True))
-    start = Point(np.array([values[name] for name in problem.names]), bent.point.release)
+    problem = Problem(freed.problem.data, freed.problem.effects, freed.problem.fixed)
+    values = dict(zip(freed.problem.names, freed.point.common.tolist(), strict=True))
+    start = Point(np.array([values[name] for name in problem.names]), freed.point.release)
     with suppress(FitError, np.linalg.LinAlgError):
         return fit(problem, start)
     return None
 
 
-def _bend(fitted: Fit, tolerance: float = 1e-4) -> Fit | None:
-    """The same effects with the forms free; None where none has one, or nothing is gained."""
+def _free_forms(fitted: Fit, tolerance: float = 1e-4) -> Fit | None:
+    """The same effects with the forms free; None where none has a form, or nothing is gained."""
     problem = fitted.problem
     kinds = [kind for kind in problem.effects if any(info.form for info in kind.parameters())]
     if not kinds:
@@ -165,7 +172,7 @@ def _bend(fitted: Fit, tolerance: float = 1e-4) -> Fit | None:
 
 
 def _within(info: ParameterInfo) -> float:
-    """Where a form starts: the textbook's, or a step inside where that is a bound: its slope may vanish there."""
+    """Where a form starts: at the textbook value, or half a step inside a bound, where its slope may vanish."""
     return info.default + 0.5 * info.scale if info.default == info.lower else info.default
 
 
@@ -174,7 +181,7 @@ def _worth_fitting(
 ) -> list[tuple[type[Effect], list[StartingPoint]]]:
     scored = [(kind, starts) for kind in kinds if (starts := starting_points(base, kind))]
     scored.sort(key=lambda item: -item[1][0].predicted_drop)
-    limit = 0.0 if always == 0 else _PREDICTED_SHARE * base.total
+    limit = 0.0 if always == 0 else PREDICTED_SHARE * base.total
     return [item for i, item in enumerate(scored) if i < always or item[1][0].predicted_drop > limit]
 
 
@@ -185,7 +192,7 @@ def _tried(kind: type[Effect], starts: Sequence[StartingPoint], base: Fit) -> Se
 def _best_fit(starts: Sequence[StartingPoint], base: Fit) -> Fit | None:
     best: Fit | None = None
     if is_gross(base):
-        # linear theory says nothing there: the balance of moments goes first
+        # linear theory does not hold there: the balance of moments goes first
         starts = sorted(starts, key=lambda start: not start.balanced)[:2]
     for start in starts:
         try:

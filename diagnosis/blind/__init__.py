@@ -1,4 +1,4 @@
-"""Blind checks: campaigns whose truth lies in a sealed key, answers that are hashed, and their score.
+"""Blind tests: campaigns whose truth is in a sealed key, answers that are hashed, and their score.
 
 `make_blind` draws campaigns with the reference simulator (another integrator and other forms of the effects than
 the fits use), `answer_set` diagnoses them without the key, `score_set` checks all hashes, opens the key and counts.

@@ -45,14 +45,14 @@ def answer_set(
 ) -> str:
     """Diagnose every campaign of a set that has no answer yet.
 
-    An interrupted run leaves whole answers only, and the next one goes on from there. A campaign that cannot be
-    diagnosed gets an answer that says why; it counts as wrong.
+    An interrupted run leaves only complete answers, and the next run continues from there. A campaign that cannot
+    be diagnosed gets an answer that says why; it counts as wrong.
 
     Args:
         folder: of the set.
         excluded: effects withheld from the vocabulary.
         jobs: number of processes.
-        progress: told campaigns answered, their number, and the last one's name.
+        progress: called with the number of campaigns answered, the number in all, and the name of the last.
 
     Returns:
         SHA-256 over all answers, in hexadecimal: publish it before the key is opened.
@@ -78,7 +78,7 @@ def answer_set(
 
 
 def _answered(target: Path) -> dict[str, str]:
-    """Hashes of the answers there are, after a look at their files."""
+    """Hashes of the answers that exist, after a check of their files."""
     if not (target / SEAL).exists():
         return {}
     hashes = read_hashes(target / SEAL, "answers_sha256", "remove the folder and answer again")

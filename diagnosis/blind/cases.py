@@ -14,7 +14,7 @@ MODERATE = (1.0, 10.0)
 
 
 class _Read(BaseModel):
-    """What is scored of a document; what else it holds is left alone."""
+    """The part of a document that is scored; the rest is ignored."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
@@ -82,7 +82,7 @@ class Case:
 
     @property
     def causes(self) -> tuple[str, ...] | None:
-        """What was answered; None where there is no answer."""
+        """The causes answered; None where there is no answer."""
         found = self.answer["causes"]
         return None if found is None else tuple(found)
 
@@ -111,7 +111,7 @@ class Case:
 
     @property
     def named_rightly(self) -> bool:
-        """Whether effects act and are exactly the ones named."""
+        """Whether effects act, and exactly these are named."""
         return self.right and self.truth not in ((), ("unknown",))
 
     @property
@@ -125,7 +125,7 @@ class Case:
 
     @property
     def rival(self) -> bool:
-        """Whether a single true effect was not the answer but named as one it cannot be told from."""
+        """Whether the true effects were not the answer, but were named as possible confusions."""
         return not self.right and set(self.truth) <= {
             *(self.causes or ()),
             *self.answer.get("ambiguous_with", ()),

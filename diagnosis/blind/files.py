@@ -1,7 +1,7 @@
 """Files of a blind set and their hashes.
 
 A set is a folder: a folder for each campaign, ``seal.json`` (published: hashes of the key and of the campaigns) and
-``key.json`` (the truth; may lie elsewhere). Answers stand in a folder of their own, with a ``seal.json``, too.
+``key.json`` (the truth; may be elsewhere). Answers are in a folder of their own, which has a ``seal.json`` too.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def read_hashes(path: Path, key: str, remedy: str) -> dict[str, str]:
 
     Args:
         path: of the ``seal.json``.
-        key: under which they stand.
+        key: under which they are listed.
         remedy: what to do when the file is missing or broken.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Makes a blind set: campaigns without their truth, a sealed key, and the hash that holds it to its word."""
+"""Makes a blind set: campaigns without their truth, a sealed key, and the hash that seals it."""
 
 from __future__ import annotations
 
@@ -32,20 +32,21 @@ def make_blind(
     progress: Told | None = None,
     tell_steps: bool = False,
 ) -> Path:
-    """Draw, simulate and write campaigns whose truth goes only into the key.
+    """Draw, simulate and write campaigns whose truth is only in the key.
 
-    The key begins with 32 random bytes (the salt), so that its published hash cannot be found by guessing truths,
-    and neither can the key be changed later. The seed stands in the key, too, since it tells the truth.
+    The key begins with 32 random bytes (the salt), so that the truth cannot be found by trying guesses against the
+    published hash; the hash shows that the key was not changed later. The seed is in the key too, since the truth
+    follows from it.
 
     Args:
         out: folder to make.
         count: number of campaigns.
         seed: of everything drawn; the same arguments give the same campaigns.
         shares: weight of each kind of campaign: single, pair, none, outside.
-        mixture: how often forms other than the textbook's are drawn.
+        mixture: how often forms other than the textbook form are drawn.
         key: file of the key; inside the folder, beside the campaigns, when None.
-        progress: told campaigns written and their number.
-        tell_steps: say on standard error how sizing the effects goes.
+        progress: called with the number of campaigns written and the number in all.
+        tell_steps: report on standard error how the sizing of the effects proceeds.
 
     Returns:
         The file of the key.

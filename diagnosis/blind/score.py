@@ -21,12 +21,9 @@ from diagnosis.blind.files import (
     read_hashes,
 )
 from diagnosis.blind.statistics import CalibrationBin, Share, calibration, share_of
+from diagnosis.policy import BLIND_CLOSED, BLIND_WITHIN
 from tunnel_sim.files.reading import as_described
 from tunnel_sim.vocabulary.errors import TunnelError, shown
-
-CLOSED = 0.95
-WITHIN = 3.0
-"""Errors of coefficients are counted within this many standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +47,7 @@ class CoefficientErrors:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """A set scored.
+    """The score of a set.
 
     Args:
         cases: truth and answer of every campaign.
@@ -58,7 +55,7 @@ class Score:
         key_sha256: hash of the key, as published before; empty for an open set.
         answers_sha256: hash over the answers, as published before the key was opened.
         made_with: arguments the set was made with; empty where unknown.
-        sealed: whether the truth was sealed; else it lay beside the data and this is no blind check.
+        sealed: whether the truth was sealed; else it was beside the data, and this is not a blind test.
     """
 
     cases: tuple[Case, ...]
@@ -91,7 +88,7 @@ class Score:
         return found
 
     def pairs(self) -> dict[str, int]:
-        """What was answered where two effects act."""
+        """The answers where two effects act."""
         found = dict.fromkeys(
             ("both", "one of them", "one of them and another", "unknown", "none", "others"), 0
         )
@@ -111,11 +108,11 @@ class Score:
         return share_of([not c.right for c in self.cases if c.kind == "none"])
 
     def missed(self) -> Share:
-        """How many campaigns with a gap were said to have none."""
+        """How many campaigns with a gap were answered with ``none``."""
         return share_of([c.causes == () for c in self.cases if c.kind != "none"])
 
     def rivals(self) -> Share:
-        """Of wrong answers to one or two effects, how many name the truth as what they cannot be told from."""
+        """Of wrong answers to one or two effects, how many name the truth as a possible confusion."""
         wrong = [c for c in self.cases if c.kind in ("single", "pair") and not c.right]
         return share_of([c.rival for c in wrong])
 
@@ -125,7 +122,7 @@ class Score:
         if not closed:
             return Share(0, 0), 0.0, 0.0
         return (
-            share_of([v >= CLOSED for v in closed]),
+            share_of([v >= BLIND_CLOSED for v in closed]),
             float(np.median(closed)),
             float(np.quantile(closed, 0.05)),
         )
@@ -146,7 +143,7 @@ class Score:
                 for when in ("before", "after"):
                     errors = [e for c in cases if (e := c.error(name, when)) is not None]
                     if errors:
-                        within = share_of([abs(stds) <= WITHIN for stds, _ in errors])
+                        within = share_of([abs(stds) <= BLIND_WITHIN for stds, _ in errors])
                         median = float(np.median([abs(share) for _, share in errors]))
                         found.append(CoefficientErrors(group, name, when, within, median))
         return found

@@ -1,4 +1,4 @@
-"""Runs that one model can be fitted to: all with their spring stated, or all of one spring that is not."""
+"""Runs that one model can be fitted to: all with a stated spring, or all with one spring that is not stated."""
 
 from __future__ import annotations
 
@@ -9,26 +9,24 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.policy import SAME_SPRING
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Record
 
-#: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
-#: fifth apart. What depends on amplitude moves a frequency gradually, and seldom as far.
-_SAME_SPRING = 1.1
-_PADDING = 8  # times the record, which places the peak of a few cycles within some per cent
+_PADDING = 8  # times the record, which places the peak of a few cycles to within a few per cent
 
 
 def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out runs that cannot be fitted together with the others.
+    """Leave out the runs that cannot be fitted together with the others.
 
     Args:
         campaign: the runs.
 
     Returns:
-        The campaign of the runs that can, and sentences that say what was left out and why; none where all
-        runs stay. Where some runs state ``spring_stiffness`` and others do not, the more numerous stay (those
-        that state it, where equal). Of runs that do not state it, those stay that oscillate alike at equal
-        wind: they alone can have one spring.
+        The campaign of the remaining runs, and sentences that say which were left out and why; none where all
+        runs remain. Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those
+        that state it, if equal). Of runs that do not state it, those with the same frequency at the same wind
+        speed remain: only they can have one spring.
     """
     stated = [run for run in campaign.runs if run.spring_stiffness is not None]
     bare = [run for run in campaign.runs if run.spring_stiffness is None]
@@ -39,16 +37,16 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
         said.append(
             f"Left out, since they {what} spring_stiffness and the others "
             f"{'do' if kept is stated else 'do not'}: {_ids(other)}. State it for all runs, or diagnose these "
-            f"by themselves."
+            f"separately."
         )
     if kept is bare:
         same = _of_one_spring(bare)
         if len(same) < len(bare):
             other = [run for run in bare if run not in same]
             said.append(
-                f"Left out, since unlike frequencies at equal wind show more than one spring, and these are not "
-                f"known to have that of the rest: {_ids(other)}. State spring_stiffness, or diagnose these by "
-                f"themselves."
+                f"Left out, since different frequencies at one wind speed show more than one spring, and these "
+                f"runs may not have the spring of the rest: {_ids(other)}. State spring_stiffness, or diagnose "
+                f"these separately."
             )
         kept = same
     order = {run.id for run in kept}
@@ -62,7 +60,8 @@ def _ids(runs: Sequence[Run]) -> str:
 def _of_one_spring(runs: Sequence[Run]) -> list[Run]:
     """The largest group of runs that may have one spring.
 
-    The air takes the same stiffness from every spring, so that at each speed the springs come in one order.
+    The air reduces the stiffness of every spring by the same amount, so that the order of the frequencies is the
+    same at each speed.
     """
     by_speed: dict[float, list[Run]] = defaultdict(list)
     for run in runs:
@@ -78,11 +77,11 @@ def _of_one_spring(runs: Sequence[Run]) -> list[Run]:
 
 
 def _by_frequency(runs: Sequence[Run]) -> list[list[Run]]:
-    """Groups of runs of about the same frequency, slowest first."""
+    """Groups of runs with about the same frequency, lowest first."""
     found = sorted(((frequency(run.record), run) for run in runs), key=lambda pair: pair[0])
     groups = [[found[0][1]]]
     for (last, _), (now, run) in itertools.pairwise(found):
-        if now > _SAME_SPRING * last:
+        if now > SAME_SPRING * last:
             groups.append([])
         groups[-1].append(run)
     return groups

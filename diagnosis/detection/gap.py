@@ -1,4 +1,4 @@
-"""Is there a gap? The nominal residuals against chance, by frequency band and by the noise's own behaviour."""
+"""Is there a gap? Tests of the nominal model's residuals by frequency band, and of the noise itself."""
 
 from __future__ import annotations
 
@@ -12,11 +12,8 @@ from diagnosis.detection.noise_under_null import level_p_value, trend_p_values
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import resonance
+from diagnosis.policy import FLOOR_TOLERANCE, GAP_FALSE_ALARM_RATE, NOISE_FALSE_ALARM_SHARE
 
-#: Rate at which a campaign without a gap is said to have one, all tests together.
-FALSE_ALARM_RATE = 1e-3
-#: The floor below 60 Hz may differ by this share from the one measured above it (quantisation colours it).
-_FLOOR_TOLERANCE = 0.03
 BANDS = ("below", "f0", "2f0", "3f0", "above")
 
 
@@ -25,11 +22,11 @@ class GapTest:
     """The tests of a gap.
 
     Args:
-        detected: whether any of them sounds.
-        p_value: the smallest, times the number of tests (at most 1).
+        detected: whether any of them rejects the absence of a gap.
+        p_value: the smallest p-value, times the number of tests (at most 1).
         tests: p-value by name: the bands, and the noise's trend with the motion, its scatter and its level.
-        noisy: whether the noise itself misbehaves: it follows the motion, comes in bursts or is above what is
-            stated.
+        noisy: whether the noise itself misbehaves: its level follows the motion, it comes in bursts, or it is
+            above the stated level.
     """
 
     detected: bool
@@ -39,20 +36,20 @@ class GapTest:
 
 
 def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) -> GapTest:
-    """Test a fit's residuals and the noise against chance.
+    """Test whether a fit's residuals and the noise are consistent with white noise.
 
     Args:
         fit: usually of the nominal model.
         noise: the campaign's.
         trend: of the noise with the motion.
-        coarse_step: whether the reading's step is known to be coarser than stated; the noise's level and trend
-            then say nothing more.
+        coarse_step: whether the reading's step is known to be coarser than stated; the level and trend of the
+            noise are then not tested.
 
     Returns:
-        The verdict at `FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
+        The verdict at `GAP_FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
     """
-    # stated noise that the records bear out may still lie a little below theirs
-    floor = (1.0 + _FLOOR_TOLERANCE) * max(noise.estimated / noise.used, 1.0)
+    # stated noise may be a little below that of the records and still agree with it
+    floor = (1.0 + FLOOR_TOLERANCE) * max(noise.estimated / noise.used, 1.0)
     tests = dict(zip(BANDS, band_p_values(fit, floor), strict=True)) | {"offset": offset_p_value(fit, floor)}
     noisy: dict[str, float] = {}
     if not coarse_step and noise.source != "floor":
@@ -60,25 +57,25 @@ def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
         if noise.stated_variance is not None:
             noisy["noise level"] = level_p_value(fit, noise)
     everything = tests | noisy
-    limit = FALSE_ALARM_RATE / len(everything)
+    limit = GAP_FALSE_ALARM_RATE / len(everything)
     smallest = min(everything.values())
     return GapTest(
         smallest < limit,
         min(1.0, smallest * len(everything)),
         everything,
-        any(p < limit * 0.01 for p in noisy.values()),
+        any(p < limit * NOISE_FALSE_ALARM_SHARE for p in noisy.values()),
     )
 
 
 def offset_p_value(fit: Fit, floor: float = 1.0) -> float:
-    """Chance that white noise alone moves the runs' means from the common zero as far as they lie.
+    """Probability that white noise alone moves the runs' means as far from the common zero.
 
     Args:
         fit: its residuals, in noise standard deviations.
-        floor: power of white noise that counts as chance, a factor on the noise variance.
+        floor: power assumed for white noise, a factor on the noise variance.
 
     Returns:
-        The p-value, one degree of freedom given to the zero.
+        The p-value; the zero takes one degree of freedom.
     """
     total = sum(float(np.sum(residual)) ** 2 / residual.size for residual in fit.residuals)
     runs = len(fit.residuals)
@@ -86,11 +83,11 @@ def offset_p_value(fit: Fit, floor: float = 1.0) -> float:
 
 
 def band_p_values(fit: Fit, floor: float = 1.0) -> tuple[float, ...]:
-    """Chance that white noise alone gives as much power in each band, summed over the runs.
+    """Probability that white noise alone gives as much power in each band, summed over the runs.
 
     Args:
         fit: its residuals, in noise standard deviations.
-        floor: power of white noise that counts as chance, a factor on the noise variance.
+        floor: power assumed for white noise, a factor on the noise variance.
 
     Returns:
         One p-value per band of `BANDS`; the bands are multiples of each run's own frequency.

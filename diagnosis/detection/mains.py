@@ -1,4 +1,4 @@
-"""The hum of the mains: found as a line, taken out before anything else is fitted."""
+"""The hum of the mains: found as a spectral line, and removed before any effect is fitted."""
 
 from __future__ import annotations
 
@@ -12,20 +12,13 @@ from scipy.stats import chi2
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import mains_line, smooth_spectra
+from diagnosis.policy import HUM_CONTRAST, HUM_RUN_DROP, HUM_RUNS, SWELL_FALSE_ALARM_RATE
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
 
 _HARMONICS = 5
-#: A run shows the line when taking it out lowers χ² by this much: at one given frequency,
-#: by chance in one run of 1800.
-_RUN_DROP = 15.0
-#: Share of the runs that must show it: the mains hum in every run.
-_RUN_SHARE = 0.75
-#: Fastest swelling of its amplitude that is looked for, Hz, and how seldom one is found in a steady hum.
+#: Fastest swelling of its amplitude that is sought, Hz.
 _SWELL_UP_TO = 0.6
-_SWELL_RATE = 1e-6
-#: Drop of χ² at the line over the largest beside it, all runs together.
-_CONTRAST = 4.0
 
 
 @dataclass(frozen=True)
@@ -36,7 +29,7 @@ class Hum:
         frequency: Hz.
         amplitude: of the fundamental, rad, root mean square over the runs.
         std: its standard deviation, rad.
-        frequency_std: standard deviation of the frequency, Hz; None where no amplitude stands out.
+        frequency_std: standard deviation of the frequency, Hz; None where the amplitude is not above the noise.
         excess: what it adds to the mean squared residual over the noise variance, a ratio.
     """
 
@@ -54,25 +47,25 @@ def find_hum(nominal: Fit) -> float | None:
         nominal: its residuals.
 
     Returns:
-        Its frequency, Hz; None where there is none beyond chance. A ringing rod and harmonics of a motion with
-        corners raise the spectrum beside the line as well, and do not pass.
+        Its frequency, Hz; None where there is none beyond chance. A ringing rod and the harmonics of a motion with
+        corners also raise the spectrum beside the line, and are therefore rejected.
     """
     line = mains_line(nominal)
-    if line is None or line.contrast < _CONTRAST:
+    if line is None or line.contrast < HUM_CONTRAST:
         return None
-    shown = [spectrum.power(line.parameter) > _RUN_DROP for spectrum in smooth_spectra(nominal)]
-    return line.parameter if np.mean(shown) >= _RUN_SHARE else None
+    shown = [spectrum.power(line.parameter) > HUM_RUN_DROP for spectrum in smooth_spectra(nominal)]
+    return line.parameter if np.mean(shown) >= HUM_RUNS else None
 
 
 def refine_frequency(campaign: Campaign, frequency: float) -> float:
-    """The mains' frequency to a small part of a spectral bin.
+    """The frequency of the mains, to a small fraction of a spectral bin.
 
     Args:
         campaign: the runs.
         frequency: Hz, to within 0.02 Hz.
 
     Returns:
-        The frequency at which sines and their harmonics take most out of all records, Hz.
+        The frequency at which a sine and its harmonics remove most power from all records, Hz.
     """
 
     def left(trial: float) -> float:
@@ -85,7 +78,7 @@ def refine_frequency(campaign: Campaign, frequency: float) -> float:
 
 
 def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[Campaign, Hum]:
-    """Take a hum and its harmonics out of every record.
+    """Remove a hum and its harmonics from every record.
 
     Args:
         campaign: the runs.
@@ -93,7 +86,7 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
         variance: of the noise of one sample, rad².
 
     Returns:
-        The campaign without it, and what was taken out.
+        The campaign without it, and the hum that was removed.
     """
     cleaned, squares, powers = [], [], []
     swells = _swells([run.record for run in campaign.runs], frequency, variance)
@@ -112,7 +105,7 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
 
 
 def _frequency_std(records: list[Record], amplitude: float, variance: float) -> float | None:
-    """Of the peak of the windowed spectra of all records, Hz, by what white noise moves it, harmonics left out.
+    """Standard deviation of the peak of all records' windowed spectra under white noise, Hz; fundamental only.
 
     Of one record of window w the variance of ω is 2 S² Σw²τ²/(a Σwτ²)², τ from its middle: with a flat window that
     is the bound 24 S²/(a² n T²) (Rife & Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591,
@@ -145,7 +138,7 @@ def _line_power(record: Record, frequency: float) -> float:
 def _remove(record: Record, frequency: float, swells: bool) -> tuple[Record, float, float]:
     """A record without the line and its harmonics, the fundamental's amplitude and the mean square removed."""
     design = np.column_stack([_lines(record, frequency), *([_swell(record, frequency)] if swells else [])])
-    # the ends of a swelling hum must be seen to be taken out
+    # a window that keeps the ends, where a swelling hum may be strongest
     window = tukey(record.time_s.size, 0.3) if swells else np.hanning(record.time_s.size)
     coefficients = _windowed_fit(record, design, window)
     wave: Array = design @ coefficients
@@ -174,7 +167,7 @@ def _swell(record: Record, frequency: float) -> Array:
 
 
 def _swells(records: list[Record], frequency: float, variance: float) -> bool:
-    """Whether the hum's amplitude varies within the runs beyond chance (false-alarm rate `_SWELL_RATE`)."""
+    """Whether the hum's amplitude varies within the runs beyond chance (`SWELL_FALSE_ALARM_RATE`)."""
     power, count = 0.0, 0
     for record in records:
         if int(2.0 * _SWELL_UP_TO * (record.time_s[-1] - record.time_s[0])) < 1:
@@ -182,16 +175,16 @@ def _swells(records: list[Record], frequency: float, variance: float) -> bool:
         steady, swelling = _lines(record, frequency), _swell(record, frequency)
         window = np.hanning(record.time_s.size)[:, None]
         both = np.linalg.qr(np.column_stack([steady, swelling]) * window)[0][:, steady.shape[1] :]
-        # white noise seen through the window has the window's mean square
+        # windowed white noise has the window's mean square
         share = both.T @ (both * window**2)
         found = both.T @ (_detrended(record.yaw_rad) * window[:, 0])
         power += float(found @ np.linalg.solve(share, found)) / variance
         count += swelling.shape[1]
-    return count > 0 and power > float(chi2.isf(_SWELL_RATE, count))
+    return count > 0 and power > float(chi2.isf(SWELL_FALSE_ALARM_RATE, count))
 
 
 def _windowed_fit(record: Record, design: Array, window: Array) -> Array:
-    """Coefficients of the columns; windowed, the slow motion leaks little into a line 40 times its frequency."""
+    """Coefficients of the columns; the window keeps the slow motion from leaking into a line far above it."""
     return np.asarray(
         np.linalg.lstsq(design * window[:, None], _detrended(record.yaw_rad) * window, rcond=None)[0]
     )

@@ -1,4 +1,4 @@
-"""What the noise's statistics are by chance: white noise on the fitted motion, read off a lattice."""
+"""Null distribution of the noise's statistics: white noise on the fitted motion, rounded like the readings."""
 
 from __future__ import annotations
 
@@ -11,23 +11,20 @@ from scipy.stats import binom, t
 
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend, trend_statistics
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.policy import NOISE_TAILS, ROUNDED_NOISE
 from tunnel_sim.vocabulary.record import Array
 
-#: Heavier tails than white noise has by this factor are let pass: a sensor's noise is not quite normal.
-_TAILS = 1.15
-#: Stated noise is often rounded to one digit, which moves its square by up to this factor.
-_ROUNDED_NOISE = 1.5
 #: Repetitions of the campaign, fewer where it is long, never below the least.
 _REPETITIONS, _FEWEST, _SAMPLES = 32, 16, 2.5e6
-#: A step this many times the noise beside it makes that noise uncertain; several are tried then.
+#: A step this many times the noise hides the noise's level; several levels are then tried.
 _COARSE = 3.0
 _FACTORS = (0.5, 1.0, 1.5)
 _NAMES = ("noise against amplitude", "noise against rate", "noise in bursts")
-_HANN = 1.57  # correlated bins of the periodogram that carry what one would without a window
+_HANN = 1.57  # correlated bins of the windowed periodogram that carry the information of one independent bin
 
 
 def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, float]:
-    """Chance that white noise behaves as the campaign's does.
+    """Probability that white noise behaves like that of the campaign.
 
     Args:
         trend: of the campaign.
@@ -37,8 +34,8 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
     Returns:
         P-values by name, from Student's t of the campaign among repetitions of it simulated with white noise
         and the readings' lattice (a prediction interval for one more; Geisser, Predictive Inference, 1993);
-        where the lattice hides the noise, the largest over noises that may be behind it. All 1 where the sampling
-        is too slow to tell.
+        where the lattice hides the noise, the largest over several possible levels. All 1 where the sampling is
+        too slow for the test.
     """
     if not trend.judged:
         return dict.fromkeys(_NAMES, 1.0)
@@ -56,7 +53,7 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
 def _p_values(trend: NoiseTrend, chance: Array) -> Array:
     count = len(chance)
     mean, scatter = chance.mean(axis=0), np.maximum(chance.std(axis=0, ddof=1), 1e-9)
-    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(_TAILS)])
+    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(NOISE_TAILS)])
     score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / count))
     two_sided = 2.0 * t.sf(np.abs(score[:2]), count - 1)
     return np.append(two_sided, t.sf(score[2], count - 1))
@@ -67,14 +64,14 @@ def _repetitions(fit: Fit, white: Mapping[str, float], step: float) -> Array:
     runs = fit.problem.data.runs
     samples = sum(run.reading.size * run.block for run in runs)
     count = int(np.clip(_SAMPLES / samples, _FEWEST, _REPETITIONS))
-    # the same campaign is held against the same repetitions, another against others
+    # seeded by the readings: the same campaign is always compared with the same repetitions
     rng = np.random.default_rng([zlib.crc32(run.reading.tobytes()) for run in runs])
     readings = []
     for run, residual in zip(runs, fit.residuals, strict=True):
         motion = _motion(run.reading - residual * np.sqrt(run.noise_variance), run.block)
         reading = motion + white[run.id] * rng.standard_normal((count, motion.size))
         if step > 0.0:
-            # where the lattice lies is not known
+            # the lattice's origin is not known
             shift = step * rng.uniform(size=(count, 1))
             reading = step * np.round((reading + shift) / step)
         readings.append((reading, run.block / run.interval))
@@ -92,21 +89,21 @@ def _motion(blocks: Array, block: int) -> Array:
 
 
 def level_p_value(fit: Fit, noise: Noise) -> float:
-    """Chance that noise as stated, or rounded up to that, is estimated as high as it is.
+    """Probability that noise as stated, allowing for its rounding, is estimated as high as it is.
 
     Args:
         fit: gives the records' lengths.
         noise: of the campaign; its stated variance is not None.
 
     Returns:
-        The p-value of a sign test: at least half the ordinates of the periodogram above the motion lie above the
-        median found, each with the chance that the largest noise the statement allows gives it.
+        The p-value of a sign test: that at least half the ordinates of the periodogram above the motion exceed the
+        median found, at the largest noise that the statement allows.
     """
     assert noise.stated_variance is not None
-    level = noise.estimated / (_ROUNDED_NOISE * noise.stated_variance)
+    level = noise.estimated / (ROUNDED_NOISE * noise.stated_variance)
     samples = sum(run.reading.size * run.block for run in fit.problem.data.runs)
     ordinates = max(int(_ABOVE * 0.5 * samples / _HANN), 1)
     return float(binom.sf((ordinates - 1) // 2, ordinates, 2.0**-level))
 
 
-_ABOVE = 0.48  # share of the ordinates that the estimate takes, where sampling is slowest
+_ABOVE = 0.48  # share of the ordinates that the estimate uses, where sampling is slowest

@@ -1,4 +1,4 @@
-"""Records that no diagnosis can begin from: said in one line, before any fit of many runs."""
+"""Campaigns that cannot be diagnosed are refused in one line, before the runs are fitted together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The noise of a record, from the part of its spectrum far above the motion, held against what is stated."""
+"""The noise of a record, from the part of its spectrum far above the motion, compared with what is stated."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.fitting.run_data import BLOCK_INTERVAL
+from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
 _FLOOR_FROM = 60.0  # Hz: above the motion, the rod's ringing and the mains
 _LN2 = float(np.log(2.0))  # median of a unit exponential: the periodogram of white noise
-_AGREES = 3.0  # standard deviations of the estimate at which the stated noise is borne out
-#: Share of the swing that block means and step leave in a fit of the nominal model's closed form, and its bands
-#: still pass for white.
+#: Error, as a share of the swing, that block means and steps leave in a fit of the closed form of the nominal
+#: model, while its bands still pass as white.
 _ACCURACY = 4e-5
-_APART = 4.065  # standard deviations from the mean at which a run's noise is its own
 
 
 @dataclass(frozen=True)
@@ -27,8 +26,8 @@ class Noise:
     Args:
         variance: of one sample, quantisation included, rad², by run id: what the diagnosis uses.
         stated_variance: of one sample as the campaign states it, rad²; None where it does not.
-        source: ``stated``, ``estimated`` or ``floor``: whose the variance used is. The floor is the accuracy of
-            the fits, where the records hold less noise than that.
+        source: of the variance used: ``stated``, ``estimated`` or ``floor``. The floor is the accuracy of the
+            fits, where the records contain less noise than that.
         reason: why, in words.
         estimate: the records' own variance, mean over the runs, rad²; None: the one used.
     """
@@ -51,7 +50,7 @@ class Noise:
 
 
 def estimate_variance(record: Record) -> tuple[float, float]:
-    """White-noise variance from the median periodogram above the motion.
+    """Variance of the white noise, from the median of the periodogram above the motion.
 
     Args:
         record: a run's reading.
@@ -70,7 +69,7 @@ def estimate_variance(record: Record) -> tuple[float, float]:
 
 
 def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
-    """One-sided periodogram with a window whose leakage stays below the floor.
+    """One-sided periodogram with a window whose leakage stays below the noise.
 
     Args:
         values: samples, shape (n,).
@@ -86,14 +85,14 @@ def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
 
 
 def campaign_noise(campaign: Campaign) -> Noise:
-    """The noise of every run: as stated where the records bear it out, else as estimated from them.
+    """The noise of every run: as stated where the records agree with it, else as estimated from them.
 
     Args:
         campaign: the runs.
 
     Returns:
-        The stated noise where runs agree with one another and their mean with it, within `_AGREES` standard
-        deviations of the estimate; else the estimate, pooled over runs where they agree with one another.
+        The stated noise where the runs agree with one another and their mean agrees with it, within `NOISE_AGREES`
+        standard deviations of the estimate; else the estimate, pooled over runs where they agree with one another.
     """
     estimates = {run.id: estimate_variance(run.record) for run in campaign.runs}
     variances = np.array([value for value, _ in estimates.values()])
@@ -102,19 +101,19 @@ def campaign_noise(campaign: Campaign) -> Noise:
     floors = {run.id: accuracy(run.record) ** 2 for run in campaign.runs}
     if any(floors[run] > value for run, (value, _) in estimates.items()):
         return _floor(campaign, {run: value for run, (value, _) in estimates.items()}, floors)
-    uniform = bool(np.all(np.abs(variances / pooled - 1.0) < _APART * relative))
+    uniform = bool(np.all(np.abs(variances / pooled - 1.0) < NOISE_OF_ITS_OWN * relative))
     estimated = {run.id: pooled if uniform else estimates[run.id][0] for run in campaign.runs}
     stated = _stated_variance(campaign.sensor, pooled)
     found = f"{np.sqrt(pooled):.3g} ± {0.5 * uncertainty * np.sqrt(pooled):.1g} rad"
     if stated is None:
         return Noise(estimated, None, "estimated", "the campaign states no noise", pooled)
     if not uniform:
-        said = f"its runs differ, {np.sqrt(variances.min()):.3g} to {np.sqrt(variances.max()):.3g} rad"
-    elif abs(pooled / stated - 1.0) < _AGREES * uncertainty:
+        said = f"their noise differs by run, {np.sqrt(variances.min()):.3g} to {np.sqrt(variances.max()):.3g} rad"
+    elif abs(pooled / stated - 1.0) < NOISE_AGREES * uncertainty:
         used = dict.fromkeys(estimated, stated)
         return Noise(used, stated, "stated", f"the records agree: {found}", pooled)
     else:
-        said = f"they hold {found}"
+        said = f"they contain {found}"
     reason = f"the records contradict the stated {np.sqrt(stated):.3g} rad: {said}"
     return Noise(estimated, stated, "estimated", reason, pooled)
 
@@ -122,9 +121,9 @@ def campaign_noise(campaign: Campaign) -> Noise:
 def _stated_variance(sensor: SensorProperties, estimate: float) -> float | None:
     """Variance of a sample as stated: with the resolution's share, or without where that is closer.
 
-    A data sheet may mean the noise before or after rounding.
+    A data sheet may give the noise before or after rounding.
     """
-    if not sensor.noise_std:  # a noise of zero states nothing a record could have
+    if not sensor.noise_std:  # no record has a noise of zero
         return None
     before = sensor.noise_std**2 + (sensor.resolution or 0.0) ** 2 / 12.0
     after = sensor.noise_std**2
@@ -132,26 +131,26 @@ def _stated_variance(sensor: SensorProperties, estimate: float) -> float | None:
 
 
 def _floor(campaign: Campaign, estimates: dict[str, float], floors: dict[str, float]) -> Noise:
-    """The accuracy of the fits in the place of a noise that is smaller."""
+    """The accuracy of the fits in place of a smaller noise."""
     pooled = float(np.mean(list(estimates.values())))
     used = {run: max(value, floors[run]) for run, value in estimates.items()}
     reason = (
-        f"the records hold {np.sqrt(pooled):.1g} rad, in {sum(used[r] > v for r, v in estimates.items())} of "
-        f"{len(used)} runs less than the fits' own accuracy, which stands in"
+        f"the records contain {np.sqrt(pooled):.1g} rad, in {sum(used[r] > v for r, v in estimates.items())} of "
+        f"{len(used)} runs less than the accuracy of the fits, which stands in for it"
     )
     return Noise(used, _stated_variance(campaign.sensor, pooled), "floor", reason, pooled)
 
 
 def accuracy(record: Record) -> float:
-    """How small a sample's noise may be before the fits' own errors show.
+    """How small a sample's noise may be before the errors of the fits show.
 
     Args:
         record: a run's reading.
 
     Returns:
-        Standard deviation of a sample, rad: a share of the swing, and thrice what RK4's loss of phase, (ωh)⁴/120
-        of it for steps h of a block (Hairer, Nørsett and Wanner, Solving ODEs I, sect. II.1), makes of the
-        reading: the error lies in one narrow band, noise in all.
+        Standard deviation of a sample, rad: a share of the swing, plus three times the error of the reading from
+        RK4's loss of phase, (ωh)⁴/120 of the phase for steps h of a block (Hairer, Nørsett and Wanner, Solving
+        ODEs I, sect. II.1). Three times, because the error lies in one narrow band and the noise in all.
     """
     swing = record.yaw_rad - np.mean(record.yaw_rad)
     cycles = 1 + int(np.argmax(np.abs(np.fft.rfft(swing)[1:])))
@@ -169,8 +168,8 @@ def reading_step(campaign: Campaign) -> float:
         campaign: the runs.
 
     Returns:
-        The smallest difference between distinct readings, rad: the true resolution where the record visits
-        neighbouring steps, as every decay does; far below any step where readings are continuous.
+        The smallest difference between distinct readings, rad. This is the true resolution where the record
+        visits neighbouring steps, as every decay does; it is far below any step where readings are continuous.
     """
     steps = []
     for run in campaign.runs:
@@ -190,10 +189,10 @@ class NoiseTrend:
         amplitude_z: slope of the local noise variance against the squared amplitude, in units of its standard
             deviation under steady white noise.
         rate_z: likewise against the squared rate.
-        spread: natural logarithm of the ratio of the local variances' standard deviation to what their quartiles
-            give (of a normal distribution): heavy tails. Skewness alone makes it some 0.1.
+        spread: natural logarithm of the ratio of the local variances' standard deviation to that of a normal
+            distribution with their quartiles: positive for heavy tails. Skewness alone makes it about 0.1.
         step: of the lattice of the readings, rad.
-        judged: whether the sampling is fast enough to tell.
+        judged: whether the sampling is fast enough for the test.
     """
 
     amplitude_z: float
@@ -203,19 +202,19 @@ class NoiseTrend:
     judged: bool = True
 
 
-_WINDOW = 0.02  # s: a small part of a swing, so that rate and angle differ
+_WINDOW = 0.02  # s: a small part of a swing, so that large angles and large rates fall in different windows
 _FEWEST = 10  # samples in a window
 
 
 def noise_trend(campaign: Campaign) -> NoiseTrend:
-    """Measure whether the noise is as strong in motion as at rest, and at all times.
+    """Measure whether the noise is as strong in motion as at rest, and the same at all times.
 
     Args:
         campaign: the runs.
 
     Returns:
-        Trends of the variance of fourth differences of the reading in windows of 20 ms, pooled over runs. What
-        white noise and the readings' lattice alone give is simulated (`diagnosis.detection.noise_under_null`).
+        Trends of the variance of fourth differences of the reading in windows of 20 ms, pooled over runs. Their
+        null distribution is simulated (`diagnosis.detection.noise_under_null`).
     """
     values = trend_statistics([(run.record.yaw_rad[None], run.record.sample_rate) for run in campaign.runs])
     if values is None:

@@ -1,8 +1,8 @@
-"""A start for motions the nominal model misses grossly: the balance of moments, sample by sample.
+"""Starting points for motions that the nominal model misses grossly: the balance of moments, sample by sample.
 
-Where a fitted trajectory runs out of phase, its sensitivities say nothing. The equation of motion itself is
-linear in the parameters of many effects, so a regression on smoothed angle, rate and acceleration (the equation-
-error method; Klein & Morelli, Aircraft System Identification, AIAA 2006) gives a start for the trajectory's fit.
+Where a fitted trajectory is out of phase with the record, its sensitivities are useless. The equation of motion is
+linear in the parameters of many effects, so that a regression on smoothed angle, rate and acceleration (the
+equation-error method; Klein & Morelli, Aircraft System Identification, AIAA 2006) gives a starting point.
 """
 
 from __future__ import annotations

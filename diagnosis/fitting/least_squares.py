@@ -64,7 +64,7 @@ class Fit:
         return float(self.point.common[self.problem.names.index(name)])
 
     def std(self, name: str) -> float:
-        """Its standard deviation, were the model right."""
+        """Its standard deviation, if the model is right."""
         i = self.problem.names.index(name)
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
 
@@ -93,10 +93,10 @@ def fit(
     Args:
         problem: runs and effects.
         start: parameter values to start from.
-        base: a fit of the same runs with fewer effects. Its sensitivities then stand in for those of the
-            parameters both have while that makes good progress, which spares most of the simulations.
-        tolerance: a step must lower χ² by this share, or by 0.1, to go on.
-        max_iterations: Gauss–Newton steps at the most.
+        base: a fit of the same runs with fewer effects. While progress is good, its sensitivities are used for
+            the parameters that both have, which saves most of the simulations.
+        tolerance: the fit goes on while a step lowers χ² by this share, or by 0.1.
+        max_iterations: Gauss–Newton steps at most.
 
     Returns:
         The fit at the best point found.
@@ -114,7 +114,7 @@ def fit(
         gain = state.improve()
         poor = gain < max(0.1, 0.02 * state.cost) if borrowed else gain < max(0.1, tolerance * state.cost)
         if poor and borrowed:
-            borrowed = False  # once more with sensitivities of its own
+            borrowed = False  # once more with its own sensitivities
         elif poor:
             converged = True
     return state.result(iterations, converged)
@@ -128,7 +128,7 @@ def fit_growing(problem: Problem, start: Point) -> Fit:
 
     Args:
         problem: runs and effects.
-        start: parameter values to start from; they may run out of phase well before the records end.
+        start: parameter values to start from; their motion may be out of phase before the records end.
 
     Returns:
         The fit of the whole records.
@@ -143,7 +143,7 @@ def fit_growing(problem: Problem, start: Point) -> Fit:
             for run in problem.data.runs
         )
         shorter = Problem(
-            dataclasses.replace(problem.data, runs=runs), problem.effects, problem.fixed, problem.bent
+            dataclasses.replace(problem.data, runs=runs), problem.effects, problem.fixed, problem.free_forms
         )
         point = fit(shorter, point, tolerance=1e-3, max_iterations=15).point
     return fit(problem, point)
@@ -235,7 +235,7 @@ def _cost(residuals: list[Array]) -> float:
 
 
 def difference_steps(problem: Problem, common: Array) -> Array:
-    """Steps for finite differences of the common parameters, one way, away from bounds.
+    """Steps for one-sided finite differences of the common parameters, away from bounds.
 
     Args:
         problem: gives the parameters and their bounds.
@@ -270,7 +270,7 @@ def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> li
     Args:
         problem: runs and effects.
         point: where.
-        base: a fit of the same runs whose derivatives are taken over for the parameters it has.
+        base: a fit of the same runs; its derivatives are reused for the parameters it has.
 
     Returns:
         By run: with respect to the common parameters, shape (n, common), and the run's own, shape (n, own).
@@ -365,7 +365,7 @@ def _covariance(jacobian: list[tuple[Array, Array]]) -> Array:
 
 
 def project_release(change: Array, slopes: Array) -> Array:
-    """What of a change of one run's prediction its release cannot absorb.
+    """The part of a change of one run's prediction that its release cannot absorb.
 
     Args:
         change: shape (n,).

@@ -15,16 +15,15 @@ from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
+from tunnel_sim.physics.release import released_by_spring_end
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.steps import fit_substeps
 from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
-_LONGEST_STEP = 4.001e-3  # s
-_RESOLUTION = 0.055  # rad of the oscillation in one step: RK4 then errs by some 1e-6 rad over 10 s
-_ROD_RESOLUTION = 0.5  # rad of the rod's own oscillation in one step
 _THREADS = 2
-_SOFT_ROD = 2e-5  # rad/(N m): a stiffer rod's ringing at the release stays below the noise
+_SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
 _POOL = ThreadPoolExecutor(_THREADS)
 
 
@@ -50,13 +49,13 @@ class Problem:
         data: the runs.
         effects: effect classes whose parameters are free.
         fixed: value of effect parameters that are held, as ``effect.parameter``.
-        bent: names of effects whose form is free; the others keep the textbook's.
+        free_forms: names of the effects whose form parameters are free; the others keep the textbook form.
     """
 
     data: Data
     effects: tuple[type[Effect], ...] = ()
     fixed: tuple[tuple[str, float], ...] = ()
-    bent: tuple[str, ...] = ()
+    free_forms: tuple[str, ...] = ()
 
     @cached_property
     def nominal_names(self) -> tuple[str, ...]:
@@ -72,7 +71,7 @@ class Problem:
             f"{kind.name}.{info.name}"
             for kind in self.effects
             for info in kind.parameters()
-            if not info.form or kind.name in self.bent
+            if not info.form or kind.name in self.free_forms
         ]
         held = dict(self.fixed)
         return tuple(name for name in names if name not in held)
@@ -179,10 +178,10 @@ class _Job:
         self.run = run
         self.zero = float(point.common[problem.nominal_names.index("zero")])
         self.chain = problem.chain(point.common, point.release[run_index], run)
-        physics = held_end(condensed(self.chain.physics(), problem.data))
+        physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         self.row, self.keep_alive = forward_run(physics)
         self.law = parameter_vector(physics.law(campaign_rig(problem.data)))
-        substeps = int(np.ceil(run.interval / _longest_step(physics)))
+        substeps = fit_substeps(physics, run.interval)
         self.row["step"], self.row["steps"] = run.interval / substeps, substeps
 
     def reading(self, angle: Array, rate: Array) -> Array:
@@ -201,7 +200,7 @@ class _Job:
 
 
 def condensed(physics: RunSettings, data: Data) -> RunSettings:
-    """Replace a rod too stiff to ring visibly by its first-order effect on the slow motion.
+    """Replace a rod that is too stiff to ring visibly by its first-order effect on the slow motion.
 
     With compliance c, the body leads the sensor's end by φ = a θ, a = c (s Ka + (1 − s) Kr): the inertia at the
     sensor's end grows by the share (1 − s) a, and the air sees (1 + a) θ. What is dropped is of order (c Kr)².
@@ -225,32 +224,6 @@ def condensed(physics: RunSettings, data: Data) -> RunSettings:
     )
     inertia = physics.yaw_inertia * (1.0 + (1.0 - share) * lead)
     return dataclasses.replace(physics, rod_twist=None, derivatives=air_seen, yaw_inertia=inertia)
-
-
-def held_end(physics: RunSettings) -> RunSettings:
-    """Take the release as that of the sensor's end, which is what a record shows.
-
-    Args:
-        physics: whose release angle is the sensor's end's.
-
-    Returns:
-        The same with the body's release angle.
-    """
-    if physics.rod_twist is None:
-        return physics
-    body = physics.release_angle * (1.0 + physics.spring_stiffness * physics.rod_twist.compliance)
-    return dataclasses.replace(physics, release_angle=body)
-
-
-def _longest_step(physics: RunSettings) -> float:
-    twist = physics.rod_twist
-    omega = np.sqrt(physics.spring_stiffness / physics.yaw_inertia)
-    longest = min(_LONGEST_STEP, _RESOLUTION / max(omega, 1e-9))
-    if twist is None:
-        return float(longest)
-    share = twist.inertia_share
-    own = np.sqrt(1.0 / (twist.compliance * physics.yaw_inertia * share * (1.0 - share)))
-    return float(min(longest, max(_ROD_RESOLUTION / own, 2e-4)))
 
 
 def campaign_rig(data: Data) -> Rig:

@@ -160,7 +160,7 @@ def hermite_means(block: int) -> Array:
 def without_start(data: Data) -> Data:
     """The runs from their second passage through the middle on.
 
-    A hand that lets go late drives the start of a record, which no free decay explains.
+    Where a hand lets go late, the start of the record is driven, which no free decay explains.
 
     Args:
         data: the runs.

@@ -36,7 +36,7 @@ class Spectrum:
         return found
 
     def power(self, frequency: float | Array) -> Array:
-        """Drop of χ² when a sine of free amplitude and phase is taken out."""
+        """Drop of χ² when a sine of free amplitude and phase is removed."""
         value: Array = np.abs(self.at(frequency)) ** 2 * self.count / 2.0
         return value
 
@@ -45,7 +45,7 @@ def residual_spectra(fit: Fit) -> list[Spectrum]:
     """The spectrum of every run's scaled residuals.
 
     Args:
-        fit: whose residuals.
+        fit: gives the residuals.
 
     Returns:
         One spectrum per run, in order.
@@ -71,12 +71,12 @@ class Line:
 
     Args:
         parameter: frequency in Hz for the mains, Strouhal number for shedding.
-        drop: of χ² by taking it out of the runs concerned, dimensionless.
+        drop: of χ² when the line is removed from the runs concerned, dimensionless.
         contrast: ratio of the drop at the line to the drop beside it (the greatest for the mains, the median for
             shedding).
         amplitude: rad at the sensor for the mains, moment coefficient for shedding.
         phases: of sine, rad, by run, shape (runs,); zero for runs not concerned.
-        runs: how many runs it was sought in.
+        runs: number of runs searched.
     """
 
     parameter: float
@@ -91,7 +91,7 @@ def mains_line(fit: Fit) -> Line | None:
     """The strongest line near 50 Hz common to all runs.
 
     Args:
-        fit: whose residuals.
+        fit: gives the residuals.
 
     Returns:
         The line; None where the sampling is too slow to see it.
@@ -127,7 +127,7 @@ def smooth_spectra(fit: Fit) -> list[Spectrum]:
 
 
 def _smooth(spectrum: Spectrum) -> Spectrum:
-    """The spectrum with the leakage of a strong line taken down (Hann window, in the frequency domain)."""
+    """The spectrum with less leakage of strong lines: a Hann window, applied in the frequency domain."""
     step = _PADDING
     values = spectrum.transform
     hann = 0.5 * values.copy()
@@ -145,7 +145,7 @@ def shedding_line(fit: Fit) -> Line | None:
     """The strongest line at one Strouhal number in all wind-on runs.
 
     Args:
-        fit: whose residuals.
+        fit: gives the residuals.
 
     Returns:
         The line; None without wind or body width.
@@ -184,7 +184,7 @@ def shedding_line(fit: Fit) -> Line | None:
 
 
 def _local_excess(power: Array) -> Array:
-    """Cap on power so that one run cannot carry a line alone: ten times the run's own 99th percentile."""
+    """Cap on power, so that no run carries a line alone: ten times the run's own 99th percentile."""
     return np.full_like(power, 10.0 * float(np.quantile(power, 0.99)) + 1.0)
 
 

@@ -1,4 +1,4 @@
-"""Where fits start: the nominal model from the record alone, and an effect's severity from its signature."""
+"""Where fits start: the nominal model from the records alone, and an effect's severity from its signature."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from diagnosis.fitting.least_squares import Fit, clip, normal_equations, scaled_
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.spectra import Line, mains_line, shedding_line
+from diagnosis.policy import GROSS_MISFIT
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import Circumstances, Trial
 from tunnel_sim.vocabulary.record import Array
 
-_GROSS = 0.01  # share of the reading's power
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
@@ -44,7 +44,7 @@ def nominal_start(data: Data) -> Point:
     pressure = np.array(
         [0.5 * r.air_density * r.wind_speed**2 * data.frontal_area * data.reference_length for r in data.runs]
     )
-    # Kr = Izz ω² + pressure Cnβ, relative errors alike
+    # Kr = Izz ω² + pressure Cnβ, with equal relative errors
     design = np.column_stack([omega2, pressure]) / spring[:, None]
     if not data.wind_on:
         design = design[:, :1]
@@ -72,7 +72,7 @@ def _frequency(run: RunData) -> float:
 
 @dataclass(frozen=True)
 class StartingPoint:
-    """Where the fit of an effect starts, and what linear theory predicts of it.
+    """Where the fit of an effect starts, and how much linear theory predicts that it closes.
 
     Args:
         problem: the fit with the effect added.
@@ -114,7 +114,7 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
 
 
 def is_gross(fit: Fit) -> bool:
-    """Whether a fit misses the motion itself, so that its sensitivities say little.
+    """Whether a fit misses the motion itself, so that its sensitivities are of little use.
 
     Args:
         fit: any fit.
@@ -125,14 +125,14 @@ def is_gross(fit: Fit) -> bool:
     readings = sum(
         float(np.sum((r.reading - np.mean(r.reading)) ** 2 / r.noise_variance)) for r in fit.problem.data.runs
     )
-    return fit.total > _GROSS * readings
+    return fit.total > GROSS_MISFIT * readings
 
 
 def _balanced_start(base: Fit, kind: type[Effect]) -> StartingPoint | None:
     held = {f"{kind.name}.{name}": value for name, value in kind.regressed_at.items()}
     fixed = dict(base.problem.fixed) | held
     problem = Problem(
-        base.problem.data, (*base.problem.effects, kind), tuple(fixed.items()), base.problem.bent
+        base.problem.data, (*base.problem.effects, kind), tuple(fixed.items()), base.problem.free_forms
     )
     point = equation_error_start(problem)
     if point is None:
@@ -143,7 +143,9 @@ def _balanced_start(base: Fit, kind: type[Effect]) -> StartingPoint | None:
 
 
 def _line_start(base: Fit, kind: type[Effect], line: Line) -> StartingPoint:
-    problem = Problem(base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.bent)
+    problem = Problem(
+        base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.free_forms
+    )
     severity, place = kind.parameters()
     lower, upper = severity.lower, severity.upper
     values = np.array(
@@ -163,7 +165,7 @@ def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint 
     held = {} if spring is None else {spring: trial.values[spring]}
     fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
     freed = any(info.form and info.name in trial.values for info in kind.parameters())
-    with_free_form = (*base.problem.bent, kind.name) if freed else base.problem.bent
+    with_free_form = (*base.problem.free_forms, kind.name) if freed else base.problem.free_forms
     problem = Problem(base.problem.data, (*base.problem.effects, kind), fixed, with_free_form)
     infos = [info for info in kind.parameters() if info.name not in held and (freed or not info.form)]
     scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)
@@ -210,7 +212,7 @@ def _moderate_change(base: Fit, problem: Problem, values: Array, scaled: int | N
 
 
 def project_out(base: Fit, columns: list[Array]) -> list[Array]:
-    """What of a change of the prediction the fitted parameters cannot absorb.
+    """The part of a change of the prediction that the fitted parameters cannot absorb.
 
     Args:
         base: a fit, whose common parameters and releases absorb.

@@ -1,6 +1,6 @@
 """Backbone curves: frequency and damping of every run against its amplitude, with bands.
 
-A linear rig shows level lines; how they bend is the mark of an effect of stiffness or of damping.
+A linear rig shows level lines. Their slope and curvature are signs of an effect on stiffness or on damping.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class Backbone:
         zeta_std: likewise, shape (n,).
         nominal_frequency: of the nominal model, Hz.
         nominal_zeta: of the nominal model, dimensionless.
-        alone_frequency: of a linear fit to this run alone, Hz; None where that fails.
-        alone_zeta: likewise, dimensionless.
+        alone_frequency: frequency of a linear fit to this run alone, Hz; None where that fails.
+        alone_zeta: damping ratio of the same fit.
         alone_excess: mean squared scaled residual of that fit minus one, a ratio.
     """
 
@@ -58,10 +58,10 @@ def backbones(fit: Fit, starts: Sequence[float] = ()) -> list[Backbone]:
 
     Args:
         fit: of the nominal model; gives zero, noise and starting values.
-        starts: what the fit left out of every record, s; nothing where empty.
+        starts: time that the fit left out at the start of every record, s; nothing where empty.
 
     Returns:
-        One per run, in order; without windows where a run decays too soon for any.
+        One per run, in order; without windows where a run decays too quickly for any.
     """
     return [
         _backbone(fit, i, run, starts[i] if starts else 0.0) for i, run in enumerate(fit.problem.data.runs)
@@ -101,8 +101,8 @@ def drift(curves: list[Backbone]) -> tuple[float, float]:
         curves: by run.
 
     Returns:
-        χ² beyond that of level lines, of frequency and of damping: an effect of stiffness bends the first, one
-        of damping the second. Window for window the two are known equally well in ω, so they compare.
+        χ² beyond that of level lines, of frequency and of damping: an effect on stiffness raises the first, one
+        on damping the second. In each window the two are known equally well in ω, so that they can be compared.
     """
     return (
         sum(_departure(c.frequency, c.frequency_std) for c in curves),

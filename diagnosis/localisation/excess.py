@@ -1,8 +1,8 @@
-"""How the squared residual is shared out over frequency, time and amplitude.
+"""How the squared residual is distributed over frequency, time and amplitude.
 
-Residuals are taken apart by the orthonormal cosine transform (Ahmed, Natarajan & Rao, IEEE Trans. Comput. 23
+Residuals are decomposed by the orthonormal cosine transform (Ahmed, Natarajan & Rao, IEEE Trans. Comput. 23
 (1974) 90, doi 10.1109/T-C.1974.223784): it keeps the sum of squares, so that under white noise every squared
-coefficient is χ² with one degree of freedom, and it does not take a record's two ends for neighbours.
+coefficient is χ² with one degree of freedom, and it does not treat a record's two ends as neighbours.
 """
 
 from __future__ import annotations
@@ -16,11 +16,10 @@ from scipy.stats import chi2
 from diagnosis.detection.sensor_noise import estimate_variance
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import resonance
+from diagnosis.policy import FLOOR_STD, INTERVAL_SHARE, PLACE_FALSE_ALARM_RATE
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
-#: Chance that the runs or bands of a campaign without a gap are said to hold one, all tests together.
-FALSE_ALARM_RATE = 0.01
 #: Bands by their upper edges in multiples of the run's own frequency.
 BANDS: tuple[tuple[str, float], ...] = (
     ("0", 0.5),
@@ -29,9 +28,7 @@ BANDS: tuple[tuple[str, float], ...] = (
     ("3f0", 3.5),
     ("above", np.inf),
 )
-_SHARE = 0.8  # of the excess that a stated interval holds
-_FLOOR = 0.015  # the floor below 60 Hz may differ by so much from the one measured above it
-_OWN = 2.0  # parameters of a run that soak up residual: its angle and rate at the release
+_OWN = 2.0  # parameters of a run that absorb residual: its angle and rate at the release
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +67,7 @@ class RunExcess:
         return np.searchsorted([edge for _, edge in BANDS], self.frequency / self.resonance, side="right")
 
     def p_value(self) -> float:
-        """Chance of a run as far from white noise without a gap: the least over all power and every band."""
+        """Probability of as much power without a gap: the least of the tests, times their number."""
         tests = [chance(float(self.power.sum()), self.power.size - self.absorbed, self.relative)]
         for index, (name, _) in enumerate(BANDS):
             power = self.power[self.band == index]
@@ -81,7 +78,7 @@ class RunExcess:
 
 
 def chance(total: float, freedom: float, relative: float) -> float:
-    """Chance that white noise reaches a sum of squares.
+    """Probability that white noise reaches a sum of squares.
 
     Args:
         total: sum of squares, in units of the noise variance.
@@ -89,7 +86,7 @@ def chance(total: float, freedom: float, relative: float) -> float:
         relative: standard deviation of the noise variance, as a share of it.
 
     Returns:
-        The upper tail of a χ² variable stretched to the wider spread that an estimated noise level gives.
+        The upper tail of a χ² variable, widened for the uncertainty of the noise level.
     """
     if freedom <= 0.0:
         return 1.0
@@ -101,8 +98,8 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
     """Every run's squared residual by frequency.
 
     Args:
-        campaign: the records, for how well their noise is known.
-        fit: whose residuals.
+        campaign: the records, which give the uncertainty of the noise.
+        fit: gives the residuals.
 
     Returns:
         One per run, in order.
@@ -114,7 +111,7 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
     levels = [run.noise_variance * run.block for run in data.runs]
     if np.allclose(levels, levels[0], rtol=1e-9):
         relative = [float(np.mean(relative)) / np.sqrt(len(relative))] * len(relative)
-    relative = [float(np.hypot(value, _FLOOR)) for value in relative]
+    relative = [float(np.hypot(value, FLOOR_STD)) for value in relative]
     shared = len(fit.problem.names) / len(data.runs)
     return [
         RunExcess(
@@ -137,7 +134,7 @@ class BandExcess:
         band: its name in `BANDS`.
         excess: sum of power beyond that of white noise, in units of the noise variance.
         mean: the same by coefficient, a ratio.
-        p_value: chance of as much without a gap, a probability.
+        p_value: probability of as much without a gap.
     """
 
     band: str
@@ -183,7 +180,7 @@ def telling_bands(bands: tuple[BandExcess, ...]) -> tuple[str, ...]:
     Returns:
         Names.
     """
-    level = FALSE_ALARM_RATE / max(len(bands), 1)
+    level = PLACE_FALSE_ALARM_RATE / max(len(bands), 1)
     found = tuple(band.band for band in bands if band.p_value < level and band.excess > 0.0)
     return found or tuple(band.band for band in bands)
 
@@ -221,7 +218,7 @@ class Profile:
     mean: Array
     std: Array
 
-    def interval(self, share: float = _SHARE) -> tuple[float, float] | None:
+    def interval(self, share: float = INTERVAL_SHARE) -> tuple[float, float] | None:
         """The shortest interval that holds a share of the excess; None where there is no excess."""
         return shortest_interval(self.edges, self.energy, share)
 

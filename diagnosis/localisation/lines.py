@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.localisation.excess import FALSE_ALARM_RATE, RunExcess, chance
+from diagnosis.localisation.excess import RunExcess, chance
+from diagnosis.policy import LINE_CONTRAST, PLACE_FALSE_ALARM_RATE
 from tunnel_sim.vocabulary.record import Array
 
 _WIDTH = 5  # coefficients a line spreads over
-_AROUND = 60  # coefficients on either side that show what a line stands out from
-_CONTRAST = 8.0  # a line is this many times the median around it; a resonance's skirt is not
-_HARMONIC = 0.2  # of the run's frequency: nearer to a harmonic it is the motion's own
-_OWN = 0.4  # likewise of the motion itself, whose frequency may drift
+_AROUND = 60  # coefficients on either side, whose median a line must exceed
+_HARMONIC = 0.2  # of the run's frequency: a line nearer to a harmonic belongs to the motion
+_OWN = 0.4  # of the run's frequency: the same for the motion itself, whose frequency may drift
 _LOWEST = 0.5  # of the run's frequency: below, drifts look like lines
-_APART = 0.5  # of the run's frequency, between two lines: nearer, it is the same line's skirt
+_APART = 0.5  # of the run's frequency, between two lines: a nearer one is the skirt of the first
 _PER_RUN = 2
 
 
@@ -61,10 +61,10 @@ def _lines(run: RunExcess, noise_std: float, runs: int) -> list[ResidualLine]:
     for index in np.argsort(np.where(open_to, local, 0.0))[::-1][: 20 * _PER_RUN].tolist():
         excess = float(local[index]) - _WIDTH
         unlikely = runs * run.power.size * chance(float(local[index]), _WIDTH, run.relative)
-        if unlikely > FALSE_ALARM_RATE or len(found) == _PER_RUN:
+        if unlikely > PLACE_FALSE_ALARM_RATE or len(found) == _PER_RUN:
             break
         near = any(abs(line.frequency - run.frequency[index]) < _APART * run.resonance for line in found)
-        if not open_to[index] or near or local[index] < _CONTRAST * _around(local, index):
+        if not open_to[index] or near or local[index] < LINE_CONTRAST * _around(local, index):
             continue
         whole = max(float(run.power.sum()) - run.power.size, excess)
         amplitude = noise_std * float(np.sqrt(2.0 * excess / run.power.size))

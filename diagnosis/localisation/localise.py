@@ -1,49 +1,44 @@
-"""Where the gap is: which runs, when, at which amplitudes and frequencies, on which channel, and when."""
+"""Where the gap is: the runs, times, amplitudes and frequencies that show it, its channel and its condition."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
-from diagnosis.detection.sensor_noise import campaign_noise
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import prepare
-from diagnosis.localisation.excess import FALSE_ALARM_RATE, run_excesses, telling_bands
+from diagnosis.localisation.excess import RunExcess, run_excesses, telling_bands
 from diagnosis.localisation.inference import Finding, blow_interval, infer_channel, infer_condition
 from diagnosis.localisation.mapping import Survey, survey
 from diagnosis.localisation.maps import Maps
 from diagnosis.localisation.words import describe, nowhere
 from diagnosis.names import plain
+from diagnosis.policy import NAMED_RUN_SHARE, PLACE_FALSE_ALARM_RATE
 from diagnosis.result import Where
-from tunnel_sim.effects import ALL_EFFECTS, effect_class
-from tunnel_sim.vocabulary.campaign import Campaign
-
-_LITTLE = 0.1  # of the largest excess: runs with less are not named
-_NAMES = frozenset(kind.name for kind in ALL_EFFECTS)
+from diagnosis.study import COARSE_STEP, Study
+from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.record import Array
 
 
-def localise(
-    campaign: Campaign, nominal: Fit, best: Fit | None, causes: tuple[str, ...]
-) -> tuple[Where, Maps]:
+def localise(study: Study) -> tuple[Where, Maps]:
     """Say where the nominal model departs from the runs.
 
     Args:
-        campaign: the records.
-        nominal: fit of the nominal model.
-        best: fit with the causes added; None where none was added.
-        causes: effect names; empty: no gap; ``unknown``: a gap without a name.
+        study: of the campaign.
 
     Returns:
         The answer in fields and in words, and the maps it is read from.
     """
-    scaled, ratio = _as_measured(campaign, nominal, causes)
-    runs = telling_runs(campaign, scaled) if causes else ()
-    found = survey(campaign, nominal, scaled, best, runs)
-    if not causes:
+    scaled, ratio = _as_measured(study)
+    excesses = run_excesses(study.campaign, scaled)
+    runs = telling_runs(excesses) if study.causes else ()
+    found = survey(study, scaled, excesses, runs)
+    if not study.causes:
         return Where(None, None, words=nowhere(found)), found.maps
-    lead = _leading(causes, nominal, best, _mean_excess(scaled), ratio)
-    condition, channel = _nature(campaign, nominal, causes, found, lead)
+    main = _main_cause(study, _mean_excess(scaled), ratio)
+    condition, channel = _nature(study, found, main)
     where = Where(
         channel=channel.value,
         condition=condition.value,
@@ -56,73 +51,75 @@ def localise(
     return dataclasses.replace(where, words=describe(where, found, bands, channel, condition)), found.maps
 
 
-def telling_runs(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
+def telling_runs(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
     """The runs that show the gap.
 
     Args:
-        campaign: the records.
-        fit: of the nominal model.
+        excesses: of all runs, from the nominal model.
 
     Returns:
-        Those beyond chance (false-alarm rate 1 % over all of them) that have a tenth or more of the largest
-        excess among them, in the campaign's order.
+        Ids of the runs beyond chance (false-alarm rate 1 % over all of them) that have a tenth or more of the
+        largest excess among them, in the campaign's order.
     """
-    excesses = run_excesses(campaign, fit)
-    clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < FALSE_ALARM_RATE}
-    least = _LITTLE * max(clear.values(), default=0.0)
+    clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < PLACE_FALSE_ALARM_RATE}
+    least = NAMED_RUN_SHARE * max(clear.values(), default=0.0)
     return tuple(name for name, excess in clear.items() if excess > least)
 
 
-def _as_measured(campaign: Campaign, nominal: Fit, causes: tuple[str, ...]) -> tuple[Fit, float]:
-    """The fit with the residuals of the records as given, in units of the noise that counts.
+def _as_measured(study: Study) -> tuple[Fit, float]:
+    """The nominal fit with the residuals of the records as given, in units of the noise that counts.
 
-    The fit may be of records from which hum was taken: here that is part of the gap. And a resolution coarser
-    than stated raises the whole floor: against the noise found in the records there is nothing to see, so then
-    the stated noise is the measure. Returns the fit and the ratio of its noise variance to the one that counts.
+    Where hum was removed before the fit, it is part of the gap, and the residuals get it back. Where the readings'
+    step is a cause, it raises the noise found in the records, so that the stated noise is the measure. Returns the
+    fit and the ratio of its noise variance to the one that counts.
     """
-    data = nominal.problem.data
-    level = float(np.mean([run.noise_variance * run.block for run in data.runs]))
-    coarse = any(effect_class(name).lattice for name in causes if name in _NAMES)
-    stated = campaign_noise(campaign).stated_variance if coarse else None
+    nominal = study.nominal
+    level = float(np.mean([run.noise_variance * run.block for run in nominal.problem.data.runs]))
+    coarse = COARSE_STEP.name in study.causes
+    stated = study.noise.stated_variance if coarse else None
     ratio = level / stated if stated else 1.0
-    given = prepare(campaign, {run.id: run.noise_variance * run.block / ratio for run in data.runs})
+    scaled = [r * np.sqrt(ratio) for r in _with_hum(study)]
+    return dataclasses.replace(nominal, residuals=scaled), ratio
+
+
+def _with_hum(study: Study) -> list[Array]:
+    """The nominal fit's scaled residuals by run, the hum put back where it was removed."""
+    data, residuals = study.nominal.problem.data, study.nominal.residuals
+    if study.hum is None:
+        return residuals
+    given = prepare(study.campaign, {run.id: run.noise_variance for run in data.runs})
     readings = {run.id: run.reading for run in given.runs}
     # the fit may leave a record's start out; both end together
-    readings = {run.id: readings[run.id][-run.reading.size :] for run in data.runs}
-    residuals = [
-        (r + (readings[run.id] - run.reading) / np.sqrt(run.noise_variance)) * np.sqrt(ratio)
-        for r, run in zip(nominal.residuals, data.runs, strict=True)
+    return [
+        r + (readings[run.id][-run.reading.size :] - run.reading) / np.sqrt(run.noise_variance)
+        for r, run in zip(residuals, data.runs, strict=True)
     ]
-    return dataclasses.replace(nominal, residuals=residuals), ratio
 
 
-def _nature(
-    campaign: Campaign, nominal: Fit, causes: tuple[str, ...], found: Survey, lead: str | None
-) -> tuple[Finding, Finding]:
+def _nature(study: Study, found: Survey, main: str | None) -> tuple[Finding, Finding]:
     """Condition and channel, from the cause where it is known and from the residuals where it is not."""
-    if lead is None:
-        condition = infer_condition(campaign, nominal, found)
-        return condition, infer_channel(nominal, found, condition.value)
-    kind = effect_class(lead)
-    others = [name for name in causes if name != lead]
-    reason = f"as {plain([lead])} does"
+    if main is None:
+        condition = infer_condition(study.campaign, study.nominal, found)
+        return condition, infer_channel(study.nominal, found, condition.value)
+    kind = effect_class(main)
+    others = [name for name in study.causes if name != main]
+    reason = f"as {plain([main])} does"
     if others:
-        reason += f", the larger part of the gap; the rest is of {plain(others)}"
+        reason += f", which causes the larger part of the gap; the rest is due to {plain(others)}"
     return Finding(kind.condition, reason), Finding(kind.channel, reason)
 
 
-def _leading(
-    causes: tuple[str, ...], nominal: Fit, best: Fit | None, excess: float, ratio: float
-) -> str | None:
+def _main_cause(study: Study, excess: float, ratio: float) -> str | None:
     """Of several causes the one without which most of the gap would stay open; None where none is known."""
-    known = [name for name in causes if name in _NAMES]
-    if len(known) < 2 or best is None:
+    known = [name for name in study.causes if name != "unknown"]
+    best = study.chosen
+    if len(known) < 2 or best is study.nominal:
         return known[0] if known else None
     fitted = {kind.name: kind for kind in best.problem.effects if kind.name in known}
-    loose = [name for name in known if name not in fitted]  # read off the records, or random
-    closed = ratio * (nominal.excess - best.excess)
-    if not fitted or (loose and excess - closed > closed):
-        return (loose or known)[0]
+    others = [name for name in known if name not in fitted]  # read off the records, or random
+    closed = ratio * (study.nominal.excess - best.excess)
+    if not fitted or (others and excess - closed > closed):
+        return (others or known)[0]
 
     def strength(name: str) -> float:
         severity = f"{name}.{fitted[name].parameters()[0].name}"

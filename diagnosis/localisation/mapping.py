@@ -21,6 +21,7 @@ from diagnosis.localisation.excess import (
 from diagnosis.localisation.lines import residual_lines
 from diagnosis.localisation.maps import GroupExcess, Maps, RunMap, Trace
 from diagnosis.localisation.phase_plane import apparent_moment, motion, phase_plane
+from diagnosis.study import Study
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
@@ -34,14 +35,14 @@ _TRACE_POINTS = 600
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Maps, and what the words about them need besides.
+    """Maps, and what else the text about them needs.
 
     Args:
         maps: the maps.
         excesses: by run.
         frequency_interval: shortest interval of frequency that holds most of the excess, Hz.
-        moment_energy: of the apparent moment beyond that of noise by bin of time, shape (n,), in variances.
-        moment_z: its sum over the standard deviation white noise gives it, a ratio.
+        moment_energy: energy of the apparent moment beyond that of noise, by bin of time, shape (n,), in variances.
+        moment_z: the sum of that over its standard deviation under white noise, a ratio.
     """
 
     maps: Maps
@@ -51,22 +52,20 @@ class Survey:
     moment_z: float
 
 
-def survey(
-    campaign: Campaign, nominal: Fit, scaled: Fit, best: Fit | None, chosen: tuple[str, ...]
-) -> Survey:
+def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[str, ...]) -> Survey:
     """Draw up all maps.
 
     Args:
-        campaign: the records.
-        nominal: fit of the nominal model.
-        scaled: the same with residuals in units of the noise that counts.
-        best: fit with the causes added, if any.
+        study: gives the records and the fits.
+        scaled: the nominal fit with residuals in units of the noise that counts.
+        excesses: its squared residuals, by run.
         chosen: ids of the runs the phase plane is taken over; all where empty.
 
     Returns:
         The survey.
     """
-    excesses = run_excesses(campaign, scaled)
+    campaign, nominal = study.campaign, study.nominal
+    best = None if study.chosen is nominal else study.chosen
     bands = band_excesses(excesses)
     inside = [
         within_bands(r, run, telling_bands(bands)) for r, run in zip(scaled.residuals, excesses, strict=True)
@@ -151,7 +150,7 @@ def _groups(fit: Fit, excesses: list[RunExcess]) -> tuple[GroupExcess, ...]:
     }
     result = []
     for by, labels in keys.items():
-        distinct = sorted(set(labels), key=_leading_number)
+        distinct = sorted(set(labels), key=_first_number)
         if len(distinct) < 2:
             continue
         for label in distinct:
@@ -162,13 +161,13 @@ def _groups(fit: Fit, excesses: list[RunExcess]) -> tuple[GroupExcess, ...]:
     return tuple(result)
 
 
-def _leading_number(label: str) -> tuple[float, str]:
+def _first_number(label: str) -> tuple[float, str]:
     head = label.split(" ")[0]
     return (float(head) if head.replace(".", "", 1).isdigit() else 0.0, label)
 
 
 def record_starts(campaign: Campaign, fit: Fit) -> list[float]:
-    """What the fit left out at the start of every record.
+    """The time that the fit left out at the start of every record.
 
     Args:
         campaign: the records.
@@ -195,13 +194,14 @@ def _time_profile(fit: Fit, inside: list[tuple[Array, float]], times: list[Array
 def _by_sample(fit: Fit, inside: list[tuple[Array, float]]) -> tuple[list[Array], list[float], list[float]]:
     """Squared residuals, their mean and variance under noise, as shares of the variance of one sample.
 
-    What a model lacks is the same in a block mean as in its samples, and the noise is less by the block's size.
+    The misfit of a model is the same in a block mean as in its samples; the noise variance is less by the block's
+    size.
     """
     blocks = [run.block for run in fit.problem.data.runs]
     return (
         [r**2 / block for (r, _), block in zip(inside, blocks, strict=True)],
         [share / block for (_, share), block in zip(inside, blocks, strict=True)],
-        # squares of filtered noise go together: as many count as independent as coefficients pass
+        # squares of filtered noise are correlated: as many are independent as coefficients pass
         [2.0 * share / block**2 for (_, share), block in zip(inside, blocks, strict=True)],
     )
 
@@ -231,7 +231,7 @@ def _moment_energy(fit: Fit, times: list[Array], edges: Array) -> tuple[Array, f
         spread = float(found.kernel @ found.kernel) * found.noise_std**2
         time = whole[found.start : found.start + found.moment.size]
         energy += np.histogram(time, edges, weights=found.moment**2 / spread - 1.0)[0]
-        variance += 2.0 * found.moment.size * found.kernel.size  # neighbours within the kernel go together
+        variance += 2.0 * found.moment.size * found.kernel.size  # neighbours within the kernel are correlated
     return energy, float(energy.sum()) / float(np.sqrt(max(variance, 1.0)))
 
 
@@ -250,7 +250,7 @@ def _spectrum(excesses: list[RunExcess], edges: Array) -> Profile:
 
 
 def _frequency_interval(excesses: list[RunExcess]) -> tuple[float, float] | None:
-    """Shortest interval in Hz that holds most of the excess, of the bands where there is any."""
+    """Shortest interval in Hz that holds most of the excess of the bands that show the gap."""
     names = telling_bands(band_excesses(excesses))
     index = [i for i, name in enumerate(("0", "f0", "2f0", "3f0", "above")) if name in names]
     kept = [np.where(np.isin(run.band, index), run.power, 1.0) for run in excesses]

@@ -1,4 +1,4 @@
-"""What the pictures of a diagnosis show: plain arrays, small enough to travel inside its JSON."""
+"""Data of a diagnosis' figures: plain arrays, small enough to be part of its JSON."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from diagnosis.localisation.lines import ResidualLine
 from diagnosis.localisation.phase_plane import PhasePlane
 from tunnel_sim.vocabulary.record import Array
 
-_DIGITS = 5  # significant: more than any picture shows
+_DIGITS = 5  # significant: more than any figure shows
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,8 @@ class RunMap:
         amplitude: at the start of the record, rad.
         frequency: of the free motion in the nominal model, Hz.
         excess: mean squared residual over the noise variance, minus one, a ratio.
-        std: of it where there is no gap, a ratio.
-        p_value: chance of as much without a gap, a probability.
+        std: its standard deviation where there is no gap, a ratio.
+        p_value: probability of as large an excess without a gap.
         share: of the campaign's excess, a fraction.
     """
 
@@ -52,7 +52,7 @@ class GroupExcess:
         label: in words, with unit.
         runs: how many.
         excess: mean over the runs, a ratio.
-        std: of it where there is no gap, a ratio.
+        std: its standard deviation where there is no gap, a ratio.
     """
 
     by: str

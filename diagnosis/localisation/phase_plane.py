@@ -1,8 +1,8 @@
-"""The moment the nominal model lacks, as it appears from the residuals, over angle and rate.
+"""The moment that is missing from the nominal model, computed from the residuals, over angle and rate.
 
-A small moment m added to the model changes the angle by ρ with I ρ̈ + C ρ̇ + K ρ = m: the residual put through the
-fitted run's own equation gives the missing moment back, smoothed over part of a cycle. This is the restoring-force
-surface of Masri & Caughey, J. Appl. Mech. 46 (1979) 433, doi 10.1115/1.3424568, of residuals in place of readings.
+A small moment m added to the model changes the angle by ρ with I ρ̈ + C ρ̇ + K ρ = m: the residual, inserted in
+the equation of the fitted run, gives the missing moment, smoothed over part of a cycle. This is the restoring-force
+surface of Masri & Caughey, J. Appl. Mech. 46 (1979) 433, doi 10.1115/1.3424568, from residuals instead of readings.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _WINDOW = (
     0.4  # of a cycle: passes the third harmonic at half height and keeps the noise of two derivatives down
 )
 _BINS = 15  # along each axis of the map
-_LEAST = 8  # residuals in a bin worth showing
+_LEAST = 8  # residuals in a bin, for it to be shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class Apparent:
     noise_std: float
 
     def summed(self, inside: np.ndarray) -> tuple[float, float]:
-        """The moment summed over some instants, and what white noise makes of that sum.
+        """The moment summed over some instants, and the variance of the sum under white noise.
 
         Args:
             inside: which instants, shape (n,), true or false.
@@ -74,7 +74,7 @@ def motion(fit: Fit, index: int) -> tuple[Array, Array]:
 
 
 def apparent_moment(fit: Fit, index: int) -> Apparent | None:
-    """The moment one run lacks.
+    """The moment that is missing in one run.
 
     Args:
         fit: of the nominal model.
@@ -113,7 +113,7 @@ def _kernel(width: int, interval: float, frequency: float, coefficients: tuple[f
 
 @dataclass(frozen=True, eq=False)
 class PhasePlane:
-    """Mean missing moment by angle and rate.
+    """The mean missing moment by angle and rate.
 
     Args:
         edges: of the bins of both axes, shape (n + 1,), rad.
@@ -124,7 +124,7 @@ class PhasePlane:
         by_rate: mean over all angles, shape (n,).
         by_rate_std: likewise, shape (n,).
         unit: of the moment: ``N m``, or ``rad/s2`` in normalised form.
-        runs: ids of the runs it is taken over.
+        runs: ids of the runs included.
     """
 
     edges: Array
@@ -143,10 +143,10 @@ def phase_plane(fit: Fit, run_ids: tuple[str, ...]) -> PhasePlane | None:
 
     Args:
         fit: of the nominal model.
-        run_ids: runs to take it over; all where empty.
+        run_ids: runs to include; all where empty.
 
     Returns:
-        The map; None where no run gives a moment.
+        The map; None where no run allows one.
     """
     data = fit.problem.data
     chosen = [i for i, run in enumerate(data.runs) if not run_ids or run.id in run_ids]

@@ -1,14 +1,13 @@
-"""The place of a gap in sentences."""
+"""Where a gap is, in sentences."""
 
 from __future__ import annotations
 
-from diagnosis.localisation.excess import FALSE_ALARM_RATE
 from diagnosis.localisation.inference import Finding
 from diagnosis.localisation.mapping import Survey
+from diagnosis.policy import LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
 from diagnosis.result import Where
 
-_SPREAD = 0.7  # of the whole: an interval as long as this says no place
-_LISTED = 12  # ids a sentence bears
+_LISTED = 12  # ids listed in a sentence at most
 _BAND_WORDS = {
     "0": "slower than the oscillation",
     "f0": "at the oscillation itself",
@@ -19,9 +18,9 @@ _BAND_WORDS = {
 _CHANNEL_WORDS = {
     "stiffness": "the restoring moment (stiffness)",
     "damping": "the damping",
-    "forcing": "the rig as a moment that does not come from its motion (forcing)",
-    "sensor": "the reading (sensor)",
-    "calibration": "what is stated of the runs (calibration)",
+    "forcing": "the rig as a moment that does not depend on its motion (forcing)",
+    "sensor": "the reading of the sensor",
+    "calibration": "a value stated for the runs (calibration)",
 }
 _CONDITION_WORDS = {"always": "with the wind on and off", "wind_on": "only with the wind on"}
 
@@ -38,22 +37,22 @@ def nowhere(found: Survey) -> str:
     count = len(found.maps.runs)
     least = min(1.0, count * min(run.p_value for run in found.maps.runs))
     return (
-        f"Nowhere: over {count} runs the residual is that of the noise "
-        f"(p = {least:.2g} for the run farthest from it, all runs considered)."
+        f"Nowhere: in {count} {'run' if count == 1 else 'runs'} the residual is consistent with the noise "
+        f"(p = {least:.2g} for the run that differs most, corrected for their number)."
     )
 
 
 def describe(
     where: Where, found: Survey, bands: tuple[str, ...], channel: Finding, condition: Finding
 ) -> str:
-    """The place in sentences.
+    """Where the gap is, in sentences.
 
     Args:
-        where: its fields.
+        where: the same in fields.
         found: the maps.
-        bands: names of the bands that show it.
-        channel: with its reason.
-        condition: likewise.
+        bands: names of the bands that show the gap.
+        channel: what it acts on, with the reason.
+        condition: when it acts, with the reason.
 
     Returns:
         A few sentences.
@@ -67,9 +66,10 @@ def describe(
 def _runs(where: Where, found: Survey) -> str:
     count = len(found.maps.runs)
     if not where.runs:
+        rate = 100.0 * PLACE_FALSE_ALARM_RATE
         return (
-            f"No run by itself is beyond chance (false-alarm rate {100.0 * FALSE_ALARM_RATE:.0f} % over all runs); "
-            "what is found shows in all of them together."
+            f"No single run is beyond chance (false-alarm rate {rate:.0f} % over all runs); "
+            "the gap shows only in all of them together."
         )
     share = sum(run.share for run in found.maps.runs if run.id in where.runs)
     named = f" ({', '.join(where.runs)})" if len(where.runs) <= _LISTED else ""
@@ -86,18 +86,19 @@ def _wind_contrast(found: Survey) -> str:
     groups = {group.label: group for group in found.maps.groups if group.by == "wind"}
     if len(groups) < 2:
         return ""
-    return f"; mean excess {groups['on'].excess:.2g} with the wind on, {groups['off'].excess:.2g} with it off"
+    on, off = (f"{float(f'{groups[wind].excess:.2g}'):g}" for wind in ("on", "off"))
+    return f"; mean excess {on} with the wind on, {off} with it off"
 
 
 def _extent(where: Where, found: Survey) -> str:
     """Time, amplitude and frequency."""
     places = []
     length = float(found.maps.time.edges[-1])
-    if where.time_s is not None and where.time_s[1] - where.time_s[0] < _SPREAD * length:
+    if where.time_s is not None and where.time_s[1] - where.time_s[0] < LOCATES_UP_TO * length:
         places.append(f"between {where.time_s[0]:.1f} and {where.time_s[1]:.1f} s of the record")
     greatest = float(found.maps.amplitude.edges[-1])
     amplitude = where.amplitude_rad
-    if amplitude is not None and amplitude[1] - amplitude[0] < _SPREAD * greatest:
+    if amplitude is not None and amplitude[1] - amplitude[0] < LOCATES_UP_TO * greatest:
         places.append(f"at amplitudes from {amplitude[0]:.2f} to {amplitude[1]:.2f} rad")
     if where.frequency_hz is not None:
         places.append(f"at {where.frequency_hz[0]:.2f} to {where.frequency_hz[1]:.2f} Hz")

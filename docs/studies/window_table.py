@@ -21,6 +21,7 @@ from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.steps import REPORT_STEP
 from tunnel_sim.vocabulary.aero import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -200,7 +201,7 @@ def simulate_windows(
         air_density=state.air_density,
         release_angle=state.release_angle,
         duration=round(1.1 * count * CYCLES * 2.0 * pi / omega_n * _RATE) / _RATE,
-        timestep=0.5 / _RATE,
+        timestep=REPORT_STEP,
     )
     return _windowed(*_read(rig, stated, effects), zeta, count)
 

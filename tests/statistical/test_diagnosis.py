@@ -14,8 +14,8 @@ from scipy.stats import binom
 
 from diagnosis._diagnose import diagnose
 from diagnosis.blind.make import make_blind
-from diagnosis.detection.gap import FALSE_ALARM_RATE
-from diagnosis.study import study
+from diagnosis.investigate import investigate
+from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from tests.reference.free_decays import RESOLUTION, Setting, campaign, with_records
 from tests.reference.rigs import rig
 from tunnel_reference import draw
@@ -45,9 +45,9 @@ def gap_free(seed, stated=NOISE, **changes):
 
 @pytest.mark.parametrize("stated", [NOISE, None])
 def test_a_gap_free_campaign_is_given_no_cause(stated, record_property):
-    alarms = [seed for seed in range(CAMPAIGNS) if study(gap_free(seed, stated), ()).test.detected]
+    alarms = [seed for seed in range(CAMPAIGNS) if investigate(gap_free(seed, stated), ()).test.detected]
     record_property("alarms", f"{len(alarms)} of {CAMPAIGNS}: {alarms}")
-    assert len(alarms) <= binom.isf(1e-3, CAMPAIGNS, FALSE_ALARM_RATE)
+    assert len(alarms) <= binom.isf(1e-3, CAMPAIGNS, GAP_FALSE_ALARM_RATE)
 
 
 def test_the_whole_answer_to_a_gap_free_campaign_is_no_cause():
@@ -60,11 +60,11 @@ def test_planted_drift_of_the_noises_own_size_is_detected_every_time():
     """The case that must fail the test above: power half that of the noise."""
     for seed in range(20):
         drifting = with_records(gap_free(seed), lambda t, y: y + NOISE * 2.4 * t / t[-1])
-        assert study(drifting, ()).test.detected
+        assert investigate(drifting, ()).test.detected
 
 
 def test_noise_that_is_not_the_stated_is_detected_every_time():
-    assert all(study(gap_free(seed, NOISE / 2.0), ()).test.detected for seed in range(10))
+    assert all(investigate(gap_free(seed, NOISE / 2.0), ()).test.detected for seed in range(10))
 
 
 PLAN = """

@@ -10,7 +10,7 @@ from diagnosis.detection import gap
 from diagnosis.detection.noise_under_null import level_p_value, trend_p_values
 from diagnosis.detection.sensor_noise import campaign_noise, noise_trend
 from diagnosis.fitting.run_data import prepare
-from diagnosis.study import fit_nominal
+from diagnosis.investigate import fit_nominal
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
 

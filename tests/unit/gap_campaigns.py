@@ -6,11 +6,16 @@ import dataclasses
 
 import numpy as np
 
-from diagnosis.detection.sensor_noise import campaign_noise
+from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.rank import Hypothesis
+from diagnosis.detection.gap import GapTest
+from diagnosis.detection.mains import Hum
+from diagnosis.detection.sensor_noise import NoiseTrend, campaign_noise
 from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData, prepare
 from diagnosis.fitting.starting_points import nominal_start
+from diagnosis.study import COARSE_STEP, HUM, Study
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
@@ -81,3 +86,21 @@ def nominal(data: Campaign) -> Fit:
     """The nominal model fitted."""
     prepared = prepare(data, campaign_noise(data).variance)
     return fit(Problem(prepared), nominal_start(prepared))
+
+
+def studied(data: Campaign, nominal: Fit, causes: tuple[str, ...] = (), best: Fit | None = None) -> Study:
+    """A study that ends in these causes, those that can be fitted answered by `best` where it is given."""
+    fitted = tuple(sorted(name for name in causes if name not in (HUM.name, COARSE_STEP.name)))
+    return Study(
+        data,
+        data,
+        campaign_noise(data),
+        NoiseTrend(0.0, 0.0, 0.0),
+        step=0.0,
+        coarse=COARSE_STEP.name in causes,
+        hum=Hum(50.0, 1e-4, 1e-6, None, 0.1) if HUM.name in causes else None,
+        nominal=nominal,
+        test=GapTest(bool(causes), 0.0, {}, noisy=False),
+        hypotheses=() if best is None else (Hypothesis(fitted, best),),
+        weighed=(Weighed(fitted, 0.0, 1.0),) if fitted else (),
+    )

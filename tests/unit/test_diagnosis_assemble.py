@@ -10,13 +10,13 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.interpolate import CubicSpline
 
 from diagnosis._diagnose import diagnose, vocabulary
-from diagnosis.answer.assemble import assemble, chosen_fit
+from diagnosis.answer.assemble import assemble
 from diagnosis.answer.candidates import candidates
 from diagnosis.answer.reported import excess_base
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.rank import Hypothesis
+from diagnosis.investigate import investigate
 from diagnosis.localisation.localise import localise
-from diagnosis.study import study
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, with_blow
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
@@ -118,7 +118,7 @@ def checked(answer):
 
 def answered(found):
     """The document of a study."""
-    return checked(assemble(found, *localise(found.campaign, found.nominal, chosen_fit(found), found.causes)))
+    return checked(assemble(found, *localise(found)))
 
 
 def hum(amplitude):
@@ -198,7 +198,7 @@ def finely(data, noise, effect=QUADRATIC):
 
 @pytest.fixture(scope="module")
 def found():
-    return study(campaign(QUADRATIC), FEW)
+    return investigate(campaign(QUADRATIC), FEW)
 
 
 def test_the_excess_is_of_samples_whatever_the_blocks():
@@ -262,7 +262,7 @@ def test_the_source_of_the_noise_is_said():
 
 
 def test_the_probability_in_words_is_that_of_the_first_candidate(found):
-    answer = assemble(found, *localise(found.campaign, found.nominal, chosen_fit(found), found.causes))
+    answer = assemble(found, *localise(found))
     assert f"(probability {answer.candidates[0].probability:.2f})" in answer.verdict
     doubtful = replace(found, test=replace(found.test, p_value=9e-4))
     (none,) = [c for c in candidates(doubtful, excess_base(doubtful)) if c.effect == "none"]
@@ -287,12 +287,12 @@ def test_noise_that_misbehaves_is_unknown_once():
 
 
 def test_the_chosen_fit_is_that_of_the_answer(found):
-    assert chosen_fit(found).problem.effects == (effect_class("quadratic_damping"),)
+    assert found.chosen.problem.effects == (effect_class("quadratic_damping"),)
     hypothesis = found.hypothesis(("quadratic_damping",))
     assert isinstance(hypothesis, Hypothesis)
-    assert chosen_fit(found) is hypothesis.fit
+    assert found.chosen is hypothesis.fit
     lost = replace(found, weighed=(Weighed(("unknown",), 1.0, 1.0),))
-    assert chosen_fit(lost) is found.nominal
+    assert lost.chosen is found.nominal
     assert lost.causes == ("unknown",)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from diagnosis.answer import confirm as module
 from diagnosis.answer.cautions import cautions
-from diagnosis.answer.confirm import TOLERANCE, Comparison, compare, confirm
+from diagnosis.answer.confirm import Comparison, compare, confirm
 from diagnosis.answer.held_out import predict_held_out, refit_releases
 from diagnosis.answer.reported import report_fits
 from diagnosis.detection.sensor_noise import campaign_noise
@@ -15,6 +15,7 @@ from diagnosis.fitting.least_squares import Fit, fit, sensitivities
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.starting_points import starting_points
+from diagnosis.policy import CONFIRMATION_TOLERANCE
 from tests.unit.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -55,7 +56,7 @@ def test_the_two_models_predict_the_same_readings(name, values):
     assert max(np.max(np.abs(d)) for d in found.differences) < 3e-5
     verdict = confirm([found])
     assert verdict.agrees
-    assert verdict.rms_difference < verdict.tolerance == pytest.approx(TOLERANCE * NOISE / 2.0)
+    assert verdict.rms_difference < verdict.tolerance == pytest.approx(CONFIRMATION_TOLERANCE * NOISE / 2.0)
 
 
 def test_every_run_may_have_parameters_of_its_own():

@@ -4,15 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diagnosis.attribution.decide import (
-    FORM_MISFIT,
-    FORM_MISFIT_UP_TO,
-    PAIR_SHARE,
-    RIVAL_PROBABILITY,
-    UNKNOWN_SHARE,
-    form_floor,
-    weigh,
-)
+from diagnosis.attribution.decide import form_floor, weigh
+from diagnosis.policy import FORM_MISFIT, FORM_MISFIT_UP_TO, PAIR_SHARE, RIVAL_PROBABILITY, UNKNOWN_SHARE
 
 NAMES = ("a", "b", "c", "d", "e")
 SHARES = st.floats(0.0, 1.5)

@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 from diagnosis.answer.coefficients import coefficients, rival_fits
 from diagnosis.answer.held_out import HeldOut, folds, predict_held_out
-from diagnosis.attribution.decide import LAPSE, Weighed
+from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.rank import Hypothesis
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.starting_points import starting_points
+from diagnosis.policy import EVEN_SHARE
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -143,7 +144,7 @@ def test_rivals_are_the_fits_that_were_not_chosen(base, best):
     hypotheses = [Hypothesis((CAUSE,), best), Hypothesis(("free_play",), base)]
     ((fit, probability),) = rival_fits(weighed, hypotheses, best)
     assert fit is base
-    assert probability == pytest.approx(0.15 - LAPSE / 3)  # no less than nothing, and without the lapse
+    assert probability == pytest.approx(0.15 - EVEN_SHARE / 3)  # without its part of the even share
 
 
 def test_normalised_runs_have_frequency_and_damping_ratio(data):

@@ -93,7 +93,7 @@ def test_stated_noise_that_the_records_contradict_is_not_used(factor):
     found = campaign_noise(decays(stated_noise=factor * NOISE))
     assert (found.source, found.stated_variance) == ("estimated", pytest.approx((factor * NOISE) ** 2))
     assert found.used == found.estimated == pytest.approx(NOISE**2, rel=0.1)
-    assert f"contradict the stated {factor * NOISE:.3g} rad: they hold 0.000" in found.reason
+    assert f"contradict the stated {factor * NOISE:.3g} rad: they contain 0.000" in found.reason
 
 
 def test_where_no_noise_is_stated_it_is_estimated():
@@ -120,7 +120,7 @@ def test_records_without_noise_are_held_to_the_fits_own_accuracy(rate, stated):
     data = free_decays.campaign(rate=rate, stated_noise=stated)
     found = campaign_noise(data)
     assert found.source == "floor"
-    assert "less than the fits' own accuracy" in found.reason
+    assert "less than the accuracy of the fits" in found.reason
     assert np.sqrt(found.estimated) < 1e-7 < 1e-5 < np.sqrt(found.used) < 1e-4
     assert [accuracy(run.record) ** 2 for run in data.runs] == list(found.variance.values())
 

@@ -19,7 +19,7 @@ from diagnosis.result import (
     ParameterEstimate,
     RunGap,
 )
-from tests.unit.gap_campaigns import campaign, nominal
+from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_lab.diagnosis_view import render_report, write_report
 from tunnel_lab.diagnosis_view.figures import diagnosis_figures, save_diagnosis_figures
 from tunnel_lab.diagnosis_view.page import DESCRIPTIONS
@@ -39,7 +39,7 @@ def document(data):
     base = nominal(data)
     lead = starting_points(base, effect_class(CAUSE))[0]
     best = fit(lead.problem, lead.point, base=base)
-    where, maps = localise(data, base, best, (CAUSE,))
+    where, maps = localise(studied(data, base, (CAUSE,), best))
     ids = [run.id for run in data.runs]
     excess = [
         (float(a @ a) / a.size - 1.0, float(b @ b) / b.size - 1.0)

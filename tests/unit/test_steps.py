@@ -17,9 +17,11 @@ from tunnel_sim.physics.steps import (
     LEAST_STEP,
     body_rate,
     check_stable,
+    fit_substeps,
     follow_fastest,
     for_contact,
     for_rod,
+    report_substeps,
     whole_steps,
 )
 from tunnel_sim.vocabulary.aero import AeroDerivatives
@@ -114,3 +116,25 @@ def test_rod_and_contact_shorten_what_they_find() -> None:
         assert number == pytest.approx(round(number), rel=1e-12)
     assert for_rod(PLAIN) is PLAIN
     assert for_contact(PLAIN) is PLAIN
+
+
+@given(st.floats(1e-5, 1e-1), st.floats(0.02, 0.98), st.sampled_from([4e-3, 5e-3, 1e-2]))
+def test_what_is_reported_takes_half_the_steps_of_a_fit_of_an_ordinary_body(
+    compliance: float, share: float, interval: float
+) -> None:
+    slow = replace(PLAIN, spring_stiffness=16.12)
+    for run in (slow, replace(slow, rod_twist=RodTwist(compliance, share))):
+        coarse, fine = fit_substeps(run, interval), report_substeps(run, interval)
+        assert fine >= 2 * coarse - 1
+        assert interval / fine <= 2e-3 * (1.0 + 1e-6)
+
+
+def test_fits_take_shorter_steps_for_a_faster_body() -> None:
+    found = [fit_substeps(replace(PLAIN, spring_stiffness=spring), 4e-3) for spring in (16.12, 67.98, 600.0)]
+    assert found == [1, 2, 6]
+
+
+def test_the_rod_s_free_frequency_is_below_that_on_a_spring() -> None:
+    twist = RodTwist(1e-3, 0.2)
+    assert twist.free_frequency(0.1) == pytest.approx(np.sqrt(1.0 / (1e-3 * 0.1 * 0.2 * 0.8)), rel=1e-12)
+    assert twist.free_frequency(0.1) < twist.frequency(0.1, 40.0)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from diagnosis.policy import LISTED_PROBABILITY
 from tunnel_lab.terminal.formatting import COEFFICIENTS, at_bound, significant, unit_mark, with_std
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -13,7 +14,6 @@ from tunnel_sim.vocabulary.campaign import Campaign
 Document = Mapping[str, Any]
 _EFFECTS = frozenset(kind.name for kind in ALL_EFFECTS)
 _CONDITIONS = {"always": "wind on and off", "wind_on": "wind on only", None: "not told by these runs"}
-_ONCE_PER_SENTENCE = 0.01  # candidates less probable are counted, not listed
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def candidate_rows(document: Document) -> tuple[list[dict[str, Any]], int]:
         Those of some probability (three at least), formatted, and how many more there are.
     """
     candidates = document["candidates"]
-    count = max(3, sum(c["probability"] >= _ONCE_PER_SENTENCE for c in candidates))
+    count = max(3, sum(c["probability"] >= LISTED_PROBABILITY for c in candidates))
     rows = [
         {
             "name": plain(c["effect"]),

@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.detection.gap import FALSE_ALARM_RATE
-from diagnosis.study import Study, study
+from diagnosis.investigate import investigate
+from diagnosis.policy import GAP_FALSE_ALARM_RATE
+from diagnosis.study import Study
 from identification.campaign.belief import Belief, prior_belief, run_link, update_belief
 from identification.decay.decay_fit import Reading, RunFit
 from identification.decay.residual_noise import stated_noise
@@ -213,7 +214,7 @@ def _diagnosed(known: Knowledge) -> Knowledge:
     """Diagnose all runs so far."""
     kinds = [effect_class(name) for name in known.conditions.effects]
     try:
-        return replace(known, study=study(known.campaign, kinds))
+        return replace(known, study=investigate(known.campaign, kinds))
     except TunnelError as error:
         return replace(known, status=f"not diagnosed: {error.what}")
 
@@ -249,7 +250,7 @@ def probabilities(known: Knowledge) -> Array:
     if known.study is None:
         return np.full(len(names), 1.0 / len(names))
     if not known.study.weighed:
-        found[0], found[-1] = 1.0 - FALSE_ALARM_RATE, FALSE_ALARM_RATE
+        found[0], found[-1] = 1.0 - GAP_FALSE_ALARM_RATE, GAP_FALSE_ALARM_RATE
         return found
     for answer in known.study.weighed:
         name = answer.effects[0] if len(answer.effects) == 1 else "several"

@@ -14,6 +14,7 @@ import numpy as np
 from tunnel_sim.engine import scenery
 from tunnel_sim.engine.plugin import load_plugin
 from tunnel_sim.physics.moment_law import state_vector
+from tunnel_sim.physics.release import spring_end_angle
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.steps import check_stable
 from tunnel_sim.vocabulary.davis import davis_vertices
@@ -90,10 +91,8 @@ class Model:
         """
         data = mujoco.MjData(self.mj)
         release = self.settings.release_angle
-        twist = self.settings.rod_twist
-        end = release
-        if twist is not None:
-            end = release / (1.0 + self.settings.spring_stiffness * twist.compliance)
+        end = spring_end_angle(self.settings)
+        if self.settings.rod_twist is not None:
             data.joint("rod_twist").qpos = release - end
         data.joint("yaw").qpos = end
         data.joint("yaw").qvel = self.settings.release_rate

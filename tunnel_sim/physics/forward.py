@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tunnel_sim.physics.moment_law import forward_library, parameter_names, parameter_vector, run_dtype
 from tunnel_sim.physics.motion import Motion, sampling
+from tunnel_sim.physics.release import spring_end_angle
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
@@ -98,8 +99,7 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
     )
     run["step"], run["steps"] = settings.timestep, 1
     if settings.rod_twist is not None:
-        twist = settings.rod_twist
-        end = settings.release_angle / (1.0 + settings.spring_stiffness * twist.compliance)
+        twist, end = settings.rod_twist, spring_end_angle(settings)
         run["angle"], run["twist"] = end, settings.release_angle - end
         run["twist_stiffness"] = 1.0 / twist.compliance
         run["twist_damping"] = twist.damping(settings.yaw_inertia)

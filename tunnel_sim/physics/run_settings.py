@@ -81,6 +81,18 @@ class RodTwist:
         share = self.inertia_share
         return 2.0 * self.damping_ratio * sqrt(yaw_inertia * share * (1.0 - share) / self.compliance)
 
+    def free_frequency(self, yaw_inertia: float) -> float:
+        """Angular frequency of the twist with both ends free, below that of the rod on its spring.
+
+        Args:
+            yaw_inertia: the whole Izz, kg m².
+
+        Returns:
+            rad/s.
+        """
+        share = self.inertia_share
+        return sqrt(1.0 / (self.compliance * yaw_inertia * share * (1.0 - share)))
+
     def frequency(self, yaw_inertia: float, spring_stiffness: float) -> float:
         """A bound from above on the rod's own frequency.
 

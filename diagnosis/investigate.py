@@ -1,0 +1,199 @@
+"""Investigate a campaign: measure its noise, test for a gap, fit every effect and weigh the answers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.attribution.decide import Weighed, form_floor, weigh
+from diagnosis.attribution.outsiders import weigh_outsiders
+from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
+from diagnosis.attribution.rank import Hypothesis, polish, rank_pairs, rank_singles
+from diagnosis.detection.gap import test_gap
+from diagnosis.detection.mains import find_hum, refine_frequency, remove_hum
+from diagnosis.detection.refusal import refuse_indefinite
+from diagnosis.detection.sensor_noise import campaign_noise, noise_trend, reading_step
+from diagnosis.fitting.least_squares import Fit, FitError, fit
+from diagnosis.fitting.problem import Problem
+from diagnosis.fitting.run_data import Data, prepare, without_start
+from diagnosis.fitting.starting_points import is_gross, nominal_start
+from diagnosis.policy import COARSE_STEP_POWER, COARSER_STEP, HUM_LEFT, NOISE_EXPLAINS_UP_TO, UNKNOWN_SHARE
+from diagnosis.study import COARSE_STEP, HUM, Study
+from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+
+Progress = Callable[[str], None]
+
+
+def investigate(
+    campaign: Campaign, kinds: Sequence[type[Effect]] = ALL_EFFECTS, progress: Progress | None = None
+) -> Study:
+    """Test a campaign for a gap, and weigh the effects that may cause it.
+
+    Args:
+        campaign: the runs.
+        kinds: the effects to answer with.
+        progress: called with the name of each step.
+
+    Returns:
+        What was found.
+
+    Raises:
+        TunnelError: when the nominal model cannot be fitted to the runs.
+    """
+    clock = _Clock(progress)
+    found = _test(campaign, {kind.name for kind in kinds}, clock)
+    if found.test.detected:
+        found = _weigh_effects(found, kinds, clock)
+    return replace(found, seconds=clock.seconds)
+
+
+def fit_nominal(data: Data) -> Fit:
+    """Fit the nominal model.
+
+    Args:
+        data: prepared runs.
+
+    Returns:
+        The fit.
+
+    Raises:
+        TunnelError: when the nominal model cannot be fitted.
+    """
+    try:
+        found = fit(Problem(data), nominal_start(data))
+    except (FitError, np.linalg.LinAlgError) as error:
+        raise TunnelError(
+            "the nominal model cannot be fitted",
+            remedy="check spring stiffness, wind speed and that the runs are free decays of three cycles or more",
+        ) from error
+    refuse_indefinite(found)
+    return found
+
+
+def _test(campaign: Campaign, allowed: set[str], clock: _Clock) -> Study:
+    """The study up to the test of the gap: noise, hum and nominal fit."""
+    with clock.step("noise"):
+        noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
+        stated = campaign.sensor.resolution
+        coarse = COARSE_STEP.name in allowed and stated is not None and step > COARSER_STEP * stated
+    with clock.step("nominal fit"):
+        nominal = fit_nominal(prepare(campaign, noise.variance))
+        cleaned, hum = campaign, None
+        line = find_hum(nominal) if HUM.name in allowed else None
+        if line is not None:
+            frequency = refine_frequency(campaign, line)
+            cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
+            noise = campaign_noise(cleaned)
+            nominal = fit_nominal(prepare(cleaned, noise.variance))
+        started_late = is_gross(nominal)
+        if started_late:
+            nominal = fit_nominal(without_start(nominal.problem.data))
+        test = test_gap(nominal, noise, trend, coarse_step=coarse)
+    return Study(campaign, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
+
+
+def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+    """The study with effects, pairs, random moments and outsiders fitted and weighed."""
+    nominal = found.nominal
+    singles, pairs = _fit_effects(nominal, kinds, clock)
+    with clock.step("random moments"):
+        random = weigh_random_moments(nominal, singles, pairs, {kind.name for kind in kinds})
+    found = replace(
+        found,
+        hypotheses=(*singles, *pairs),
+        random=tuple(random),
+        outsider=weigh_outsiders(nominal),
+    )
+    weighed = _weighed(found)
+    if weighed[0].effects == ("unknown",) and _read_off_explains(found):
+        weighed = []  # what is left belongs to the cause read off the records
+    elif weighed[0].effects != ("unknown",):
+        with clock.step("polishing"):
+            found = replace(found, hypotheses=_polished(found.hypotheses, weighed[0], random))
+    if weighed and _noise_explains(found):
+        named = [replace(w, probability=0.0) for w in weighed if w.effects != ("unknown",)]
+        weighed = [Weighed(("unknown",), 1.0, 1.0), *named]
+    return replace(found, weighed=tuple(weighed))
+
+
+def _fit_effects(
+    nominal: Fit, kinds: Sequence[type[Effect]], clock: _Clock
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """Single effects, and pairs where no single effect closes the gap; each best first."""
+    fitted = [kind for kind in kinds if kind.fitted]
+    with clock.step("single effects"):
+        singles = rank_singles(nominal, fitted, clock.progress)
+    if not singles or _share(singles[0].fit, nominal) <= form_floor(nominal.excess, singles[0].effects):
+        return singles, []
+    with clock.step("pairs"):
+        return singles, rank_pairs(singles, fitted, clock.progress)
+
+
+def _weighed(found: Study) -> list[Weighed]:
+    """The answers with their probabilities, most probable first."""
+    nominal = found.nominal
+    shares = [(h.effects, _share(h.fit, nominal)) for h in found.hypotheses]
+    shares += [(answer.effects, answer.share) for answer in found.random]
+    return weigh(
+        shares,
+        chance=float(np.sqrt(2.0 / nominal.count)) / max(nominal.excess, 1e-3),
+        excess=nominal.excess,
+        outside=UNKNOWN_SHARE if found.outsider is None else found.outsider.share,
+        forms={h.names: h.forms for h in found.hypotheses},
+    )
+
+
+def _polished(
+    hypotheses: Sequence[Hypothesis], answer: Weighed, random: Sequence[RandomAnswer]
+) -> tuple[Hypothesis, ...]:
+    """The hypotheses, the answer's own fitted to convergence unless a random moment is the answer."""
+    if any(moment.effects == answer.effects for moment in random):
+        return tuple(hypotheses)
+    return tuple(polish(h) if h.names == answer.effects else h for h in hypotheses)
+
+
+def _share(fitted: Fit, nominal: Fit) -> float:
+    """Share of the nominal gap that a fit leaves open."""
+    return max(fitted.excess, 0.0) / max(nominal.excess, 1e-9)
+
+
+def _read_off_explains(found: Study) -> bool:
+    """Whether what is left is no more than a coarse step or a removed hum leaves by itself.
+
+    The error of a coarse step is not white: its power is step²/12, wherever in the spectrum it lies. A hum that
+    is not a pure line leaves a small share of itself.
+    """
+    left = found.nominal.excess / found.nominal.problem.data.runs[0].block
+    variance = float(np.mean(list(found.noise.variance.values())))
+    if found.coarse and left * variance < COARSE_STEP_POWER * found.step**2 / 12.0:
+        return True
+    return found.hum is not None and left < HUM_LEFT * found.hum.excess
+
+
+def _noise_explains(found: Study) -> bool:
+    """Whether the gap is so small that the noise, which misbehaves, is all of it."""
+    block = found.nominal.problem.data.runs[0].block
+    return found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block
+
+
+class _Clock:
+    """Wall time by step, and the progress call."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self.seconds: dict[str, float] = {}
+        self.progress = progress
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        """Time a step."""
+        if self.progress is not None:
+            self.progress(name)
+        begun = time.perf_counter()
+        yield
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begun

@@ -1,0 +1,164 @@
+"""Every judgement of the diagnosis, with its origin: false-alarm rates, weights, cut-offs and shares.
+
+Origins: *tuned* means set on tuning sets that another integrator drew with other forms (decisions 0007 to 0009,
+docs/blind-check.md); blind tests use other seeds. *Convention* means a customary level. *Judgement* means chosen by
+reason alone, as stated. Numerical constants (grids, iterations, paddings) stand where they are used.
+"""
+
+from __future__ import annotations
+
+# ---- Is there a gap? ------------------------------------------------------------------------------------------
+
+#: Rate at which a campaign without a gap is said to have one, all tests together. Convention: one in a thousand.
+GAP_FALSE_ALARM_RATE = 1e-3
+#: Share of that rate at which the noise itself counts as misbehaving. Judgement: it outweighs any cause.
+NOISE_FALSE_ALARM_SHARE = 0.01
+#: The noise below 60 Hz may exceed the noise measured above it by this share. Judgement: quantisation colours it.
+FLOOR_TOLERANCE = 0.03
+#: Standard deviation of that share, where single runs are tested. Judgement: half of the tolerance.
+FLOOR_STD = 0.015
+#: Standard deviations of the estimate within which records agree with the stated noise. Convention.
+NOISE_AGREES = 3.0
+#: Standard deviations from the mean beyond which a run has a noise of its own. Convention: one run in 20 000.
+NOISE_OF_ITS_OWN = 4.065
+#: Heavier tails than white noise has, by this factor, are accepted. Judgement: sensor noise is not quite normal.
+NOISE_TAILS = 1.15
+#: Stated noise is often rounded to one digit, which changes its square by up to this factor. Arithmetic.
+ROUNDED_NOISE = 1.5
+#: Gap, in noise variances of a sample, below which noise that misbehaves explains all of it. Judgement: as much
+#: again as the noise itself.
+NOISE_EXPLAINS_UP_TO = 1.0
+
+# ---- What is read off the records before any fit --------------------------------------------------------------
+
+#: A run shows a hum when removing the line lowers χ² by this much. By chance at one frequency: one run in 1800.
+HUM_RUN_DROP = 15.0
+#: Share of the runs that must show it. Judgement: the mains hum in every run.
+HUM_RUNS = 0.75
+#: Drop of χ² at the hum's line over the largest beside it, all runs together. Judgement: rods and corners ring too.
+HUM_CONTRAST = 4.0
+#: Rate at which a steady hum is said to swell. Judgement.
+SWELL_FALSE_ALARM_RATE = 1e-6
+#: Share of a hum's power that may be left once the line and its harmonics are removed. Judgement.
+HUM_LEFT = 0.02
+#: A reading's step beyond this multiple of the stated resolution is coarser than stated. Judgement.
+COARSER_STEP = 1.5
+#: Power that a coarse step's error may leave outside the noise, in step²/12. At most all of it, and chance.
+COARSE_STEP_POWER = 1.2
+#: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
+#: fifth apart. Judgement: what depends on amplitude changes a frequency gradually, and seldom as much.
+SAME_SPRING = 1.1
+#: Share of the readings' power in the residual beyond which a fit misses the motion itself. Judgement.
+GROSS_MISFIT = 0.01
+
+# ---- Which effects are fitted ---------------------------------------------------------------------------------
+
+#: Starting points fitted whatever linear theory predicts. Judgement: it ranks well but cannot judge.
+ALWAYS_FITTED = 7
+#: Predicted drop, as a share of χ², beyond which others are fitted too. Judgement.
+PREDICTED_SHARE = 0.01
+#: Single effects to which a second is added, and second effects fitted to each. Judgement: time against coverage.
+PAIR_BASES, PAIR_SECONDS = 3, 4
+#: Hypotheses whose forms are freed, and the share they must leave open with the textbook form (0008).
+FREED_HYPOTHESES, FREED_FROM = 3, 0.02
+
+# ---- How answers are weighed (0007) ---------------------------------------------------------------------------
+
+#: Exponent of the share left open. Tuned.
+STEEPNESS = 3.0
+#: Exponent beside it of a share beyond `UNKNOWN_SHARE`, three times as steep together. Tuned: many effects that
+#: close little must not together outweigh ``unknown``.
+STEEPNESS_BEYOND = 6.0
+#: Misfit of form that counts as none, as a share of the gap. Tuned.
+FORM_MISFIT = 0.005
+#: The same of effects that have no form to miss. Tuned.
+EXACT_MISFIT = 0.001
+#: Excess of block means beyond which that share no longer grows with the gap. Tuned: a motion missed grossly is
+#: no reason to overlook a second effect a thousand times the noise.
+FORM_MISFIT_UP_TO = 1000.0
+#: Standard deviations by which chance may change a share. Convention.
+CHANCE_STDS = 2.0
+#: Share at which a cause is as likely as an unknown one. Tuned.
+UNKNOWN_SHARE = 0.2
+#: A second effect must leave less than this share of what the first leaves. Tuned.
+PAIR_SHARE = 0.40
+#: A freed form must leave less than this share of what is left without it. Tuned.
+FORM_SHARE = 0.80
+#: Share of the probability that is spread evenly over all answers. Tuned: how often an answer of overwhelming
+#: weight was wrong, where something was at work that neither fits nor rivals know.
+EVEN_SHARE = 0.03
+
+# ---- Random moments (0009) ------------------------------------------------------------------------------------
+
+#: Largest departure of the innovations' power by band from white, in standard deviations. Judgement: among 64 to
+#: 100 bands the greatest is below 3.5 by chance; a real spectrum is not first-order, which adds some.
+WHITE_BY_BAND = 7.0
+#: The same for quarters of the record in time. Judgement.
+STEADY_IN_TIME = 5.5
+#: Excess of the wind-off runs up to which they count as free of a gap: a share of the nominal model's excess, and
+#: at least so many noise variances. Judgement.
+WIND_OFF_SHARE, WIND_OFF_LEAST = 0.05, 0.1
+#: Single effects beside which a random moment is tried. Judgement: time against coverage.
+RANDOM_PARTNERS = 3
+#: −2 ln L by which an effect beside the random moment must improve on the moment alone. Judgement: a parameter
+#: fitted by least squares to a random motion gains about ten for nothing.
+BESIDE_EVIDENCE = 60.0
+#: −2 ln L beyond which a likelier kind of random moment rules another out. Convention: odds of e^10.
+RIVAL_EVIDENCE = 20.0
+#: Where deterministic effects leave a smaller share of the gap, no random moment is tried (0009).
+CLOSED_WITHOUT_RANDOM = 0.015
+
+# ---- Where the gap is -----------------------------------------------------------------------------------------
+
+#: Rate at which runs, bands or lines of a campaign without a gap are said to show one, all tests together.
+#: Convention: one in a hundred.
+PLACE_FALSE_ALARM_RATE = 0.01
+#: Runs with a smaller share of the largest excess are not named. Judgement.
+NAMED_RUN_SHARE = 0.1
+#: Share of the excess that a stated interval holds. Judgement: the text says four fifths.
+INTERVAL_SHARE = 0.8
+#: An interval longer than this share of the whole range does not locate anything. Judgement.
+LOCATES_UP_TO = 0.7
+#: Share of the excess that makes a band or a line the place of the gap. Judgement.
+DOMINANT_SHARE = 0.6
+#: Share of the excess in the second harmonic that goes with a shifted centre. Judgement.
+SECOND_HARMONIC_SHARE = 0.05
+#: Share of the excess in one run, among three or more, beyond which that run alone shows the gap. Judgement.
+SINGLE_RUN_SHARE = 0.85
+#: Share of the excess that fits to single runs leave at most, where the gap lies between runs. Judgement.
+BETWEEN_RUNS_SHARE = 0.2
+#: Half of the missing moment within this share of the record is a blow. Judgement.
+BLOW_SHARE = 0.1
+#: Standard deviations beyond which the missing moment stands out of the noise. Convention.
+CLEAR_MOMENT = 5.0
+#: Ratio of the drifts of frequency and damping beyond which the larger decides the channel. Judgement.
+DRIFT_RATIO = 1.5
+#: Highest frequency of a moment, Hz: the rig's inertia keeps the response to faster ones below any noise. Physics.
+FASTEST_MOMENT = 30.0
+#: A line is this many times the median around it. Judgement: the skirt of a resonance is not.
+LINE_CONTRAST = 8.0
+
+# ---- What is reported -----------------------------------------------------------------------------------------
+
+#: Answers less probable than this are not called rivals. Tuned.
+RIVAL_PROBABILITY = 0.05
+#: Candidates less probable than this are counted, not listed. Judgement.
+LISTED_PROBABILITY = 0.01
+#: MuJoCo and the fits' integrator may differ by this share of a block mean's noise, root mean square over a run.
+#: Judgement: a hundredth of the noise's power.
+CONFIRMATION_TOLERANCE = 0.1
+#: Excess of block means beyond which residuals are not white and the scatter of the runs sets the interval.
+#: Judgement.
+COLOURED_EXCESS = 0.03
+#: Share of a coefficient's change on freeing the forms that counts as its standard deviation. Judgement, made when
+#: a blind test had shown Cnβ's intervals too narrow, and tested on campaigns drawn afterwards.
+FORM_CHANGE_STD = 0.5
+#: With fewer runs a caution is given. Judgement.
+FEW_RUNS = 3
+#: A caution is given where the stated noise is wrong by this factor. Judgement: rounding to one digit reaches half
+#: of it.
+NOISE_CONTRADICTED = 3.0
+#: A blind case counts as closed from this share of the gap on. Convention.
+BLIND_CLOSED = 0.95
+#: Errors of coefficients in blind tests are counted within this many standard deviations. Convention.
+BLIND_WITHIN = 3.0
