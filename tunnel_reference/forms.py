@@ -1,4 +1,4 @@
-"""The catalogue of forms of the vocabulary's 23 families; ``p`` is the severity parameter, ``e`` the rest."""
+"""The catalogue of forms of the vocabulary's families; ``p`` is the severity parameter, ``e`` the rest."""
 
 from __future__ import annotations
 

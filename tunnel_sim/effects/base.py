@@ -172,6 +172,9 @@ class Effect:
     The hooks are identities unless an effect overrides them, and at the null every one of them is. ``stated``
     is the run as the campaign states it, before any effect; ``drawn`` is what `draw` gave for the run.
 
+    Every effect states ``place``, its number in the vocabulary (random draws depend on the order, so a new effect
+    takes the next), and ``example``, values of its parameters, in their order, at which it is seen.
+
     An effect overrides the traits that do not fit it:
 
     - ``random``: what a random moment's spectrum is like; empty where the effect is deterministic. A vortex
@@ -189,11 +192,13 @@ class Effect:
     """
 
     name: ClassVar[str]
+    place: ClassVar[int]
     channel: ClassVar[Channel]
     condition: ClassVar[Condition]
     equation: ClassVar[str]
     signature: ClassVar[str]
     references: ClassVar[tuple[str, ...]]
+    example: ClassVar[tuple[float, ...]]
 
     random: ClassVar[Literal["", "broad_band", "narrow_band"]] = ""
     line: ClassVar[Literal["", "mains", "shedding"]] = ""

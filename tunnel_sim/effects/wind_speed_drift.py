@@ -25,11 +25,13 @@ class WindSpeedDrift(Effect):
     """
 
     name = "wind_speed_drift"
+    place = 10
     channel = "stiffness"
     condition = "wind_on"
     equation = "V(t) = V (1 + d t/T) over a run of length T; bent: " + EQUATION + " for t/T"
     signature = "The frequency of wind-on runs moves with time, whatever the amplitude."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
+    example = (0.1,)
 
     drift: float = parameter(
         "d", "1", "share of the speed gained over the run", scale=0.02, lower=-0.9, upper=5.0
