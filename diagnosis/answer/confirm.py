@@ -7,9 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
-from diagnosis.fitting.problem import Point, Problem, campaign_rig, condensed, held_end
+from diagnosis.fitting.problem import (
+    Point,
+    Problem,
+    blocks_beyond,
+    campaign_rig,
+    condensed,
+    held_end,
+    sample_means,
+)
 from diagnosis.fitting.run_data import RunData
 from diagnosis.result import Confirmation
 from tunnel_sim.physics.motion import Motion
@@ -144,20 +151,14 @@ class _Case:
         self.zero = float(common[problem.nominal_names.index("zero")])
         physics = held_end(condensed(self.chain.physics(), problem.data))
         steps = int(np.ceil(run.interval / _longest_step(physics) - 1e-9))
+        blocks = run.reading.size + blocks_beyond(physics, run)
         self.physics = dataclasses.replace(
-            physics, timestep=run.interval / steps, duration=(run.reading.size + 1) * run.interval
+            physics, timestep=run.interval / steps, duration=(blocks + 1) * run.interval
         )
 
     def reading(self, motion: Motion) -> Array:
         """Block means of the reading from the motion at the blocks' ends."""
-        run = self.run
-        ends = CubicHermiteSpline(motion.time_s, motion.angle, motion.rate)
-        samples = run.reading.size * run.block
-        time: Array = np.asarray(np.arange(samples) * (run.interval / run.block), np.float64)
-        angle: Array = np.asarray(ends(time), np.float64)
-        reading = self.chain.reading(self.chain.angle(angle, time) + self.zero)
-        means: Array = reading.reshape(run.reading.size, run.block).mean(axis=1)
-        return means
+        return sample_means(self.chain, motion, self.run, self.zero)
 
 
 def _longest_step(physics: RunSettings) -> float:

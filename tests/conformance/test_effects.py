@@ -24,7 +24,7 @@ SENSOR = SensorModel(zero=0.003)
 WIND_ON = settings(Setting(duration=1.0))
 WIND_OFF = replace(WIND_ON, wind_speed=0.0)
 UNITS = {
-    "1", "N m", "N m/rad", "N m s2/rad2", "1/rad", "1/rad2", "rad", "rad/(N m)", "l/V", "Hz", "m/s",
+    "1", "N m", "N m/rad", "N m s2/rad2", "1/rad", "1/rad2", "rad", "rad/(N m)", "l/V", "Hz", "m/s", "rad/s", "s",
 }  # fmt: skip
 
 each_effect = pytest.mark.parametrize("kind", ALL_EFFECTS, ids=lambda kind: kind.name)

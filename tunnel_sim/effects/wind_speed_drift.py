@@ -50,5 +50,5 @@ class WindSpeedDrift(Effect):
             return run
         part = ramp(np.linspace(0.0, 1.0, 2 if self.settling == 0.0 else _SAMPLES), self.settling)
         speeds = run.wind_speed * (1.0 + self.drift * part)
-        drifting = Series(tuple(speeds.tolist()), run.duration / (part.size - 1))
+        drifting = Series(tuple(speeds.tolist()), stated.duration / (part.size - 1))
         return dataclasses.replace(run, series={**run.series, "wind_speed": drifting})
