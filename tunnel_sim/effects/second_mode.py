@@ -45,7 +45,7 @@ class SecondMode(Effect):
         "ω2", "rad/s", "undamped angular frequency", scale=50.0, lower=0.01, upper=1e5, default=50.0
     )
     damping_ratio: float = parameter(
-        "ζ2", "1", "share of critical damping", scale=0.01, lower=0.0, upper=0.9, default=0.01
+        "ζ2", "1", "share of critical damping", scale=0.01, lower=0.0, upper=0.9, fit_upper=0.2, default=0.01
     )
     exponent: float = parameter(
         "n", "1", "power of the release angle", scale=1.0, lower=0.0, upper=3.0, default=0.0, form=True
