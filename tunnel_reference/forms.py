@@ -1,13 +1,22 @@
-"""The catalogue of forms of the vocabulary's 23 families; ``p`` is the severity parameter, ``e`` the rest."""
+"""The catalogue of forms of the vocabulary's families; ``p`` is the severity parameter, ``e`` the rest."""
 
 from __future__ import annotations
 
-from tunnel_reference.catalogue import Form
-from tunnel_reference.forms_air import AIR_FORMS
-from tunnel_reference.forms_mechanical import MECHANICAL_FORMS
-from tunnel_reference.forms_sensor import SENSOR_FORMS
+from importlib import import_module
+from pkgutil import iter_modules
 
-FORMS: tuple[Form, ...] = (*MECHANICAL_FORMS, *AIR_FORMS, *SENSOR_FORMS)
+import tunnel_reference
+from tunnel_reference.catalogue import Form
+
+
+def _found() -> tuple[Form, ...]:
+    """``FORMS`` of every module of this package whose name begins with ``forms_``."""
+    names = [module.name for module in iter_modules(tunnel_reference.__path__)]
+    modules = [import_module(f"tunnel_reference.{name}") for name in names if name.startswith("forms_")]
+    return tuple(form for module in modules for form in module.FORMS)
+
+
+FORMS: tuple[Form, ...] = _found()
 FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS}))
 
 

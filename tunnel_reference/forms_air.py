@@ -140,4 +140,4 @@ _FORCING = (
          draw=_strouhal(False, True)),
 )  # fmt: skip
 
-AIR_FORMS: tuple[Form, ...] = (*_MOMENT, *_SPEED, *_FORCING)
+FORMS: tuple[Form, ...] = (*_MOMENT, *_SPEED, *_FORCING)

@@ -126,4 +126,4 @@ _ROD = (
          draw=lambda g, _c: {"spring": float(g.integers(0, 12))}),
 )  # fmt: skip
 
-MECHANICAL_FORMS: tuple[Form, ...] = (*_FRICTION, *_DAMPING, *_SPRING, *_ROD)
+FORMS: tuple[Form, ...] = (*_FRICTION, *_DAMPING, *_SPRING, *_ROD)

@@ -111,4 +111,4 @@ _LIMITS = (
          reading(r.clipping, Order.LIMIT, _limit), draw=lambda _g, _c: {"lower": 0.0}, limits=(1e-3, 0.8)),
 )  # fmt: skip
 
-SENSOR_FORMS: tuple[Form, ...] = (*_CURVES, *_STEPS, *_LINKAGE, *_DRIFTS, *_HUM, *_LIMITS)
+FORMS: tuple[Form, ...] = (*_CURVES, *_STEPS, *_LINKAGE, *_DRIFTS, *_HUM, *_LIMITS)

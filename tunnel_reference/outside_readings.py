@@ -35,14 +35,6 @@ def motion_noise(r: Reading, p: Params) -> Array:
     return np.asarray(r.value + noise)
 
 
-def second_mode(r: Reading, p: Params) -> Array:
-    """Adds q β(0) e^(−ζωt) sin(ωt + φ): the rod's swing in another plane leaks in."""
-    t = r.conditions.time[:, None]
-    omega = 2.0 * np.pi * p["frequency"]
-    ring = np.exp(-p["damping"] * omega * t) * np.sin(omega * t + p["phase"])
-    return np.asarray(r.value + p["share"] * r.motion.angle[0] * ring)
-
-
 def amplitude_zero(r: Reading, p: Params) -> Array:
     """Adds z E/E0, E the running energy of the motion: a zero that follows the amplitude."""
     c = r.conditions

@@ -91,6 +91,7 @@ def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
     conditions, terms = bind_effects(draw)
     sensor = [t for t in terms if isinstance(t, ReadingTerm)]
     readings = read_motion(conditions, motion, sensor, np.random.default_rng(draw.seed))
+    readings = readings[: draw.conditions.samples]  # a motion may outlast the record
     power = fit_nominal(draw.conditions, readings).residual_power / conditions.noise_power
     return Simulated(draw, readings, float(np.mean(power)) - 1.0, power - 1.0)
 

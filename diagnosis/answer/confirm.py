@@ -7,9 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
-from diagnosis.fitting.problem import Point, Problem, campaign_rig, condensed
+from diagnosis.fitting.problem import (
+    Point,
+    Problem,
+    blocks_beyond,
+    campaign_rig,
+    condensed,
+    sample_means,
+)
 from diagnosis.fitting.run_data import RunData
 from diagnosis.policy import CONFIRMATION_TOLERANCE
 from diagnosis.result import Confirmation
@@ -141,17 +147,11 @@ class _Case:
         self.zero = float(common[problem.nominal_names.index("zero")])
         physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         steps = report_substeps(physics, run.interval)
+        blocks = run.reading.size + blocks_beyond(physics, run)
         self.physics = dataclasses.replace(
-            physics, timestep=run.interval / steps, duration=(run.reading.size + 1) * run.interval
+            physics, timestep=run.interval / steps, duration=(blocks + 1) * run.interval
         )
 
     def reading(self, motion: Motion) -> Array:
         """Block means of the reading from the motion at the blocks' ends."""
-        run = self.run
-        ends = CubicHermiteSpline(motion.time_s, motion.angle, motion.rate)
-        samples = run.reading.size * run.block
-        time: Array = np.asarray(np.arange(samples) * (run.interval / run.block), np.float64)
-        angle: Array = np.asarray(ends(time), np.float64)
-        reading = self.chain.reading(self.chain.angle(angle, time) + self.zero)
-        means: Array = reading.reshape(run.reading.size, run.block).mean(axis=1)
-        return means
+        return sample_means(self.chain, motion, self.run, self.zero)

@@ -15,6 +15,7 @@ from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
+from tunnel_sim.physics.motion import Motion
 from tunnel_sim.physics.release import released_by_spring_end
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.steps import fit_substeps
@@ -33,8 +34,9 @@ class Point:
 
     Args:
         common: parameters common to the runs, in the order of `Problem.names`, shape (common,).
-        release: of every run its own parameters, shape (runs, own): angle (rad) and rate (rad/s) of the
-            sensor's end at the record's start, then the phase (rad) of each periodic effect.
+        release: of every run its own parameters, shape (runs, own): angle (rad) and rate (rad/s) of the sensor's
+            end at the record's start, then in the effects' order the phase (rad) of each periodic one and the
+            instant (share of the run's length) of each that skips samples.
     """
 
     common: Array
@@ -83,8 +85,8 @@ class Problem:
 
     @cached_property
     def phased(self) -> tuple[str, ...]:
-        """Names of the effects that have a phase of their own in every run."""
-        return tuple(kind.name for kind in self.effects if kind.line)
+        """Names of the effects that have a phase or an instant of their own in every run."""
+        return tuple(kind.name for kind in self.effects if kind.line or kind.skips)
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
@@ -145,7 +147,7 @@ class Problem:
             run: conditions.
 
         Returns:
-            The effects with the phases that the run has.
+            The effects with the phases and instants that the run has.
         """
         phases = dict(zip(self.phased, own[2:].tolist(), strict=True))
         drawn = tuple(phases.get(kind.name) for kind in self.effects)
@@ -181,11 +183,15 @@ class _Job:
         physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         self.row, self.keep_alive = forward_run(physics)
         self.law = parameter_vector(physics.law(campaign_rig(problem.data)))
+        self.blocks = run.reading.size + blocks_beyond(physics, run)
         substeps = fit_substeps(physics, run.interval)
         self.row["step"], self.row["steps"] = run.interval / substeps, substeps
 
     def reading(self, angle: Array, rate: Array) -> Array:
         """Block means of the reading from angle and rate at the blocks' ends."""
+        if self.chain.skips:
+            ends = np.arange(angle.size) * self.run.interval
+            return sample_means(self.chain, Motion(ends, angle, rate), self.run, self.zero)
         weights = hermite_means(self.run.block)
         h = self.run.interval
         mean: Array = (
@@ -197,6 +203,38 @@ class _Job:
             (np.arange(mean.size) + 0.5 * (self.run.block - 1) / self.run.block) * h, np.float64
         )
         return self.chain.reading(self.chain.angle(mean, time) + self.zero)
+
+
+def blocks_beyond(physics: RunSettings, run: RunData) -> int:
+    """By how many blocks a motion must outlast the record.
+
+    Args:
+        physics: of the run, effects included.
+        run: the record.
+
+    Returns:
+        0 unless an effect reads the motion after the record's end.
+    """
+    return int(np.ceil(max(0.0, physics.duration - run.duration) / run.interval))
+
+
+def sample_means(chain: EffectChain, motion: Motion, run: RunData, zero: float) -> Array:
+    """Block means of the reading, sample by sample.
+
+    Args:
+        chain: the run's effects.
+        motion: at the blocks' ends.
+        run: gives samples and blocks.
+        zero: of the sensor, rad.
+
+    Returns:
+        rad, of the shape of the run's ``reading``.
+    """
+    samples = run.reading.size * run.block
+    time: Array = np.asarray(np.arange(samples) * (run.interval / run.block), np.float64)
+    reading = chain.reading(chain.seen(motion, time) + zero)
+    means: Array = reading.reshape(run.reading.size, run.block).mean(axis=1)
+    return means
 
 
 def condensed(physics: RunSettings, data: Data) -> RunSettings:
@@ -248,7 +286,7 @@ def _rig(area: float, length: float, width: float) -> Rig:
 def _run_jobs(jobs: list[_Job]) -> list[Array]:
     """Integrate jobs, those of equal length together."""
     out: list[Array | None] = [None] * len(jobs)
-    lengths = np.array([job.run.reading.size for job in jobs])
+    lengths = np.array([job.blocks for job in jobs])
     for length in np.unique(lengths):
         at = np.flatnonzero(lengths == length)
         while at.size:
@@ -260,6 +298,7 @@ def _run_jobs(jobs: list[_Job]) -> list[Array]:
                 out[i] = jobs[i].reading(angle[k], rate[k])
             if status == 0:
                 break
-            out[at[status - 1]] = np.full(int(length), np.inf)
+            failed = at[status - 1]
+            out[failed] = np.full(jobs[failed].run.reading.size, np.inf)
             at = at[status:]
     return [values for values in out if values is not None]

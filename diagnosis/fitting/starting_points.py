@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnosis.fitting.equation_error import equation_error_start
 from diagnosis.fitting.least_squares import Fit, clip, normal_equations, scaled_residuals
+from diagnosis.fitting.own_numbers import OwnNumbers, ringing, skip
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.spectra import Line, mains_line, shedding_line
@@ -87,8 +88,17 @@ class StartingPoint:
     balanced: bool = False
 
 
-#: Where the line of a periodic effect is found, by what sets its frequency.
-_LINES: Mapping[str, Callable[[Fit], Line | None]] = {"mains": mains_line, "shedding": shedding_line}
+def _of_line(line: Line | None) -> OwnNumbers | None:
+    return None if line is None else OwnNumbers((line.amplitude, line.parameter), line.phases, line.drop)
+
+
+#: How an effect with a number of its own in every run is found: a periodic one by what sets its frequency.
+_FINDERS: Mapping[str, Callable[[Fit], OwnNumbers | None]] = {
+    "mains": lambda base: _of_line(mains_line(base)),
+    "shedding": lambda base: _of_line(shedding_line(base)),
+    "ringing": ringing,
+    "skips": skip,
+}
 
 
 def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
@@ -104,9 +114,9 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     data = base.problem.data
     if kind.condition == "wind_on" and not data.wind_on:
         return []
-    if kind.line:
-        line = _LINES[kind.line](base)
-        return [] if line is None else [_line_start(base, kind, line)]
+    if kind.line or kind.skips:
+        found_own = _FINDERS[kind.line or "skips"](base)
+        return [] if found_own is None else [_own_start(base, kind, found_own)]
     found = [_scaled_start(base, kind, trial) for trial in kind.trials(_circumstances(data))]
     if is_gross(base):
         found.append(_balanced_start(base, kind))
@@ -142,17 +152,12 @@ def _balanced_start(base: Fit, kind: type[Effect]) -> StartingPoint | None:
     return StartingPoint(problem, point, base.total - total, balanced=True) if np.isfinite(total) else None
 
 
-def _line_start(base: Fit, kind: type[Effect], line: Line) -> StartingPoint:
-    problem = Problem(
-        base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.free_forms
-    )
-    severity, place = kind.parameters()
-    lower, upper = severity.lower, severity.upper
-    values = np.array(
-        [np.clip(line.amplitude, lower, upper), np.clip(line.parameter, place.lower, place.upper)]
-    )
-    release = np.column_stack([base.point.release, line.phases])
-    return StartingPoint(problem, Point(np.concatenate([base.point.common, values]), release), line.drop)
+def _own_start(base: Fit, kind: type[Effect], found: OwnNumbers) -> StartingPoint:
+    problem = Problem(base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.free_forms)
+    infos = [info for info in kind.parameters() if not info.form]
+    values = [np.clip(value, info.lower, info.upper) for value, info in zip(found.values, infos, strict=True)]
+    release = np.column_stack([base.point.release, found.numbers])
+    return StartingPoint(problem, Point(np.concatenate([base.point.common, values]), release), found.drop)
 
 
 def _circumstances(data: Data) -> Circumstances:

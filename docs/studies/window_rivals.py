@@ -189,7 +189,7 @@ def diagnose_windows(
 
 def has_trend(kind: type[Effect]) -> bool:
     """Whether an effect has a trend to show in one run: it is neither random nor periodic nor a mere step."""
-    return kind.fitted and not kind.line
+    return kind.fitted and not kind.line and not kind.skips
 
 
 def _moves_zeta(e: Explanation, none: Explanation) -> bool:

@@ -304,6 +304,12 @@ SENSOR: dict[str, Callable[[np.ndarray, Parameters, Setting, float], np.ndarray]
     "sensor_clipping": lambda b, p, _run, _phase: np.minimum(np.maximum(b, -p["limit"]), p["limit"]),
 }
 
+#: The effects that are solved here; the others are compared with the reference simulator.
+SOLVED = {
+    *SENSOR, *ADDED, *OTHER_CONDITIONS, "coulomb_friction", "free_play", "rod_flexibility", "unsteady_aero_lag",
+    "buffeting",
+}  # fmt: skip
+
 
 def fitted_phase(residual: np.ndarray, frequency: float, run: Setting) -> tuple[float, float]:
     """Amplitude and phase of a sine of known frequency in a residual, by least squares."""

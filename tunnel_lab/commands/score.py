@@ -51,7 +51,7 @@ def run(
     ] = None,
     breakdown: Annotated[
         bool,
-        typer.Option("--breakdown", help="Map the bias under each of the 23 unmodelled effects instead."),
+        typer.Option("--breakdown", help="Map the bias under each unmodelled effect instead."),
     ] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a finished score in the folder.")
@@ -70,7 +70,7 @@ def run(
     hundred checks. Without a grid, the baseline's own records are scored, so
     that unchanged code compares to the last bit.
 
-    --breakdown puts each of the 23 unmodelled effects into a campaign of twelve
+    --breakdown puts each unmodelled effect into a campaign of twelve
     runs of the reference simulator, 1 and 10 times as strong as the noise, and
     shows the bias of Cnβ and Cnr in % and in reported standard deviations
     (three realisations, or --trials). Allow some minutes.

@@ -3,60 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
+from pkgutil import iter_modules
 
-from tunnel_sim.effects.asymmetric_stiffness import AsymmetricStiffness
 from tunnel_sim.effects.base import Effect, ParameterInfo, make_effect
-from tunnel_sim.effects.buffeting import Buffeting
 from tunnel_sim.effects.chain import EffectChain
-from tunnel_sim.effects.coulomb_friction import CoulombFriction
-from tunnel_sim.effects.cubic_stiffness import CubicStiffness
-from tunnel_sim.effects.flow_misalignment import FlowMisalignment
-from tunnel_sim.effects.free_play import FreePlay
-from tunnel_sim.effects.gravity_stiffness import GravityStiffness
-from tunnel_sim.effects.mains_hum import MainsHum
-from tunnel_sim.effects.nonlinear_yaw_damping import NonlinearYawDamping
-from tunnel_sim.effects.nonlinear_yaw_moment import NonlinearYawMoment
-from tunnel_sim.effects.quadratic_damping import QuadraticDamping
-from tunnel_sim.effects.rod_flexibility import RodFlexibility
-from tunnel_sim.effects.sensor_clipping import SensorClipping
-from tunnel_sim.effects.sensor_drift import SensorDrift
-from tunnel_sim.effects.sensor_hysteresis import SensorHysteresis
-from tunnel_sim.effects.sensor_nonlinearity import SensorNonlinearity
-from tunnel_sim.effects.sensor_quantisation import SensorQuantisation
-from tunnel_sim.effects.spring_miscalibration import SpringMiscalibration
-from tunnel_sim.effects.structural_damping import StructuralDamping
-from tunnel_sim.effects.unsteady_aero_lag import UnsteadyAeroLag
-from tunnel_sim.effects.vortex_shedding import VortexShedding
-from tunnel_sim.effects.wind_speed_drift import WindSpeedDrift
-from tunnel_sim.effects.wind_speed_offset import WindSpeedOffset
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
-#: Every effect, in the order of the vocabulary.
-ALL_EFFECTS: tuple[type[Effect], ...] = (
-    CoulombFriction,
-    QuadraticDamping,
-    StructuralDamping,
-    CubicStiffness,
-    AsymmetricStiffness,
-    FreePlay,
-    GravityStiffness,
-    RodFlexibility,
-    NonlinearYawMoment,
-    WindSpeedDrift,
-    NonlinearYawDamping,
-    UnsteadyAeroLag,
-    Buffeting,
-    VortexShedding,
-    FlowMisalignment,
-    SensorNonlinearity,
-    SensorQuantisation,
-    SensorHysteresis,
-    SensorDrift,
-    MainsHum,
-    SensorClipping,
-    SpringMiscalibration,
-    WindSpeedOffset,
-)
+
+def _found() -> tuple[type[Effect], ...]:
+    """The effects that this package's modules define, by their place."""
+    modules = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
+    defined = {
+        kind
+        for module in modules
+        for kind in vars(module).values()
+        if isinstance(kind, type) and issubclass(kind, Effect) and kind.__module__ == module.__name__
+    }
+    return tuple(sorted(defined - {Effect}, key=lambda kind: kind.place))
+
+
+#: Every effect, in the order of the vocabulary: a module of this package that defines one is enough.
+ALL_EFFECTS: tuple[type[Effect], ...] = _found()
 
 
 def effect_class(name: str) -> type[Effect]:

@@ -19,6 +19,7 @@ class AsymmetricStiffness(Effect):
     """
 
     name = "asymmetric_stiffness"
+    place = 5
     channel = "stiffness"
     condition = "always"
     equation = "−κ Kr β²; bent: |β|^p for β²"
@@ -27,6 +28,7 @@ class AsymmetricStiffness(Effect):
         "frequency changes only in second order."
     )
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
+    example = (0.2,)
 
     coefficient: float = parameter(
         "κ",

@@ -172,11 +172,16 @@ class Effect:
     The hooks are identities unless an effect overrides them, and at the null every one of them is. ``stated``
     is the run as the campaign states it, before any effect; ``drawn`` is what `draw` gave for the run.
 
+    Every effect states ``place``, its number in the vocabulary (random draws depend on the order, so a new effect
+    takes the next), and ``example``, values of its parameters, in their order, at which it is seen.
+
     An effect overrides the traits that do not fit it:
 
     - ``random``: what a random moment's spectrum is like; empty where the effect is deterministic. A vortex
       street is both: its phase may be steady or wander.
     - ``line``: what sets the frequency of a periodic effect, which has a phase of its own in every run.
+    - ``skips``: whether samples are missing, at an instant of its own in every run (a share of the run's length):
+      the motion is read at other times than stated.
     - ``fitted``: whether a fit of the deterministic motion can find it. What is not fitted is read off the
       records (``line``, ``lattice``) or found by its spectrum (``random``).
     - ``lattice``: whether it is the step of the readings.
@@ -189,14 +194,17 @@ class Effect:
     """
 
     name: ClassVar[str]
+    place: ClassVar[int]
     channel: ClassVar[Channel]
     condition: ClassVar[Condition]
     equation: ClassVar[str]
     signature: ClassVar[str]
     references: ClassVar[tuple[str, ...]]
+    example: ClassVar[tuple[float, ...]]
 
     random: ClassVar[Literal["", "broad_band", "narrow_band"]] = ""
-    line: ClassVar[Literal["", "mains", "shedding"]] = ""
+    line: ClassVar[Literal["", "mains", "shedding", "ringing"]] = ""
+    skips: ClassVar[bool] = False
     fitted: ClassVar[bool] = True
     lattice: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
@@ -318,12 +326,26 @@ class Effect:
         law = self.law()
         return with_law(run, **law) if law else run
 
+    def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
+        """Change when the motion is read.
+
+        Args:
+            time_s: by the time stamps, s, shape (n,).
+            stated: the run as the campaign states it.
+            drawn: what the run drew.
+
+        Returns:
+            The true times, s, shape (n,).
+        """
+        del stated, drawn
+        return time_s
+
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Change what the sensor sees before its zero and noise.
 
         Args:
             angle: of the rod's upper end, rad, shape (n,).
-            time_s: s, shape (n,).
+            time_s: true times, s, shape (n,).
             stated: the run as the campaign states it.
             drawn: what the run drew.
 

@@ -25,6 +25,7 @@ class Buffeting(Effect):
     """
 
     name = "buffeting"
+    place = 13
     channel = "forcing"
     condition = "wind_on"
     equation = "random moment of standard deviation s ½ρV²Al, correlated as exp(−2π fb |t − t'|)"
@@ -36,6 +37,7 @@ class Buffeting(Effect):
         "Dryden & Kuethe, NACA Report 342 (1930)",
         "Gauss–Markov process: Gillespie, Phys. Rev. E 54 (1996) 2084, doi 10.1103/PhysRevE.54.2084",
     )
+    example = (0.02, 8.0)
     fitted = False
     random = "broad_band"
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.physics.motion import Motion
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array
@@ -54,12 +55,49 @@ class EffectChain:
             run = effect.on_run(run, self.stated, drawn)
         return run
 
+    @property
+    def skips(self) -> bool:
+        """Whether the motion is read at other times than stated."""
+        return any(
+            effect.skips and not effect.is_null and drawn is not None
+            for effect, drawn in zip(self.effects, self.drawn, strict=True)
+        )
+
+    def true_times(self, time_s: Array) -> Array:
+        """When the motion is read.
+
+        Args:
+            time_s: by the time stamps, s, shape (n,).
+
+        Returns:
+            The true times since the release, s, shape (n,).
+        """
+        for effect, drawn in zip(self.effects, self.drawn, strict=True):
+            time_s = effect.on_time(time_s, self.stated, drawn)
+        return time_s
+
+    def seen(self, motion: Motion, time_s: Array) -> Array:
+        """What the sensor sees of a motion before its zero and noise.
+
+        Args:
+            motion: of the rod's upper end, as long as `physics` asks for.
+            time_s: of the samples by their time stamps, s, shape (n,); need not be those of the motion.
+
+        Returns:
+            The angle seen, rad, shape (n,); cubic between the motion's own times.
+        """
+        from scipy.interpolate import CubicHermiteSpline  # only here: slow to load
+
+        true = self.true_times(time_s)
+        path = CubicHermiteSpline(motion.time_s, motion.angle, motion.rate)
+        return self.angle(np.asarray(path(true), np.float64), true)
+
     def angle(self, angle: Array, time_s: Array) -> Array:
         """What the sensor sees before its zero and noise.
 
         Args:
             angle: of the rod's upper end, rad, shape (n,).
-            time_s: since the release, s, shape (n,).
+            time_s: true times since the release, s, shape (n,).
 
         Returns:
             The angle seen, rad, shape (n,).
@@ -95,7 +133,9 @@ class EffectChain:
     def reads_plainly(self) -> bool:
         """Whether no effect touches what the sensor sees or reads."""
         return not any(
-            _overrides(effect, hook) for effect in self.effects for hook in ("on_angle", "on_reading")
+            _overrides(effect, hook)
+            for effect in self.effects
+            for hook in ("on_time", "on_angle", "on_reading")
         )
 
 

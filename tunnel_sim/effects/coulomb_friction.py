@@ -26,6 +26,7 @@ class CoulombFriction(Effect):
     """
 
     name = "coulomb_friction"
+    place = 1
     channel = "damping"
     condition = "always"
     equation = "−Tc sgn β̇; rest while the other moments stay within ±Tc; bent: −Tc z/zs, ż = β̇ − |β̇| z/zs"
@@ -37,6 +38,7 @@ class CoulombFriction(Effect):
         "Feeny & Liang, J. Sound Vib. 195 (1996) 149, doi 10.1006/jsvi.1996.0411",
         "Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, doi 10.1109/9.376053",
     )
+    example = (0.05,)
 
     friction_moment: float = parameter("Tc", "N m", "moment of friction", scale=0.004, lower=0.0, upper=1e4)
     presliding: float = parameter(

@@ -19,11 +19,13 @@ class CubicStiffness(Effect):
     """
 
     name = "cubic_stiffness"
+    place = 4
     channel = "stiffness"
     condition = "always"
     equation = "−κ Kr β³; bent: |β|^p sgn β for β³"
     signature = "The frequency departs from its small-amplitude value by the share (3/8) κ A²."
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
+    example = (1.0,)
 
     coefficient: float = parameter(
         "κ",

@@ -18,11 +18,13 @@ class FlowMisalignment(Effect):
     """
 
     name = "flow_misalignment"
+    place = 15
     channel = "forcing"
     condition = "wind_on"
     equation = "Ka βf added; bent: βf (V/20 m/s)^n"
     signature = "The centre of the oscillation shifts with wind speed squared over the stiffness."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
+    example = (0.02,)
 
     angle: float = parameter(
         "βf", "rad", "angle of the flow against the rig's zero", scale=0.01, lower=-0.8, upper=0.8

@@ -17,11 +17,13 @@ class FreePlay(Effect):
     """
 
     name = "free_play"
+    place = 6
     channel = "stiffness"
     condition = "always"
     equation = "−Kr dz(β), dz = 0 within ±δ and β ∓ δ beyond"
     signature = "The frequency falls steeply as the amplitude nears the dead zone."
     references = ("Conner, Tang, Dowell & Virgin, J. Fluids Struct. 11 (1997) 89",)
+    example = (0.01,)
 
     half_width: float = parameter(
         "δ", "rad", "half width of the dead zone", scale=0.002, lower=0.0, upper=0.2

@@ -22,6 +22,7 @@ class GravityStiffness(Effect):
     """
 
     name = "gravity_stiffness"
+    place = 7
     channel = "stiffness"
     condition = "always"
     equation = "−Kg sin(β − βg)"
@@ -30,6 +31,7 @@ class GravityStiffness(Effect):
         "slope and leaves the origin; the centre shifts by the spring."
     )
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
+    example = (0.4, 0.2)
     regressed_at: ClassVar[Mapping[str, float]] = {"rest_angle": 0.0}  # which is the zero there
 
     stiffness: float = parameter(

@@ -21,11 +21,13 @@ class MainsHum(Effect):
     """
 
     name = "mains_hum"
+    place = 20
     channel = "sensor"
     condition = "always"
     equation = "y = β + a sin(2π f t + φ), φ drawn for every run"
     signature = "A spectral line at the mains' frequency in every run, whatever the motion."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+    example = (0.002, 60.0)
     fitted = False
     line = "mains"
 

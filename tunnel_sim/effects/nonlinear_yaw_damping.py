@@ -18,11 +18,13 @@ class NonlinearYawDamping(Effect):
     """
 
     name = "nonlinear_yaw_damping"
+    place = 11
     channel = "damping"
     condition = "wind_on"
     equation = "Ca (1 + μa β²) β̇ in place of Ca β̇; bent: |β|^p for β²"
     signature = "The damping ratio of wind-on runs departs by the share μa A²/4 of the aerodynamic part."
     references = ("van der Pol, Phil. Mag. 2 (1926) 978, doi 10.1080/14786442608564127",)
+    example = (20.0,)
 
     coefficient: float = parameter(
         "μa", "1/rad2", "share of Ca per squared angle", scale=5.0, lower=-500.0, upper=500.0

@@ -18,11 +18,13 @@ class NonlinearYawMoment(Effect):
     """
 
     name = "nonlinear_yaw_moment"
+    place = 9
     channel = "stiffness"
     condition = "wind_on"
     equation = "Ka (1 + κa β²) β in place of Ka β; bent: |β|^p for β²"
     signature = "As cubic stiffness, but in proportion to V² and absent with the wind off."
     references = ("Mansor & Passmore, J. Wind Eng. Ind. Aerodyn. 96 (2008) 1218",)
+    example = (3.0,)
 
     coefficient: float = parameter(
         "κa", "1/rad2", "share of Ka per squared angle", scale=1.0, lower=-100.0, upper=100.0

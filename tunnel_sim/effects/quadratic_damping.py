@@ -21,11 +21,13 @@ class QuadraticDamping(Effect):
     """
 
     name = "quadratic_damping"
+    place = 2
     channel = "damping"
     condition = "always"
     equation = "−C2 |β̇| β̇; bent: |β̇|^n sgn β̇"
     signature = "The damping ratio falls in proportion to the amplitude."
     references = ("ITTC Recommended Procedure 7.5-02-07-04.5, roll damping of ships: B1 p + B2 |p| p",)
+    example = (0.01,)
 
     coefficient: float = parameter(
         "C2", "N m s2/rad2", "coefficient of the squared rate", scale=0.002, lower=-1e4, upper=1e4

@@ -21,6 +21,7 @@ class RodFlexibility(Effect):
     """
 
     name = "rod_flexibility"
+    place = 8
     channel = "stiffness"
     condition = "always"
     equation = (
@@ -32,6 +33,7 @@ class RodFlexibility(Effect):
         "the spring; the air's stiffness acts on the far end; the rod may ring at the release."
     )
     references = ("Meirovitch, Fundamentals of Vibrations, McGraw-Hill 2001",)
+    example = (0.001, 0.3)
     tries = 3
 
     compliance: float = parameter(

@@ -24,11 +24,13 @@ class SensorClipping(Effect):
     """
 
     name = "sensor_clipping"
+    place = 21
     channel = "sensor"
     condition = "always"
     equation = "|y| ≤ L; bent: |y − c| ≤ L, exponentially within k L of it"
     signature = "The tops of the largest swings are flat, and nothing else is touched."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+    example = (0.2,)
     tries = 2
 
     limit: float = parameter(

@@ -20,11 +20,13 @@ class SensorDrift(Effect):
     """
 
     name = "sensor_drift"
+    place = 19
     channel = "sensor"
     condition = "always"
     equation = f"y = β + d t/T over a run of length T; bent: {EQUATION} for t/T"
     signature = "The centre of the oscillation moves with time and is the same at any wind and spring."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+    example = (0.01,)
 
     drift: float = parameter("d", "rad", "drift over the run", scale=0.002, lower=-1.0, upper=1.0)
     settling: float = settling()

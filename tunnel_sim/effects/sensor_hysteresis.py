@@ -23,6 +23,7 @@ class SensorHysteresis(Effect):
     """
 
     name = "sensor_hysteresis"
+    place = 18
     channel = "sensor"
     condition = "always"
     equation = "y follows β when pushed: play of half width w; bent: mean of plays (1 ± k) w"
@@ -30,6 +31,7 @@ class SensorHysteresis(Effect):
     references = (
         "Visintin, Differential Models of Hysteresis, Springer 1994, doi 10.1007/978-3-662-11557-2",
     )
+    example = (0.003,)
     remembers = True
     ahead_of_sensor = True
 

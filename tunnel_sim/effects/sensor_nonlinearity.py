@@ -25,6 +25,7 @@ class SensorNonlinearity(Effect):
     """
 
     name = "sensor_nonlinearity"
+    place = 16
     channel = "sensor"
     condition = "always"
     equation = "y = β + s β³; bent: |β|^p sgn β for β³, and q β² beside it"
@@ -33,6 +34,7 @@ class SensorNonlinearity(Effect):
         "(3/2) s A², whatever spring and wind."
     )
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+    example = (0.2,)
 
     coefficient: float = parameter("s", "1/rad2", "cubic coefficient", scale=0.05, lower=-1.0, upper=1.0)
 

@@ -18,11 +18,13 @@ class SensorQuantisation(Effect):
     """
 
     name = "sensor_quantisation"
+    place = 17
     channel = "sensor"
     condition = "always"
     equation = "y = q round(y/q); a step finer than the stated resolution does nothing"
     signature = "The reading lies on a lattice coarser than stated, and its error is a sawtooth of the angle."
     references = ("Widrow & Kollár, Quantization Noise, CUP 2008, doi 10.1017/CBO9780511754661",)
+    example = (0.004,)
     fitted = False
     lattice = True
 

@@ -21,6 +21,7 @@ class SpringMiscalibration(Effect):
     """
 
     name = "spring_miscalibration"
+    place = 22
     channel = "calibration"
     condition = "always"
     equation = "(1 + x) Kr in place of the stated Kr, in the runs of one spring"
@@ -28,6 +29,7 @@ class SpringMiscalibration(Effect):
         "All runs of one spring leave the line of stiffness against squared frequency by the same share."
     )
     references = ("Paper, Table II: springs 4 and 7 leave the line by −12 % and +10 %",)
+    example = (0.05, 16.12)
     exact = True
     tries = 2
 

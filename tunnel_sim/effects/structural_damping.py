@@ -18,6 +18,7 @@ class StructuralDamping(Effect):
     """
 
     name = "structural_damping"
+    place = 3
     channel = "damping"
     condition = "always"
     equation = "−(η Kr/ωn) β̇, ωn = √(Kr/Izz)"
@@ -25,6 +26,7 @@ class StructuralDamping(Effect):
         "Linear in every run, but the damping moment grows with the square root of the spring's stiffness."
     )
     references = ("Crandall, J. Sound Vib. 11 (1970) 3, doi 10.1016/S0022-460X(70)80105-5",)
+    example = (0.02,)
 
     loss_factor: float = parameter("η", "1", "loss factor", scale=0.005, lower=-1.0, upper=1.0)
 

@@ -20,6 +20,7 @@ class UnsteadyAeroLag(Effect):
     """
 
     name = "unsteady_aero_lag"
+    place = 12
     channel = "damping"
     condition = "wind_on"
     equation = (
@@ -33,6 +34,7 @@ class UnsteadyAeroLag(Effect):
         "Theissen, Unsteady Vehicle Aerodynamics in Gusty Crosswind (dissertation), TU München 2012",
         "Jones, NACA Report 681 (1940)",
     )
+    example = (1.5,)
     tries = 2
     caveat = (
         "Cnr after is the derivative of the moment's own damping term; the lag acts besides. Over a slow "

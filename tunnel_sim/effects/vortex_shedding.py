@@ -18,11 +18,13 @@ class VortexShedding(Effect):
     """
 
     name = "vortex_shedding"
+    place = 14
     channel = "forcing"
     condition = "wind_on"
     equation = "c ½ρV²Al sin(2π St V t/width + φ), φ drawn for every run"
     signature = "A spectral line whose frequency grows in proportion to the wind speed."
     references = ("Bearman, Annu. Rev. Fluid Mech. 16 (1984) 195, doi 10.1146/annurev.fl.16.010184.001211",)
+    example = (0.1, 0.02)
     line = "shedding"
     random = "narrow_band"
 

@@ -25,11 +25,13 @@ class WindSpeedDrift(Effect):
     """
 
     name = "wind_speed_drift"
+    place = 10
     channel = "stiffness"
     condition = "wind_on"
     equation = "V(t) = V (1 + d t/T) over a run of length T; bent: " + EQUATION + " for t/T"
     signature = "The frequency of wind-on runs moves with time, whatever the amplitude."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
+    example = (0.1,)
 
     drift: float = parameter(
         "d", "1", "share of the speed gained over the run", scale=0.02, lower=-0.9, upper=5.0
@@ -48,5 +50,5 @@ class WindSpeedDrift(Effect):
             return run
         part = ramp(np.linspace(0.0, 1.0, 2 if self.settling == 0.0 else _SAMPLES), self.settling)
         speeds = run.wind_speed * (1.0 + self.drift * part)
-        drifting = Series(tuple(speeds.tolist()), run.duration / (part.size - 1))
+        drifting = Series(tuple(speeds.tolist()), stated.duration / (part.size - 1))
         return dataclasses.replace(run, series={**run.series, "wind_speed": drifting})

@@ -19,11 +19,13 @@ class WindSpeedOffset(Effect):
     """
 
     name = "wind_speed_offset"
+    place = 23
     channel = "calibration"
     condition = "wind_on"
     equation = "true speed = stated speed + ΔV; bent: ΔV (V/20 m/s)^n"
     signature = "The aerodynamic stiffness does not grow as the stated speed squared."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
+    example = (1.0,)
 
     offset: float = parameter("ΔV", "m/s", "true minus stated speed", scale=0.5, lower=-50.0, upper=50.0)
     exponent: float = parameter(

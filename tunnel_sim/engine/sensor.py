@@ -24,13 +24,17 @@ def read_motion(
     Returns:
         The record. The ideal converter has no end stop: clipping is an effect.
     """
-    angle = motion.angle
-    if chain is not None:
-        angle, sensor = chain.angle(angle, motion.time_s), chain.sensor(sensor)
+    angle, time = motion.angle, motion.time_s
+    if chain is not None and chain.skips:
+        time = time[: round(chain.stated.duration / (time[1] - time[0]))]
+        angle = chain.seen(motion, time)
+    elif chain is not None:
+        angle = chain.angle(angle, time)
+    sensor = sensor if chain is None else chain.sensor(sensor)
     reading = angle + sensor.zero + sensor.noise_std * rng.standard_normal(angle.shape)
     if chain is not None:
         reading = chain.reading(reading)
-    return Record(motion.time_s, quantise(reading, sensor.resolution))
+    return Record(time, quantise(reading, sensor.resolution))
 
 
 def quantise(reading: Array, step: float) -> Array:

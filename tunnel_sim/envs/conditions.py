@@ -121,7 +121,10 @@ def plan_run(
     settings = _effects(given, config, plan, rng)
     try:
         one_run = CampaignPlan("episode", 0, truth, (condition,), plan.sensor, tuple(settings))
-        return RunPlan(condition, truth, plan.sensor, plan_effects(one_run))
+        effects = plan_effects(one_run)
+        for effect in effects:
+            _check_time(effect)
+        return RunPlan(condition, truth, plan.sensor, effects)
     except TunnelError as error:
         raise as_env_error(error, "option effects") from error
 
@@ -231,9 +234,20 @@ def _effects(
     )
 
 
+def _check_time(effect: Effect) -> None:
+    """An episode reads the motion as it goes: none of it can be passed over."""
+    if effect.skips and not effect.is_null:
+        raise TunnelError(
+            "an episode cannot pass over samples",
+            where=f"effect {effect.name}",
+            remedy="inject it with tunnel simulate, which makes whole records",
+        )
+
+
 def _drawn_effect(plan: RunPlan, rng: np.random.Generator) -> EffectSetting:
     """Any effect of the vocabulary, half to twice its typical size."""
-    kind = ALL_EFFECTS[int(rng.integers(len(ALL_EFFECTS)))]
+    kinds = [kind for kind in ALL_EFFECTS if not kind.skips]
+    kind = kinds[int(rng.integers(len(kinds)))]
     severity = kind.parameters()[0]
     value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))
     values = {severity.name: value}

@@ -1,0 +1,60 @@
+"""Effects with a number of their own in every run: found in the residuals, then fitted to what was planted.
+
+Truth: campaigns made from known values by the forward integrator.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.fitting.least_squares import Fit, fit
+from diagnosis.fitting.own_numbers import ringing, skip
+from diagnosis.fitting.starting_points import starting_points
+from tests.unit.gap_campaigns import campaign, nominal
+from tunnel_sim.effects import Effect, effect_from
+
+MODE = effect_from("second_mode", {"amplitude": 0.002, "frequency": 70.0, "damping_ratio": 0.01})
+LOST = effect_from("dropped_samples", {"lost_time": 0.006})
+OWN = np.linspace(0.2, 0.8, 6)  # as planted: rad, or share of the run
+
+
+def fitted(effect: Effect) -> Fit:
+    base = nominal(campaign(effect))
+    (start,) = starting_points(base, type(effect))
+    return fit(start.problem, start.point, base=base)
+
+
+@pytest.mark.parametrize("effect", [MODE, LOST], ids=lambda effect: effect.name)
+def test_the_effect_planted_is_fitted_within_its_errors(effect: Effect) -> None:
+    found = fitted(effect)
+    assert found.excess == pytest.approx(0.0, abs=4.0 * np.sqrt(2.0 / found.count))
+    for info in effect.parameters():
+        if not info.form:
+            name = f"{effect.name}.{info.name}"
+            assert found.value(name) == pytest.approx(getattr(effect, info.name), abs=4.0 * found.std(name))
+
+
+def test_a_ringing_is_seen_beside_the_motion() -> None:
+    found = ringing(nominal(campaign(MODE)))
+    assert found is not None
+    amplitude, frequency, damping_ratio = found.values
+    assert amplitude == pytest.approx(0.002, rel=0.3)
+    assert frequency == pytest.approx(70.0, abs=1.0)
+    assert 0.003 < damping_ratio < 0.03
+    assert found.numbers == pytest.approx(OWN, abs=0.7)
+
+
+def test_a_skip_is_placed_to_within_a_few_blocks() -> None:
+    found = skip(nominal(campaign(LOST)))
+    assert found is not None
+    assert found.values[0] == pytest.approx(0.006, rel=0.1)
+    assert found.numbers == pytest.approx(OWN, abs=0.005)  # 50 ms: at a turn of the motion a skip is not seen
+
+
+def test_without_a_gap_next_to_nothing_is_expected_of_either() -> None:
+    base = nominal(campaign())
+    for find in (ringing, skip):
+        found = find(base)
+        assert found is not None
+        assert found.drop < 0.02 * base.total

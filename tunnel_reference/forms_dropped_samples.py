@@ -1,0 +1,53 @@
+"""Forms of samples that are missing without a gap in the time stamps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tunnel_reference.catalogue import Bind, Bound, Draw, Extra, Form, Group
+from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.readings import Order, Params, Reading, ReadingTerm
+
+_LONGEST = 0.25  # s: longest time lost, for which the motion goes on beyond the record
+
+
+def missing(r: Reading, p: Params) -> Array:
+    """Takes a whole number of samples out at every instant and closes up; the end is padded, and cut off later."""
+    out = r.value.copy()
+    count = np.round(p["lost"] * r.conditions.sample_rate).astype(int)
+    for run in range(out.shape[1]):
+        for share in np.atleast_1d(p["instants"][run]):
+            first = int(np.ceil(share * p["duration"][run] * r.conditions.sample_rate))
+            out[: out.shape[0] - count[run], run] = np.delete(out[:, run], slice(first, first + count[run]))[
+                : out.shape[0] - count[run]
+            ]
+    return out
+
+
+def _lost(instants: int) -> Bind:
+    """Time lost, shared out over instants drawn for every run."""
+
+    def bind(p: float, e: Extra, c: Conditions) -> tuple[Conditions, Bound | None]:
+        shares = np.full((c.runs, instants), e.get("own", 0.0))
+        if "seed" in e:
+            shares = np.random.default_rng(int(e["seed"])).uniform(0.1, 0.9, (c.runs, instants))
+        params = {
+            "lost": np.full(c.runs, p / instants),
+            "instants": shares,
+            "duration": np.full(c.runs, e["duration"]),
+        }
+        return replace(c, duration=e["duration"] + _LONGEST), ReadingTerm(missing, Order.LINE, params)
+
+    return bind
+
+
+_DRAWN: Draw = lambda g, c: {"seed": float(g.integers(0, 2**31)), "duration": c.duration}  # noqa: E731
+
+FORMS = (
+    Form("dropped_samples", "one_instant", Group.TEXTBOOK, "τ, s", 0.005, _lost(1), draw=_DRAWN,
+         limits=(1e-3, 0.9 * _LONGEST)),
+    Form("dropped_samples", "three_instants", Group.COMMON, "τ, s", 0.005, _lost(3), draw=_DRAWN,
+         limits=(3e-3, 0.9 * _LONGEST)),
+)  # fmt: skip

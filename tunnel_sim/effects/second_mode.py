@@ -1,0 +1,61 @@
+"""A second oscillation beside the first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.effects.base import Drawn, Effect, parameter
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.record import Array
+
+_REFERENCE_RELEASE = 0.3  # rad: where all exponents give the same amplitude
+
+
+@dataclass(frozen=True)
+class SecondMode(Effect):
+    """A second oscillation beside the first, as of a bending sting or a coupled freedom.
+
+    Args:
+        amplitude: amplitude at the release, rad.
+        frequency: undamped angular frequency, rad/s.
+        damping_ratio: share of critical damping, dimensionless.
+        exponent: power of the release angle that the amplitude follows, dimensionless; 0 is the textbook's.
+    """
+
+    name = "second_mode"
+    place = 24
+    channel = "sensor"
+    condition = "always"
+    equation = (
+        "y = β + a exp(−ζ2 ω2 t) cos(ω2 t + φ), φ drawn for every run; other form: a (|β0|/0.3 rad)^n for a, "
+        "β0 the release angle"
+    )
+    signature = "A decaying line from the release on, at one frequency whatever the spring and the wind."
+    references = ("Meirovitch, Fundamentals of Vibrations, McGraw-Hill 2001",)
+    example = (0.005, 60.0, 0.01)
+    line = "ringing"
+    ahead_of_sensor = True
+
+    amplitude: float = parameter(
+        "a", "rad", "amplitude at the release", scale=0.002, lower=0.0, upper=1.0, default=0.0
+    )
+    frequency: float = parameter(
+        "ω2", "rad/s", "undamped angular frequency", scale=50.0, lower=0.01, upper=1e5, default=50.0
+    )
+    damping_ratio: float = parameter(
+        "ζ2", "1", "share of critical damping", scale=0.01, lower=0.0, upper=0.9, fit_upper=0.2, default=0.01
+    )
+    exponent: float = parameter(
+        "n", "1", "power of the release angle", scale=1.0, lower=0.0, upper=3.0, default=0.0, form=True
+    )
+
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
+        """Add the oscillation at a phase of the run's own."""
+        if self.is_null or not isinstance(drawn, float):
+            return angle
+        size = self.amplitude * (abs(stated.release_angle) / _REFERENCE_RELEASE) ** self.exponent
+        since = np.maximum(time_s, 0.0)  # the body is held before the release
+        turn = self.frequency * since
+        return angle + size * np.exp(-self.damping_ratio * turn) * np.cos(turn + drawn)
