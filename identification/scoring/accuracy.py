@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from identification.estimate import Quantity
+from identification.statistics.wilson import wilson_interval
 from tunnel_sim.vocabulary.record import Array, read_only
 
 NOMINAL_COVERAGE = 0.95
@@ -128,10 +129,7 @@ class Proportion:
     @property
     def interval(self) -> tuple[float, float]:
         """Wilson's interval of 95 %, as shares."""
-        n, p, z = self.total, self.value, INTERVAL
-        centre = (p + z**2 / (2 * n)) / (1 + z**2 / n)
-        half = z / (1 + z**2 / n) * sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
-        return max(0.0, centre - half), min(1.0, centre + half)
+        return wilson_interval(self.count, self.total)
 
     def to_json_dict(self) -> dict[str, Any]:
         """Count, total, share and interval."""
