@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from tunnel_sim.vocabulary.record import Array
 
@@ -108,7 +109,4 @@ def embed(link: Array, *, with_zero: bool) -> Array:
     """
     if not with_zero:
         return link
-    extended = np.zeros((3, link.shape[1] + 1))
-    extended[:2, :-1] = link
-    extended[2, -1] = 1.0
-    return extended
+    return np.asarray(block_diag(link, 1.0))
