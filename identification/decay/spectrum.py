@@ -47,15 +47,31 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
         return SpectralPeak(0.0, 0.0)
     centred = record.yaw_rad - record.yaw_rad.mean()
     size = 1 << int(np.ceil(np.log2(padding * centred.size)))
-    power = np.abs(np.fft.rfft(centred * _window(centred.size, falling), size)) ** 2
     # Below one cycle per record the spectrum holds the offset's remainder, not the oscillation.
     lowest = max(1, int(size / centred.size))
-    peak = lowest + int(np.argmax(power[lowest:-1]))
-    if power[peak] <= 0.0:
+    place, power = highest_peak(centred * _window(centred.size, falling), size, lowest)
+    highest = float(power[lowest:-1].max())
+    if highest <= 0.0:
         return SpectralPeak(0.0, 0.0)
-    place = peak + _parabola_offset(power[peak - 1 : peak + 2])
     median = max(float(np.median(power[lowest:])), 1e-300)
-    return SpectralPeak(place * record.sample_rate / size, float(power[peak]) / median)
+    return SpectralPeak(place * record.sample_rate / size, highest / median)
+
+
+def highest_peak(values: Array, size: int, lowest: int = 1) -> tuple[float, Array]:
+    """Where the spectrum of a series is highest, between its bins.
+
+    Args:
+        values: the series, windowed, without its mean, shape (n,).
+        size: number of samples it is padded to with zeros, at least n.
+        lowest: first bin that is looked at; the last bin never is.
+
+    Returns:
+        The place of the peak in bins, by a parabola through the logarithms of the three highest; and the power,
+        shape (size // 2 + 1,).
+    """
+    power = np.abs(np.fft.rfft(values, size)) ** 2
+    peak = lowest + int(np.argmax(power[lowest:-1]))
+    return peak + _parabola_offset(power[peak - 1 : peak + 2]), power
 
 
 @lru_cache(maxsize=4)  # the runs of a campaign are mostly of one length
