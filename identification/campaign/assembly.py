@@ -18,7 +18,6 @@ from identification.campaign.derivatives import (
     build_design,
     combine,
     derivatives,
-    loads,
     positive_inertia,
 )
 from identification.campaign.springs import wind_off_line
@@ -33,7 +32,7 @@ from identification.estimate import (
     by_gravity,
 )
 from identification.statistics.information import determined, inverse
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
 
 Combination = Callable[[Design, list[int], Array, Array], tuple[Array, Array]]
@@ -60,27 +59,6 @@ class RunDecay:
     def failed(cls, run: Run, status: Status) -> RunDecay:
         """A run that gave nothing, and why."""
         return cls(RunEstimate(run.id, (status,)))
-
-
-def estimate_by_runs(
-    campaign: Campaign, name: str, method: Callable[[Run, SensorProperties], RunDecay]
-) -> Estimate:
-    """Identify every run by itself, then the campaign from the runs.
-
-    Args:
-        campaign: at least one run.
-        name: of the estimator.
-        method: identifies one run.
-
-    Returns:
-        The estimate, as by `combined_estimate`.
-
-    Raises:
-        TunnelError: when a wind-on run states no air density; before any run is worked on.
-    """
-    for run in campaign.runs:
-        loads(run, campaign.rig)
-    return combined_estimate(campaign, name, [method(run, campaign.sensor) for run in campaign.runs])
 
 
 def combined_estimate(

@@ -52,7 +52,7 @@ class Bayesian:
             campaign: at least one run.
 
         Returns:
-            The estimate. A run that could not be identified is left out.
+            The estimate, its intervals those of the posterior. A run that could not be identified is left out.
 
         Raises:
             TunnelError: when a wind-on run states no air density.

@@ -16,7 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay, estimate_by_runs
+from identification.campaign.assembly import RunDecay
 from identification.decay.decay_fit import project_run
 from identification.decay.filter_fit import DrivenFit, fit_driven
 from identification.decay.residual_noise import Residual, noise_level, white_noise
@@ -28,8 +28,9 @@ from identification.decay.run_fit import (
     identify_run,
 )
 from identification.decay.thinning import block_means
-from identification.estimate import Estimate, NoiseLevel, Quantity, Status
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from identification.estimate import NoiseLevel, Quantity, Status
+from identification.estimators.run_by_run import RunByRun
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
 _DECIDED = 6  # what a run's data decide: decay, stiffness, intensity, initial state, zero
 _INNOVATIONS_BLOCK = 3  # of them in an eighth of a cycle
@@ -37,8 +38,11 @@ INTENSITY_UNIT = "rad2/s3"
 
 
 @dataclass(frozen=True)
-class FilterError:
+class FilterError(RunByRun):
     """Maximum likelihood with measurement and process noise.
+
+    A run's ``process_noise`` is the random moment's spectral intensity q over the inertia,
+    ⟨w(t)w(t′)⟩ = q δ(t − t′); where its spectrum is not flat, that at the natural frequency.
 
     Args:
         blocks_per_cycle: block means per period that the filter sees, at least.
@@ -46,22 +50,6 @@ class FilterError:
 
     name: ClassVar[str] = "filter_error"
     blocks_per_cycle: int = 24
-
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign from the runs.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate. A run that could not be identified is left out; ``process_noise`` of the others is
-            the random moment's spectral intensity q over the inertia, ⟨w(t)w(t′)⟩ = q δ(t − t′); where its
-            spectrum is not flat, that at the natural frequency.
-
-        Raises:
-            TunnelError: when a wind-on run states no air density.
-        """
-        return estimate_by_runs(campaign, self.name, self._run)
 
     def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
         bare = identify_run(run, sensor, cycles_per_window=NO_WINDOWS)

@@ -18,7 +18,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay, estimate_by_runs
+from identification.campaign.assembly import RunDecay
 from identification.decay.damped_oscillation import Decay
 from identification.decay.decay_fit import Reading, project_run
 from identification.decay.envelope import Envelope, envelope
@@ -27,9 +27,10 @@ from identification.decay.residual_check import residual_check
 from identification.decay.residual_noise import white_noise
 from identification.decay.run_fit import describe_run, judge
 from identification.decay.windows import CYCLES, modal_quantities
-from identification.estimate import Estimate, Quantity, Status, WindowEstimate
+from identification.estimate import Quantity, Status, WindowEstimate
+from identification.estimators.run_by_run import RunByRun
 from identification.statistics.weighted_line import WeightedFit, decay_covariance, weighted_fit
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _PASSES = 3  # each carries the record on with the decay of the one before
@@ -39,8 +40,8 @@ _LEAST_WINDOW_ENERGY = 400.0  # over the power of the noise, as in other windows
 
 
 @dataclass(frozen=True)
-class Hilbert:
-    """Regression of the envelope's logarithm and of the phase.
+class Hilbert(RunByRun):
+    """Regression of the envelope's logarithm and of the phase. The windows of a run are the backbone.
 
     Args:
         cycles_per_window: periods in each window of the backbone; 0 gives none.
@@ -48,20 +49,6 @@ class Hilbert:
 
     name: ClassVar[str] = "hilbert"
     cycles_per_window: int = CYCLES
-
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run from its envelope, then the campaign from the runs.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate. A run that could not be identified is left out; windows are the backbone.
-
-        Raises:
-            TunnelError: when a wind-on run states no air density.
-        """
-        return estimate_by_runs(campaign, self.name, self._run)
 
     def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
         start = starting_decay(run.record)

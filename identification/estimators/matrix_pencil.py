@@ -13,20 +13,21 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay, estimate_by_runs
+from identification.campaign.assembly import RunDecay
 from identification.decay.decay_fit import Reading, project_run
 from identification.decay.first_guess import starting_frequency
 from identification.decay.pencil import PencilDecay, pencil_decay
 from identification.decay.run_fit import describe_run, judge
 from identification.decay.thinning import block_means
-from identification.estimate import Estimate, Status
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from identification.estimate import Status
+from identification.estimators.run_by_run import RunByRun
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
 _DECAY_TIMES = 8.0  # 1/σ: what comes later holds e^−16 of the energy, and noise
 
 
 @dataclass(frozen=True)
-class MatrixPencil:
+class MatrixPencil(RunByRun):
     """Poles from the shift of a Hankel matrix.
 
     Args:
@@ -36,20 +37,6 @@ class MatrixPencil:
 
     name: ClassVar[str] = "matrix_pencil"
     blocks_per_cycle: int = 16
-
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign from the runs.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate. A run that could not be identified is left out.
-
-        Raises:
-            TunnelError: when a wind-on run states no air density.
-        """
-        return estimate_by_runs(campaign, self.name, self._run)
 
     def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
         frequency = starting_frequency(run.record)
