@@ -30,7 +30,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from tunnel_sim.files.toml_input import StrictModel, check_version, load_toml, shown, validate
+from tunnel_sim.files.toml_input import StrictModel, read_document, shown
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
 
@@ -124,9 +124,8 @@ def load_uncertainties(path: Path) -> InputUncertainties:
     Raises:
         TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
     """
-    raw = load_toml(path, missing="name a TOML of uncertainties, see docs/how-to/state-uncertainties.md")
-    check_version(raw, path)
-    document = validate(_Document, raw, path)
+    missing = "name a TOML of uncertainties, see docs/how-to/state-uncertainties.md"
+    document = read_document(_Document, path, missing=missing)
     where = shown(path)
     common = {name: value for name, value in document.common.model_dump().items() if value > 0.0}
     individual = {name: value for name, value in document.individual.model_dump().items() if value > 0.0}
