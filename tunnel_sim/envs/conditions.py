@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tunnel_sim.effects import ALL_EFFECTS, Effect
-from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
+from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings, stated_run
 from tunnel_sim.envs.config import FreeDecayConfig, angle_limit
 from tunnel_sim.envs.errors import EnvError, as_env_error
 from tunnel_sim.physics.run_settings import RunSettings
@@ -65,15 +65,7 @@ class RunPlan:
         Returns:
             The run; it knows nothing of the truth.
         """
-        condition = self.condition
-        return Run(
-            id=condition.id,
-            record=record,
-            wind_speed=condition.wind_speed,
-            spring_stiffness=condition.spring_stiffness,
-            air_density=condition.air_density if condition.wind_speed > 0.0 else None,
-            release_angle=condition.release_angle,
-        )
+        return stated_run(self.condition, record)
 
     def statement(self) -> dict[str, float]:
         """What the operator is told at the start, SI units."""
