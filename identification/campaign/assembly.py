@@ -31,14 +31,13 @@ from identification.estimate import (
     Status,
     by_gravity,
 )
+from identification.policy import MISFIT_RATE
 from identification.statistics.information import determined, inverse
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
 
 Combination = Callable[[Design, list[int], Array, Array], tuple[Array, Array]]
 """The design, the places of its runs, φ and its covariance to φ and its covariance."""
-
-_FALSE_ALARM_RATE = 1e-3  # of saying that the runs contradict each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +152,7 @@ def _birge_ratio(design: Design, parameters: Array, decays: Array, informations:
         return 1.0
     away = [decay - link @ parameters for decay, link in zip(decays, design.links, strict=True)]
     scatter = sum(float(d @ weight @ d) for d, weight in zip(away, informations, strict=True))
-    return scatter / freedom if scatter > float(chi2.isf(_FALSE_ALARM_RATE, freedom)) else 1.0
+    return scatter / freedom if scatter > float(chi2.isf(MISFIT_RATE, freedom)) else 1.0
 
 
 def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> set[Status]:

@@ -20,6 +20,7 @@ from identification.campaign.derivatives import Design, derivatives, loads
 from identification.decay.damped_oscillation import Decay
 from identification.decay.decay_fit import Prior, Reading, RunFit, fit_decays, information_at
 from identification.estimate import PARAMETERS
+from identification.policy import SAFE_DEVIATIONS
 from identification.statistics.information import eliminate, embed, inverse, scaled_solve
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
 from tunnel_sim.vocabulary.record import Array
@@ -27,7 +28,6 @@ from tunnel_sim.vocabulary.record import Array
 # All four columns of φ, whatever the runs separate: the prior holds what they do not.
 _DESIGN = Design((np.zeros((2, 4)),), {"g": 0, "n": 1, "d": 2, "m": 3}, np.zeros(0), np.zeros(0), True)
 _COEFFICIENTS = [PARAMETERS.index("cn_beta"), PARAMETERS.index("cn_r")]
-_SAFE = 3.0  # standard deviations that keep a proposed run's stiffness and damping positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +178,7 @@ def expected_belief(
     """
     rate, stiffness = map(float, link @ belief.shared)
     spread = np.sqrt(np.diag(link @ belief.shared_covariance @ link.T))
-    if rate <= _SAFE * spread[0] or stiffness <= _SAFE * spread[1]:
+    if rate <= SAFE_DEVIATIONS * spread[0] or stiffness <= SAFE_DEVIATIONS * spread[1]:
         return None
     information = information_at(time, Decay(rate, stiffness), angle, 0.0) / noise_std**2
     reduced, _ = eliminate(information, np.zeros(5), 3)

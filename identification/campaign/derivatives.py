@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.campaign.springs import LEAST_SPREAD
 from identification.estimate import PARAMETERS
+from identification.policy import LEAST_SPRING_SPREAD
 from identification.statistics.information import determined, inverse, scaled_solve
 from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
@@ -25,7 +25,7 @@ from tunnel_sim.vocabulary.record import Array
 
 # Smallest singular value of two columns scaled to unit length: that of two runs whose springs, or speeds, differ by
 # the least spread that counts.
-_RANK_TOLERANCE = LEAST_SPREAD / np.sqrt(8.0)
+_RANK_TOLERANCE = LEAST_SPRING_SPREAD / np.sqrt(8.0)
 _GREATEST = (
     1e60  # of a stiffness or a moment in SI units, and its inverse the least: fourth powers are formed
 )

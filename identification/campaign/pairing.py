@@ -25,12 +25,12 @@ import numpy as np
 from identification.campaign.derivatives import has_size
 from identification.campaign.springs import inertia_of_springs, wind_off_line
 from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, Status, by_gravity
+from identification.policy import LEAST_FOR_SCATTER
 from identification.statistics.widening import widened_covariance
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
 
 LN2 = float(np.log(2.0))
-_LEAST_FOR_SCATTER = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +207,7 @@ def _damping_scatter(pairing: _Pairing, seen: Sequence[PairedRun], inertia: floa
 
 def _mean_std(values: Array) -> float:
     # Of the mean, from the scatter; 0, so that the propagated one is given, where there are too few.
-    if values.size < _LEAST_FOR_SCATTER:
+    if values.size < LEAST_FOR_SCATTER:
         return 0.0
     return float(values.std(ddof=1)) / float(np.sqrt(values.size))
 

@@ -13,17 +13,10 @@ from numpy.typing import NDArray
 from scipy.special import stdtr
 
 from identification.estimate import Quantity
+from identification.policy import LEAST_SPRING_RESOLUTION, LEAST_SPRING_SPREAD, SPRING_FLAG_RATE
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-# One set in ten, not in twenty: a flag costs only a look at a spring. The choice was made with Table II
-# in view, whose p-value is 0.06: its springs 4 and 7 are flagged at this rate and would not be at 5 %.
-FALSE_ALARM_RATE = 0.10
-# Of stiffnesses that count as different: a spring is hardly known to better than some per mille.
-LEAST_SPREAD = 0.01
-# Rise of ωn² over the springs in its standard deviations. The attenuation of the gradient is the inverse square,
-# here 1 %, a tenth of its standard deviation.
-_RESOLVED = 10.0
 _TRIALS = 9999  # sets of good springs the rule is calibrated on
 
 
@@ -50,7 +43,7 @@ def fit_springs(
     stiffness: Sequence[float],
     frequency_hz: Sequence[float],
     *,
-    false_alarm_rate: float = FALSE_ALARM_RATE,
+    false_alarm_rate: float = SPRING_FLAG_RATE,
     rng: np.random.Generator | None = None,
 ) -> SpringFit:
     """Fit the line by least squares and flag the springs that leave it.
@@ -115,11 +108,11 @@ def wind_off_line(
     """
     squared, squared_std = omega_n**2, 2.0 * omega_n * omega_n_std
     away = stiffness - stiffness.mean()
-    apart = float(np.ptp(stiffness)) > LEAST_SPREAD * float(stiffness.max())
+    apart = float(np.ptp(stiffness)) > LEAST_SPRING_SPREAD * float(stiffness.max())
     rise, rise_std = float(away @ squared), float(np.linalg.norm(away * squared_std))
-    if apart and rise < -_RESOLVED * rise_std:
+    if apart and rise < -LEAST_SPRING_RESOLUTION * rise_std:
         return None, None
-    if not apart or rise < _RESOLVED * rise_std:
+    if not apart or rise < LEAST_SPRING_RESOLUTION * rise_std:
         inertias = stiffness / squared
         propagated = inertias * squared_std / squared / stiffness.size
         scatter = float(np.std(inertias, ddof=1)) / np.sqrt(stiffness.size) if stiffness.size > 1 else 0.0

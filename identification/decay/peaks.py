@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.decay.residual_noise import FLOOR as ROUNDING
+from identification.policy import LEAST_NOISE, LEAST_PEAK_SHARE
 from tunnel_sim.vocabulary.record import Array, Record
 
 PEAK_HALF_WIDTH = 1.0 / 12.0  # of a period, either side of a peak, that its parabola is fitted to
-_LEAST_SHARE = 0.1  # of the first peak; below it the noise bends the logarithm
 _LEAST_PEAKS = 4
 _MOVES = 8  # of half a window each
 
@@ -54,7 +53,7 @@ def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
     centres = 0.25 * (heights[:-2] + 2.0 * heights[1:-1] + heights[2:])
     zero = float(centres.mean())
     sizes = np.abs(heights - zero)
-    below = np.flatnonzero(sizes < _LEAST_SHARE * sizes[0])
+    below = np.flatnonzero(sizes < LEAST_PEAK_SHARE * sizes[0])
     count = int(below[0]) if below.size else sizes.size
     if count < _LEAST_PEAKS:
         return None
@@ -62,10 +61,10 @@ def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
     period_half, period_std = _line(np.arange(count, dtype=np.float64), times[:count])
     return PeakDecay(
         rate=-slope,
-        rate_std=max(slope_std, ROUNDING * frequency),
-        frequency_std=max(0.5 * period_std / period_half**2, ROUNDING * frequency),
+        rate_std=max(slope_std, LEAST_NOISE * frequency),
+        frequency_std=max(0.5 * period_std / period_half**2, LEAST_NOISE * frequency),
         zero=zero,
-        zero_std=max(float(centres.std(ddof=1) / np.sqrt(centres.size)), ROUNDING * float(sizes[0])),
+        zero_std=max(float(centres.std(ddof=1) / np.sqrt(centres.size)), LEAST_NOISE * float(sizes[0])),
     )
 
 

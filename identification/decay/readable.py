@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from identification.policy import LEAST_SAMPLES
 from tunnel_sim.vocabulary.record import Record
 
-# Five unknowns describe a run, and three more samples are the least that say how well they do.
-LEAST_SAMPLES = 8
 # The fourth power of a reading or of a time is summed over a record: beyond these it leaves the double precision.
 _LEAST, _GREATEST = 1e-60, 1e60
 _ROUNDING = 1e-12  # of the largest reading: some thousand roundings, in which no motion can be told

@@ -2,7 +2,7 @@
 
 A method's own motion misses a clear record by the method's error alone, so it is no judge of the record. Judged is
 the least-squares motion nearest to the method's decay, by `noise.noise_level`: it departs in one run of a thousand
-that a damped oscillation with white noise explains (`noise.FALSE_ALARM_RATE`).
+that a damped oscillation with white noise explains (`identification.policy.MISFIT_RATE`).
 """
 
 from __future__ import annotations

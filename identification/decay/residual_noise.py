@@ -16,19 +16,16 @@ import numpy as np
 from scipy.special import fdtri
 
 from identification.estimate import NoiseLevel
+from identification.policy import LEAST_NOISE, MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
-FALSE_ALARM_RATE = 1e-3
-_STATEMENT_TOLERANCE = 0.05  # a stated or measured standard deviation is taken to be good to 5 %
-FLOOR = 1e-7  # of the largest reading: no sensor and no integrator is better, so no smaller noise is claimed
 _ORDER = 6
 # Variance of one sixth difference of unit white noise, and how many samples count as one independent one:
 # Σ (C(12, 6+j)/C(12, 6))² = C(24, 12)/C(12, 6)².
 _DIFFERENCE_GAIN = 924.0
 _SAMPLES_PER_DEGREE = 2704156.0 / 924.0**2
 _LONGEST_BLOCK = 1e9  # samples: longer than any record
-_CHANCE = 3.29  # two-sided 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +78,7 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
     Returns:
         The level, with the verdicts on the model (``departs``) and on the statement (``disagrees``).
     """
-    floor = FLOOR * max(residual.peak for residual in residuals)
+    floor = LEAST_NOISE * max(residual.peak for residual in residuals)
     unknowns = sum(residual.unknowns for residual in residuals)
     count = sum(residual.values.size for residual in residuals)
     squares = sum(float(residual.values @ residual.values) for residual in residuals)
@@ -117,7 +114,7 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
         Standard deviation of one sample, rad, quantisation included.
     """
     peak = 0.5 * float(np.ptp(reading))
-    floor = max(FLOOR * peak, 1e-300)
+    floor = max(LEAST_NOISE * peak, 1e-300)
     fast, degrees = _fast_part([Residual(reading, 1, 0, peak)], floor)
     fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
     stated = stated_noise(sensor)
@@ -135,7 +132,7 @@ def _fast_part(residuals: Sequence[Residual], fallback: float) -> tuple[float, f
 
 
 def _agree(measured: float, stated: float, degrees: float) -> bool:
-    tolerance = _STATEMENT_TOLERANCE + _CHANCE / np.sqrt(2.0 * max(degrees, 1.0))
+    tolerance = NOISE_TOLERANCE + MISFIT_DEVIATIONS / np.sqrt(2.0 * max(degrees, 1.0))
     return bool(abs(measured / stated - 1.0) <= tolerance)
 
 
@@ -152,6 +149,6 @@ def _slow_part(
     if degrees < 3:
         return 1.0, False
     ratio = power / degrees / reference**2
-    chance = float(fdtri(degrees, min(reference_degrees, 1e9), 1.0 - FALSE_ALARM_RATE))
-    departs = bool(ratio > chance * (1.0 + _STATEMENT_TOLERANCE) ** 2)
+    chance = float(fdtri(degrees, min(reference_degrees, 1e9), 1.0 - MISFIT_RATE))
+    departs = bool(ratio > chance * (1.0 + NOISE_TOLERANCE) ** 2)
     return max(ratio, 1.0), departs

@@ -30,14 +30,11 @@ from identification.estimate import (
     WindowEstimate,
     by_gravity,
 )
+from identification.policy import FEW_CYCLES, LEAST_ENERGY
 from identification.statistics.information import determined, inverse
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
-# The energy of the decay over the noise variance that noise alone reaches, at the best of all frequencies of
-# a record of 1e6 samples, less than once in 1e6 runs: 2 ln(1e12).
-_LEAST_ENERGY = 56.0
-_FEW_CYCLES = 3.0
 NO_WINDOWS = 10**6
 """As periods in a window: longer than any record, so that a run has none."""
 _UNKNOWNS = 5
@@ -174,7 +171,7 @@ def judge(
     """
     noise = noise_level(residuals_of([reading], [fitted], zero, _UNKNOWNS), sensor)
     motion = reading.yaw - zero - fitted.residual
-    if float(motion @ motion) < _LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
+    if float(motion @ motion) < LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
         return noise, Status.NO_OSCILLATION
     return noise, None if determined(fitted.information) else Status.NOT_DETERMINED
 
@@ -235,7 +232,7 @@ def _statuses(run: Run, reading: Reading, decay: Decay, noise: NoiseLevel | None
         statuses.add(Status.MODEL_DEPARTS)
     if noise is not None and noise.disagrees:
         statuses.add(Status.NOISE_DISAGREES)
-    if decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * _FEW_CYCLES:
+    if decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * FEW_CYCLES:
         statuses.add(Status.FEW_CYCLES)
     if run.spring_stiffness is None:
         statuses.add(Status.NO_STIFFNESS)

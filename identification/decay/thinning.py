@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.decay.decay_fit import Reading
-from identification.decay.readable import LEAST_SAMPLES
+from identification.policy import LEAST_SAMPLES
 from tunnel_sim.vocabulary.record import Array
 
 

@@ -23,6 +23,7 @@ from identification.decay.decay_fit import (
 from identification.decay.first_guess import starting_decay
 from identification.decay.residual_noise import eighth_of_a_cycle
 from identification.estimate import NoiseLevel, Quantity, WindowEstimate
+from identification.policy import LEAST_WINDOW_ENERGY
 from identification.statistics.information import determined, inverse
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -30,9 +31,6 @@ CYCLES = 3
 _LEAST_WINDOWS = 4
 _LEAST_SAMPLES = 16
 _TOLERANCE = 1e-5  # of a window's fit, as a ratio: Gauss–Newton's next step would be a thousand times smaller
-# A window is given while its oscillation stands out: an energy of 400 over the power of the noise, N(A/S)²/2,
-# is an amplitude known to 5 %.
-_LEAST_ENERGY = 400.0
 
 
 def fit_windows(
@@ -73,7 +71,7 @@ def _series(
     while (fitted := _fit_window(reading, begin, decay, zero, cycles)) is not None:
         fit, count = fitted
         motion = reading.yaw[begin : begin + count] - fit.zero - fit.runs[0].residual
-        if float(motion @ motion) < _LEAST_ENERGY * noise.std**2:
+        if float(motion @ motion) < LEAST_WINDOW_ENERGY * noise.std**2:
             break
         window = _window_estimate(reading, begin, count, fit.runs[0], noise) if fit.converged else None
         if window is not None:
@@ -127,7 +125,7 @@ def _window_estimate(
     decay = run.decay
     amplitude = envelope_amplitude(decay, run.angle, run.rate) * np.exp(-0.5 * decay.rate * duration)
     variance = noise.std**2 * max(1.0, _slow_ratio(run.residual, decay, interval, noise.std))
-    if not np.isfinite(amplitude) or 0.5 * count * amplitude**2 < _LEAST_ENERGY * variance:
+    if not np.isfinite(amplitude) or 0.5 * count * amplitude**2 < LEAST_WINDOW_ENERGY * variance:
         return None
     order = [RATE, STIFFNESS, ANGLE, ANGULAR_RATE]
     information = run.information[np.ix_(order, order)]

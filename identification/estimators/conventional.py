@@ -21,10 +21,9 @@ from identification.decay.peaks import PeakDecay, peak_decay
 from identification.decay.residual_check import residual_check
 from identification.decay.spectrum import psd_peak
 from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_gravity
+from identification.policy import LEAST_PROMINENCE
 from identification.statistics.weighted_line import decay_covariance, deviations
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
-
-_LEAST_PROMINENCE = 40.0  # of the spectral peak; less may be noise
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ class _Seen:
 
 def _see(run: Run, sensor: SensorProperties) -> _Seen:
     peak = psd_peak(run.record)
-    peaks = peak_decay(run.record, peak.frequency) if peak.prominence > _LEAST_PROMINENCE else None
+    peaks = peak_decay(run.record, peak.frequency) if peak.prominence > LEAST_PROMINENCE else None
     if peaks is None:
         return _Seen(run, peak.frequency, None)
     omega_d = 2.0 * np.pi * peak.frequency

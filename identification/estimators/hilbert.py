@@ -29,14 +29,13 @@ from identification.decay.run_fit import describe_run, judge
 from identification.decay.windows import CYCLES, modal_quantities
 from identification.estimate import Quantity, Status, WindowEstimate
 from identification.estimators.run_by_run import RunByRun
+from identification.policy import LEAST_ENVELOPE, LEAST_WINDOW_ENERGY
 from identification.statistics.weighted_line import WeightedFit, decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _PASSES = 3  # each carries the record on with the decay of the one before
 _LEAST_POINTS = 5
-_LEAST_AMPLITUDE = 4.0  # in deviations of an average
-_LEAST_WINDOW_ENERGY = 400.0  # over the power of the noise, as in other windows
 
 
 @dataclass(frozen=True)
@@ -94,7 +93,7 @@ def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array
     expected = scale * np.exp(-decay.rate * seen.time)
     found = None
     for _ in range(2):
-        below = np.flatnonzero(expected < _LEAST_AMPLITUDE * deviation)
+        below = np.flatnonzero(expected < LEAST_ENVELOPE * deviation)
         count = int(below[0]) if below.size else expected.size
         if count < _LEAST_POINTS:
             return None
@@ -126,7 +125,7 @@ def _backbone(seen: Envelope, noise_std: float, cycles: int) -> tuple[WindowEsti
     for begin in range(0, seen.time.size - length + 1, length or 1):
         part = slice(begin, begin + length)
         amplitude = float(np.exp(np.log(seen.amplitude[part]).mean())) if length else 0.0
-        if 0.5 * length * seen.samples * amplitude**2 < _LEAST_WINDOW_ENERGY * noise_std**2:
+        if 0.5 * length * seen.samples * amplitude**2 < LEAST_WINDOW_ENERGY * noise_std**2:
             break
         decay, covariance = _decay(seen, *_two_lines(seen, part, np.full(length, deviation / amplitude)))
         if decay.stiffness <= 0.0:

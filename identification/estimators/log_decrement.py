@@ -29,12 +29,12 @@ from identification.decay.residual_noise import white_noise
 from identification.decay.run_fit import describe_run, judge
 from identification.estimate import Status
 from identification.estimators.run_by_run import RunByRun
+from identification.policy import LEAST_PEAK_HEIGHT
 from identification.statistics.weighted_line import decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _LEAST_PEAKS = 5
-_LEAST_HEIGHT = 10.0  # in deviations of a peak: below, the logarithm bends the noise
 _SWEEPS = 4  # of weights and zero; each brings two digits more
 
 
@@ -82,7 +82,7 @@ def _decay_of_peaks(
     expected = np.abs(heights - zero)
     count = times.size
     for _ in range(_SWEEPS):
-        below = np.flatnonzero(expected < _LEAST_HEIGHT * height_std)
+        below = np.flatnonzero(expected < LEAST_PEAK_HEIGHT * height_std)
         count = int(below[0]) if below.size else times.size
         if count < _LEAST_PEAKS or not np.all(np.abs(heights[:count] - zero) > 0.0):
             return None

@@ -29,19 +29,16 @@ from identification.campaign.pairing import PairedRun, paired_estimate
 from identification.decay.damped_oscillation import Decay
 from identification.decay.readable import holds_motion
 from identification.decay.residual_check import residual_check
-from identification.decay.residual_noise import FALSE_ALARM_RATE, white_noise
+from identification.decay.residual_noise import white_noise
 from identification.decay.windows import modal_quantities
 from identification.estimate import Estimate, Quantity, RunEstimate, Status, WindowEstimate, by_gravity
 from identification.neural.files import read_networks, shipped_networks
 from identification.neural.networks import Networks
 from identification.neural.shape import CYCLES, network_inputs, normalise, response_points
 from identification.neural.three_cycles import ThreeCycles, find_windows
+from identification.policy import GREATEST_NETWORK_DISTANCE, LEAST_FOR_SCATTER, MISFIT_RATE, SCATTER_TOLERANCE
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
-
-_UNLIKE = 0.1  # root mean square distance from a damped oscillation, of its amplitude, that is none
-_LEAST_FOR_SCATTER = 3
-_TOLERANCE = 1.2  # of χ²: the propagated deviations are good to a tenth
 
 
 @dataclass(frozen=True)
@@ -117,7 +114,7 @@ def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None
     inputs = window.shape.inputs
     zeta = float(networks.zeta(inputs[None])[0])
     clean = network_inputs(np.clip([zeta], *networks.spec.zeta_range))[0]
-    if float(np.sqrt(np.mean((inputs - clean) ** 2))) > _UNLIKE:
+    if float(np.sqrt(np.mean((inputs - clean) ** 2))) > GREATEST_NETWORK_DISTANCE:
         return None
     omega_n = float(networks.omega_n(np.array([zeta]), np.array([window.t3]))[0])
     weights = window.noise.weights(window.shape, networks.damping.input_gradient(inputs))
@@ -212,12 +209,12 @@ def _average(values: Array, covariance: Array) -> tuple[float, float, bool]:
     weights = weights / weights.sum()
     mean = float(weights @ values)
     std = float(np.sqrt(weights @ covariance @ weights))
-    if values.size < _LEAST_FOR_SCATTER:
+    if values.size < LEAST_FOR_SCATTER:
         return mean, std, False
     inverse = np.linalg.inv(covariance)
     away = values - float(inverse.sum(axis=0) @ values) / float(inverse.sum())
     scatter = float(away @ inverse @ away)
-    chance = _TOLERANCE * float(chi2.isf(0.5 * FALSE_ALARM_RATE, values.size - 1))
+    chance = SCATTER_TOLERANCE * float(chi2.isf(0.5 * MISFIT_RATE, values.size - 1))
     departs = scatter > chance
     return mean, std * float(np.sqrt(scatter / (values.size - 1))) if departs else std, departs
 

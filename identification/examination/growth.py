@@ -7,10 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.examination.swings import Swing
+from identification.policy import REFUSAL_DEVIATIONS
 from identification.remark import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
-
-_CHANCE = 4.75  # standard deviations: one-sided, less than once in 1e6 runs of no damping at all
 
 
 def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
@@ -37,7 +36,7 @@ def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
 
 
 def _grows(swing: Swing) -> bool:
-    if swing.rate + _CHANCE * swing.rate_std >= 0.0:
+    if swing.rate + REFUSAL_DEVIATIONS * swing.rate_std >= 0.0:
         return False
     quarters = [_power(part) for part in np.array_split(swing.motion, 4)]
     return quarters[3] > quarters[2] > max(quarters[0], quarters[1])

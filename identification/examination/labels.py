@@ -16,17 +16,12 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
 from identification.examination.swings import Swing
+from identification.policy import LEAST_STIFFNESS_STD, MISFIT_RATE, REFUSAL_RATE, SPRING_TOLERANCE
 from identification.remark import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
 
-#: How well a stated stiffness is usually known, as a ratio: weights and arm of a static calibration.
-SPRING_TOLERANCE = 0.01
-# Contradicted by chance once in 1e6 campaigns, and in agreement but for one in a thousand.
-_CONTRADICTION = 1e-6
-_AGREEMENT = 1e-3
 _CANDIDATES = 12  # runs that fit worst, each tried against all others
 _LEAST_RUNS = 2
-_LEAST_STD = 1e-5  # of k, as a ratio: no clock and no fit is trusted further
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +50,7 @@ class Labels:
             np.array([float(run.spring_stiffness or 0.0) for run in runs]),
             np.array([0.5 * (run.air_density or 0.0) * run.wind_speed**2 for run in runs]),
             seen,
-            np.maximum(std, _LEAST_STD * seen),
+            np.maximum(std, LEAST_STIFFNESS_STD * seen),
         )
 
 
@@ -69,14 +64,14 @@ class _Misfit:
     @property
     def contradicts(self) -> bool:
         """Whether that is beyond chance."""
-        return self.freedom > 0 and self.squares > float(chi2.isf(_CONTRADICTION, self.freedom))
+        return self.freedom > 0 and self.squares > float(chi2.isf(REFUSAL_RATE, self.freedom))
 
     def mends(self, before: _Misfit, trials: int) -> bool:
         """Whether the statements agree, or agree so much better than before that chance cannot be why."""
-        if self.squares <= float(chi2.isf(_AGREEMENT, self.freedom)):
+        if self.squares <= float(chi2.isf(MISFIT_RATE, self.freedom)):
             return True
         ratio = before.squares / max(self.squares, 1e-300)
-        return ratio > float(f.isf(_CONTRADICTION / max(trials, 1), self.freedom, self.freedom))
+        return ratio > float(f.isf(REFUSAL_RATE / max(trials, 1), self.freedom, self.freedom))
 
 
 def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
@@ -127,7 +122,7 @@ def _best_exchanges(
         return []
     least = min(found.squares for _, found in mended)
     # Exchanges that leave as little as the best one cannot be told apart.
-    limit = least + float(chi2.isf(_AGREEMENT, 1))
+    limit = least + float(chi2.isf(MISFIT_RATE, 1))
     return [places for places, found in mended if found.squares <= limit]
 
 

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2, norm
 
-from identification.examination.labels import SPRING_TOLERANCE
 from identification.examination.swings import Swing
+from identification.policy import MISFIT_RATE, SPRING_TOLERANCE
 from identification.remark import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
 
-_FALSE_ALARM_RATE = 1e-3  # of sets of springs that are as good as SPRING_TOLERANCE
 _LEAST = 3  # springs that it takes to say which one is off
 
 _REMEDY = "weigh that spring again; a tilted axis or a rod that twists looks alike, and the diagnosis tells"
@@ -55,7 +54,7 @@ class _Springs:
     def disagree(self) -> bool:
         """Whether the springs' inertias differ beyond chance."""
         away = (self.inertia - self.mean()[0]) / self.std
-        return float(away @ away) > float(chi2.isf(_FALSE_ALARM_RATE, self.stiffness.size - 1))
+        return float(away @ away) > float(chi2.isf(MISFIT_RATE, self.stiffness.size - 1))
 
 
 def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
@@ -92,7 +91,7 @@ def _the_one(springs: _Springs) -> int | None:
         score = abs(springs.inertia[place] - mean) / float(np.hypot(std, springs.std[place]))
         scores.append(-1.0 if rest.disagree() else score)
     best = int(np.argmax(scores))
-    beyond = float(norm.isf(0.5 * _FALSE_ALARM_RATE / springs.stiffness.size))
+    beyond = float(norm.isf(0.5 * MISFIT_RATE / springs.stiffness.size))
     return best if scores[best] > beyond else None
 
 

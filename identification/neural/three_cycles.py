@@ -17,8 +17,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from identification.decay.first_guess import starting_decay
-from identification.decay.readable import LEAST_SAMPLES
 from identification.neural.shape import CYCLES, POINTS, Shape, normalise
+from identification.policy import LEAST_SAMPLES
 from tunnel_sim.vocabulary.record import Array, Record
 
 HALVES = 2 * CYCLES

@@ -16,14 +16,12 @@ from typing import Literal
 
 import numpy as np
 
+from identification.policy import DIFFERENCE_RATE, LEAST_CHANGE, OUTLIER_MEDIANS
 from identification.scoring.accuracy import NOMINAL_COVERAGE, Trials
 from tunnel_sim.vocabulary.record import Array
 
 Aspect = Literal["bias", "spread", "outliers", "coverage", "failures"]
 ASPECTS: tuple[Aspect, ...] = ("bias", "spread", "outliers", "coverage", "failures")
-FALSE_ALARM_RATE = 0.01
-_MATERIAL = 0.02  # of the spread, where trials are on the same records
-_FAR_OUT = 6.0  # medians of the error's size: four standard deviations where errors are normal
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ..
     )
 
 
-def holm(p_values: Sequence[float], rate: float = FALSE_ALARM_RATE) -> tuple[bool, ...]:
+def holm(p_values: Sequence[float], rate: float = DIFFERENCE_RATE) -> tuple[bool, ...]:
     """Which of many tests are significant, so that a false alarm among all of them has a probability of ``rate``.
 
     Args:
@@ -113,14 +111,14 @@ def _bias(scaled: Sequence[tuple[Array, Array]], same: bool) -> Change:
         direction = 1.0 if both.size == 0 or both.mean() >= 0.0 else -1.0
         turned.append((direction * old, direction * new))
     before, now = (_mean_size(scaled, side) for side in (0, 1))
-    least = before + (_MATERIAL * _root_mean_square(scaled, 0) if same else 0.0)
+    least = before + (LEAST_CHANGE * _root_mean_square(scaled, 0) if same else 0.0)
     return Change("bias", before, now, _larger(turned, same) if now > least else 1.0)
 
 
 def _spread(scaled: Sequence[tuple[Array, Array]], same: bool) -> Change:
     sizes = [(np.abs(old), np.abs(new)) for old, new in scaled]
     before, now = (_root_mean_square(scaled, side) for side in (0, 1))
-    least = before * (1.0 + _MATERIAL if same else 1.0)
+    least = before * (1.0 + LEAST_CHANGE if same else 1.0)
     return Change("spread", before, now, _larger(sizes, same) if now > least else 1.0)
 
 
@@ -128,7 +126,7 @@ def _outliers(scaled: Sequence[tuple[Array, Array]]) -> Change:
     counts = np.zeros((2, 2), dtype=int)
     for pair in scaled:
         both = np.abs(np.concatenate(pair))
-        limit = _FAR_OUT * float(np.median(both)) if both.size else 0.0
+        limit = OUTLIER_MEDIANS * float(np.median(both)) if both.size else 0.0
         for side, values in enumerate(pair):
             counts[side] += int(np.sum(np.abs(values) > limit)), values.size
     (old, old_total), (new, new_total) = counts.tolist()

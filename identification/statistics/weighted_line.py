@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from identification.policy import MISFIT_RATE
 from identification.statistics.information import inverse, scaled_solve
 from tunnel_sim.vocabulary.record import Array
-
-_FALSE_ALARM_RATE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +44,7 @@ def weighted_fit(columns: Array, target: Array, variance: Array) -> WeightedFit:
     residual = target - columns @ values
     freedom = target.size - values.size
     scatter = float(residual @ (weights * residual))
-    beyond = scatter > float(chi2.isf(_FALSE_ALARM_RATE, freedom))
+    beyond = scatter > float(chi2.isf(MISFIT_RATE, freedom))
     return WeightedFit(values, inverse(normal) * (scatter / freedom if beyond else 1.0), residual)
 
 

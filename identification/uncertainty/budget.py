@@ -27,6 +27,7 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.estimate import PARAMETERS, Estimate, Quantity
+from identification.policy import DIFFERENCE_DEVIATIONS
 from identification.uncertainty.input_uncertainty import InputUncertainties
 from identification.uncertainty.scatter import error_groups, scaled, side_scatter
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -46,7 +47,6 @@ _POWERS: Mapping[str, tuple[float, float, float, float, float]] = {
     "yaw_inertia": (0.0, 0.0, 0.0, 0.0, 0.0),  # the nominal one decides nothing: Izz is identified
     "clock": (0.0, 1.0, 2.0, 1.0, 2.0),
 }
-_CHANCE = 2.58  # of a move, in its standard deviations: once in a hundred
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,7 +274,7 @@ def _model(budget: Budget, own_std: Array, rivals: Mapping[str, Estimate]) -> Co
         move = np.abs(values - budget.values)
         # Of two unbiased answers to the same records, the better one is uncorrelated with their difference.
         chance = np.sqrt(np.abs(_deviations(rival, budget) ** 2 - own_std**2))
-        move = np.where(move > _CHANCE * chance, move, 0.0)
+        move = np.where(move > DIFFERENCE_DEVIATIONS * chance, move, 0.0)
         if np.any(move > 0.0):
             blamed.append(name)
         largest = np.maximum(largest, move)

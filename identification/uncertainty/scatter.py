@@ -18,14 +18,12 @@ import numpy as np
 
 from identification.campaign.derivatives import Design, build_design, combine, derivatives
 from identification.estimate import RunEstimate
+from identification.policy import DIFFERENCE_RATE, LEAST_FREE_SHARE, LEAST_SCATTER_FREEDOM
 from identification.statistics.information import inverse
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.record import Array
 
-FALSE_ALARM_RATE = 0.01
-_LEAST_DEGREES = 0.5
 _STEP = 1e-4
-_LEAST_FREE = 0.1  # of a residual that the run's own pull leaves; of less, nothing can be told
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,16 +189,16 @@ def _side(fit: _Fit, covariance: Array, mine: Array) -> SideScatter:
         # The weighed residuals of these rows are a linear map of errors of this covariance.
         residual_map = root[:, None] * (np.eye(size) - fit.hat)
         spread = residual_map @ covariance @ residual_map.T
-        if float(np.trace(residual_map @ fit.noise @ residual_map.T)) < _LEAST_DEGREES:
+        if float(np.trace(residual_map @ fit.noise @ residual_map.T)) < LEAST_SCATTER_FREEDOM:
             continue
         seen = True
         expected = float(np.trace(spread))
         degrees = expected**2 / float(np.sum(spread**2))
         ratio = float(np.sum((root * fit.residual) ** 2)) / expected
         largest = max(largest, ratio)
-        if ratio > float(chdtri(degrees, FALSE_ALARM_RATE)) / degrees:
+        if ratio > float(chdtri(degrees, DIFFERENCE_RATE)) / degrees:
             # As the jackknife does, every run is given the variance of its own residual, freed of its own pull.
-            freed = fit.residual / np.maximum(1.0 - np.diag(fit.hat), _LEAST_FREE)
+            freed = fit.residual / np.maximum(1.0 - np.diag(fit.hat), LEAST_FREE_SHARE)
             excess = np.maximum(freed**2 - np.diag(covariance), 0.0)
             added += (fit.influence * (chosen * excess)) @ fit.influence.T
     return SideScatter(seen, largest, fit.names, added)
