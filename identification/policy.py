@@ -109,7 +109,7 @@ LEAST_SCATTER_FREEDOM = 0.5
 """Degrees of freedom of a scatter: below half of one it says nothing."""
 
 LEAST_FREE_SHARE = 0.1
-"""Share of a residual that the run's own pull on the fit leaves: below it the others cannot judge it."""
+"""One minus the leverage of a run: below it the other runs cannot judge this one."""
 
 LEAST_CHANGE = 0.02
 """Change of a bias or of a spread that matters, over the spread, where both trials use the same records."""

@@ -1,6 +1,6 @@
 """Maximum likelihood of a driven decay: decay rate, stiffness and the random moment's intensity, by scoring.
 
-The start is output error's optimum and the best of a ladder of intensities. Each step solves Fisher's
+The start is the optimum of output error with the best of a range of intensities. Each step solves Fisher's
 information, from central differences of the innovations and of their variance, against the gradient of the
 likelihood (Maine & Iliff, SIAM J. Appl. Math. 41 (1981) 558–579, doi 10.1137/0141046).
 """
@@ -19,7 +19,7 @@ from identification.statistics.information import inverse, scaled_solve
 from tunnel_sim.vocabulary.record import Array
 
 _DECADES = np.arange(-7.0, 3.1, 1.0)  # of q over R ω³, the intensity that doubles R within a radian
-_CORNERS = (8.0, 3.0, 1.0, 0.3)  # Hz; above, a rig of a few Hz cannot tell the moment from a white one
+_CORNERS = (8.0, 3.0, 1.0, 0.3)  # Hz; above these, the moment of a rig of a few Hz looks white
 _MAX_STEPS = 25
 _SETTLED = 0.01  # standard deviations
 _NUDGE = 0.1  # standard deviations of a and k; of ln q outright
@@ -72,7 +72,7 @@ def fit_driven(
 
 
 class _Fit:
-    """The likelihood of one run, and how to climb it."""
+    """The likelihood of one run, and its maximisation."""
 
     def __init__(self, values: Array, interval: float, noise_variance: float, deviations: Array) -> None:
         self.values, self.interval, self.noise_variance = values, interval, noise_variance

@@ -29,16 +29,16 @@ class SpectralPeak:
 def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) -> SpectralPeak:
     """The damped frequency, as the peak of the power spectral density.
 
-    The mean is taken off, a Hann window keeps the offset and the negative frequencies from leaking into the
-    peak, zeros pad the record to at least eight times its length, and a parabola through the logarithm of the
-    three highest bins gives the peak between them.
+    The mean is removed. A Hann window keeps the offset and the negative frequencies from leaking into the peak. The
+    record is padded with zeros to at least eight times its length. A parabola through the logarithms of the three
+    highest bins gives the peak between them.
 
     Args:
         record: the reading, n samples, rad against s.
-        padding: number of times its length the record is padded to at least; 1 is quicker, and good enough to
-            start a fit of many cycles from.
-        falling: whether the window falls from the record's start on, in place of rising first: it then sees a
-            decay that is over long before the record is.
+        padding: the record is padded to at least this number of times its length; 1 is faster, and good enough to
+            start a fit of many cycles.
+        falling: whether the window falls from the start of the record, instead of rising first: it then sees a
+            decay that ends long before the record does.
 
     Returns:
         The peak.
@@ -63,7 +63,7 @@ def highest_peak(values: Array, size: int, lowest: int = 1) -> tuple[float, Arra
     Args:
         values: the series, windowed, without its mean, shape (n,).
         size: number of samples it is padded to with zeros, at least n.
-        lowest: first bin that is looked at; the last bin never is.
+        lowest: first bin to be considered; the last bin is never considered.
 
     Returns:
         The place of the peak in bins, by a parabola through the logarithms of the three highest; and the power,
@@ -74,7 +74,7 @@ def highest_peak(values: Array, size: int, lowest: int = 1) -> tuple[float, Arra
     return peak + _parabola_offset(power[peak - 1 : peak + 2]), power
 
 
-@lru_cache(maxsize=4)  # the runs of a campaign are mostly of one length
+@lru_cache(maxsize=4)  # most runs of a campaign have the same length
 def _window(size: int, falling: bool) -> Array:
     return read_only(np.hanning(2 * size)[size:] if falling else np.hanning(size))
 

@@ -1,9 +1,9 @@
 """The paper's conventional method: spectrum, time to half amplitude, wind-on against wind-off.
 
 The damped frequency f is the peak of the power spectral density, the time to half amplitude t½ = ln 2/σ comes
-from the decay of the peaks, and each wind-on run is set against the wind-off runs of its spring by eqs 7, 8, 17
+from the decay of the peaks, and each wind-on run is compared with the wind-off runs of its spring by eqs 7, 8, 17
 and 18 (`identification.campaign.pairing`). Standard deviations of f and σ are the scatter of one run's peaks.
-They cover scatter only, not the method's bias.
+They include scatter only, not the bias of the method.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Conventional:
             campaign: at least one run.
 
         Returns:
-            The estimate; the coefficients leave out wind-on runs without a wind-off run of their spring.
+            The estimate; the coefficients omit wind-on runs without a wind-off run of their spring.
 
         Raises:
             TunnelError: when a wind-on run states no air density.

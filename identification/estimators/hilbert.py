@@ -1,10 +1,10 @@
 """Hilbert envelope: decay rate from the logarithm of the envelope, frequency from the phase.
 
-Both are weighted lines over half-cycle averages of the analytic signal, whose deviations follow from the
-noise: √2 S/(√m A) for the logarithm and the phase alike. The ends are handled by carrying the record on with
-the decay found so far (see `identification.decay.envelope`). Short stretches of the same lines give
-ζ and ωn against the amplitude, the backbone of the rig, which stands in the run's windows; where a line does
-not fit a run, its deviations are raised to the scatter about it.
+Both are weighted lines over half-cycle averages of the analytic signal, whose deviations follow from the noise:
+√2 S/(√m A) for the logarithm and the phase alike. To reduce end effects the record is extended with the decay
+found so far (see `identification.decay.envelope`). Short parts of the same lines give ζ and ωn against the
+amplitude, the backbone of the rig, as the windows of the run. Where a line does not fit a run, its standard
+deviations are raised to the scatter about it.
 
 Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018; backbone
 from free decays: J. M. Londoño, S. A. Neild & J. E. Cooper, J. Sound Vib. 348 (2015) 224–238,
@@ -34,7 +34,7 @@ from identification.statistics.weighted_line import WeightedFit, decay_covarianc
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
-_PASSES = 3  # each carries the record on with the decay of the one before
+_PASSES = 3  # each extends the record with the decay of the previous one
 _LEAST_POINTS = 5
 
 
@@ -61,7 +61,7 @@ class Hilbert(RunByRun):
             if projected is None:
                 return RunDecay.failed(run, Status.NOT_CONVERGED)
             if decay.omega_d * float(reading.time[-1]) < np.pi * _LEAST_POINTS:
-                break  # fewer half cycles than a line needs
+                break  # too few half cycles for a line
             seen = envelope(reading, *projected)
             lines = _lines(seen, decay, noise_std)
             if lines is None:
@@ -117,7 +117,7 @@ def _decay(seen: Envelope, logarithm: WeightedFit, phase: WeightedFit) -> tuple[
 
 
 def _backbone(seen: Envelope, noise_std: float, cycles: int) -> tuple[WindowEstimate, ...]:
-    # Lines through consecutive stretches of the envelope; two averages to the cycle.
+    # Lines through consecutive parts of the envelope; two averages per cycle.
     windows: list[WindowEstimate] = []
     length = 2 * cycles
     deviation = noise_std * np.sqrt(2.0 / seen.samples)

@@ -1,10 +1,10 @@
 """Logarithmic decrement as a regression: a weighted line through the logarithm of every peak.
 
-A peak is the vertex of a parabola, and white noise of S per sample moves its height by (3/2) S/√m and its
-instant by √(3/m) S/(w ωd² h), with m samples in its half width w and h its height; so the logarithms have the
-variance (9/4) S²/(m h²), and large peaks count for more. The line's gradient is the decay rate, the sensor's
-zero is fitted along with it (peaks of one side rise by what those of the other side fall), and a second line,
-through the instants, gives the damped frequency. Where peaks scatter about a line by more than the noise
+A peak is the vertex of a parabola, and white noise of S per sample moves its height by (3/2) S/√m and its instant
+by √(3/m) S/(w ωd² h), with m samples in its half width w and h its height; so the logarithms have the variance
+(9/4) S²/(m h²), and large peaks have larger weights. The line's gradient is the decay rate, the sensor's zero is
+fitted along with it (an error of it raises the peaks of one side and lowers those of the other), and a second
+line, through the instants, gives the damped frequency. Where peaks scatter about a line by more than the noise
 explains, its deviation is raised to that scatter. Peaks are used down to ten deviations.
 
 Sources: the decrement: Lord Rayleigh, The Theory of Sound, vol. 1 (1894), § 46; its regression over many peaks
@@ -35,7 +35,7 @@ from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _LEAST_PEAKS = 5
-_SWEEPS = 4  # of weights and zero; each brings two digits more
+_SWEEPS = 4  # of weights and zero; each adds two digits
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
-"""Matrix pencil: poles by linear algebra alone, no start and no iteration on the parameters.
+"""Matrix pencil: poles by linear algebra, without starting values and without iteration on the parameters.
 
-Every run is thinned to block means, its two poles are read from the shift of their Hankel matrix, and the
-first-order perturbation of that gives their covariance; the campaign's coefficients are those that fit the
-runs' poles best. Sources: Hua & Sarkar, IEEE Trans. Acoust. Speech Signal Process. 38 (1990) 814–824,
-doi 10.1109/29.56027; see `identification.decay.pencil`.
+Every run is thinned to block means. Its two poles follow from the shift of their Hankel matrix, and a first-order
+perturbation gives their covariance. The campaign's coefficients are a least-squares fit to the poles of the runs.
+Sources: Hua & Sarkar, IEEE Trans. Acoust. Speech Signal Process. 38 (1990) 814–824, doi 10.1109/29.56027; see
+`identification.decay.pencil`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from identification.estimate import Status
 from identification.estimators.run_by_run import RunByRun
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
-_DECAY_TIMES = 8.0  # 1/σ: what comes later holds e^−16 of the energy, and noise
+_DECAY_TIMES = 8.0  # in units of 1/σ: later samples hold e^−16 of the energy, and noise
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class MatrixPencil(RunByRun):
     """Poles from the shift of a Hankel matrix.
 
     Args:
-        blocks_per_cycle: block means per period, at least. Fewer are quicker and see less of the signal: its
-            amplitude in them falls by (π/blocks)²/6.
+        blocks_per_cycle: block means per period, at least. Fewer are faster but lose signal: its amplitude
+            in them falls by (π/blocks)²/6.
     """
 
     name: ClassVar[str] = "matrix_pencil"

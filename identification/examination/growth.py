@@ -1,4 +1,4 @@
-"""Motion that grows with the wind off: a passive rig cannot, so the record is not what it is said to be."""
+"""Motion that grows with the wind off. A passive rig cannot do that, so the record or its labels are wrong."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
         swings: of the runs.
 
     Returns:
-        One remark for all such runs; none where there is none. A run grows where its decay rate is negative
-        beyond chance and its swings are the larger the later. A blow in mid-record does not look like that.
+        One remark for all such runs, if any. A run grows if its decay rate is negative beyond chance and its swings
+        become larger with time; a blow in mid-record does not look like that.
     """
     ids = tuple(s.run.id for s in swings if not s.run.wind_on and _grows(s))
     if not ids:
@@ -29,8 +29,8 @@ def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
         Remark(
             Outcome.REFUSED,
             ids,
-            "the motion grows with the wind off, which a passive rig cannot",
-            "check whether time runs backwards in the file, or state the wind's speed, or leave the run out",
+            "the motion grows with the wind off, which is impossible on a passive rig",
+            "check whether time runs backwards in the file, state the wind speed, or remove the run",
         ),
     )
 

@@ -1,8 +1,8 @@
-"""Whether a method got worse: its trials against those of a baseline, at a stated rate of false alarms.
+"""Whether a method got worse than a baseline, at a stated false-alarm rate.
 
-Every test is exact, or nearly so, whatever the distribution of the errors: ranks and counts only. If nothing
-changed, trials of the baseline and of now are exchangeable, and so is whatever is chosen by looking at both
-together (a direction, a threshold). Many tests share one false-alarm rate by Holm's method.
+The tests use only ranks and counts, so they are exact, or nearly so, for any distribution of the errors. If nothing
+changed, old and new trials are exchangeable, and so is any choice made from both together (a direction, a
+threshold). Many tests share one false-alarm rate by Holm's method.
 
 Sources: rank sum over strata, P. van Elteren, Bull. Int. Stat. Inst. 37 (1960) 351–361; Fisher's exact test;
 S. Holm, Scand. J. Stat. 6 (1979) 65–70.
@@ -26,7 +26,7 @@ ASPECTS: tuple[Aspect, ...] = ("bias", "spread", "outliers", "coverage", "failur
 
 @dataclass(frozen=True)
 class Change:
-    """One aspect of one method, before and now.
+    """One aspect of one method, in the baseline and now.
 
     Args:
         aspect: ``bias`` and ``spread`` (sizes of errors) in units of the bound, or of the truth where there is no
@@ -64,7 +64,7 @@ def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ..
     scaled = [_scaled(old, new) for old, new in pairs]
     same = all(
         np.array_equal(old.truth, new.truth) for old, new in pairs
-    )  # truths are drawn: so are the records
+    )  # the truths are drawn, so equal truths mean equal records
     return (
         _bias(scaled, same),
         _spread(scaled, same),
@@ -79,7 +79,7 @@ def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ..
 
 
 def holm(p_values: Sequence[float], rate: float = DIFFERENCE_RATE) -> tuple[bool, ...]:
-    """Which of many tests are significant, so that a false alarm among all of them has a probability of ``rate``.
+    """Which of several tests are significant, with a probability of ``rate`` for any false alarm among them.
 
     Args:
         p_values: one per test.
@@ -104,7 +104,7 @@ def _scaled(old: Trials, new: Trials) -> tuple[Array, Array]:
 
 
 def _bias(scaled: Sequence[tuple[Array, Array]], same: bool) -> Change:
-    # Each cell's direction is that of all its errors, old and new: moved further that way is worse.
+    # The direction of a cell is that of all its errors, old and new: a move in this direction is worse.
     turned = []
     for old, new in scaled:
         both = np.concatenate((old, new))
@@ -147,7 +147,7 @@ def _coverage(pairs: Sequence[tuple[Trials, Trials]]) -> Change:
 
 
 def _shares(aspect: Aspect, old: tuple[int, int], new: tuple[int, int]) -> Change:
-    """A share that is worse the larger it is."""
+    """A share for which larger is worse."""
     from scipy.stats import fisher_exact
 
     if 0 in (old[1], new[1]):
@@ -160,12 +160,12 @@ def _shares(aspect: Aspect, old: tuple[int, int], new: tuple[int, int]) -> Chang
 
 
 def _larger(cells: Sequence[tuple[Array, Array]], same: bool) -> float:
-    """One-sided p-value of the new values being the larger ones."""
+    """One-sided p-value for larger new values."""
     return _signed_rank(cells) if same else _rank_sum(cells)
 
 
 def _signed_rank(cells: Sequence[tuple[Array, Array]]) -> float:
-    """By pairs, ranked within each cell; pairs without a difference say nothing."""
+    """Of pairs, ranked within each cell; pairs without a difference do not count."""
     from scipy.special import ndtr
     from scipy.stats import rankdata
 
@@ -190,7 +190,7 @@ def _rank_sum(cells: Sequence[tuple[Array, Array]]) -> float:
         if n == 0 or m == 0:
             continue
         ranks = rankdata(np.concatenate((old, new)))
-        # Weighed by 1/(n + m + 1), as van Elteren does; the variance is that of the ranks met, ties and all.
+        # Weighted by 1/(n + m + 1) after van Elteren; the variance is that of the actual ranks, with ties.
         weight = 1.0 / (n + m + 1)
         excess += weight * (float(ranks[n:].sum()) - m * (n + m + 1) / 2.0)
         variance += weight**2 * n * m / (n + m) * float(ranks.var(ddof=1))

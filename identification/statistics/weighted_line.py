@@ -1,4 +1,4 @@
-"""Straight lines through points of known variance, and what their scatter says of it."""
+"""Straight lines through points of known variance, with a test of their scatter."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class WeightedFit:
 
 
 def weighted_fit(columns: Array, target: Array, variance: Array) -> WeightedFit:
-    """Least squares with known variances; they are raised by the scatter where that is beyond chance.
+    """Least squares with known variances, which are raised where the scatter is beyond chance.
 
     Args:
         columns: one per unknown, shape (n, p) with n above p.

@@ -7,8 +7,8 @@ def wilson_interval(count: int, total: int) -> tuple[float, float]:
     """Wilson's interval of 95 % (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209–212).
 
     Args:
-        count: number that have the property.
-        total: number of all, above 0.
+        count: number of successes.
+        total: number of trials, above 0.
 
     Returns:
         Lower and upper end, as fractions of 1.
