@@ -1,4 +1,4 @@
-"""The one verb: a campaign in, an estimate out."""
+"""Identification of a campaign."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def identify(
 
     Args:
         campaign: the runs of one rig; angles in rad, stiffness in N m/rad, speed in m/s.
-        estimator: a name of `identification.estimators.ALL_ESTIMATORS`, or an estimator with settings of its
-            own, such as ``OutputError(cycles_per_window=5)``.
+        estimator: a name of `identification.estimators.ALL_ESTIMATORS`, or an estimator with its own
+            settings, such as ``OutputError(cycles_per_window=5)``.
         throw: raise when there is no result at all; otherwise the estimate's status says so.
 
     Returns:
-        The estimate. What could not be had is None, and its statuses say why and what would give it.
+        The estimate. Values that could not be identified are None; the statuses say why and what to do.
 
     Raises:
         TunnelError: for an unknown estimator, a campaign without runs, a wind-on run without air density,
@@ -45,7 +45,7 @@ def identify(
 
 
 def _of_all_runs(campaign: Campaign, examined: Examined, estimate: Estimate) -> Estimate:
-    """The estimate with the examination's remarks and a line for every run of the campaign, in its order."""
+    """The estimate with the remarks of the examination and an entry for every run of the campaign, in its order."""
     if not examined.remarks:
         return estimate
     found = {run.id: run for run in estimate.runs}

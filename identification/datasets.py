@@ -17,7 +17,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 MEASURED_CAMPAIGNS: tuple[str, ...] = ("kvlcc2-roll-decay-0kn", "rotary-pendulum")
 """Names of the packaged measured campaigns."""
 
-# Windows of Table III whose omega_n reads in two ways in the scan, and the reading that is not in the file.
+# Windows of Table III whose omega_n can be read in two ways in the scan, and the reading that is not in the file.
 _SECOND_READING = {3: 12.5054, 4: 12.5638}
 
 
@@ -41,7 +41,7 @@ class WindowRow:
     """Three consecutive cycles of Table III's wind-on run.
 
     Args:
-        number: of the window, from the release on.
+        number: of the window, counted from the release.
         zeta: damping ratio.
         omega_n_rad_per_s: natural frequency, rad/s.
         omega_n_second_reading_rad_per_s: where the scan is garbled, its other possible reading; else None.
@@ -112,7 +112,7 @@ def measured_campaign(name: str) -> Campaign:
         name: one of :data:`MEASURED_CAMPAIGNS`.
 
     Returns:
-        The campaign, angles in radians; without spring stiffness, so identified in normalised form.
+        The campaign, angles in radians. It states no spring stiffness, so only omega_n and zeta can be identified.
 
     Raises:
         TunnelError: there is no such campaign.

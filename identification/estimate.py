@@ -1,7 +1,7 @@
-"""What an estimator answers: values with standard deviations, and a status that says what to do next.
+"""The result of an estimator: values with standard deviations, and statuses that say what to do.
 
-One `Estimate` serves every estimator. A value that could not be had is None, never NaN, and a `Status` says
-why and what would give it.
+All estimators return an `Estimate`. A value that could not be identified is None, never NaN, and a `Status` says
+why and what to do.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class Quantity:
         value: in the unit.
         std: its standard deviation, in the unit.
         unit: SI, e.g. ``rad/s``; ``1`` where there is none.
-        interval: lower and upper end of the 95 % interval, in the unit, where the method gives one of its own;
-            elsewhere value ± 1.96 std is it.
+        interval: lower and upper end of the 95 % interval, in the unit, where the method gives one;
+            otherwise it is value ± 1.96 std.
     """
 
     value: float
@@ -54,7 +54,7 @@ class Quantity:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> Quantity:
-        """The inverse of `to_json_dict`; raises `TunnelError` where it is none."""
+        """The inverse of `to_json_dict`; raises `TunnelError` for a malformed document."""
         with _taken_apart("quantity"):
             interval = data.get("interval")
             ends = None
@@ -66,14 +66,14 @@ class Quantity:
 
 @dataclass(frozen=True)
 class NoiseLevel:
-    """The sensor noise a standard deviation rests on, and how the residual compares with it.
+    """The sensor noise behind the standard deviations, compared with the residual.
 
     Args:
         std: standard deviation used, rad, quantisation included.
-        source: ``stated`` (noise_std and resolution of the campaign) or ``residual`` (what the fit left).
+        source: ``stated`` (noise_std and resolution of the campaign) or ``residual`` (of the fit).
         residual_std: standard deviation of the residual, rad.
         slow_ratio: power of the residual's slow part over that of white noise; 1 where the model explains the
-            data, and the factor the variances are widened by where it does not.
+            data; where it does not, the variances are multiplied by it.
         departs: whether the slow ratio is beyond chance (false-alarm rate 1e-3).
         disagrees: whether the residual's white part contradicts the stated noise.
     """
@@ -91,7 +91,7 @@ class NoiseLevel:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> NoiseLevel:
-        """The inverse of `to_json_dict`; raises `TunnelError` where it is none."""
+        """The inverse of `to_json_dict`; raises `TunnelError` for a malformed document."""
         with _taken_apart("noise level"):
             return cls(
                 std=_number(data["std"]),
@@ -105,7 +105,7 @@ class NoiseLevel:
 
 @dataclass(frozen=True)
 class WindowEstimate:
-    """The oscillation seen through one window of a few cycles, as in the paper's Table III.
+    """The oscillation in one window of a few cycles, as in the paper's Table III.
 
     Args:
         start_s: start of the window since the record's first sample, s.
@@ -113,7 +113,7 @@ class WindowEstimate:
         amplitude: of the oscillation at mid-window, rad.
         omega_n: natural angular frequency, rad/s.
         zeta: damping ratio.
-        cycles: how many periods it holds; three, or one in a short record.
+        cycles: number of periods; three, or one in a short record.
     """
 
     start_s: float
@@ -136,7 +136,7 @@ class WindowEstimate:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> WindowEstimate:
-        """The inverse of `to_json_dict`; raises `TunnelError` where it is none."""
+        """The inverse of `to_json_dict`; raises `TunnelError` for a malformed document."""
         with _taken_apart("window"):
             names = ("amplitude", "omega_n", "zeta")
             quantities = {name: Quantity.from_json_dict(data[name]) for name in names}
@@ -158,21 +158,21 @@ _RUN_QUANTITIES = (
 
 @dataclass(frozen=True)
 class RunEstimate:
-    """One run by itself.
+    """The result for one run.
 
     Args:
         id: the run's.
-        statuses: from the gravest; OK alone where nothing is to be said.
+        statuses: from the gravest; only OK where there are no others.
         omega_n: natural angular frequency, rad/s.
         zeta: damping ratio.
         initial_angle: at the first sample, from the sensor's zero, rad.
         initial_rate: at the first sample, rad/s.
-        sensor_zero: as this run alone shows it, rad.
+        sensor_zero: from this run alone, rad.
         aerodynamic_stiffness: Ka, N m/rad, from the whole campaign; wind-on runs only.
         aerodynamic_damping: Ca, N m s/rad, likewise.
         process_noise: spectral intensity of a random moment over the inertia, rad²/s³; None where the method
-            does not ask for it, or the run shows none.
-        noise: what the standard deviations rest on; None where the method does not use it.
+            does not estimate it, or the run shows none.
+        noise: the noise level behind the standard deviations; None where the method does not use it.
         windows: consecutive windows of three cycles.
     """
 
@@ -206,7 +206,7 @@ class RunEstimate:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> RunEstimate:
-        """The inverse of `to_json_dict`; raises `TunnelError` where it is none."""
+        """The inverse of `to_json_dict`; raises `TunnelError` for a malformed document."""
         with _taken_apart("run"):
             return cls(
                 id=_text(data["id"]),
@@ -222,23 +222,23 @@ _CAMPAIGN_QUANTITIES = (*PARAMETERS, "sensor_zero", "wind_off_inertia", "wind_of
 
 @dataclass(frozen=True)
 class Estimate:
-    """A campaign identified.
+    """The result for a campaign.
 
     Args:
         campaign: the campaign's name.
         estimator: the method's name in the registry.
         runs: one per run of the campaign, in its order.
-        statuses: from the gravest; OK alone where nothing is to be said.
+        statuses: from the gravest; only OK where there are no others.
         cn_beta: Cnβ, 1/rad.
         cn_r: Cnr, 1/rad.
-        yaw_inertia: Izz, kg m², as the method's own model gives it.
+        yaw_inertia: Izz, kg m², from the method's own model.
         mechanical_damping: Cr, N m s/rad.
         sensor_zero: common to the campaign, rad.
         wind_off_inertia: Izz as the gradient of Kr against ωn² of the wind-off runs, kg m².
         wind_off_intercept: the intercept of that line, N m/rad; None with one spring.
         parameters: names of the covariance's rows and columns.
         covariance: of the parameters, in the products of their units; shape (p, p).
-        noise: what the covariance rests on; None where the method does not use it.
+        noise: the noise level behind the covariance; None where the method does not use it.
         remarks: of the examination before the estimation, on runs left out, cut or to look at.
     """
 
@@ -288,13 +288,14 @@ class Estimate:
         """The inverse of `to_json_dict`.
 
         Args:
-            data: the document; further keys, such as the budget's, are left alone.
+            data: the document; further keys, such as those of the budget, are ignored.
 
         Returns:
             The estimate.
 
         Raises:
-            TunnelError: when it is no estimate: a key is missing, or a value is not of its kind or not finite.
+            TunnelError: when it is not an estimate: a key is missing, or a value has the wrong type or is not
+            finite.
         """
         check_shape(data, _WHERE, _REMEDY)
         with _taken_apart("estimate"):
@@ -330,28 +331,28 @@ def _covariance(rows: Sequence[Sequence[float]], size: int) -> tuple[tuple[float
     """Rows of a covariance, shape (size, size)."""
     found = tuple(tuple(_number(value) for value in row) for row in rows)
     if [len(row) for row in found] != [size] * size:
-        raise ValueError("the covariance is not of the parameters")
+        raise ValueError("the covariance does not match the parameters")
     return found
 
 
 _WHERE = "the estimate as JSON"
-_REMEDY = "write it anew with tunnel identify --json"
+_REMEDY = "write it again with tunnel identify --json"
 
 
 def _taken_apart(kind: str) -> AbstractContextManager[None]:
-    """Whatever a malformed document does to the code that takes it apart becomes one `TunnelError`."""
+    """Turn the errors that a malformed document causes into one `TunnelError`."""
     return as_described(f"is no {kind}", _WHERE, _REMEDY)
 
 
 def _number(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        raise ValueError(f"{one_line(repr(value), 20)} is no finite number")
+        raise ValueError(f"{one_line(repr(value), 20)} is not a finite number")
     return float(value)
 
 
 def _text(value: object) -> str:
     if not isinstance(value, str):
-        raise TypeError(f"{one_line(repr(value), 20)} is no text")
+        raise TypeError(f"{one_line(repr(value), 20)} is not text")
     return value
 
 

@@ -1,4 +1,4 @@
-"""What an examination says of a campaign, and what it does about it."""
+"""The findings of the examination of a campaign."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 
 class Outcome(Enum):
-    """What follows from a remark. Listed from the gravest to the least."""
+    """The consequence of a remark. Listed from the gravest to the least."""
 
     REFUSED = "refused"
     LEFT_OUT = "left out"
@@ -63,7 +63,7 @@ class Examined:
     """A campaign after its examination.
 
     Args:
-        campaign: the runs to go on with; the given one itself where nothing was left out or cut.
+        campaign: the runs to identify; the given campaign itself where nothing was left out or cut.
         remarks: what was found, in the order of the checks.
     """
 
@@ -71,7 +71,7 @@ class Examined:
     remarks: tuple[Remark, ...] = ()
 
     def accepted(self) -> Examined:
-        """Itself, unless the examination refuses the campaign.
+        """Return itself, unless the examination refuses the campaign.
 
         Raises:
             TunnelError: for the first remark that refuses it.

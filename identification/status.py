@@ -1,4 +1,4 @@
-"""The outcome of an estimate, in words that say what to do next."""
+"""The outcome of an estimate, with what to do about it."""
 
 from __future__ import annotations
 
@@ -6,46 +6,46 @@ from enum import Enum
 
 
 class Status(Enum):
-    """The outcome of an estimate; its text states the remedy. Listed from the gravest to none."""
+    """The outcome of an estimate; its text states the remedy. Listed from the gravest to the least."""
 
     NO_RUN_IDENTIFIED = "no run could be identified: check that the records hold a free decay in radians"
     NOT_CONVERGED = "the fit did not converge: cut the record to the free decay, or lengthen it"
     NO_OSCILLATION = (
-        "no decaying motion above the noise: check the sensor, or let the record start at the release"
+        "no decaying motion above the noise: check the sensor, or start the record at the release"
     )
-    NOT_DETERMINED = "the record does not determine frequency and damping: lengthen it, or sample it faster"
+    NOT_DETERMINED = "the record does not determine frequency and damping: lengthen it, or sample faster"
     TOO_FEW_CYCLES = (
-        "fewer than the three cycles the networks need after the first zero crossing: lengthen the record, or use "
-        "output_error"
+        "fewer than three cycles after the first zero crossing, which the networks need: lengthen the record, or "
+        "use output_error"
     )
-    OUTSIDE_TRAINING = (
-        "damping or frequency outside the networks' training range: use output_error, or train others"
-    )
+    OUTSIDE_TRAINING = "damping or frequency outside the networks' training range: use output_error"
     RUN_LEFT_OUT = "a run could not be identified and was left out: see the status of the runs"
-    REPEATED_RUN = "the same samples as another run, counted once: leave the run out, or name its own file"
-    MODEL_DEPARTS = "model departs from the data: run the diagnosis; the intervals are widened meanwhile"
+    REPEATED_RUN = (
+        "the same samples as another run, so counted once: remove the run, or correct its file name"
+    )
+    MODEL_DEPARTS = "the model does not explain the data, so the intervals are widened: run the diagnosis"
     NOISE_DISAGREES = (
-        "the noise is not what noise_std states: correct noise_std or leave it out; the residual's is used"
+        "the records contradict noise_std, so the residual's is used: correct or remove noise_std"
     )
-    FEW_CYCLES = "fewer than three cycles: lengthen the record for windows and a firm damping"
-    NO_STIFFNESS = "no spring_stiffness, so normalised form only (omega_n, zeta): state it in campaign.toml"
+    FEW_CYCLES = "fewer than three cycles: lengthen the record for windows and a reliable damping"
+    NO_STIFFNESS = "no spring_stiffness, so only omega_n and zeta are given: state it in campaign.toml"
     INERTIA_NOT_POSITIVE = (
-        "the frequencies contradict the stated springs, so no inertia: check which spring and wind speed each run "
-        "states"
+        "the frequencies contradict the stated springs, so no inertia is given: check the spring and wind speed "
+        "of each run"
     )
-    NO_WIND_ON = "no wind-on runs, so no cn_beta and cn_r: add runs with the wind on"
+    NO_WIND_ON = "no wind-on runs, so cn_beta and cn_r are not given: add runs with the wind on"
     NO_WIND_OFF_PAIR = (
-        "a wind-on run has no wind-off run of its spring: record one with the wind off, or use output_error"
+        "a wind-on run has no wind-off run with the same spring: record one, or use output_error"
     )
     STIFFNESS_NOT_SEPARABLE = (
-        "spring and air stiffness cannot be told apart: add a wind-off run or a second spring"
+        "spring and aerodynamic stiffness cannot be separated: add a wind-off run or a second spring"
     )
     DAMPING_NOT_SEPARABLE = (
-        "mechanical and air damping cannot be told apart: add a wind-off run or a second wind speed"
+        "mechanical and aerodynamic damping cannot be separated: add a wind-off run or a second wind speed"
     )
     NO_REFERENCE_SIZE = (
-        "no frontal_area or reference_length, so dimensional stiffness and damping per run only: "
-        "state both under [rig]"
+        "no frontal_area or reference_length, so the air's stiffness and damping are given per run, without "
+        "coefficients: state both under [rig]"
     )
     OK = "identified"
 
@@ -67,10 +67,10 @@ _GRAVITY = {status: rank for rank, status in enumerate(Status)}
 
 
 def by_gravity(statuses: set[Status]) -> tuple[Status, ...]:
-    """The statuses from the gravest to the least; OK alone where there is none.
+    """The statuses from the gravest to the least; OK alone where there are none.
 
     Args:
-        statuses: what was met; OK need not be among them.
+        statuses: any of them; OK need not be included.
 
     Returns:
         At least one status.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -22,6 +20,7 @@ from diagnosis.blind.files import (
 )
 from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.files.writing import output_folder
+from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError
 
 Told = Callable[[int, int, str], None]
@@ -107,17 +106,8 @@ def _answers(
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Name and answer of each campaign, as they come."""
     work = partial(answer_campaign, excluded=tuple(excluded))
-    if jobs <= 1 or len(campaigns) <= 1:
-        yield from map(work, campaigns)
-        return
-    context = multiprocessing.get_context("spawn")
-    with context.Pool(min(jobs, len(campaigns)), initializer=_ignore_interrupt) as pool:
-        yield from pool.imap_unordered(work, campaigns)
-
-
-def _ignore_interrupt() -> None:
-    """Leave Ctrl-C to the parent, which ends the pool."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    processes = jobs if jobs > 1 and len(campaigns) > 1 else 0
+    return (answer for _, answer in in_processes(work, campaigns, processes))
 
 
 def answer_campaign(folder: Path, excluded: Sequence[str] = ()) -> tuple[str, dict[str, Any]]:

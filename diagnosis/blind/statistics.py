@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-_Z = 1.959963984540054
+from identification.statistics.wilson import wilson_interval
+
 BINS = 10
 
 
@@ -32,13 +32,8 @@ class Share:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's interval of 95 % (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209–212)."""
-        if self.total == 0:
-            return 0.0, 1.0
-        n, p = self.total, self.count / self.total
-        centre = (p + _Z**2 / (2 * n)) / (1 + _Z**2 / n)
-        half = _Z / (1 + _Z**2 / n) * math.sqrt(p * (1 - p) / n + _Z**2 / (4 * n**2))
-        return max(0.0, centre - half), min(1.0, centre + half)
+        """Wilson's interval of 95 %, as shares; 0 to 1 of none."""
+        return wilson_interval(self.count, self.total) if self.total else (0.0, 1.0)
 
     def to_json_dict(self) -> dict[str, Any]:
         """Count, total, share and interval."""

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.policy import SAME_SPRING
+from identification.decay.spectrum import highest_peak
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Record
 
@@ -97,6 +98,6 @@ def frequency(record: Record) -> float:
         The peak of its spectrum, Hz.
     """
     swing = record.yaw_rad - np.mean(record.yaw_rad)
-    count = _PADDING * swing.size
-    peak = 1 + int(np.argmax(np.abs(np.fft.rfft(swing * np.hanning(swing.size), count))[1:]))
-    return peak * record.sample_rate / count
+    size = _PADDING * swing.size
+    place, _ = highest_peak(swing * np.hanning(swing.size), size)
+    return place * record.sample_rate / size

@@ -90,7 +90,7 @@ def _balance(
     spring = 1.0 if data.normalised else run.spring_stiffness or 1.0
     columns = [-angle if data.normalised else -acceleration, -rate]
     if data.wind_on:
-        pressure = 0.5 * run.air_density * run.wind_speed**2 * data.frontal_area * data.reference_length
+        pressure = data.air_moment(run)
         columns.append(pressure * angle)
         columns.append(pressure * data.reference_length / max(run.wind_speed, 1e-9) * rate)
     regressors = [kind.regressor(angle, rate, spring) for kind in problem.effects]

@@ -254,8 +254,7 @@ def condensed(physics: RunSettings, data: Data) -> RunSettings:
     if twist is None or twist.compliance > _SOFT_ROD:
         return physics
     share = twist.inertia_share
-    pressure = 0.5 * physics.air_density * physics.wind_speed**2 * data.frontal_area * data.reference_length
-    air = pressure * physics.derivatives.cn_beta
+    air = data.air_moment(physics) * physics.derivatives.cn_beta
     lead = twist.compliance * (share * air + (1.0 - share) * physics.spring_stiffness)
     air_seen = AeroDerivatives(
         physics.derivatives.cn_beta * (1.0 + lead), physics.derivatives.cn_r * (1.0 + lead)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.aero import aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
 
@@ -78,6 +80,23 @@ class Data:
     def wind_on(self) -> bool:
         """Whether any run of the campaign has the wind on."""
         return self.windy or any(run.wind_on for run in self.runs)
+
+    def air_moment(self, run: RunData | RunSettings) -> float:
+        """The air's yaw moment on the model for a moment coefficient of 1.
+
+        Args:
+            run: gives the air's density and speed.
+
+        Returns:
+            ½ρV²·A·l, N m.
+        """
+        return aerodynamic_stiffness(
+            1.0,
+            air_density=run.air_density,
+            wind_speed=run.wind_speed,
+            frontal_area=self.frontal_area,
+            reference_length=self.reference_length,
+        )
 
     def with_runs(self, runs: tuple[RunData, ...]) -> Data:
         """Other runs of the same campaign, whose model has the same parameters.

@@ -215,10 +215,9 @@ def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
     problem = fit.problem
     run = problem.data.runs[run_index]
     stated = problem.stated(fit.point.common, fit.point.release[run_index], run)
-    area, length = problem.data.frontal_area, problem.data.reference_length
-    pressure = 0.5 * run.air_density * run.wind_speed**2 * area * length
+    pressure = problem.data.air_moment(run)
     stiffness = stated.spring_stiffness - pressure * stated.derivatives.cn_beta
-    rate = pressure * length / run.wind_speed if run.wind_on else 0.0
+    rate = pressure * problem.data.reference_length / run.wind_speed if run.wind_on else 0.0
     return stated.yaw_inertia, stated.mechanical_damping - rate * stated.derivatives.cn_r, stiffness
 
 
@@ -228,5 +227,4 @@ def _forced_gain(fit: Fit, run_index: int, frequency: float) -> complex:
     run = data.runs[run_index]
     inertia, damping, stiffness = linear_coefficients(fit, run_index)
     omega = 2.0 * np.pi * frequency
-    moment = 0.5 * run.air_density * run.wind_speed**2 * data.frontal_area * data.reference_length
-    return complex(moment / (stiffness - inertia * omega**2 + 1j * omega * damping))
+    return complex(data.air_moment(run) / (stiffness - inertia * omega**2 + 1j * omega * damping))

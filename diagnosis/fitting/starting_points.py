@@ -14,6 +14,7 @@ from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.spectra import Line, mains_line, shedding_line
 from diagnosis.policy import GROSS_MISFIT
+from identification.decay.spectrum import highest_peak
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import Circumstances, Trial
 from tunnel_sim.vocabulary.record import Array
@@ -42,9 +43,7 @@ def nominal_start(data: Data) -> Point:
             release,
         )
     spring = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
-    pressure = np.array(
-        [0.5 * r.air_density * r.wind_speed**2 * data.frontal_area * data.reference_length for r in data.runs]
-    )
+    pressure = np.array([data.air_moment(run) for run in data.runs])
     # Kr = Izz ω² + pressure Cnβ, with equal relative errors
     design = np.column_stack([omega2, pressure]) / spring[:, None]
     if not data.wind_on:
@@ -64,11 +63,8 @@ def _frequency(run: RunData) -> float:
     """Frequency of the greatest peak of a run's spectrum, Hz."""
     values = run.reading - run.reading.mean()
     size = _PADDING * values.size
-    power = np.abs(np.fft.rfft(values * np.hanning(values.size), size)) ** 2
-    peak = int(np.argmax(power[1:-1])) + 1
-    left, middle, right = np.log(power[peak - 1 : peak + 2])
-    offset = 0.5 * (left - right) / (left - 2.0 * middle + right)
-    return float((peak + offset) / (size * run.interval))
+    place, _ = highest_peak(values * np.hanning(values.size), size)
+    return place / (size * run.interval)
 
 
 @dataclass(frozen=True)

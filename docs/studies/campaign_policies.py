@@ -20,6 +20,7 @@ import numpy as np
 from scipy.stats import binom
 
 from identification.estimate import PARAMETERS
+from identification.statistics.wilson import wilson_interval
 from tunnel_lab.envs.campaign import CampaignEnv, reached
 from tunnel_lab.envs.picture import beliefs
 from tunnel_lab.envs.policies import POLICIES, run_campaign
@@ -155,22 +156,6 @@ def median_interval(values: Array) -> tuple[float, float, float]:
     return float(np.median(ordered)), float(low), float(high)
 
 
-def share_interval(hits: int, count: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a share.
-
-    Args:
-        hits: number of them.
-        count: of all.
-
-    Returns:
-        Lower and upper end, as fractions. Source: Wilson (1927), doi 10.1080/01621459.1927.10502953.
-    """
-    z, p = 1.959964, hits / count
-    centre = (p + z**2 / (2 * count)) / (1 + z**2 / count)
-    half = z / (1 + z**2 / count) * float(np.sqrt(p * (1 - p) / count + z**2 / (4 * count**2)))
-    return max(0.0, centre - half), min(1.0, centre + half)
-
-
 def table(rows: Sequence[Row], preset: str) -> str:
     """The comparison as a table in Markdown.
 
@@ -216,7 +201,7 @@ def _shown(values: Array, unit: float, digits: int) -> str:
 
 def _share(rows: Sequence[Row], name: str) -> str:
     hits = int(np.sum(_values(rows, name)))
-    low, high = share_interval(hits, len(rows))
+    low, high = wilson_interval(hits, len(rows))
     return f"{hits} of {len(rows)} ({100 * low:.0f} to {100 * high:.0f} %)"
 
 

@@ -98,17 +98,22 @@ def infer_springs(table: Sequence[WindowRow] | None = None) -> tuple[SpringInfer
     rows = paper_windows() if table is None else table
     omega = float(np.mean([row.omega_n_rad_per_s for row in rows]))
     zeta = float(np.mean([row.zeta for row in rows]))
-    printed, body, density = paper_derivatives()[0], load_rig().body, load_rig().air.density
+    printed, rig = paper_derivatives()[0], load_rig()
+    air = {
+        "air_density": rig.air.density,
+        "frontal_area": rig.body.frontal_area,
+        "reference_length": rig.body.length,
+    }
     found = []
     for spring in paper_springs():
         stiffness, omega_0 = spring.stiffness_n_m_per_rad, 2.0 * pi * spring.frequency_hz
         if omega_0 <= omega:
             continue
         inertia = stiffness / omega_0**2
-        per_square = 0.5 * density * body.frontal_area * body.length * printed.cn_beta_per_rad
+        per_square = aerodynamic_stiffness(printed.cn_beta_per_rad, wind_speed=1.0, **air)
         speed = sqrt((stiffness - inertia * omega**2) / per_square)
-        air = 0.5 * density * speed * body.frontal_area * body.length**2 * printed.cn_r_per_rad
-        found.append(SpringInference(spring.number, speed, 2.0 * zeta * omega * inertia + air))
+        lost = aerodynamic_damping(printed.cn_r_per_rad, wind_speed=speed, **air)
+        found.append(SpringInference(spring.number, speed, 2.0 * zeta * omega * inertia + lost))
     return tuple(found)
 
 

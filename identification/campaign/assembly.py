@@ -1,6 +1,6 @@
-"""From runs and shared parameters to an `Estimate`: what every estimator does alike, once.
+"""From runs and shared parameters to an `Estimate`: the steps that all estimators share.
 
-A method that identifies run by run hands its runs to `combined_estimate`; a joint method uses the parts.
+A method that identifies run by run calls `combined_estimate`; a joint method uses its parts.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from identification.campaign.derivatives import (
     build_design,
     combine,
     derivatives,
-    loads,
     positive_inertia,
 )
 from identification.campaign.springs import wind_off_line
@@ -32,19 +31,18 @@ from identification.estimate import (
     Status,
     by_gravity,
 )
+from identification.policy import MISFIT_RATE
 from identification.statistics.information import determined, inverse
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
 
 Combination = Callable[[Design, list[int], Array, Array], tuple[Array, Array]]
 """The design, the places of its runs, φ and its covariance to φ and its covariance."""
 
-_FALSE_ALARM_RATE = 1e-3  # of saying that the runs contradict each other
-
 
 @dataclass(frozen=True, eq=False)
 class RunDecay:
-    """What a method found of one run by itself.
+    """The result of a method for one run alone.
 
     Args:
         estimate: the run's result, or the status of its failure.
@@ -58,29 +56,8 @@ class RunDecay:
 
     @classmethod
     def failed(cls, run: Run, status: Status) -> RunDecay:
-        """A run that gave nothing, and why."""
+        """A run without a result, and the reason."""
         return cls(RunEstimate(run.id, (status,)))
-
-
-def estimate_by_runs(
-    campaign: Campaign, name: str, method: Callable[[Run, SensorProperties], RunDecay]
-) -> Estimate:
-    """Identify every run by itself, then the campaign from the runs.
-
-    Args:
-        campaign: at least one run.
-        name: of the estimator.
-        method: identifies one run.
-
-    Returns:
-        The estimate, as by `combined_estimate`.
-
-    Raises:
-        TunnelError: when a wind-on run states no air density; before any run is worked on.
-    """
-    for run in campaign.runs:
-        loads(run, campaign.rig)
-    return combined_estimate(campaign, name, [method(run, campaign.sensor) for run in campaign.runs])
 
 
 def combined_estimate(
@@ -95,11 +72,11 @@ def combined_estimate(
         campaign: the runs' conditions.
         name: of the estimator.
         found: one per run, in the campaign's order.
-        together: a method's own way to put runs together, from that of least squares on.
+        together: a method's own combination of the runs, which starts from that of least squares.
 
     Returns:
-        The estimate. A run that could not be identified is left out; one without spring stiffness counts for
-        itself only.
+        The estimate. A run that could not be identified is left out; one without spring stiffness is identified
+        by itself only.
 
     Raises:
         TunnelError: when a wind-on run states no air density.
@@ -150,7 +127,7 @@ def campaign_estimate(
         design: links of those runs.
         parameters: φ, shape (p,).
         covariance: of φ, shape (p, p).
-        statuses: met so far.
+        statuses: found so far.
 
     Returns:
         The estimate with coefficients, the air of its runs and the wind-off line.
@@ -175,18 +152,18 @@ def _birge_ratio(design: Design, parameters: Array, decays: Array, informations:
         return 1.0
     away = [decay - link @ parameters for decay, link in zip(decays, design.links, strict=True)]
     scatter = sum(float(d @ weight @ d) for d, weight in zip(away, informations, strict=True))
-    return scatter / freedom if scatter > float(chi2.isf(_FALSE_ALARM_RATE, freedom)) else 1.0
+    return scatter / freedom if scatter > float(chi2.isf(MISFIT_RATE, freedom)) else 1.0
 
 
 def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> set[Status]:
-    """What the runs' own results mean for the campaign.
+    """The statuses of a campaign that follow from its runs.
 
     Args:
         campaign: their conditions.
         estimates: one per run, in the campaign's order.
 
     Returns:
-        The statuses; NO_RUN_IDENTIFIED alone where there is no run to go on with.
+        The statuses; only NO_RUN_IDENTIFIED where no run was identified.
     """
     identified = [estimate.omega_n is not None for estimate in estimates]
     if not any(identified):
@@ -202,7 +179,7 @@ def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> se
 
 
 def departures(levels: Sequence[NoiseLevel | None]) -> set[Status]:
-    """What noise levels say of the model and of the stated noise.
+    """The statuses that follow from noise levels.
 
     Args:
         levels: of runs or of a joint fit; None where there is none.
@@ -220,14 +197,14 @@ def departures(levels: Sequence[NoiseLevel | None]) -> set[Status]:
 
 
 def limits(design: Design, parameters: Array) -> set[Status]:
-    """What a campaign's conditions cannot show, and what they contradict.
+    """The statuses of a campaign whose conditions do not separate parameters, or contradict them.
 
     Args:
         design: of the campaign.
         parameters: φ as found, shape (p,).
 
     Returns:
-        The statuses that say so.
+        The statuses, if any.
     """
     statuses = set()
     if not np.any(design.stiffness_loads > 0.0):

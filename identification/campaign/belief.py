@@ -1,11 +1,11 @@
 """What is known of Cnβ, Cnr, Izz and Cr after each run of a campaign, and what a further run would add.
 
 In the shared parameters φ = (1/Izz, Cnβ/Izz, Cr/Izz, Cnr/Izz) every run's decay rate and stiffness are linear
-(see `derivatives`), so a normal prior of φ and the runs' likelihood give a posterior at any number of runs, also
-where the runs alone do not separate the four. The initial state of every run and the sensor's zero are unknown
-throughout and eliminated. The information of a run that has not been made yet is Fisher's, exact for its sample
-times, at the parameters believed now: Bayesian D-optimal design with the nuisance parameters marginalised.
-Source: Chaloner & Verdinelli, Statist. Sci. 10 (1995) 273–304, doi 10.1214/ss/1177009939, sec. 2.
+(see `derivatives`), so a normal prior of φ and the likelihood of the runs give a posterior for any number of
+runs, even if the runs alone do not separate the four. The initial state of every run and the sensor's zero are
+unknown and eliminated. The information of a future run is Fisher's, exact for its sample times, at the current
+estimate of the parameters: Bayesian D-optimal design with the nuisance parameters marginalised. Source: Chaloner
+& Verdinelli, Statist. Sci. 10 (1995) 273–304, doi 10.1214/ss/1177009939, sec. 2.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from identification.campaign.derivatives import Design, derivatives, loads
 from identification.decay.damped_oscillation import Decay
 from identification.decay.decay_fit import Prior, Reading, RunFit, fit_decays, information_at
 from identification.estimate import PARAMETERS
+from identification.policy import SAFE_DEVIATIONS
 from identification.statistics.information import eliminate, embed, inverse, scaled_solve
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
 from tunnel_sim.vocabulary.record import Array
 
-# All four columns of φ, whatever the runs separate: the prior holds what they do not.
+# All four columns of φ, whatever the runs separate: the prior supplies what they do not.
 _DESIGN = Design((np.zeros((2, 4)),), {"g": 0, "n": 1, "d": 2, "m": 3}, np.zeros(0), np.zeros(0), True)
 _COEFFICIENTS = [PARAMETERS.index("cn_beta"), PARAMETERS.index("cn_r")]
-_SAFE = 3.0  # standard deviations that keep a proposed run's stiffness and damping positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ def prior_belief(mean: Mapping[str, float], std: Mapping[str, float]) -> Belief:
 
 
 def run_link(run: Run, rig: RigProperties) -> Array:
-    """How a run's decay rate a [1/s] and stiffness k [1/s²] hang on φ.
+    """How a run's decay rate a [1/s] and stiffness k [1/s²] depend on φ.
 
     Args:
         run: its conditions; the record is not used.
@@ -151,7 +151,7 @@ def update_belief(
 
 
 def _start(mean: Array, known: Array, links: Sequence[Array], fits: Sequence[RunFit]) -> Array:
-    """The runs' own (a, k), weighed by what each knows of them, and the prior."""
+    """The (a, k) of the runs, weighted by their information, and the prior."""
     normal, right = known.copy(), known @ mean
     for link, fit in zip(links, fits, strict=True):
         weight = eliminate(fit.information, fit.score, 2)[0]
@@ -163,7 +163,7 @@ def _start(mean: Array, known: Array, links: Sequence[Array], fits: Sequence[Run
 def expected_belief(
     belief: Belief, link: Array, time: Array, angle: float, noise_std: float
 ) -> Belief | None:
-    """What would be known after one more run, released at rest.
+    """The belief after one more run, released at rest.
 
     Args:
         belief: what is known now.
@@ -173,12 +173,12 @@ def expected_belief(
         noise_std: of the reading, quantisation included, rad.
 
     Returns:
-        The same values with more information; None where, within three standard deviations of the belief, the
-        run might not come back (no positive stiffness or damping).
+        The same values with more information; None where the stiffness or the damping of the run might not be
+        positive, within three standard deviations of the belief.
     """
     rate, stiffness = map(float, link @ belief.shared)
     spread = np.sqrt(np.diag(link @ belief.shared_covariance @ link.T))
-    if rate <= _SAFE * spread[0] or stiffness <= _SAFE * spread[1]:
+    if rate <= SAFE_DEVIATIONS * spread[0] or stiffness <= SAFE_DEVIATIONS * spread[1]:
         return None
     information = information_at(time, Decay(rate, stiffness), angle, 0.0) / noise_std**2
     reduced, _ = eliminate(information, np.zeros(5), 3)
@@ -187,7 +187,7 @@ def expected_belief(
 
 
 def information_gain(before: Belief, after: Belief) -> float:
-    """How much more is known of (Cnβ, Cnr): ½ ln(det Σ before / det Σ after), in nats.
+    """Information gained on (Cnβ, Cnr): ½ ln(det Σ before / det Σ after), in nats.
 
     It is the fall of the differential entropy of the two, the other parameters marginalised; negative where
     ``after`` is wider.

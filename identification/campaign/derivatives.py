@@ -1,11 +1,11 @@
-"""From decay rates and stiffnesses of the runs to Cnβ, Cnr, Izz and Cr, and what a campaign can tell apart.
+"""From decay rates and stiffnesses of the runs to Cnβ, Cnr, Izz and Cr, and which of them a campaign separates.
 
 With g = 1/Izz, n = Cnβ/Izz, d = Cr/Izz and m = Cnr/Izz the equation of motion (paper, eqs 2–6, signs as in
 eqs 7 and 8) gives for run i
 
     kᵢ = Krᵢ g − ½ρᵢVᵢ² A l n,    2aᵢ = d − ½ρᵢVᵢ A l² m,
 
-linear in (g, n, d, m). A block whose columns a campaign does not separate is left free, run by run.
+linear in (g, n, d, m). If a campaign does not separate the columns of a block, that block is fitted run by run.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.campaign.springs import LEAST_SPREAD
 from identification.estimate import PARAMETERS
+from identification.policy import LEAST_SPRING_SPREAD
 from identification.statistics.information import determined, inverse, scaled_solve
 from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-# Smallest singular value of two columns scaled to unit length: that of two runs whose springs, or speeds, differ by
-# the least spread that counts.
-_RANK_TOLERANCE = LEAST_SPREAD / np.sqrt(8.0)
+# Smallest singular value of two columns of unit length, for two runs whose springs or speeds just count as
+# different.
+_RANK_TOLERANCE = LEAST_SPRING_SPREAD / np.sqrt(8.0)
 _GREATEST = (
-    1e60  # of a stiffness or a moment in SI units, and its inverse the least: fourth powers are formed
+    1e60  # of a stiffness or a moment in SI units; its inverse is the smallest. Fourth powers are formed.
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """How the runs' decay rates and stiffnesses hang on the shared parameters φ.
+    """How the runs' decay rates and stiffnesses depend on the shared parameters φ.
 
     Args:
         links: one (2, p) matrix per run: (aᵢ, kᵢ) = Lᵢ φ.
-        columns: where g, n, d, m stand in φ; only those that the campaign separates.
+        columns: places of g, n, d, m in φ; only of those that the campaign separates.
         stiffness_loads: ½ρV²·A·l per run, N m, shape (r,); without A·l where the size is unknown.
         damping_loads: ½ρV·A·l² per run, N m s, shape (r,); without A·l² where the size is unknown.
         has_size: whether the rig states A and l.
@@ -60,7 +60,7 @@ class Derivatives:
     """The campaign's parameters.
 
     Args:
-        names: of `estimate.PARAMETERS`, those that could be had, in that order.
+        names: of `estimate.PARAMETERS`, those that were determined, in that order.
         values: shape (p,), SI. Without the rig's size, cn_beta and cn_r stand for A·l·Cnβ and A·l²·Cnr.
         jacobian: of the values to φ, shape (p, size).
     """
@@ -70,20 +70,21 @@ class Derivatives:
     jacobian: Array
 
     def get(self, name: str) -> float | None:
-        """A value by name; None where it could not be had."""
+        """A value by name; None where it was not determined."""
         return float(self.values[self.names.index(name)]) if name in self.names else None
 
 
 def loads(run: Run, rig: RigProperties) -> tuple[float, float]:
-    """What multiplies Cnβ and Cnr in a run: ½ρV²·A·l [N m] and ½ρV·A·l² [N m s]; A and l as 1 where unknown.
+    """The factors of Cnβ and Cnr in a run: ½ρV²·A·l [N m] and ½ρV·A·l² [N m s]; A and l as 1 where unknown.
 
     Args:
         run: the run's conditions.
         rig: the rig's size.
 
     Raises:
-        TunnelError: when a wind-on run states no air density, and when a stated value is so large or small that
-            computing with it is beyond the double precision.
+        TunnelError: when a wind-on run states no air density, or a stated value is too large or too small for
+        double
+            precision.
     """
     _within_range("spring_stiffness", run.spring_stiffness or 1.0, "N m/rad", run)
     if not run.wind_on:
@@ -180,7 +181,7 @@ def derivatives(design: Design, parameters: Array) -> Derivatives:
         parameters: φ, shape (p,).
 
     Returns:
-        The parameters the design separates; none where it does not give Izz, or gives one that is not positive.
+        The parameters that the design separates; none where it gives no Izz, or one that is not positive.
     """
     if not positive_inertia(design, parameters):
         return Derivatives((), np.zeros(0), np.zeros((0, design.size)))

@@ -3,14 +3,14 @@
     N̂β = −{4π²(f² − f₀²) + ln²2 (1/t½² − 1/t½₀²)}         (eq. 7)
     N̂r = −2 ln 2 (1/t½ − 1/t½₀)                            (eq. 8; printed with the first term squared)
 
-With ωn² = 4π²f² + ln²2/t½² and 2ζωn = 2 ln 2/t½ these are the differences of eqs 10 and 11, which the paper's
-networks are used with: one path serves both methods. With N̂β = +Ka/Izz and N̂r = +Ca/Izz (the text after eq. 6
+With ωn² = 4π²f² + ln²2/t½² and 2ζωn = 2 ln 2/t½ these are the differences of eqs 10 and 11, which the paper uses
+with its networks: the same code serves both methods. With N̂β = +Ka/Izz and N̂r = +Ca/Izz (the text after eq. 6
 has the signs reversed) eqs 17 and 18 give Cnβ and Cnr, averaged over the wind-on runs. Izz is the gradient of Kr
 against ωn² of the wind-off runs (eq. 1).
 
 Standard deviations of f and σ are propagated numerically, one input at a time (Kragten, Analyst 119 (1994)
 2161–2165, doi 10.1039/AN9941902161). Where the scatter over the wind-on runs, or of the springs about their line,
-is more than that, it is what is given.
+is larger, it is used instead.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ import numpy as np
 from identification.campaign.derivatives import has_size
 from identification.campaign.springs import inertia_of_springs, wind_off_line
 from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, Status, by_gravity
+from identification.policy import LEAST_FOR_SCATTER
 from identification.statistics.widening import widened_covariance
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
 
 LN2 = float(np.log(2.0))
-_LEAST_FOR_SCATTER = 3
 
 
 @dataclass(frozen=True, eq=False)
 class PairedRun:
-    """What a run says of its oscillation.
+    """The oscillation of a run.
 
     Args:
         run: the run, with its conditions.
@@ -56,11 +56,11 @@ class PairedRun:
 
 @dataclass(frozen=True, eq=False)
 class _Pairing:
-    """The sprung runs as arrays, and who is set against whom.
+    """The runs with a stated spring as arrays, and their pairs.
 
     Args:
         stiffness: Kr, N m/rad, shape (r,).
-        loads: what multiplies Cnβ and Cnr, shape (r, 2).
+        loads: factors of Cnβ and Cnr, shape (r, 2).
         off: places of the wind-off runs.
         on: places of the wind-on runs that have a wind-off run of their spring.
         partners: per place in ``on``, the places of those wind-off runs.
@@ -105,7 +105,7 @@ def normalised_derivatives(
 
 
 def _outcome(pairing: _Pairing, frequency: Array, rate: Array, *, with_line: bool) -> Array:
-    # Izz and Cr, then Ka of each paired run, then Ca of each: all that is propagated.
+    # Izz and Cr, then Ka of each paired run, then Ca of each: the quantities that are propagated.
     off = pairing.off
     omega = np.hypot(2.0 * np.pi * frequency[off], rate[off])
     inertia = inertia_of_springs(pairing.stiffness[off], omega**2, with_line=with_line)
@@ -133,7 +133,7 @@ def paired_estimate(
         campaign: what is identified.
         estimate: with every run's own result.
         known: the runs that could be identified, at least one, each with what `derivatives.loads` gives.
-        statuses: what was met so far.
+        statuses: found so far.
 
     Returns:
         The estimate with Cnβ, Cnr, Izz and Cr, as far as there are pairs; wind-on runs without a wind-off run
@@ -206,8 +206,8 @@ def _damping_scatter(pairing: _Pairing, seen: Sequence[PairedRun], inertia: floa
 
 
 def _mean_std(values: Array) -> float:
-    # Of the mean, from the scatter; 0, so that the propagated one is given, where there are too few.
-    if values.size < _LEAST_FOR_SCATTER:
+    # Of the mean, from the scatter; 0 for too few values, so that the propagated one is used.
+    if values.size < LEAST_FOR_SCATTER:
         return 0.0
     return float(values.std(ddof=1)) / float(np.sqrt(values.size))
 

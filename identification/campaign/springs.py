@@ -1,4 +1,4 @@
-"""The rig's inertia from springs of known stiffness, and the springs that leave the line.
+"""The rig's inertia from springs of known stiffness, and outliers among the springs.
 
 The paper's eq. (1): Izz is the gradient of Kr against ωn² over the wind-off runs.
 """
@@ -13,18 +13,11 @@ from numpy.typing import NDArray
 from scipy.special import stdtr
 
 from identification.estimate import Quantity
+from identification.policy import LEAST_SPRING_RESOLUTION, LEAST_SPRING_SPREAD, SPRING_FLAG_RATE
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-# One set in ten, not in twenty: a flag costs only a look at a spring. The choice was made with Table II
-# in view, whose p-value is 0.06: its springs 4 and 7 are flagged at this rate and would not be at 5 %.
-FALSE_ALARM_RATE = 0.10
-# Of stiffnesses that count as different: a spring is hardly known to better than some per mille.
-LEAST_SPREAD = 0.01
-# Rise of ωn² over the springs in its standard deviations. The attenuation of the gradient is the inverse square,
-# here 1 %, a tenth of its standard deviation.
-_RESOLVED = 10.0
-_TRIALS = 9999  # sets of good springs the rule is calibrated on
+_TRIALS = 9999  # simulated sets of correct springs that calibrate the rule
 
 
 @dataclass(frozen=True)
@@ -35,8 +28,8 @@ class SpringFit:
         inertia: its gradient Izz, kg m².
         intercept: N m/rad.
         residual_percent: stated stiffness over the line's, less one, per spring, %.
-        flagged: whether a spring leaves the line.
-        p_value: probability that good springs look at least as bad as this set, (1 + k)/(1 + trials).
+        flagged: whether a spring is an outlier.
+        p_value: probability that correct springs deviate at least as much as this set, (1 + k)/(1 + trials).
     """
 
     inertia: Quantity
@@ -50,27 +43,27 @@ def fit_springs(
     stiffness: Sequence[float],
     frequency_hz: Sequence[float],
     *,
-    false_alarm_rate: float = FALSE_ALARM_RATE,
+    false_alarm_rate: float = SPRING_FLAG_RATE,
     rng: np.random.Generator | None = None,
 ) -> SpringFit:
-    """Fit the line by least squares and flag the springs that leave it.
+    """Fit the line by least squares and flag outliers.
 
     The line is the paper's: unweighted, all springs in it. The flags come from the inertia each spring gives
-    by itself, Kr/ωn² (eq. 1), because a spring errs in per cent. Outliers mask one another, so the rule is
+    by itself, Kr/ωn² (eq. 1), because the error of a spring is relative. Outliers mask one another, so the rule is
     the generalised extreme studentised deviate (Rosner, Technometrics 25 (1983) 165–172,
     doi 10.1080/00401706.1983.10487848): the spring furthest from the others is tested by its externally
-    studentised residual (Student's t, Bonferroni over the springs left) and taken out, again and again up to
+    studentised residual (Student's t, Bonferroni over the springs left) and removed, repeatedly up to
     a third of them; all those up to the *last* one beyond chance are flagged. The nominal level is too
-    lenient for ten springs (8.5 % of good sets at 5 %), so it is calibrated on simulated sets of good
-    springs, of normal relative errors: one set in ten raises a flag at all. The line's intercept is zero
+    lenient for ten springs (8.5 % of correct sets at 5 %), so it is calibrated on simulated sets of correct
+    springs with normal relative errors: one set in ten raises a flag. The line's intercept is zero
     for springs alone; a stiffness common to all runs (a tilted axis) shows in the intercept and in flags
-    on the softest springs. With three springs nothing is flagged: two good ones cannot outvote a bad one.
+    on the softest springs. Of three springs none is flagged: two correct ones cannot outvote a wrong one.
 
     Args:
         stiffness: Kr per spring, N m/rad, shape (n,), n ≥ 3.
         frequency_hz: wind-off frequency with it, Hz, shape (n,).
-        false_alarm_rate: probability that a set of good springs is flagged at all.
-        rng: draws the calibration; one of a fixed seed where None, so that the answer is repeatable.
+        false_alarm_rate: probability that a spring of a correct set is flagged.
+        rng: draws the calibration; one of a fixed seed where None, so that the result is repeatable.
 
     Returns:
         The line, its residuals and the flags.
@@ -100,9 +93,9 @@ def wind_off_line(
     """Izz from wind-off runs: the gradient of Kr against ωn², or Kr/ωn² where there is one spring only.
 
     The standard deviation is the larger of what the scatter about the line gives and what the frequencies'
-    own standard deviations propagate to. Springs whose stated stiffnesses lie within 1 %, or that the frequencies
-    do not tell apart, count as one: a gradient over them would be that of their errors, and small for that (the
-    attenuation of Fuller, Measurement Error Models (1987), doi 10.1002/9780470316665, § 1.1).
+    own standard deviations propagate to. Springs whose stated stiffnesses lie within 1 %, or whose
+    frequencies cannot be told apart, count as one: a gradient over them would be dominated by their errors and too
+    small (the attenuation of Fuller, Measurement Error Models (1987), doi 10.1002/9780470316665, § 1.1).
 
     Args:
         stiffness: Kr per run, N m/rad, shape (n,).
@@ -115,11 +108,11 @@ def wind_off_line(
     """
     squared, squared_std = omega_n**2, 2.0 * omega_n * omega_n_std
     away = stiffness - stiffness.mean()
-    apart = float(np.ptp(stiffness)) > LEAST_SPREAD * float(stiffness.max())
+    apart = float(np.ptp(stiffness)) > LEAST_SPRING_SPREAD * float(stiffness.max())
     rise, rise_std = float(away @ squared), float(np.linalg.norm(away * squared_std))
-    if apart and rise < -_RESOLVED * rise_std:
+    if apart and rise < -LEAST_SPRING_RESOLUTION * rise_std:
         return None, None
-    if not apart or rise < _RESOLVED * rise_std:
+    if not apart or rise < LEAST_SPRING_RESOLUTION * rise_std:
         inertias = stiffness / squared
         propagated = inertias * squared_std / squared / stiffness.size
         scatter = float(np.std(inertias, ddof=1)) / np.sqrt(stiffness.size) if stiffness.size > 1 else 0.0
@@ -155,7 +148,9 @@ def inertia_of_springs(stiffness: Array, squared: Array, *, with_line: bool) -> 
 def _check(springs: Array, omega_squared: Array) -> None:
     where = "springs"
     if springs.shape != omega_squared.shape or springs.ndim != 1:
-        raise TunnelError("as many frequencies as stiffnesses are needed", where=where, remedy="pair them")
+        raise TunnelError(
+            "the numbers of stiffnesses and frequencies differ", where=where, remedy="pair them"
+        )
     if springs.size < 3:
         raise TunnelError(
             "fewer than three springs", where=where, remedy="add wind-off runs with other springs"
@@ -164,7 +159,7 @@ def _check(springs: Array, omega_squared: Array) -> None:
         raise TunnelError("stiffness and frequency must be positive", where=where, remedy="correct the table")
     if np.unique(omega_squared).size < 2:
         raise TunnelError(
-            "all frequencies are the same", where=where, remedy="use springs of other stiffness"
+            "all frequencies are the same", where=where, remedy="use springs of different stiffness"
         )
 
 
@@ -177,7 +172,7 @@ def _least_squares(columns: Array, values: Array) -> tuple[Array, Array]:
 
 def _leaving(inertias: Array, false_alarm_rate: float, rng: np.random.Generator) -> tuple[Array, float]:
     flagged = np.zeros(inertias.size, dtype=bool)
-    if inertias.size < 4:  # with three, two good springs cannot outvote a bad one
+    if inertias.size < 4:  # of three springs, two correct ones cannot outvote a wrong one
         return flagged, 1.0
     chances, order = _take_out_the_worst(inertias[None, :])
     null, _ = _take_out_the_worst(rng.standard_normal((_TRIALS, inertias.size)))
@@ -200,7 +195,7 @@ def _take_out_the_worst(sets: Array) -> tuple[Array, NDArray[np.intp]]:
         squares = np.where(kept, (sets - mean) ** 2, -1.0)
         worst = np.argmax(squares, axis=1)
         own = squares[rows, worst] * count / (count - 1)  # over 1 − leverage
-        # Rounding alone is no residual: a set that agrees to the last digits has no outlier.
+        # Rounding errors do not count: a set that agrees to the last digits has no outlier.
         floor = (1e-12 * np.abs(mean[:, 0])) ** 2
         rest = np.maximum((np.sum(squares * kept, axis=1) - own) / (count - 2), floor)
         chances.append(np.minimum(1.0, 2.0 * count * stdtr(count - 2, -np.sqrt(own / rest))))

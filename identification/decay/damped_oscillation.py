@@ -4,14 +4,14 @@ With decay rate a = C/(2 Izz) [1/s], normalised stiffness k = K/Izz [1/s²] and 
 
     β(t) = β₀ u(t) + r₀ s(t),   s = e^{−at} S(t),   u = e^{−at} C(t) + a s,
 
-where C = cos(√Δ t) and S = sin(√Δ t)/√Δ are entire functions of Δ: one formula serves under-, over- and
-critical damping. Every derivative with respect to a and k is a combination of two more functions only,
+where C = cos(√Δ t) and S = sin(√Δ t)/√Δ are entire functions of Δ: one formula covers under-, over- and
+critical damping. All derivatives with respect to a and k are combinations of only two more functions,
 w = e^{−at} ∂S/∂Δ and t s(t):
 
     ∂u/∂a = −2k w,   ∂u/∂k = a w − t s/2,   ∂s/∂a = −t s − 2a w,   ∂s/∂k = w.
 
 Angles in rad, times in s. Near Δt² = 0 a power series replaces the quotients, so nothing is singular.
-Source: the characteristic equation (6) of the paper; the derivatives are this project's own.
+Source: the characteristic equation (6) of the paper; the derivatives were derived for this project.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _SERIES = np.array(
 
 @dataclass(frozen=True)
 class Decay:
-    """The two numbers that shape a free decay.
+    """The two parameters of a free decay.
 
     Args:
         rate: a = ζωn, 1/s; negative where the oscillation grows.
@@ -69,7 +69,7 @@ class Decay:
 
 
 def response_rows(time: Array, decay: Decay, *, constant: bool = False) -> Array:
-    """The four functions of time a decay and its sensitivities are made of.
+    """The four functions of time that make up a decay and its sensitivities.
 
     Args:
         time: times since the initial state, shape (n,), s.
@@ -120,7 +120,7 @@ def free_decay(time: Array, decay: Decay, angle: float, rate: float) -> Array:
 
 
 def sensitivity_weights(decay: Decay, angle: float, rate: float) -> Array:
-    """How ∂β/∂a and ∂β/∂k are made of the rows of `response_rows`.
+    """Weights of the rows of `response_rows` in ∂β/∂a and ∂β/∂k.
 
     Args:
         decay: decay rate and normalised stiffness.

@@ -20,10 +20,10 @@ from tunnel_sim.vocabulary.record import Array, Record, read_only
 # Local order of one run's unknowns throughout: decay rate, stiffness | zero | initial angle, initial rate.
 RATE, STIFFNESS, ZERO, ANGLE, ANGULAR_RATE = range(5)
 _TOLERANCE = 1e-12  # relative step of k, and of a in units of ωn, at which the iteration ends
-_ROUNDING = 1e-9  # a step this small that lowers the cost no more is limited by rounding alone
+_ROUNDING = 1e-9  # a step this small that no longer lowers the cost is limited by rounding
 _MAX_ITERATIONS = 100
-# Where the model departs grossly, Gauss–Newton closes in slowly: at the last iteration a fall of the cost by
-# less than this share of one sample's residual variance, a hundredth of a standard deviation, is good enough.
+# Where the model fits badly, Gauss–Newton converges slowly. At the last iteration a fall of the cost by less than
+# this share of the residual variance of a sample, a hundredth of a standard deviation, is accepted.
 _SETTLED = 1e-4
 
 
@@ -79,7 +79,7 @@ class DecayFit:
         zero: the sensor's zero, rad.
         runs: one per reading.
         normal: information of φ, and of the zero last where it was estimated, shape (p, p) or (p + 1, p + 1).
-        converged: whether the step fell below 1e-12.
+        converged: whether the step fell below the tolerance.
         iterations: how many linearisations it took.
     """
 
@@ -126,13 +126,13 @@ def fit_decays(
         links: one (2, p) matrix Lᵢ per run: (aᵢ, kᵢ) = Lᵢ φ.
         start: φ to start from, shape (p,).
         zero: the sensor's zero where it is known, rad; estimated, common to the runs, where None.
-        prior: what is known of φ beforehand: the fit is then the maximum of the posterior, and ``normal`` has
-            the prior's information in it.
+        prior: what is known of φ beforehand. The fit is then the maximum of the posterior, and ``normal`` includes
+            the information of the prior.
         tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
 
     Returns:
-        The fit; ``converged`` is False where the iteration stalled: the values are then the best met, and
-        ``runs`` is empty where even the start was out of range, or holds no motion.
+        The fit. ``converged`` is False where the iteration stalled: the values are then the best ones found, and
+        ``runs`` is empty where even the start was out of range or held no motion.
     """
     best = _project(readings, links, np.asarray(start, dtype=np.float64), zero, prior)
     samples = sum(reading.time.size for reading in readings)
@@ -183,7 +183,7 @@ def fit_run(
 
 
 def project_run(reading: Reading, decay: Decay) -> tuple[RunFit, float] | None:
-    """The best initial state and zero of a run whose decay is given, by another method say.
+    """The best initial state and zero of a run for a given decay, for example one found by another method.
 
     Args:
         reading: the run.
@@ -197,7 +197,7 @@ def project_run(reading: Reading, decay: Decay) -> tuple[RunFit, float] | None:
 
 
 def projected_cost(reading: Reading, decay: Decay) -> float:
-    """What is left of a reading by the best initial state and zero for a given decay.
+    """Sum of squared residuals of a reading for a given decay, at the best initial state and zero.
 
     Args:
         reading: angles in rad against s.
@@ -244,7 +244,7 @@ def _project(
     prior: Prior | None = None,
 ) -> _Point:
     decays = [Decay(*map(float, link @ parameters)) for link in links]
-    with np.errstate(over="ignore", invalid="ignore"):  # a trial far off may overflow; it is then refused
+    with np.errstate(over="ignore", invalid="ignore"):  # a trial far off may overflow; it is rejected then
         rows = [_rows(reading.time, decay) for reading, decay in zip(readings, decays, strict=True)]
         grams = [block @ block.T for block in rows]
     if not all(np.isfinite(gram).all() for gram in grams):
@@ -315,8 +315,8 @@ def _shared_system(
 
 
 def _next_damping(damping: float, gain: float) -> float:
-    # Marquardt's damping by the ratio of the actual to the predicted fall of the cost: Gauss–Newton where the
-    # residual is small, and shorter steps where it is not and Gauss–Newton overshoots.
+    # Marquardt's damping, set by the ratio of the actual to the predicted fall of the cost: Gauss–Newton where the
+    # residual is small, shorter steps where it is large and Gauss–Newton overshoots.
     if gain < 0.25:
         return max(4.0 * damping, 0.01)
     if gain < 0.75:

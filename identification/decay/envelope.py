@@ -1,10 +1,10 @@
 """Envelope and phase of a decaying oscillation, from its analytic signal.
 
-The analytic signal of a finite record is wrong near its ends, where the transform sees the record break off.
-So the record is first carried on past both ends for a few cycles by a decay that is known roughly, fading
-out; what is left of the break is as small as that decay is good. The envelope is then demodulated with a
-fixed frequency and averaged over half cycles: for an exponential decay the averages are an exponential
-sequence again, and their errors are independent with 2 S²/m in each component for m samples.
+The analytic signal of a finite record is wrong near its ends, where the transform sees a discontinuity. So the
+record is first extended past both ends by a few cycles of an approximate decay that fades out; the remaining
+error is as small as that decay is accurate. The envelope is then demodulated with a fixed frequency and averaged
+over half cycles: for an exponential decay the averages are an exponential sequence again, and their errors are
+independent with 2 S²/m in each component for m samples.
 
 Source: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018 (the free
 decay by the Hilbert transform, and its end effects).
@@ -23,7 +23,7 @@ from identification.decay.decay_fit import Reading, RunFit
 from tunnel_sim.vocabulary.record import Array
 
 _CARRIED_ON = 6.0  # cycles past either end
-_GROWTH = 3.0  # a fast decay is followed backwards no further than it grows by e³
+_GROWTH = 3.0  # a fast decay is extended backwards only until it has grown by e³
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
 
     Args:
         reading: the whole record.
-        rough: a decay of the record that is roughly right, with its initial state; it must oscillate.
+        rough: an approximate decay of the record, with its initial state; it must oscillate.
         zero: the sensor's, rad.
 
     Returns:
@@ -73,7 +73,7 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
 def _carried_on(reading: Reading, rough: RunFit, zero: float, interval: float, margin: int) -> Array:
     steps = interval * np.arange(1, margin + 1, dtype=np.float64)
     share = steps / (steps[-1] + interval) if margin else steps
-    # From 1 to 0 with three derivatives 0 at either end: a kink would be a break of its own.
+    # From 1 to 0 with three zero derivatives at either end: a kink would be another discontinuity.
     fade = 1.0 - share**4 * (35.0 - 84.0 * share + 70.0 * share**2 - 20.0 * share**3)
     after = free_decay(reading.time[-1] + steps, rough.decay, rough.angle, rough.rate)
     before = free_decay(-steps, rough.decay, rough.angle, rough.rate)

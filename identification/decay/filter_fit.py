@@ -1,6 +1,6 @@
 """Maximum likelihood of a driven decay: decay rate, stiffness and the random moment's intensity, by scoring.
 
-The start is output error's optimum and the best of a ladder of intensities. Each step solves Fisher's
+The start is the optimum of output error with the best of a range of intensities. Each step solves Fisher's
 information, from central differences of the innovations and of their variance, against the gradient of the
 likelihood (Maine & Iliff, SIAM J. Appl. Math. 41 (1981) 558–579, doi 10.1137/0141046).
 """
@@ -14,14 +14,12 @@ import numpy as np
 
 from identification.decay.damped_oscillation import Decay
 from identification.decay.innovations import Driven, Innovations, innovations
+from identification.policy import LEAST_CORNER_DROP, LEAST_MOMENT_DROP, MOMENT_DROP_FOR_CORNER
 from identification.statistics.information import inverse, scaled_solve
 from tunnel_sim.vocabulary.record import Array
 
 _DECADES = np.arange(-7.0, 3.1, 1.0)  # of q over R ω³, the intensity that doubles R within a radian
-_CORNERS = (8.0, 3.0, 1.0, 0.3)  # Hz; above, a rig of a few Hz cannot tell the moment from a white one
-_LEAST_DROP = 1.0  # of −2 ln L: less is no sign of a random moment
-_DROP_FOR_CORNER = 20.0  # the moment must stand out before its spectrum's shape is asked for
-_CORNER_GAIN = 4.0  # of −2 ln L, that a corner must bring
+_CORNERS = (8.0, 3.0, 1.0, 0.3)  # Hz; above these, the moment of a rig of a few Hz looks white
 _MAX_STEPS = 25
 _SETTLED = 0.01  # standard deviations
 _NUDGE = 0.1  # standard deviations of a and k; of ln q outright
@@ -66,15 +64,15 @@ def fit_driven(
     if bare is None or best is None:
         return None
     found = fit.maximise(best)
-    if found is None or bare.cost - found.innovations.cost < _LEAST_DROP:
+    if found is None or bare.cost - found.innovations.cost < LEAST_MOMENT_DROP:
         return None
-    if bare.cost - found.innovations.cost > _DROP_FOR_CORNER:
+    if bare.cost - found.innovations.cost > MOMENT_DROP_FOR_CORNER:
         found = fit.with_corner(found)
     return DrivenFit(found.model, found.covariance, found.innovations, bare.cost - found.innovations.cost)
 
 
 class _Fit:
-    """The likelihood of one run, and how to climb it."""
+    """The likelihood of one run, and its maximisation."""
 
     def __init__(self, values: Array, interval: float, noise_variance: float, deviations: Array) -> None:
         self.values, self.interval, self.noise_variance = values, interval, noise_variance
@@ -96,7 +94,7 @@ class _Fit:
         ]
         best = self.best(ladder)
         found = None if best is None else self.maximise(best)
-        if found is None or white.innovations.cost - found.innovations.cost < _CORNER_GAIN:
+        if found is None or white.innovations.cost - found.innovations.cost < LEAST_CORNER_DROP:
             return white
         return found
 

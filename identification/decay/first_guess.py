@@ -1,4 +1,4 @@
-"""Where the fit of a record starts: from the record alone, at any damping."""
+"""Starting values of a fit, from the record alone, at any damping."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from identification.decay.spectrum import psd_peak
 from identification.decay.thinning import mean_of_blocks
 from tunnel_sim.vocabulary.record import Array, Record
 
-_SAMPLES = 1024  # the start is judged on a thinned record; the fit itself sees every sample
-_LONG = 4096  # samples that a spectrum to start from needs; a longer record is thinned to them and not padded
+_SAMPLES = 1024  # candidates are compared on a thinned record; the fit itself uses every sample
+_LONG = 4096  # samples for the spectrum; a longer record is thinned to them and not padded
 _DAMPING_RATIOS = (0.0, 0.002, 0.006, 0.02, 0.06, 0.2, 0.5)
 
 
 def starting_decay(record: Record) -> Decay | None:
-    """A decay near enough for the least-squares fit to converge.
+    """A decay close enough for the least-squares fit to converge.
 
-    Candidates are the peak of the power spectral density with a ladder of damping ratios, for records of many
-    cycles, and the fit of the twice integrated equation of motion, for heavily damped ones; the one that
-    leaves the smallest sum of squares is taken.
+    For records of many cycles the candidates are the peak of the power spectral density with several damping
+    ratios; for heavily damped ones, the fit of the twice integrated equation of motion. The candidate with the
+    smallest sum of squares is taken.
 
     Args:
         record: the reading of one run.
 
     Returns:
-        The start; None where the record holds no motion, or no decay fits it at all.
+        The decay; None where the record holds no motion, or no decay fits it at all.
     """
     frequency = starting_frequency(record)
     if frequency is None:
@@ -44,7 +44,7 @@ def starting_decay(record: Record) -> Decay | None:
 
 
 def starting_frequency(record: Record) -> float | None:
-    """The frequency of the strongest oscillation, good enough to start from.
+    """The approximate frequency of the strongest oscillation.
 
     Args:
         record: the reading of one run.
@@ -54,7 +54,7 @@ def starting_frequency(record: Record) -> float | None:
     """
     if not holds_motion(record):
         return None
-    # A block mean hides what has two samples to the cycle or fewer: a record of some two thousand cycles.
+    # A block mean hides an oscillation of two samples per cycle or fewer: a record of some two thousand cycles.
     factor = max(1, record.time_s.size // _LONG)
     if factor > 1:
         record = Record(mean_of_blocks(record.time_s, factor), mean_of_blocks(record.yaw_rad, factor))
@@ -63,7 +63,7 @@ def starting_frequency(record: Record) -> float | None:
 
 
 def thinned_reading(record: Record, frequency: float) -> Reading:
-    """Block means of a record, at least twenty to the cycle; an exponential decay keeps its rate in them.
+    """Block means of a record, at least twenty per cycle; they decay at the same rate.
 
     Args:
         record: the reading of one run.
@@ -79,7 +79,7 @@ def thinned_reading(record: Record, frequency: float) -> Reading:
 
 
 def _integrated_equation(reading: Reading) -> Decay:
-    # y + 2a∫y + k∬y = c₀ + c₁t + c₂t²: linear in a and k, and integration quiets the noise.
+    # y + 2a∫y + k∬y = c₀ + c₁t + c₂t²: linear in a and k, and integration reduces the noise.
     time, yaw = reading.time, reading.yaw
     once = _integral(time, yaw)
     twice = _integral(time, once)

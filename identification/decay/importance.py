@@ -1,7 +1,7 @@
-"""Runs put together: the mean and covariance of shared parameters under the product of the runs' likelihoods.
+"""Combination of runs: mean and covariance of the shared parameters under the product of the runs' likelihoods.
 
 Importance sampling from Student's distribution about the normal approximation, drawn in pairs of opposite
-sign, and laid anew where it misses the posterior (Kloek & van Dijk, Econometrica 46 (1978) 1–19,
+sign, and repeated where it misses the posterior (Kloek & van Dijk, Econometrica 46 (1978) 1–19,
 doi 10.2307/1913641).
 """
 
@@ -17,7 +17,7 @@ from tunnel_sim.vocabulary.record import Array
 _PAIRS = 3000
 _TAILS = 6.0  # degrees of freedom of the proposal
 _ROUNDS = 4
-_LEAST_SHARE = 0.3  # of the draws that must count
+_LEAST_SHARE = 0.3  # of the draws: least effective number
 
 
 def shared_moments(

@@ -6,12 +6,12 @@ discrete time the reading obeys D(z) y = C(z) e: D is the characteristic polynom
 the variance of the innovations e follow by spectral factorisation of R D(z)D(1/z) + γ(z), γ the covariance of
 the driven part. So innovations are one call of a recursive filter over the record, with no loop in Python.
 
-The initial state and the sensor's zero are unknown without limit and enter linearly: filtered like the
-reading and fitted to it by least squares. What the steady filter assumes of the initial state's covariance
-then has no influence, since the least squares are blind to it. Where q is 0, C is D and the innovations are
-output error's residual. Sources: Maine & Iliff, SIAM J. Appl. Math. 41 (1981) 558–579, doi 10.1137/0141046;
-Åström, Automatica 16 (1980) 551–574, doi 10.1016/0005-1098(80)90078-3; Jategaonkar, Flight Vehicle System
-Identification, 2nd ed. (2015), ch. 5, doi 10.2514/4.102790.
+The initial state and the sensor's zero are unknown and enter linearly: their responses are filtered like the
+reading and fitted to it by least squares. The covariance that the steady filter assumes for the initial state
+then has no influence. Where q is 0, C is D and the innovations are output error's residual. Sources: Maine &
+Iliff, SIAM J. Appl. Math. 41 (1981) 558–579, doi 10.1137/0141046; Åström, Automatica 16 (1980) 551–574, doi
+10.1016/0005-1098(80)90078-3; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5, doi
+10.2514/4.102790.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from scipy.signal import lfilter
 from identification.decay.damped_oscillation import Decay, response_rows
 from tunnel_sim.vocabulary.record import Array
 
-_GREATEST = 1e60  # of a growth or a variance over one interval: beyond it there is no filter
+_GREATEST = 1e60  # of a growth or a variance over one interval: beyond it no filter is formed
 
 
 @dataclass(frozen=True)
@@ -52,12 +52,12 @@ class Driven:
 
 @dataclass(frozen=True, eq=False)
 class Innovations:
-    """What a model could not foresee of a reading.
+    """The prediction errors of a model.
 
     Args:
         values: shape (n,), rad.
-        variance: that they should have, rad².
-        cost: −2 ln L but for a constant, dimensionless.
+        variance: their expected variance, rad².
+        cost: −2 ln L up to a constant, dimensionless.
     """
 
     values: Array
@@ -104,8 +104,8 @@ def innovations(values: Array, interval: float, model: Driven, noise_variance: f
 
 
 def _started_by_moment(time: Array, model: Driven) -> tuple[Array, ...]:
-    # A moment with a memory has an initial value of its own; its response is e^(−ct) less the free motion
-    # that meets it, and the free motion is among the columns already.
+    # A moment that is not white has an unknown initial value. Its response is e^(−ct) less a free motion, which is
+    # among the columns already.
     if model.corner is None or model.intensity == 0.0:
         return ()
     return (np.exp(-2.0 * np.pi * model.corner * time),)

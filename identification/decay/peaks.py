@@ -6,18 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.decay.residual_noise import FLOOR as ROUNDING
+from identification.policy import LEAST_NOISE, LEAST_PEAK_SHARE
 from tunnel_sim.vocabulary.record import Array, Record
 
 PEAK_HALF_WIDTH = 1.0 / 12.0  # of a period, either side of a peak, that its parabola is fitted to
-_LEAST_SHARE = 0.1  # of the first peak; below it the noise bends the logarithm
 _LEAST_PEAKS = 4
 _MOVES = 8  # of half a window each
 
 
 @dataclass(frozen=True)
 class PeakDecay:
-    """What the peaks say.
+    """Damping and scatter of the peaks.
 
     Args:
         rate: decay rate σ, 1/s; the time to half amplitude is ln 2/σ.
@@ -37,9 +36,9 @@ class PeakDecay:
 def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
     """The decay rate from a line through the logarithm of the peaks, of both signs, against time.
 
-    A peak is the vertex of a parabola through the samples within a twelfth of a period. The zero is that of
-    which neighbouring peaks lie evenly on both sides, (p₁ + 2p₂ + p₃)/4 on average. Peaks are followed until
-    they fall below a tenth of the first.
+    A peak is the vertex of a parabola through the samples within a twelfth of a period. The zero is the mean of
+    (p₁ + 2p₂ + p₃)/4 over neighbouring peaks, which lie evenly on both sides of it. Peaks are followed until they
+    fall below a tenth of the first.
 
     Args:
         record: the reading, rad against s.
@@ -54,7 +53,7 @@ def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
     centres = 0.25 * (heights[:-2] + 2.0 * heights[1:-1] + heights[2:])
     zero = float(centres.mean())
     sizes = np.abs(heights - zero)
-    below = np.flatnonzero(sizes < _LEAST_SHARE * sizes[0])
+    below = np.flatnonzero(sizes < LEAST_PEAK_SHARE * sizes[0])
     count = int(below[0]) if below.size else sizes.size
     if count < _LEAST_PEAKS:
         return None
@@ -62,10 +61,10 @@ def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
     period_half, period_std = _line(np.arange(count, dtype=np.float64), times[:count])
     return PeakDecay(
         rate=-slope,
-        rate_std=max(slope_std, ROUNDING * frequency),
-        frequency_std=max(0.5 * period_std / period_half**2, ROUNDING * frequency),
+        rate_std=max(slope_std, LEAST_NOISE * frequency),
+        frequency_std=max(0.5 * period_std / period_half**2, LEAST_NOISE * frequency),
         zero=zero,
-        zero_std=max(float(centres.std(ddof=1) / np.sqrt(centres.size)), ROUNDING * float(sizes[0])),
+        zero_std=max(float(centres.std(ddof=1) / np.sqrt(centres.size)), LEAST_NOISE * float(sizes[0])),
     )
 
 
@@ -81,7 +80,7 @@ def follow_peaks(record: Record, frequency: float) -> tuple[Array, Array]:
 
     Returns:
         Instants since the first sample in s and heights in rad, shape (n,) each; they end where peaks no
-        longer go up and down in turn.
+        longer alternate.
     """
     time = record.time_s - record.time_s[0]
     half = 0.5 / frequency
@@ -97,7 +96,7 @@ def follow_peaks(record: Record, frequency: float) -> tuple[Array, Array]:
         if vertex is None:
             break
         if len(heights) >= 2 and (vertex[1] > heights[-1]) != (heights[-2] > heights[-1]):
-            break  # no longer up and down in turn: the oscillation has sunk into the noise
+            break  # peaks no longer alternate: the oscillation is lost in the noise
         times.append(vertex[0])
         heights.append(vertex[1])
         expected = vertex[0] + half
@@ -105,7 +104,7 @@ def follow_peaks(record: Record, frequency: float) -> tuple[Array, Array]:
 
 
 def _vertex(time: Array, yaw: Array, expected: float, width: float) -> tuple[float, float] | None:
-    # Where the period drifts, a peak is off the expected instant: the window follows it.
+    # Where the period drifts, a peak is not at the expected instant: the window follows it.
     for _ in range(_MOVES):
         low, high = np.searchsorted(time, (expected - width, expected + width))
         if high - low < 3:
@@ -115,7 +114,7 @@ def _vertex(time: Array, yaw: Array, expected: float, width: float) -> tuple[flo
         place = -0.5 * slope / bend if bend != 0.0 else np.inf
         if abs(place) <= 0.5:
             return expected + float(place) * width, float(height + 0.5 * slope * place)
-        # Up the slope on the side the peak is on: a bend of the wrong sign would point away from it.
+        # Move up the slope: with curvature of the wrong sign the vertex would lie on the other side.
         rising = slope * np.sign(yaw[low:high].mean() - yaw.mean()) > 0.0
         expected += (0.5 if rising else -0.5) * width
     return None

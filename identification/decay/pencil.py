@@ -1,9 +1,9 @@
 """The matrix pencil: poles of a damped oscillation from the shift of a Hankel matrix, and their covariance.
 
-Block means y of a decay are a sum of two exponentials λ₁ⁱ, λ₂ⁱ and a constant. Their Hankel matrix, its rows
-freed of their mean, has rank two, and its column space goes over into itself when shifted by one block: that
-2×2 shift has the eigenvalues λ. The two leading singular vectors come from orthogonal iteration in which the
-Hankel matrix is only ever multiplied, by FFT, so that the cost grows as n log n.
+Block means y of a decay are a sum of two exponentials λ₁ⁱ, λ₂ⁱ and a constant. Their Hankel matrix,
+with the mean of each row removed, has rank two. A shift by one block maps its column space onto itself, and this
+2×2 map has the eigenvalues λ. The two leading singular vectors are found by orthogonal iteration with products by
+FFT, so the cost grows as n log n.
 
 To first order δλ = qᴴ E v is linear in the noise's Hankel matrix E, so a convolution of q with v gives the
 weight of every block mean in δλ, and with it the covariance. Source: Hua & Sarkar, IEEE Trans. Acoust.
@@ -23,9 +23,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from identification.decay.damped_oscillation import Decay
 from tunnel_sim.vocabulary.record import Array
 
-_LENGTH = (
-    0.35  # of the rows to the blocks: a third is best where little decays, and more hardly helps elsewhere
-)
+_LENGTH = 0.35  # rows over blocks: a third is best at light damping, and more hardly helps elsewhere
 _LEAST_BLOCKS = 8
 _MAX_SWEEPS = 60
 _SETTLED = 1e-10  # change of the subspace in a sweep
@@ -35,7 +33,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False)
 class PencilDecay:
-    """A decay and how it hangs on the noise.
+    """A decay and its sensitivity to the noise.
 
     Args:
         decay: decay rate and stiffness.
@@ -52,10 +50,10 @@ def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | 
     Args:
         values: readings or block means of them, offset included, shape (n,), rad.
         interval: between them, s; well below half a period.
-        omega: a rough angular frequency to start the iteration from, rad/s.
+        omega: an approximate angular frequency to start the iteration, rad/s.
 
     Returns:
-        The decay; None where there are too few values or their poles are no decay's.
+        The decay; None where there are too few values or their poles are not those of a decay.
     """
     if values.size < _LEAST_BLOCKS:
         return None
@@ -86,7 +84,7 @@ def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | 
 
 
 def _exponents(poles: Complex, interval: float) -> Complex | None:
-    # A pair of real poles is an overdamped decay; a pole at or below zero is none.
+    # Two real poles are an overdamped decay; a pole at or below zero is not a decay.
     if np.any((np.abs(poles.imag) == 0.0) & (poles.real <= 0.0)):
         return None
     return np.asarray(np.log(poles.astype(np.complex128)) / interval)
@@ -119,8 +117,8 @@ def _leading_pair(values: Array, rows: int, angle: float) -> tuple[Array, Array,
 
 
 def _gradient(pole: complex, dual: Complex, right: Complex) -> Complex:
-    # δλ = Σᵢⱼ q(i) e(i + j) v(j): q is the shift's residual on the dual vector, v is freed of its mean as the
-    # rows are.
+    # δλ = Σᵢⱼ q(i) e(i + j) v(j): q is the shift's residual on the dual vector; the mean of v is removed, like
+    # that of the rows.
     q = np.zeros(dual.size + 1, dtype=np.complex128)
     q[1:] += dual
     q[:-1] -= pole * dual

@@ -1,15 +1,16 @@
-"""The posterior of one run's decay rate and stiffness, the rest integrated out, on a grid that finds its place.
+"""The posterior of one run's decay rate and stiffness on an adaptive grid, with all other unknowns integrated out.
 
-Initial angle and rate and the sensor's zero enter linearly, so they are integrated out in closed form, and so
-is an unknown noise level, which leaves Student's form (Bretthorst, Bayesian Spectrum Analysis and Parameter
-Estimation (1988), doi 10.1007/978-1-4684-9399-3). The prior is Jeffreys' rule over all unknowns, whose
-intervals keep their promise and do not hang on the choice of parameters (Jeffreys, Proc. R. Soc. A 186 (1946)
+Initial angle and rate and the sensor's zero enter linearly, so they are integrated out in closed form, and so is
+an unknown noise level, which leaves Student's form (Bretthorst, Bayesian Spectrum Analysis and Parameter
+Estimation (1988), doi 10.1007/978-1-4684-9399-3). The prior is Jeffreys' rule over all unknowns, whose intervals
+have the stated coverage and do not depend on the choice of parameters (Jeffreys, Proc. R. Soc. A 186 (1946)
 453–461, doi 10.1098/rspa.1946.0056): with it
 
     p(a, k | y) ∝ RSS(a, k)^(−ν/2) √|I(a, k)|,   or  exp(−RSS/2S²) √|I|  where the noise S is known,
 
-with RSS what the best state and zero leave, and I the information on (a, k) at them. Two unknowns remain: the
-sum over a grid in units of the posterior's own deviations, refined until it holds the posterior.
+with RSS the sum of squares at the best state and zero, and I the information on (a, k) there. The two remaining
+unknowns are summed over a grid in units of the posterior's standard deviations, refined until it covers the
+posterior.
 """
 
 from __future__ import annotations
@@ -24,27 +25,28 @@ from identification.decay.damped_oscillation import Decay
 from identification.decay.decay_fit import Reading
 from tunnel_sim.vocabulary.record import Array
 
-_FIRST = (5.6, 0.8)  # half width and step in deviations: to a normal distribution the sum is exact to 1e-7
+# Half width and step in standard deviations: for a normal distribution the sum is exact to 1e-7.
+_FIRST = (5.6, 0.8)
 _FINER = (7.0, 0.35)
 _WIDENING = 1.25  # of the half width in each refinement after the first: Student's tails are long
 _MOST_REFINEMENTS = 7
 _BORDER_MASS = 1e-4
-_SCALE_BAND = (0.7, 1.4)  # of the deviations found over those the grid was laid for
-_FLOOR = -60.0  # of the logarithm of the likelihood over its peak: what is below counts for nothing
-_STEEPEST = 50.0  # |a| times the record's length: beyond, the motion is not one of this record
-_RIDGE = 1e-13  # of a scaled Gram matrix, which a motion of a few samples only makes singular
+_SCALE_BAND = (0.7, 1.4)  # of the standard deviations found over those the grid was made for
+_FLOOR = -60.0  # of the logarithm of the likelihood relative to its peak: smaller values are neglected
+_STEEPEST = 50.0  # |a| times the record's length: beyond it the record would not show the motion
+_RIDGE = 1e-13  # of a scaled Gram matrix, which is singular for a motion of only a few samples
 _FINE = 121  # points a side for the quantiles
 TAIL = 0.025
 
 
 @dataclass(frozen=True)
 class NoiseKnowledge:
-    """What the posterior knows of the noise.
+    """What is known of the noise.
 
     Args:
         variance: S² of one value of the reading, rad²; None where it is unknown and integrated out.
         samples: number of samples behind one value.
-        within: sum of squares within the blocks, rad²: what thinning took out of the residual.
+        within: sum of squares within the blocks, rad², which thinning removes from the residual.
         freedom: ν, number of samples less that of linear unknowns.
     """
 
@@ -83,7 +85,7 @@ class Posterior:
         return self.centre + self.scale @ mean, self.scale @ covariance @ self.scale.T
 
     def log_likelihood_at(self, decays: Array) -> Array:
-        """ℓ(a, k), for putting runs together; beyond the grid it falls as a normal distribution does.
+        """ℓ(a, k), for combining runs; beyond the grid it falls like a normal distribution.
 
         Args:
             decays: shape (n, 2), 1/s and 1/s².
@@ -115,7 +117,7 @@ class Posterior:
 def posterior_of(
     thin: Reading, start: Decay, covariance: Array, knowledge: NoiseKnowledge
 ) -> Posterior | None:
-    """Lay the grid, and lay it anew until it holds the posterior.
+    """Compute the posterior on a grid, and move the grid until it covers the posterior.
 
     Args:
         thin: the run, or block means of it.
@@ -124,7 +126,7 @@ def posterior_of(
         knowledge: of the noise.
 
     Returns:
-        The posterior; None where none is found: the record is too short to bound the decay.
+        The posterior; None where the record is too short to bound the decay.
     """
     centre, spread = np.array([start.rate, start.stiffness]), covariance
     width, step = _FIRST
@@ -150,7 +152,7 @@ def posterior_of(
 
 
 def _spline(axis: Array, values: Array) -> RectBivariateSpline:
-    # A smooth curve overshoots where the prior cuts the posterior off; straight pieces do not.
+    # A spline overshoots where the prior cuts off the posterior; linear interpolation does not.
     degree = 1 if np.any(np.abs(np.diff(values, axis=0)) > -_FLOOR / 4.0) else 3
     return RectBivariateSpline(axis, axis, values, kx=degree, ky=degree)
 
@@ -185,7 +187,7 @@ def _log_terms(thin: Reading, decays: Array, knowledge: NoiseKnowledge) -> tuple
 
 
 def _possible(thin: Reading, decays: Array) -> NDArray[np.bool_]:
-    # With a spring, and neither dying nor growing within a sample.
+    # Positive stiffness, and neither decay nor growth within a sample.
     return np.asarray((decays[1] > 0.0) & (np.abs(decays[0]) * float(thin.time[-1]) < _STEEPEST))
 
 
@@ -208,12 +210,12 @@ def _squares_and_prior(thin: Reading, rate: Array, stiffness: Array) -> tuple[Ar
     by_stiffness = (a * angle + speed) * rows[:, 3] - 0.5 * angle * rows[:, 4]
     full = np.concatenate((linear, by_rate[:, None], by_stiffness[:, None]), axis=1)
     information = full @ full.transpose(0, 2, 1)
-    with np.errstate(invalid="ignore"):  # a motion gone within a few samples has none to offer
+    with np.errstate(invalid="ignore"):  # a motion of only a few samples gives no information
         return squares, 0.5 * (np.linalg.slogdet(information)[1] - np.linalg.slogdet(gram)[1])
 
 
 def _responses(time: Array, rate: Array, stiffness: Array) -> Array:
-    # As `response_rows`, for many decays; complex, so that one formula serves all but exactly critical damping.
+    # As `response_rows`, for many decays; complex, so one formula covers all but exactly critical damping.
     delta = (stiffness - rate**2).astype(np.complex128)
     delta[np.abs(delta) < 1e-9 * np.abs(stiffness)] += 1e-9 * np.abs(stiffness).max()
     root = np.sqrt(delta)

@@ -1,20 +1,19 @@
-"""What numerics need of a record before any method looks at it; everything else is for the method to judge."""
+"""What a record must fulfil for numerical reasons; the methods judge everything else."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from identification.policy import LEAST_SAMPLES
 from tunnel_sim.vocabulary.record import Record
 
-# Five unknowns describe a run, and three more samples are the least that say how well they do.
-LEAST_SAMPLES = 8
-# The fourth power of a reading or of a time is summed over a record: beyond these it leaves the double precision.
+# Fourth powers of readings and of times are summed over a record: beyond these limits they overflow or underflow.
 _LEAST, _GREATEST = 1e-60, 1e60
-_ROUNDING = 1e-12  # of the largest reading: some thousand roundings, in which no motion can be told
+_ROUNDING = 1e-12  # of the largest reading: a few thousand rounding errors, in which no motion can be seen
 
 
 def holds_motion(record: Record) -> bool:
-    """Whether a record has enough samples, and a reading that moves by more than its own rounding.
+    """Whether a record has enough samples, and a reading that changes by more than rounding.
 
     Args:
         record: the reading of one run.

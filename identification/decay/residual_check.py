@@ -1,8 +1,8 @@
-"""Does one damped oscillation explain a record? The same question, and the same answer, for every method.
+"""Whether one damped oscillation explains a record: one test for every method.
 
-A method's own motion misses a clear record by the method's error alone, so it is no judge of the record. Judged is
-the least-squares motion nearest to the method's decay, by `noise.noise_level`: it departs in one run of a thousand
-that a damped oscillation with white noise explains (`noise.FALSE_ALARM_RATE`).
+On a record of little noise a method's own motion misses the record by the error of the method alone, so its
+residual does not judge the record. The least-squares motion nearest to the method's decay is tested instead, by
+`residual_noise.noise_level`. The false-alarm rate is `identification.policy.MISFIT_RATE`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True, eq=False)
 class ResidualCheck:
-    """What the least-squares residual of a run says.
+    """The verdict of the least-squares residual of a run.
 
     Args:
         noise: its level and the verdict on the model.
@@ -33,13 +33,13 @@ class ResidualCheck:
     covariance: Array
 
     def widened(self, covariance: Array) -> Array:
-        """A method's covariance of (a, k), raised to the least squares' where the model departs.
+        """A method's covariance of (a, k), raised to that of least squares where the model departs.
 
         Args:
             covariance: the method's own, shape (2, 2), in 1/s and 1/s².
 
         Returns:
-            Shape (2, 2): no standard deviation is less than that of the widened least squares.
+            Shape (2, 2); no standard deviation is smaller than that of the widened least squares.
         """
         if not self.noise.departs:
             return covariance
@@ -47,7 +47,7 @@ class ResidualCheck:
 
 
 def residual_check(run: Run, decay: Decay, sensor: SensorProperties) -> ResidualCheck | None:
-    """Fit a run by least squares from a method's decay on, and judge what is left.
+    """Fit a run by least squares, starting from a method's decay, and test the residual.
 
     Args:
         run: the run.

@@ -1,8 +1,8 @@
-"""How noisy the sensor is, and whether the residual of a fit is that noise and no more.
+"""The noise of the sensor, and whether the residual of a fit is that noise and nothing else.
 
-White noise has the same power slow and fast. The fast part of a residual (its sixth differences) holds noise
-alone, whatever the model; its slow part (means over an eighth of a cycle) holds also what the model does not
-explain, in the band where the oscillation is and the parameters are decided. Their ratio is tested by F.
+White noise has the same power at low and high frequencies. The fast part of a residual (its sixth differences)
+holds only noise, whatever the model. The slow part (means over an eighth of a cycle) also holds what the model
+does not explain, in the band of the oscillation, which determines the parameters. Their ratio is tested by F.
 Quantisation adds resolution²/12 to the variance.
 """
 
@@ -16,29 +16,26 @@ import numpy as np
 from scipy.special import fdtri
 
 from identification.estimate import NoiseLevel
+from identification.policy import LEAST_NOISE, MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
-FALSE_ALARM_RATE = 1e-3
-_STATEMENT_TOLERANCE = 0.05  # a stated or measured standard deviation is taken to be good to 5 %
-FLOOR = 1e-7  # of the largest reading: no sensor and no integrator is better, so no smaller noise is claimed
 _ORDER = 6
-# Variance of one sixth difference of unit white noise, and how many samples count as one independent one:
+# Variance of one sixth difference of unit white noise, and the number of samples per degree of freedom:
 # Σ (C(12, 6+j)/C(12, 6))² = C(24, 12)/C(12, 6)².
 _DIFFERENCE_GAIN = 924.0
 _SAMPLES_PER_DEGREE = 2704156.0 / 924.0**2
 _LONGEST_BLOCK = 1e9  # samples: longer than any record
-_CHANCE = 3.29  # two-sided 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """What a fit left of one run or window.
+    """The residual of a fit to one run or window.
 
     Args:
         values: reading less model, shape (n,), rad.
         block: samples in an eighth of a cycle.
-        unknowns: how many parameters the run's own data decided.
+        unknowns: number of parameters fitted to the run's own data.
         peak: largest distance of the reading from the sensor's zero, rad.
     """
 
@@ -70,9 +67,9 @@ def stated_noise(sensor: SensorProperties) -> float | None:
 
 
 def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> NoiseLevel:
-    """The noise that standard deviations rest on, checked against the residuals.
+    """The noise level behind the standard deviations, checked against the residuals.
 
-    The stated noise is used where the residuals bear it out, their own where they do not or none is stated.
+    The stated noise is used where the residuals agree with it; otherwise the level of the residuals is used.
 
     Args:
         residuals: of the runs fitted together.
@@ -81,7 +78,7 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
     Returns:
         The level, with the verdicts on the model (``departs``) and on the statement (``disagrees``).
     """
-    floor = FLOOR * max(residual.peak for residual in residuals)
+    floor = LEAST_NOISE * max(residual.peak for residual in residuals)
     unknowns = sum(residual.unknowns for residual in residuals)
     count = sum(residual.values.size for residual in residuals)
     squares = sum(float(residual.values @ residual.values) for residual in residuals)
@@ -107,17 +104,17 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
 
 
 def white_noise(reading: Array, sensor: SensorProperties) -> float:
-    """The white part of a reading's noise, from its sixth differences, which hold next to none of the motion.
+    """The white part of a reading's noise, from its sixth differences, which hold almost none of the motion.
 
     Args:
         reading: of many samples per cycle, shape (n,), rad.
-        sensor: what the campaign states; used where the reading bears it out.
+        sensor: what the campaign states; used where the reading agrees with it.
 
     Returns:
         Standard deviation of one sample, rad, quantisation included.
     """
     peak = 0.5 * float(np.ptp(reading))
-    floor = max(FLOOR * peak, 1e-300)
+    floor = max(LEAST_NOISE * peak, 1e-300)
     fast, degrees = _fast_part([Residual(reading, 1, 0, peak)], floor)
     fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
     stated = stated_noise(sensor)
@@ -125,7 +122,7 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
 
 
 def _fast_part(residuals: Sequence[Residual], fallback: float) -> tuple[float, float]:
-    # Standard deviation of the white part, and the degrees of freedom it is known with.
+    # Standard deviation of the white part, and its degrees of freedom.
     differences = [np.diff(r.values, _ORDER) for r in residuals if r.values.size > 4 * _ORDER]
     count = sum(difference.size for difference in differences)
     if count == 0:
@@ -135,14 +132,14 @@ def _fast_part(residuals: Sequence[Residual], fallback: float) -> tuple[float, f
 
 
 def _agree(measured: float, stated: float, degrees: float) -> bool:
-    tolerance = _STATEMENT_TOLERANCE + _CHANCE / np.sqrt(2.0 * max(degrees, 1.0))
+    tolerance = NOISE_TOLERANCE + MISFIT_DEVIATIONS / np.sqrt(2.0 * max(degrees, 1.0))
     return bool(abs(measured / stated - 1.0) <= tolerance)
 
 
 def _slow_part(
     residuals: Sequence[Residual], reference: float, reference_degrees: float
 ) -> tuple[float, bool]:
-    # Power of block means over what white noise of the reference level would give, and the verdict by F.
+    # Power of the block means relative to white noise of the reference level, and the verdict by F.
     power, degrees = 0.0, 0
     for residual in residuals:
         blocks = residual.values.size // residual.block
@@ -152,6 +149,6 @@ def _slow_part(
     if degrees < 3:
         return 1.0, False
     ratio = power / degrees / reference**2
-    chance = float(fdtri(degrees, min(reference_degrees, 1e9), 1.0 - FALSE_ALARM_RATE))
-    departs = bool(ratio > chance * (1.0 + _STATEMENT_TOLERANCE) ** 2)
+    chance = float(fdtri(degrees, min(reference_degrees, 1e9), 1.0 - MISFIT_RATE))
+    departs = bool(ratio > chance * (1.0 + NOISE_TOLERANCE) ** 2)
     return max(ratio, 1.0), departs

@@ -1,4 +1,4 @@
-"""One run by itself: start, least squares, noise, standard deviations, windows."""
+"""Identification of one run: start, least squares, noise, standard deviations, windows."""
 
 from __future__ import annotations
 
@@ -30,18 +30,15 @@ from identification.estimate import (
     WindowEstimate,
     by_gravity,
 )
+from identification.policy import FEW_CYCLES, LEAST_ENERGY
 from identification.statistics.information import determined, inverse
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
-# The energy of the decay over the noise variance that noise alone reaches, at the best of all frequencies of
-# a record of 1e6 samples, less than once in 1e6 runs: 2 ln(1e12).
-_LEAST_ENERGY = 56.0
-_FEW_CYCLES = 3.0
 NO_WINDOWS = 10**6
 """As periods in a window: longer than any record, so that a run has none."""
 _UNKNOWNS = 5
-_NEAR = 1e-6  # how close, as a ratio, block means bring the start to their own optimum
+_NEAR = 1e-6  # relative tolerance of the fit to block means that gives the start
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +62,7 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     """Identify ωn, ζ, the initial state and the sensor's zero of one run by maximum likelihood.
 
     Args:
-        run: the run; wind and spring are of no concern here.
+        run: the run; its wind and spring are not used.
         sensor: what is stated of the noise.
         cycles_per_window: periods in each of its windows; where None three, or one in a short record.
 
@@ -109,7 +106,7 @@ def fit_from(run: Run, reading: Reading, start: Decay) -> DecayFit | None:
 
 
 def _near(run: Run, start: Decay) -> Decay:
-    # Most of the way to the optimum goes by block means, which cost a twentieth; the fit itself sees all samples.
+    # Block means lead most of the way to the optimum at a twentieth of the cost; the fit itself uses all samples.
     if start.omega_d == 0.0:
         return start
     thin = thinned_reading(run.record, start.omega_d / (2.0 * np.pi))
@@ -122,13 +119,13 @@ def _near(run: Run, start: Decay) -> Decay:
 def residuals_of(
     readings: Sequence[Reading], runs: Sequence[RunFit], zero: float, unknowns: int
 ) -> list[Residual]:
-    """The residuals of fitted runs with what their judgement needs.
+    """The residuals of fitted runs, with what is needed to test them.
 
     Args:
         readings: of the runs.
         runs: their fits.
         zero: the sensor's, rad.
-        unknowns: how many parameters each run's own data decided.
+        unknowns: number of parameters fitted to each run's own data.
 
     Returns:
         One per run.
@@ -161,7 +158,7 @@ def decay_covariance_of(fitted: RunFit) -> Array:
 def judge(
     reading: Reading, fitted: RunFit, zero: float, sensor: SensorProperties
 ) -> tuple[NoiseLevel, Status | None]:
-    """What the residual of one run's fit says of the noise, and whether it shows a decay at all.
+    """The noise level from the residual of one run's fit, and whether the run shows a decay at all.
 
     Args:
         reading: what was fitted.
@@ -170,11 +167,11 @@ def judge(
         sensor: what is stated of the noise.
 
     Returns:
-        The noise level, and the status of the failure: None where there is none.
+        The noise level, and the status of the failure, None if there is none.
     """
     noise = noise_level(residuals_of([reading], [fitted], zero, _UNKNOWNS), sensor)
     motion = reading.yaw - zero - fitted.residual
-    if float(motion @ motion) < _LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
+    if float(motion @ motion) < LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
         return noise, Status.NO_OSCILLATION
     return noise, None if determined(fitted.information) else Status.NOT_DETERMINED
 
@@ -190,7 +187,7 @@ def describe_run(
     noise: NoiseLevel | None = None,
     windows: tuple[WindowEstimate, ...] = (),
 ) -> RunEstimate:
-    """One run's result from its decay, whichever method found that.
+    """The result of one run from its decay, whatever the method.
 
     The initial state and the zero are those that fit the decay best; their uncertainty is that of the reading
     and that of the decay.
@@ -202,12 +199,12 @@ def describe_run(
         zero: its sensor zero, rad.
         covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
         noise_variance: of one sample of the reading, rad².
-        noise: the level that the deviations rest on; None where the method does not use it.
+        noise: the level behind the standard deviations; None where the method does not use it.
         windows: of the run.
 
     Returns:
-        The estimate with the statuses that its noise, its length and its spring call for; NOT_DETERMINED alone
-        where the method's covariance is none.
+        The estimate with the statuses that follow from its noise, its length and its spring; only NOT_DETERMINED
+        where the method's covariance is not positive definite.
     """
     if not determined(covariance):
         return RunEstimate(run.id, (Status.NOT_DETERMINED,))
@@ -235,7 +232,7 @@ def _statuses(run: Run, reading: Reading, decay: Decay, noise: NoiseLevel | None
         statuses.add(Status.MODEL_DEPARTS)
     if noise is not None and noise.disagrees:
         statuses.add(Status.NOISE_DISAGREES)
-    if decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * _FEW_CYCLES:
+    if decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * FEW_CYCLES:
         statuses.add(Status.FEW_CYCLES)
     if run.spring_stiffness is None:
         statuses.add(Status.NO_STIFFNESS)

@@ -29,16 +29,16 @@ class SpectralPeak:
 def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) -> SpectralPeak:
     """The damped frequency, as the peak of the power spectral density.
 
-    The mean is taken off, a Hann window keeps the offset and the negative frequencies from leaking into the
-    peak, zeros pad the record to at least eight times its length, and a parabola through the logarithm of the
-    three highest bins gives the peak between them.
+    The mean is removed. A Hann window keeps the offset and the negative frequencies from leaking into the peak. The
+    record is padded with zeros to at least eight times its length. A parabola through the logarithms of the three
+    highest bins gives the peak between them.
 
     Args:
         record: the reading, n samples, rad against s.
-        padding: number of times its length the record is padded to at least; 1 is quicker, and good enough to
-            start a fit of many cycles from.
-        falling: whether the window falls from the record's start on, in place of rising first: it then sees a
-            decay that is over long before the record is.
+        padding: the record is padded to at least this number of times its length; 1 is faster, and good enough to
+            start a fit of many cycles.
+        falling: whether the window falls from the start of the record, instead of rising first: it then sees a
+            decay that ends long before the record does.
 
     Returns:
         The peak.
@@ -47,18 +47,34 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
         return SpectralPeak(0.0, 0.0)
     centred = record.yaw_rad - record.yaw_rad.mean()
     size = 1 << int(np.ceil(np.log2(padding * centred.size)))
-    power = np.abs(np.fft.rfft(centred * _window(centred.size, falling), size)) ** 2
     # Below one cycle per record the spectrum holds the offset's remainder, not the oscillation.
     lowest = max(1, int(size / centred.size))
-    peak = lowest + int(np.argmax(power[lowest:-1]))
-    if power[peak] <= 0.0:
+    place, power = highest_peak(centred * _window(centred.size, falling), size, lowest)
+    highest = float(power[lowest:-1].max())
+    if highest <= 0.0:
         return SpectralPeak(0.0, 0.0)
-    place = peak + _parabola_offset(power[peak - 1 : peak + 2])
     median = max(float(np.median(power[lowest:])), 1e-300)
-    return SpectralPeak(place * record.sample_rate / size, float(power[peak]) / median)
+    return SpectralPeak(place * record.sample_rate / size, highest / median)
 
 
-@lru_cache(maxsize=4)  # the runs of a campaign are mostly of one length
+def highest_peak(values: Array, size: int, lowest: int = 1) -> tuple[float, Array]:
+    """Where the spectrum of a series is highest, between its bins.
+
+    Args:
+        values: the series, windowed, without its mean, shape (n,).
+        size: number of samples it is padded to with zeros, at least n.
+        lowest: first bin to be considered; the last bin is never considered.
+
+    Returns:
+        The place of the peak in bins, by a parabola through the logarithms of the three highest; and the power,
+        shape (size // 2 + 1,).
+    """
+    power = np.abs(np.fft.rfft(values, size)) ** 2
+    peak = lowest + int(np.argmax(power[lowest:-1]))
+    return peak + _parabola_offset(power[peak - 1 : peak + 2]), power
+
+
+@lru_cache(maxsize=4)  # most runs of a campaign have the same length
 def _window(size: int, falling: bool) -> Array:
     return read_only(np.hanning(2 * size)[size:] if falling else np.hanning(size))
 

@@ -1,11 +1,11 @@
-"""Block means of a reading. A decay keeps its rate and frequency in them; only its amplitude falls a little."""
+"""Block means of a reading. They keep the rate and frequency of a decay and reduce its amplitude a little."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from identification.decay.decay_fit import Reading
-from identification.decay.readable import LEAST_SAMPLES
+from identification.policy import LEAST_SAMPLES
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -18,7 +18,7 @@ def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[R
         per_cycle: least number of blocks per period; the record itself gives eight at the least.
 
     Returns:
-        The thinned reading, its clock that of the blocks' middles, and how many samples a block holds.
+        The thinned reading, with the times of the middles of the blocks, and the number of samples per block.
     """
     rate = (reading.time.size - 1) / float(reading.time[-1])
     factor = max(1, int(min(rate / (per_cycle * frequency), reading.time.size / LEAST_SAMPLES)))

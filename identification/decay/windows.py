@@ -1,6 +1,6 @@
 """Damping and frequency through consecutive windows of a few cycles, as in the paper's Table III.
 
-A linear oscillation shows the same ζ and ωn in every window; drift with the amplitude is a gap of the model.
+A linear oscillation has the same ζ and ωn in every window; a drift with the amplitude shows a gap in the model.
 """
 
 from __future__ import annotations
@@ -23,28 +23,26 @@ from identification.decay.decay_fit import (
 from identification.decay.first_guess import starting_decay
 from identification.decay.residual_noise import eighth_of_a_cycle
 from identification.estimate import NoiseLevel, Quantity, WindowEstimate
+from identification.policy import LEAST_WINDOW_ENERGY
 from identification.statistics.information import determined, inverse
 from tunnel_sim.vocabulary.record import Array, Record
 
 CYCLES = 3
 _LEAST_WINDOWS = 4
 _LEAST_SAMPLES = 16
-_TOLERANCE = 1e-5  # of a window's fit, as a ratio: Gauss–Newton's next step would be a thousand times smaller
-# A window is given while its oscillation stands out: an energy of 400 over the power of the noise, N(A/S)²/2,
-# is an amplitude known to 5 %.
-_LEAST_ENERGY = 400.0
+_TOLERANCE = 1e-5  # relative, of a window's fit; the next Gauss–Newton step would be a thousand times smaller
 
 
 def fit_windows(
     reading: Reading, run: Decay, zero: float, noise: NoiseLevel, *, cycles: int | None = None
 ) -> tuple[WindowEstimate, ...]:
-    """Fit a decay to each window of a run by itself.
+    """Fit a decay to each window of a run separately.
 
     Each window lasts ``cycles`` periods of its own fitted frequency and the next starts where it ends, so the
-    windows keep step with the cycles where the frequency drifts. The sensor's zero is common to them: that of
+    windows follow the cycles where the frequency drifts. The sensor's zero is common to them: that of
     the whole run, or, where one decay does not fit the whole run, the median of the windows' own. The series
-    ends with the record or with the oscillation sinking into the noise; a window that one decay does not
-    describe even roughly is passed over.
+    ends with the record, or where the oscillation is lost in the noise; a window that one decay does not
+    describe even roughly is skipped.
 
     Args:
         reading: the whole run.
@@ -73,7 +71,7 @@ def _series(
     while (fitted := _fit_window(reading, begin, decay, zero, cycles)) is not None:
         fit, count = fitted
         motion = reading.yaw[begin : begin + count] - fit.zero - fit.runs[0].residual
-        if float(motion @ motion) < _LEAST_ENERGY * noise.std**2:
+        if float(motion @ motion) < LEAST_WINDOW_ENERGY * noise.std**2:
             break
         window = _window_estimate(reading, begin, count, fit.runs[0], noise) if fit.converged else None
         if window is not None:
@@ -99,7 +97,7 @@ def _length(decay: Decay, cycles: int) -> float:
 def _fit_window(
     reading: Reading, begin: int, decay: Decay, zero: float | None, cycles: int
 ) -> tuple[DecayFit, int] | None:
-    # Fitted once with the frequency expected, and again where its own frequency changes its length.
+    # Fitted with the expected frequency, and again where the fitted frequency changes the length of the window.
     interval = float(reading.time[-1]) / (reading.time.size - 1)
     fit, count = None, 0
     for _ in range(2):
@@ -127,7 +125,7 @@ def _window_estimate(
     decay = run.decay
     amplitude = envelope_amplitude(decay, run.angle, run.rate) * np.exp(-0.5 * decay.rate * duration)
     variance = noise.std**2 * max(1.0, _slow_ratio(run.residual, decay, interval, noise.std))
-    if not np.isfinite(amplitude) or 0.5 * count * amplitude**2 < _LEAST_ENERGY * variance:
+    if not np.isfinite(amplitude) or 0.5 * count * amplitude**2 < LEAST_WINDOW_ENERGY * variance:
         return None
     order = [RATE, STIFFNESS, ANGLE, ANGULAR_RATE]
     information = run.information[np.ix_(order, order)]
@@ -135,7 +133,7 @@ def _window_estimate(
         return None
     covariance = inverse(information) * variance
     omega_n, zeta = modal_quantities(decay, covariance[:2, :2])
-    # The middle of the window is where the amplitude hardly hangs on the damping: white noise gives A √(2/N).
+    # At mid-window the amplitude hardly depends on the damping: white noise gives A √(2/N).
     return WindowEstimate(
         start_s=float(time[0]),
         duration_s=duration,

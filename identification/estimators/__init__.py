@@ -1,8 +1,8 @@
-"""One estimator per file, one registry of them.
+"""The estimators, one per file, and their registry.
 
-To add one: a frozen dataclass in a file of its own whose fields are its settings, with the members of
-`Estimator`, and an entry below. The entry is data, so that a heavy import (torch, say) waits until the
-estimator is used, and the conformance suite runs over every entry by itself.
+To add one, write a frozen dataclass in its own file, whose fields are its settings and which has the members of
+`Estimator`, and add an entry below. An entry is only data, so a heavy import such as torch waits until the
+estimator is used. The conformance suite runs over all entries.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Estimator(Protocol):
-    """A method with its settings."""
+    """An identification method with its settings."""
 
     name: ClassVar[str]
 
@@ -42,7 +42,7 @@ class Entry:
         name: in the registry, in JSON and on the command line.
         module: it lives in.
         factory: the class in it; called without arguments it has its default settings.
-        summary: one line for the command line's help: the method, and what it is for.
+        summary: one line for the help of the command line: the method and its purpose.
     """
 
     name: str
@@ -62,25 +62,25 @@ ENTRIES: tuple[Entry, ...] = (
         "conventional",
         "identification.estimators.conventional",
         "Conventional",
-        "the paper's: spectrum, time to half amplitude, each wind-on run paired with a wind-off run of its spring",
+        "the paper's: spectrum, time to half amplitude, each wind-on run paired with wind-off runs of its spring",
     ),
     Entry(
         "neural_network",
         "identification.estimators.neural",
         "NeuralNetwork",
-        "the paper's: one network for damping, one for frequency, three cycles at a time, paired likewise",
+        "the paper's: one network for damping, one for frequency, three cycles at a time, paired in the same way",
     ),
     Entry(
         "matrix_pencil",
         "identification.estimators.matrix_pencil",
         "MatrixPencil",
-        "poles by linear algebra, run by run: the quickest, and nearly as good",
+        "poles by linear algebra, run by run: the fastest, and nearly as accurate",
     ),
     Entry(
         "log_decrement",
         "identification.estimators.log_decrement",
         "LogDecrement",
-        "weighted regression of the logarithms of all peaks, run by run: the hand method at its best",
+        "weighted regression of the logarithms of all peaks, run by run: the classical manual method",
     ),
     Entry(
         "hilbert",
@@ -92,13 +92,13 @@ ENTRIES: tuple[Entry, ...] = (
         "filter_error",
         "identification.estimators.filter_error",
         "FilterError",
-        "maximum likelihood with a random moment on the rig: for buffeted runs",
+        "maximum likelihood with a random moment on the model: for runs with buffeting",
     ),
     Entry(
         "bayesian",
         "identification.estimators.bayesian",
         "Bayesian",
-        "posterior means and 95 % intervals that hold in records of one to three cycles",
+        "posterior means and 95 % intervals that are valid for records of one to three cycles",
     ),
 )
 
@@ -115,7 +115,7 @@ def make_estimator(name: str) -> Estimator:
         The estimator.
 
     Raises:
-        TunnelError: when there is none of that name, with the closest one.
+        TunnelError: when there is no such estimator; the error names the closest one.
     """
     for entry in ENTRIES:
         if entry.name == name:

@@ -1,9 +1,9 @@
 """Bayesian: the posterior of each run's decay, and of the campaign's coefficients under all of them.
 
 The initial state, the zero and the noise level are integrated out in closed form and damping and frequency
-are summed over a grid (see `identification.decay.posterior`), so that nothing rests on the likelihood being a
-parabola: in records of one to three cycles, or of few samples, it is not. Values are posterior means, their
-deviations the posterior's, and ωn and ζ carry their 95 % intervals. The campaign's coefficients are drawn from
+are summed over a grid (see `identification.decay.posterior`). So the logarithm of the likelihood need not be a
+parabola, which it is not in records of one to three cycles or of few samples. Values are posterior means, with the
+posterior's standard deviations, and ωn and ζ carry their 95 % intervals. The campaign's coefficients are drawn from
 the product of the runs' likelihoods. Sources: Bretthorst, Bayesian Spectrum Analysis and Parameter Estimation
 (1988), doi 10.1007/978-1-4684-9399-3; Jeffreys, Proc. R. Soc. A 186 (1946) 453–461,
 doi 10.1098/rspa.1946.0056.
@@ -38,7 +38,7 @@ class Bayesian:
 
     Args:
         blocks_per_cycle: block means per period that the posterior is computed from, at least.
-        seed: of the draws that put the runs together.
+        seed: of the draws that combine the runs.
     """
 
     name: ClassVar[str] = "bayesian"
@@ -52,7 +52,7 @@ class Bayesian:
             campaign: at least one run.
 
         Returns:
-            The estimate. A run that could not be identified is left out.
+            The estimate, its intervals those of the posterior. A run that could not be identified is left out.
 
         Raises:
             TunnelError: when a wind-on run states no air density.

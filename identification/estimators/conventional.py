@@ -1,9 +1,9 @@
 """The paper's conventional method: spectrum, time to half amplitude, wind-on against wind-off.
 
 The damped frequency f is the peak of the power spectral density, the time to half amplitude t½ = ln 2/σ comes
-from the decay of the peaks, and each wind-on run is set against the wind-off runs of its spring by eqs 7, 8, 17
+from the decay of the peaks, and each wind-on run is compared with the wind-off runs of its spring by eqs 7, 8, 17
 and 18 (`identification.campaign.pairing`). Standard deviations of f and σ are the scatter of one run's peaks.
-They cover scatter only, not the method's bias.
+They include scatter only, not the bias of the method.
 """
 
 from __future__ import annotations
@@ -21,10 +21,9 @@ from identification.decay.peaks import PeakDecay, peak_decay
 from identification.decay.residual_check import residual_check
 from identification.decay.spectrum import psd_peak
 from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_gravity
+from identification.policy import LEAST_PROMINENCE
 from identification.statistics.weighted_line import decay_covariance, deviations
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
-
-_LEAST_PROMINENCE = 40.0  # of the spectral peak; less may be noise
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class Conventional:
             campaign: at least one run.
 
         Returns:
-            The estimate; the coefficients leave out wind-on runs without a wind-off run of their spring.
+            The estimate; the coefficients omit wind-on runs without a wind-off run of their spring.
 
         Raises:
             TunnelError: when a wind-on run states no air density.
@@ -68,7 +67,7 @@ class _Seen:
 
 def _see(run: Run, sensor: SensorProperties) -> _Seen:
     peak = psd_peak(run.record)
-    peaks = peak_decay(run.record, peak.frequency) if peak.prominence > _LEAST_PROMINENCE else None
+    peaks = peak_decay(run.record, peak.frequency) if peak.prominence > LEAST_PROMINENCE else None
     if peaks is None:
         return _Seen(run, peak.frequency, None)
     omega_d = 2.0 * np.pi * peak.frequency

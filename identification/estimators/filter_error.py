@@ -1,12 +1,12 @@
-"""Filter error: maximum likelihood with a random moment on the rig as well as noise in the sensor.
+"""Filter error: maximum likelihood with a random moment on the model and noise in the sensor.
 
-For runs in a turbulent stream: the motion wanders about the decay, so output error's residual is not white
-and its intervals are too narrow or, widened, too wide. Here a Kalman filter predicts every sample from those
-before, and decay rate, stiffness and the moment's intensity are those under which the prediction errors are
-likeliest; the initial state and the sensor's zero are marginal. Where a run shows no random moment, what is
-left is output error, and its result is given. Sources: Maine & Iliff, SIAM J. Appl. Math. 41 (1981) 558–579,
-doi 10.1137/0141046; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5,
-doi 10.2514/4.102790.
+This is for runs in a turbulent stream. There the motion departs randomly from the decay, so the residual of
+output error is not white and its intervals are too narrow or, after widening, too wide. Here a Kalman filter
+predicts every sample from the previous ones, and decay rate, stiffness and intensity of the moment maximise the
+likelihood of the prediction errors; the initial state and the sensor's zero are fitted by least squares. For a
+run without a random moment the result is that of output error. Sources: Maine & Iliff, SIAM J. Appl. Math. 41
+(1981) 558–579, doi 10.1137/0141046; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5, doi
+10.2514/4.102790.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay, estimate_by_runs
+from identification.campaign.assembly import RunDecay
 from identification.decay.decay_fit import project_run
 from identification.decay.filter_fit import DrivenFit, fit_driven
 from identification.decay.residual_noise import Residual, noise_level, white_noise
@@ -28,40 +28,28 @@ from identification.decay.run_fit import (
     identify_run,
 )
 from identification.decay.thinning import block_means
-from identification.estimate import Estimate, NoiseLevel, Quantity, Status
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from identification.estimate import NoiseLevel, Quantity, Status
+from identification.estimators.run_by_run import RunByRun
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
-_DECIDED = 6  # what a run's data decide: decay, stiffness, intensity, initial state, zero
+_DECIDED = 6  # parameters fitted to a run's data: decay, stiffness, intensity, initial state, zero
 _INNOVATIONS_BLOCK = 3  # of them in an eighth of a cycle
 INTENSITY_UNIT = "rad2/s3"
 
 
 @dataclass(frozen=True)
-class FilterError:
+class FilterError(RunByRun):
     """Maximum likelihood with measurement and process noise.
 
+    A run's ``process_noise`` is the random moment's spectral intensity q over the inertia,
+    ⟨w(t)w(t′)⟩ = q δ(t − t′); where its spectrum is not flat, that at the natural frequency.
+
     Args:
-        blocks_per_cycle: block means per period that the filter sees, at least.
+        blocks_per_cycle: block means per period that the filter uses, at least.
     """
 
     name: ClassVar[str] = "filter_error"
     blocks_per_cycle: int = 24
-
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign from the runs.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate. A run that could not be identified is left out; ``process_noise`` of the others is
-            the random moment's spectral intensity q over the inertia, ⟨w(t)w(t′)⟩ = q δ(t − t′); where its
-            spectrum is not flat, that at the natural frequency.
-
-        Raises:
-            TunnelError: when a wind-on run states no air density.
-        """
-        return estimate_by_runs(campaign, self.name, self._run)
 
     def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
         bare = identify_run(run, sensor, cycles_per_window=NO_WINDOWS)
@@ -74,7 +62,7 @@ class FilterError:
         return RunDecay(bare.estimate, bare.fit.decay, decay_covariance_of(bare.fit) * variance)
 
     def _driven(self, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | None:
-        # The fit, and the sensor noise of one sample that it rests on.
+        # The fit, and the sensor noise of one sample that it assumes.
         fit, noise = bare.fit, bare.noise
         if fit is None or noise is None or fit.decay.omega_d == 0.0:
             return None
@@ -98,7 +86,7 @@ def _with_moment(
     fitted, zero = projected
     noise = _judged(before, found, noise_std)
     covariance = found.covariance * noise.slow_ratio
-    # The initial state is that of the least squares: the moment's own part in it is as the residual's power.
+    # The initial state is that of least squares; the part of it due to the moment is of the power of the residual.
     variance = max(noise_std, noise.residual_std) ** 2
     estimate = describe_run(run, bare.reading, fitted, zero, covariance[:2, :2], variance, noise=noise)
     q = found.model.intensity_at_resonance
@@ -107,7 +95,7 @@ def _with_moment(
 
 
 def _judged(before: NoiseLevel, found: DrivenFit, noise_std: float) -> NoiseLevel:
-    # The model is judged by the innovations, which are white if it is right; the residual never is.
+    # The model is judged by the innovations, which are white if it is right; the residual is not.
     values, variance = found.innovations.values, found.innovations.variance
     level = noise_level(
         [Residual(values, _INNOVATIONS_BLOCK, _DECIDED, float(np.abs(values).max()))],

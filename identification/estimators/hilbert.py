@@ -1,10 +1,10 @@
 """Hilbert envelope: decay rate from the logarithm of the envelope, frequency from the phase.
 
-Both are weighted lines over half-cycle averages of the analytic signal, whose deviations follow from the
-noise: √2 S/(√m A) for the logarithm and the phase alike. The ends are handled by carrying the record on with
-the decay found so far (see `identification.decay.envelope`). Short stretches of the same lines give
-ζ and ωn against the amplitude, the backbone of the rig, which stands in the run's windows; where a line does
-not fit a run, its deviations are raised to the scatter about it.
+Both are weighted lines over half-cycle averages of the analytic signal, whose deviations follow from the noise:
+√2 S/(√m A) for the logarithm and the phase alike. To reduce end effects the record is extended with the decay
+found so far (see `identification.decay.envelope`). Short parts of the same lines give ζ and ωn against the
+amplitude, the backbone of the rig, as the windows of the run. Where a line does not fit a run, its standard
+deviations are raised to the scatter about it.
 
 Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018; backbone
 from free decays: J. M. Londoño, S. A. Neild & J. E. Cooper, J. Sound Vib. 348 (2015) 224–238,
@@ -18,7 +18,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay, estimate_by_runs
+from identification.campaign.assembly import RunDecay
 from identification.decay.damped_oscillation import Decay
 from identification.decay.decay_fit import Reading, project_run
 from identification.decay.envelope import Envelope, envelope
@@ -27,20 +27,20 @@ from identification.decay.residual_check import residual_check
 from identification.decay.residual_noise import white_noise
 from identification.decay.run_fit import describe_run, judge
 from identification.decay.windows import CYCLES, modal_quantities
-from identification.estimate import Estimate, Quantity, Status, WindowEstimate
+from identification.estimate import Quantity, Status, WindowEstimate
+from identification.estimators.run_by_run import RunByRun
+from identification.policy import LEAST_ENVELOPE, LEAST_WINDOW_ENERGY
 from identification.statistics.weighted_line import WeightedFit, decay_covariance, weighted_fit
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
-_PASSES = 3  # each carries the record on with the decay of the one before
+_PASSES = 3  # each extends the record with the decay of the previous one
 _LEAST_POINTS = 5
-_LEAST_AMPLITUDE = 4.0  # in deviations of an average
-_LEAST_WINDOW_ENERGY = 400.0  # over the power of the noise, as in other windows
 
 
 @dataclass(frozen=True)
-class Hilbert:
-    """Regression of the envelope's logarithm and of the phase.
+class Hilbert(RunByRun):
+    """Regression of the envelope's logarithm and of the phase. The windows of a run are the backbone.
 
     Args:
         cycles_per_window: periods in each window of the backbone; 0 gives none.
@@ -48,20 +48,6 @@ class Hilbert:
 
     name: ClassVar[str] = "hilbert"
     cycles_per_window: int = CYCLES
-
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run from its envelope, then the campaign from the runs.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate. A run that could not be identified is left out; windows are the backbone.
-
-        Raises:
-            TunnelError: when a wind-on run states no air density.
-        """
-        return estimate_by_runs(campaign, self.name, self._run)
 
     def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
         start = starting_decay(run.record)
@@ -75,7 +61,7 @@ class Hilbert:
             if projected is None:
                 return RunDecay.failed(run, Status.NOT_CONVERGED)
             if decay.omega_d * float(reading.time[-1]) < np.pi * _LEAST_POINTS:
-                break  # fewer half cycles than a line needs
+                break  # too few half cycles for a line
             seen = envelope(reading, *projected)
             lines = _lines(seen, decay, noise_std)
             if lines is None:
@@ -107,7 +93,7 @@ def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array
     expected = scale * np.exp(-decay.rate * seen.time)
     found = None
     for _ in range(2):
-        below = np.flatnonzero(expected < _LEAST_AMPLITUDE * deviation)
+        below = np.flatnonzero(expected < LEAST_ENVELOPE * deviation)
         count = int(below[0]) if below.size else expected.size
         if count < _LEAST_POINTS:
             return None
@@ -131,7 +117,7 @@ def _decay(seen: Envelope, logarithm: WeightedFit, phase: WeightedFit) -> tuple[
 
 
 def _backbone(seen: Envelope, noise_std: float, cycles: int) -> tuple[WindowEstimate, ...]:
-    # Lines through consecutive stretches of the envelope; two averages to the cycle.
+    # Lines through consecutive parts of the envelope; two averages per cycle.
     windows: list[WindowEstimate] = []
     length = 2 * cycles
     deviation = noise_std * np.sqrt(2.0 / seen.samples)
@@ -139,7 +125,7 @@ def _backbone(seen: Envelope, noise_std: float, cycles: int) -> tuple[WindowEsti
     for begin in range(0, seen.time.size - length + 1, length or 1):
         part = slice(begin, begin + length)
         amplitude = float(np.exp(np.log(seen.amplitude[part]).mean())) if length else 0.0
-        if 0.5 * length * seen.samples * amplitude**2 < _LEAST_WINDOW_ENERGY * noise_std**2:
+        if 0.5 * length * seen.samples * amplitude**2 < LEAST_WINDOW_ENERGY * noise_std**2:
             break
         decay, covariance = _decay(seen, *_two_lines(seen, part, np.full(length, deviation / amplitude)))
         if decay.stiffness <= 0.0:

@@ -1,10 +1,10 @@
 """Logarithmic decrement as a regression: a weighted line through the logarithm of every peak.
 
-A peak is the vertex of a parabola, and white noise of S per sample moves its height by (3/2) S/√m and its
-instant by √(3/m) S/(w ωd² h), with m samples in its half width w and h its height; so the logarithms have the
-variance (9/4) S²/(m h²), and large peaks count for more. The line's gradient is the decay rate, the sensor's
-zero is fitted along with it (peaks of one side rise by what those of the other side fall), and a second line,
-through the instants, gives the damped frequency. Where peaks scatter about a line by more than the noise
+A peak is the vertex of a parabola, and white noise of S per sample moves its height by (3/2) S/√m and its instant
+by √(3/m) S/(w ωd² h), with m samples in its half width w and h its height; so the logarithms have the variance
+(9/4) S²/(m h²), and large peaks have larger weights. The line's gradient is the decay rate, the sensor's zero is
+fitted along with it (an error of it raises the peaks of one side and lowers those of the other), and a second
+line, through the instants, gives the damped frequency. Where peaks scatter about a line by more than the noise
 explains, its deviation is raised to that scatter. Peaks are used down to ten deviations.
 
 Sources: the decrement: Lord Rayleigh, The Theory of Sound, vol. 1 (1894), § 46; its regression over many peaks
@@ -19,7 +19,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay, estimate_by_runs
+from identification.campaign.assembly import RunDecay
 from identification.decay.damped_oscillation import Decay
 from identification.decay.decay_fit import Reading, project_run
 from identification.decay.first_guess import starting_frequency
@@ -27,61 +27,47 @@ from identification.decay.peaks import PEAK_HALF_WIDTH, follow_peaks
 from identification.decay.residual_check import residual_check
 from identification.decay.residual_noise import white_noise
 from identification.decay.run_fit import describe_run, judge
-from identification.estimate import Estimate, Status
+from identification.estimate import Status
+from identification.estimators.run_by_run import RunByRun
+from identification.policy import LEAST_PEAK_HEIGHT
 from identification.statistics.weighted_line import decay_covariance, weighted_fit
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _LEAST_PEAKS = 5
-_LEAST_HEIGHT = 10.0  # in deviations of a peak: below, the logarithm bends the noise
-_SWEEPS = 4  # of weights and zero; each brings two digits more
+_SWEEPS = 4  # of weights and zero; each adds two digits
 
 
 @dataclass(frozen=True)
-class LogDecrement:
+class LogDecrement(RunByRun):
     """Weighted regression of the logarithms of all peaks; it has no settings."""
 
     name: ClassVar[str] = "log_decrement"
 
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run from its peaks, then the campaign from the runs.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate. A run that could not be identified is left out.
-
-        Raises:
-            TunnelError: when a wind-on run states no air density.
-        """
-        return estimate_by_runs(campaign, self.name, _identify)
-
-
-def _identify(run: Run, sensor: SensorProperties) -> RunDecay:
-    frequency = starting_frequency(run.record)
-    if frequency is None:
-        return RunDecay.failed(run, Status.NO_OSCILLATION)
-    reading = Reading.from_record(run.record)
-    noise_std = white_noise(reading.yaw, sensor)
-    half_width = PEAK_HALF_WIDTH / frequency
-    share = noise_std / np.sqrt(2.0 * half_width * run.record.sample_rate)
-    times, heights = follow_peaks(run.record, frequency)
-    found = _decay_of_peaks(times, heights, share, half_width)
-    projected = None if found is None else project_run(reading, found[0])
-    if found is None or projected is None:
-        return RunDecay.failed(
-            run, Status.NO_OSCILLATION if times.size < _LEAST_PEAKS else Status.NOT_CONVERGED
-        )
-    fitted, zero = projected
-    _, failure = judge(reading, fitted, zero, sensor)
-    if failure is not None:
-        return RunDecay.failed(run, failure)
-    check = residual_check(run, found[0], sensor)
-    noise = None if check is None else check.noise
-    covariance = found[1] if check is None else check.widened(found[1])
-    estimate = describe_run(run, reading, fitted, zero, covariance, noise_std**2, noise=noise)
-    return RunDecay(estimate, found[0], covariance)
+    def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
+        frequency = starting_frequency(run.record)
+        if frequency is None:
+            return RunDecay.failed(run, Status.NO_OSCILLATION)
+        reading = Reading.from_record(run.record)
+        noise_std = white_noise(reading.yaw, sensor)
+        half_width = PEAK_HALF_WIDTH / frequency
+        share = noise_std / np.sqrt(2.0 * half_width * run.record.sample_rate)
+        times, heights = follow_peaks(run.record, frequency)
+        found = _decay_of_peaks(times, heights, share, half_width)
+        projected = None if found is None else project_run(reading, found[0])
+        if found is None or projected is None:
+            return RunDecay.failed(
+                run, Status.NO_OSCILLATION if times.size < _LEAST_PEAKS else Status.NOT_CONVERGED
+            )
+        fitted, zero = projected
+        _, failure = judge(reading, fitted, zero, sensor)
+        if failure is not None:
+            return RunDecay.failed(run, failure)
+        check = residual_check(run, found[0], sensor)
+        noise = None if check is None else check.noise
+        covariance = found[1] if check is None else check.widened(found[1])
+        estimate = describe_run(run, reading, fitted, zero, covariance, noise_std**2, noise=noise)
+        return RunDecay(estimate, found[0], covariance)
 
 
 def _decay_of_peaks(
@@ -96,7 +82,7 @@ def _decay_of_peaks(
     expected = np.abs(heights - zero)
     count = times.size
     for _ in range(_SWEEPS):
-        below = np.flatnonzero(expected < _LEAST_HEIGHT * height_std)
+        below = np.flatnonzero(expected < LEAST_PEAK_HEIGHT * height_std)
         count = int(below[0]) if below.size else times.size
         if count < _LEAST_PEAKS or not np.all(np.abs(heights[:count] - zero) > 0.0):
             return None

@@ -1,9 +1,9 @@
-"""Matrix pencil: poles by linear algebra alone, no start and no iteration on the parameters.
+"""Matrix pencil: poles by linear algebra, without starting values and without iteration on the parameters.
 
-Every run is thinned to block means, its two poles are read from the shift of their Hankel matrix, and the
-first-order perturbation of that gives their covariance; the campaign's coefficients are those that fit the
-runs' poles best. Sources: Hua & Sarkar, IEEE Trans. Acoust. Speech Signal Process. 38 (1990) 814–824,
-doi 10.1109/29.56027; see `identification.decay.pencil`.
+Every run is thinned to block means. Its two poles follow from the shift of their Hankel matrix, and a first-order
+perturbation gives their covariance. The campaign's coefficients are a least-squares fit to the poles of the runs.
+Sources: Hua & Sarkar, IEEE Trans. Acoust. Speech Signal Process. 38 (1990) 814–824, doi 10.1109/29.56027; see
+`identification.decay.pencil`.
 """
 
 from __future__ import annotations
@@ -13,43 +13,30 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay, estimate_by_runs
+from identification.campaign.assembly import RunDecay
 from identification.decay.decay_fit import Reading, project_run
 from identification.decay.first_guess import starting_frequency
 from identification.decay.pencil import PencilDecay, pencil_decay
 from identification.decay.run_fit import describe_run, judge
 from identification.decay.thinning import block_means
-from identification.estimate import Estimate, Status
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from identification.estimate import Status
+from identification.estimators.run_by_run import RunByRun
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
-_DECAY_TIMES = 8.0  # 1/σ: what comes later holds e^−16 of the energy, and noise
+_DECAY_TIMES = 8.0  # in units of 1/σ: later samples hold e^−16 of the energy, and noise
 
 
 @dataclass(frozen=True)
-class MatrixPencil:
+class MatrixPencil(RunByRun):
     """Poles from the shift of a Hankel matrix.
 
     Args:
-        blocks_per_cycle: block means per period, at least. Fewer are quicker and see less of the signal: its
-            amplitude in them falls by (π/blocks)²/6.
+        blocks_per_cycle: block means per period, at least. Fewer are faster but lose signal: its amplitude
+            in them falls by (π/blocks)²/6.
     """
 
     name: ClassVar[str] = "matrix_pencil"
     blocks_per_cycle: int = 16
-
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign from the runs.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate. A run that could not be identified is left out.
-
-        Raises:
-            TunnelError: when a wind-on run states no air density.
-        """
-        return estimate_by_runs(campaign, self.name, self._run)
 
     def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
         frequency = starting_frequency(run.record)

@@ -1,13 +1,14 @@
 """The paper's neural networks: three cycles at a time, ζ by 100-5-5-1 and ωn by 2-2-5-1.
 
-Each run is cut into consecutive windows of three cycles (the paper's Table III), found from zero crossings alone;
-the first network reads ζ off a window's shape, the second ωn off ζ and the window's length t3. The run's ζ and ωn
-are the averages over its windows, each with the weight its noise leaves it; eqs 10, 11, 17 and 18 then give Cnβ and
-Cnr from wind-on and wind-off runs of the same spring (`identification.campaign.pairing`).
+Each run is cut into consecutive windows of three cycles (the paper's Table III), found from zero crossings alone.
+The first network gives ζ from the shape of a window, the second ωn from ζ and the length t3 of the window. The
+run's ζ and ωn are averages over its windows, weighted by their noise; eqs 10, 11, 17 and 18 then give Cnβ and Cnr
+from wind-on and wind-off runs of the same spring (`identification.campaign.pairing`).
 
-A standard deviation holds the reading's noise, carried through crossings, shape and networks by the delta method;
-the posterior of the networks' weights; and their largest error on responses they were not trained on. Where the
-windows scatter by more than that, it is widened by as much and the status says that the model departs.
+A standard deviation includes the noise of the reading, propagated through crossings, shape and networks by the
+delta method; the posterior of the networks' weights; and their largest error on test responses. Where the windows
+scatter by more than that, it is raised to the scatter and the status says that the model does not explain the
+data.
 
 Torch is not needed: the shipped weights are used in NumPy.
 """
@@ -29,19 +30,16 @@ from identification.campaign.pairing import PairedRun, paired_estimate
 from identification.decay.damped_oscillation import Decay
 from identification.decay.readable import holds_motion
 from identification.decay.residual_check import residual_check
-from identification.decay.residual_noise import FALSE_ALARM_RATE, white_noise
+from identification.decay.residual_noise import white_noise
 from identification.decay.windows import modal_quantities
 from identification.estimate import Estimate, Quantity, RunEstimate, Status, WindowEstimate, by_gravity
 from identification.neural.files import read_networks, shipped_networks
 from identification.neural.networks import Networks
 from identification.neural.shape import CYCLES, network_inputs, normalise, response_points
 from identification.neural.three_cycles import ThreeCycles, find_windows
+from identification.policy import GREATEST_NETWORK_DISTANCE, LEAST_FOR_SCATTER, MISFIT_RATE, SCATTER_TOLERANCE
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
-
-_UNLIKE = 0.1  # root mean square distance from a damped oscillation, of its amplitude, that is none
-_LEAST_FOR_SCATTER = 3
-_TOLERANCE = 1.2  # of χ²: the propagated deviations are good to a tenth
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,7 @@ class NeuralNetwork:
     """The paper's networks.
 
     Args:
-        weights: a safetensors file that ``tunnel train`` wrote; those that ship where None.
+        weights: a safetensors file written by ``tunnel train``; the packaged weights where None.
     """
 
     name: ClassVar[str] = "neural_network"
@@ -62,8 +60,8 @@ class NeuralNetwork:
             campaign: at least one run.
 
         Returns:
-            The estimate. A run of fewer than three cycles, or outside the range of the training, is left out and
-            its status says so.
+            The estimate. A run of fewer than three cycles, or outside the training range, is left out; its status
+            says so.
 
         Raises:
             TunnelError: when a wind-on run states no air density, or the weights cannot be read.
@@ -84,7 +82,7 @@ class NeuralNetwork:
 
 @dataclass(frozen=True, eq=False)
 class WindowReading:
-    """What the networks read off one window.
+    """The result of the networks for one window.
 
     Args:
         window: where it lies.
@@ -112,12 +110,12 @@ def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None
         networks: trained.
 
     Returns:
-        The reading; None where the window is nothing like a damped oscillation.
+        The result; None where the window is not similar to a damped oscillation.
     """
     inputs = window.shape.inputs
     zeta = float(networks.zeta(inputs[None])[0])
     clean = network_inputs(np.clip([zeta], *networks.spec.zeta_range))[0]
-    if float(np.sqrt(np.mean((inputs - clean) ** 2))) > _UNLIKE:
+    if float(np.sqrt(np.mean((inputs - clean) ** 2))) > GREATEST_NETWORK_DISTANCE:
         return None
     omega_n = float(networks.omega_n(np.array([zeta]), np.array([window.t3]))[0])
     weights = window.noise.weights(window.shape, networks.damping.input_gradient(inputs))
@@ -195,7 +193,7 @@ def _identified(
 
 
 def _covariance(readings: Sequence[WindowReading], row: int) -> Array:
-    # Of one quantity over the windows: neighbours share the crossing between them, and its noise.
+    # Of one quantity over the windows: neighbours share a crossing and its noise.
     covariance = np.diag([one.variances[row] for one in readings])
     for place, (one, other) in enumerate(pairwise(readings)):
         offset = other.window.noise.first - one.window.noise.first
@@ -207,17 +205,17 @@ def _covariance(readings: Sequence[WindowReading], row: int) -> Array:
 
 
 def _average(values: Array, covariance: Array) -> tuple[float, float, bool]:
-    # Weighted mean, its standard deviation, widened where the windows scatter beyond chance, and whether they do.
+    # Weighted mean; its standard deviation, widened if the windows scatter beyond chance; and whether they do.
     weights = 1.0 / np.diag(covariance)
     weights = weights / weights.sum()
     mean = float(weights @ values)
     std = float(np.sqrt(weights @ covariance @ weights))
-    if values.size < _LEAST_FOR_SCATTER:
+    if values.size < LEAST_FOR_SCATTER:
         return mean, std, False
     inverse = np.linalg.inv(covariance)
     away = values - float(inverse.sum(axis=0) @ values) / float(inverse.sum())
     scatter = float(away @ inverse @ away)
-    chance = _TOLERANCE * float(chi2.isf(0.5 * FALSE_ALARM_RATE, values.size - 1))
+    chance = SCATTER_TOLERANCE * float(chi2.isf(0.5 * MISFIT_RATE, values.size - 1))
     departs = scatter > chance
     return mean, std * float(np.sqrt(scatter / (values.size - 1))) if departs else std, departs
 

@@ -1,8 +1,8 @@
-"""Output error: maximum likelihood of the free decay, run by run and jointly over the campaign.
+"""Output error: maximum likelihood of the free decay, for each run and jointly for the campaign.
 
-The measurement is the model's output plus white Gaussian noise. Every run is fitted by itself (ωn, ζ, initial
-state, zero); those fits start the joint one, in which Izz, Cr, Cnβ, Cnr and the sensor's zero are common and
-the initial state is each run's own. Nothing nominal is needed, only the spring stiffnesses. Sources: the
+The measurement is the model's output plus white Gaussian noise. Every run is fitted separately (ωn, ζ, initial
+state, zero). These fits start the joint fit, in which Izz, Cr, Cnβ, Cnr and the sensor's zero are common and
+the initial state is each run's own. No nominal values are needed, only the spring stiffnesses. Sources: the
 equation of motion (2)–(6) of the paper; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015),
 ch. 4, doi 10.2514/4.102790.
 """
@@ -37,7 +37,7 @@ from identification.statistics.widening import (
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
 
-_JOINT_UNKNOWNS = 2  # of a run's own in the joint fit: its initial angle and rate
+_JOINT_UNKNOWNS = 2  # of each run in the joint fit: its initial angle and rate
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class OutputError:
 
         Returns:
             The estimate. A run that could not be identified is left out; a run without spring stiffness
-            counts for itself only.
+            is identified by itself only.
 
         Raises:
             TunnelError: when a wind-on run states no air density.
@@ -121,7 +121,7 @@ def _joint_estimate(
 
 
 def _joint_fit(design: Design, items: Sequence[FittedRun]) -> DecayFit | None:
-    # The runs' own (a, k), weighed by what each knows of them, are within a few deviations of the optimum.
+    # The runs' own (a, k), weighted by their information, are within a few standard deviations of the optimum.
     own = [item.fit for item in items if item.fit is not None]
     decays = np.array([[fit.decay.rate, fit.decay.stiffness] for fit in own])
     informations = [eliminate(fit.information, fit.score, 2)[0] for fit in own]
@@ -130,7 +130,7 @@ def _joint_fit(design: Design, items: Sequence[FittedRun]) -> DecayFit | None:
 
 
 def _influences(runs: Sequence[RunFit], links: Sequence[Array], jacobian: Array) -> Array:
-    """What each run's residual contributes to parameters fitted to all runs.
+    """The contribution of each run's residual to parameters fitted to all runs.
 
     Args:
         runs: of the joint fit, with the zero common to them.

@@ -1,4 +1,4 @@
-"""One examination of a campaign, for every command alike, before anything is estimated from it."""
+"""The examination of a campaign before anything is estimated from it, the same for every command."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from tunnel_sim.vocabulary.record import Record
 def examine(campaign: Campaign) -> Examined:
     """Check a campaign's records against one another and against what is stated of them.
 
-    Repeated records are counted once, what lies before a release is cut off, motion that grows with the wind
-    off and springs or winds at the wrong runs are refused, and springs that do not fit the frequencies are
+    Repeated records are counted once. Samples before the release are cut off. Motion that grows with the wind off,
+    and springs or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies are
     noted.
 
     Args:
         campaign: measured or simulated runs.
 
     Returns:
-        The campaign to go on with and the remarks; the very campaign given where nothing is wrong.
+        The campaign to identify and the remarks; the given campaign itself if nothing is wrong.
 
     Raises:
         TunnelError: when a wind-on run states no air density, or a stated value cannot be computed with.
@@ -44,13 +44,13 @@ def examine(campaign: Campaign) -> Examined:
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """Let every record begin at its release.
+    """Cut every record to begin at its release.
 
     Args:
         campaign: the runs.
 
     Returns:
-        The campaign, itself where every record does so already, and a remark for each run that was cut.
+        The campaign, itself if every record begins at its release already, and a remark for each run that was cut.
     """
     found = [_from_release(run, campaign.sensor) for run in campaign.runs]
     remarks = tuple(remark for _, remark in found if remark is not None)
@@ -65,7 +65,7 @@ def _from_release(run: Run, sensor: SensorProperties) -> tuple[Run, Remark | Non
     remark = Remark(
         Outcome.CUT,
         (run.id,),
-        f"release found at {record.time_s[first]:.3f} s, and what lies before it left out",
-        "cut the record by hand where that is wrong",
+        f"release found at {record.time_s[first]:.3f} s; the samples before it are left out",
+        "cut the record by hand if that is wrong",
     )
     return replace(run, record=Record(record.time_s[first:], record.yaw_rad[first:])), remark

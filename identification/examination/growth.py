@@ -1,4 +1,4 @@
-"""Motion that grows with the wind off: a passive rig cannot, so the record is not what it is said to be."""
+"""Motion that grows with the wind off. A passive rig cannot do that, so the record or its labels are wrong."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.examination.swings import Swing
+from identification.policy import REFUSAL_DEVIATIONS
 from identification.remark import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
-
-_CHANCE = 4.75  # standard deviations: one-sided, less than once in 1e6 runs of no damping at all
 
 
 def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
@@ -20,8 +19,8 @@ def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
         swings: of the runs.
 
     Returns:
-        One remark for all such runs; none where there is none. A run grows where its decay rate is negative
-        beyond chance and its swings are the larger the later. A blow in mid-record does not look like that.
+        One remark for all such runs, if any. A run grows if its decay rate is negative beyond chance and its swings
+        become larger with time; a blow in mid-record does not look like that.
     """
     ids = tuple(s.run.id for s in swings if not s.run.wind_on and _grows(s))
     if not ids:
@@ -30,14 +29,14 @@ def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
         Remark(
             Outcome.REFUSED,
             ids,
-            "the motion grows with the wind off, which a passive rig cannot",
-            "check whether time runs backwards in the file, or state the wind's speed, or leave the run out",
+            "the motion grows with the wind off, which is impossible on a passive rig",
+            "check whether time runs backwards in the file, state the wind speed, or remove the run",
         ),
     )
 
 
 def _grows(swing: Swing) -> bool:
-    if swing.rate + _CHANCE * swing.rate_std >= 0.0:
+    if swing.rate + REFUSAL_DEVIATIONS * swing.rate_std >= 0.0:
         return False
     quarters = [_power(part) for part in np.array_split(swing.motion, 4)]
     return quarters[3] > quarters[2] > max(quarters[0], quarters[1])

@@ -1,8 +1,8 @@
-"""Whether the stated springs and wind speeds can belong to the frequencies, and which two may be exchanged.
+"""Whether the stated springs and wind speeds fit the frequencies, and which two may have been exchanged.
 
-Every run has Kr = Izz ωn² + Ka with one Izz, and Ka in proportion to ½ρV²; within one spring that is a straight
-line of ωn² over ½ρV², whatever the spring's own error. Where the statements contradict the frequencies beyond
-chance and exchanging those of two runs brings them to agree, they were exchanged.
+Every run obeys Kr = Izz ωn² + Ka with a common Izz and with Ka proportional to ½ρV². The runs of one spring lie on
+a straight line of ωn² against ½ρV², whatever the error of the spring. If the statements contradict the frequencies
+beyond chance, and exchanging those of two runs makes them agree, they were exchanged.
 """
 
 from __future__ import annotations
@@ -16,22 +16,17 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
 from identification.examination.swings import Swing
+from identification.policy import LEAST_STIFFNESS_STD, MISFIT_RATE, REFUSAL_RATE, SPRING_TOLERANCE
 from identification.remark import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
 
-#: How well a stated stiffness is usually known, as a ratio: weights and arm of a static calibration.
-SPRING_TOLERANCE = 0.01
-# Contradicted by chance once in 1e6 campaigns, and in agreement but for one in a thousand.
-_CONTRADICTION = 1e-6
-_AGREEMENT = 1e-3
 _CANDIDATES = 12  # runs that fit worst, each tried against all others
 _LEAST_RUNS = 2
-_LEAST_STD = 1e-5  # of k, as a ratio: no clock and no fit is trusted further
 
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """What is stated and what is seen of the runs, run by run.
+    """Stated and measured quantities, run by run.
 
     Args:
         spring: stated Kr, shape (n,), N m/rad.
@@ -55,38 +50,38 @@ class Labels:
             np.array([float(run.spring_stiffness or 0.0) for run in runs]),
             np.array([0.5 * (run.air_density or 0.0) * run.wind_speed**2 for run in runs]),
             seen,
-            np.maximum(std, _LEAST_STD * seen),
+            np.maximum(std, LEAST_STIFFNESS_STD * seen),
         )
 
 
 @dataclass(frozen=True)
 class _Misfit:
-    """Weighted squares that the statements leave, and their degrees of freedom."""
+    """Weighted sum of squared residuals, and its degrees of freedom."""
 
     squares: float
     freedom: int
 
     @property
     def contradicts(self) -> bool:
-        """Whether that is beyond chance."""
-        return self.freedom > 0 and self.squares > float(chi2.isf(_CONTRADICTION, self.freedom))
+        """Whether the residuals are beyond chance."""
+        return self.freedom > 0 and self.squares > float(chi2.isf(REFUSAL_RATE, self.freedom))
 
     def mends(self, before: _Misfit, trials: int) -> bool:
-        """Whether the statements agree, or agree so much better than before that chance cannot be why."""
-        if self.squares <= float(chi2.isf(_AGREEMENT, self.freedom)):
+        """Whether the statements now agree, or agree better than before by more than chance."""
+        if self.squares <= float(chi2.isf(MISFIT_RATE, self.freedom)):
             return True
         ratio = before.squares / max(self.squares, 1e-300)
-        return ratio > float(f.isf(_CONTRADICTION / max(trials, 1), self.freedom, self.freedom))
+        return ratio > float(f.isf(REFUSAL_RATE / max(trials, 1), self.freedom, self.freedom))
 
 
 def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
-    """Refuse springs or wind speeds that stand at the wrong runs.
+    """Refuse springs or wind speeds that are assigned to the wrong runs.
 
     Args:
-        swings: of the runs; those without a stated spring are passed over.
+        swings: of the runs; those without a stated spring are ignored.
 
     Returns:
-        One remark that refuses, with the runs to look at; none where the statements may be right.
+        One remark that refuses the campaign and names the runs; none if the statements may be right.
     """
     known = [swing for swing in swings if swing.run.spring_stiffness is not None]
     if len(known) < _LEAST_RUNS:
@@ -108,8 +103,8 @@ def _remark(what: str, places: Sequence[tuple[str, ...]]) -> Remark:
     return Remark(
         Outcome.REFUSED,
         ids,
-        f"the stated {what} contradicts the frequencies, and agrees once that of {pairs} is exchanged",
-        f"correct {what} of these runs, or their files",
+        f"the stated {what} contradicts the frequencies, but agrees if {pairs} are exchanged",
+        f"correct {what} or the file names of these runs",
     )
 
 
@@ -126,15 +121,15 @@ def _best_exchanges(
     if not mended:
         return []
     least = min(found.squares for _, found in mended)
-    # Exchanges that leave as little as the best one cannot be told apart.
-    limit = least + float(chi2.isf(_AGREEMENT, 1))
+    # Exchanges that fit as well as the best one cannot be told apart.
+    limit = least + float(chi2.isf(MISFIT_RATE, 1))
     return [places for places, found in mended if found.squares <= limit]
 
 
 def _of_springs(labels: Labels) -> tuple[_Misfit, Array]:
-    """How far Kr = Izz k + C ½ρV² is from all runs, each good to its frequency and its spring's tolerance.
+    """Misfit of Kr = Izz k + C ½ρV² to all runs, weighted by their frequencies and the springs' tolerance.
 
-    The runs of one spring share its error, so together they count once.
+    The runs of one spring share its error, so they count once together.
     """
     columns = labels.seen[:, None]
     if np.any(labels.pressure > 0.0):
@@ -146,7 +141,7 @@ def _of_springs(labels: Labels) -> tuple[_Misfit, Array]:
 
 
 def _of_winds(labels: Labels) -> tuple[_Misfit, Array]:
-    """How far k = k0(spring) - c ½ρV² is from all runs."""
+    """Misfit of k = k0(spring) - c ½ρV² to all runs."""
     springs, place = np.unique(labels.spring, return_inverse=True)
     columns = np.zeros((labels.seen.size, springs.size + 1))
     columns[np.arange(labels.seen.size), place] = 1.0

@@ -1,9 +1,9 @@
 """Where the free motion of a record begins, after a hand, a latch or a sensor at rest.
 
-Free motion crosses its centre every half cycle, whatever phase it starts in. A stretch between two crossings (or
-from the record's start to the first) that lasts longer is no free motion: the body was held, or moved by hand, or
-hung at rest. The release is then where the motion that follows, carried back, stands still. A hold shorter than
-about three quarters of a cycle leaves no such stretch and is not looked for.
+Free motion crosses its centre every half cycle, whatever its initial phase. In a longer interval between two
+crossings (or between the start of the record and the first one) the body was held, moved by hand, or at rest. The
+release is then the turning point of the motion that follows, extrapolated backwards. A hold shorter than about
+three quarters of a cycle leaves no such interval and is not detected.
 """
 
 from __future__ import annotations
@@ -16,33 +16,32 @@ from identification.decay.residual_noise import white_noise
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
-_NEAR_LARGEST = 0.9  # the last swing of this share of the largest comes after the release
+_NEAR_LARGEST = 0.9  # of the largest swing: the last swing of this size comes after the release
 _LEAST_SAMPLES = 16
-_SMOOTHED = 0.125  # of a cycle, as a moving average: noise and hum fall, the swing hardly
-_BAND = 0.1  # of the largest swing: how far beyond the centre a crossing must lead
-_NOISE_MARGIN = 5.0  # standard deviations of the smoothed noise, where that is more: no crossing by chance
+_SMOOTHED = 0.125  # of a cycle, width of the moving average: it reduces noise and hum, and hardly the swing
+_BAND = 0.1  # of the largest swing: a crossing counts if the motion goes this far beyond the centre
+_NOISE_MARGIN = 5.0  # standard deviations of the smoothed noise, if that is more: no crossing by chance
 _WIDEST_BAND = 0.3
-# A half cycle may be longer than the next ones by its amplitude alone: a pendulum let go at 160 degrees takes twice
-# the time of its small swings.
+# A half cycle may be longer than the next ones because of its amplitude alone: a pendulum released at 160 degrees
+# takes twice the time of its small swings.
 _LONGER = 2.0
-_GROWTH = 0.02  # e-folds of growth over those half cycles: a motion that builds up has no release
+_GROWTH = 0.02  # e-folds of growth over the fitted half cycles: a motion that builds up has no release
 _CARRIED_BACK = (
-    0.75  # of a half cycle: beyond a quarter cycle, where the release lies, short of the one before
+    0.75  # of a half cycle: the release lies a quarter cycle back, the previous turning point three quarters
 )
-_FITTED_HALVES = 4.0  # half cycles after the release that are carried back
-_REGULAR = 2  # half cycles of about the usual length before a release; more are a free motion of their own
+_FITTED_HALVES = 4.0  # half cycles after the release that are fitted and extrapolated backwards
+_REGULAR = 2  # half cycles of about the usual length before a release; more are an earlier free motion
 
 
 def find_release(record: Record, sensor: SensorProperties) -> int:
-    """The sample at which the body is let go.
+    """The sample at which the body is released.
 
     Args:
         record: one run's reading.
         sensor: what is stated of its noise.
 
     Returns:
-        Index of the first sample of the free motion; 0 where the record starts in it, or where no oscillation
-        stands out.
+        Index of the first sample of the free motion; 0 if the record starts in it, or if no oscillation is found.
     """
     free = _surely_free(record)
     if record.yaw_rad.size - free < _LEAST_SAMPLES:
@@ -59,14 +58,14 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
 def _surely_free(record: Record) -> int:
     yaw = record.yaw_rad
     away = np.abs(yaw - np.median(yaw[yaw.size // 2 :]))
-    # Where next to nothing decays, a large swing comes last: half the record is enough to know the motion by.
+    # Under very light damping a large swing may come last: half the record is enough to know the motion.
     return min(int(np.flatnonzero(away >= _NEAR_LARGEST * away.max())[-1]), yaw.size // 2)
 
 
 def _crossings(
     record: Record, sensor: SensorProperties, centre: float, frequency: float
 ) -> tuple[Array, int]:
-    """Where the smoothed reading passes its centre, in samples from the record's start, which is the first of them.
+    """Where the smoothed reading crosses its centre, in samples; the start of the record counts as the first.
 
     The second value is the place of the first crossing after the largest excursion.
     """
@@ -85,7 +84,7 @@ def _crossings(
 
 
 def _last_long_stretch(crossings: Array, largest: int) -> int | None:
-    """Which stretch up to the largest excursion lasts longer than free motion can; None where none does."""
+    """The last interval before the largest excursion that is too long for free motion; None if there is none."""
     lengths = np.diff(crossings)
     for place in range(min(largest, lengths.size - 1) - 1, -1, -1):
         usual = float(lengths[place + 1 : place + 3].max())
@@ -97,10 +96,10 @@ def _last_long_stretch(crossings: Array, largest: int) -> int | None:
 
 
 def _standstill(record: Record, crossings: Array, held: int) -> int:
-    """The sample where the motion after a held stretch, carried back, stands still."""
+    """The turning point of the motion after a hold, extrapolated backwards, in samples."""
     usual = float(np.diff(crossings)[held + 1 : held + 3].max())
     end = crossings[held + 1]
-    # The end of the stretch is a crossing of the free motion, or a jump to where it begins: fit after the next one.
+    # The interval ends at a crossing of the free motion, or at a jump to its start: fit after the next crossing.
     first = int(crossings[min(held + 2, crossings.size - 1)])
     last = min(record.yaw_rad.size, first + round(_FITTED_HALVES * usual))
     if last - first < _LEAST_SAMPLES:
@@ -121,7 +120,7 @@ def _standstill(record: Record, crossings: Array, held: int) -> int:
 def _turning_points(run: RunFit, sample_rate: float) -> Array:
     """Turning points of a fitted decay from two cycles before its first sample to one after, in samples."""
     decay = run.decay
-    # β = e^{-at}(C cos ωt + S sin ωt) stands still where (Sω - aC) cos ωt = (Cω + aS) sin ωt.
+    # β = e^{-at}(C cos ωt + S sin ωt) has its turning points where (Sω - aC) cos ωt = (Cω + aS) sin ωt.
     cosine, sine = run.angle, (run.rate + decay.rate * run.angle) / decay.omega_d
     phase = np.arctan2(sine * decay.omega_d - decay.rate * cosine, cosine * decay.omega_d + decay.rate * sine)
     return np.asarray((phase + np.pi * np.arange(-4, 3)) / decay.omega_d * sample_rate)

@@ -1,4 +1,4 @@
-"""The same record under several ids: counted once, since it holds its information once."""
+"""The same record under several ids is counted once."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def without_repeats(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         campaign: the runs.
 
     Returns:
-        The campaign with every record once, and a remark for every id that was left out. Where the same
-        samples stand under other conditions, one of the two statements is wrong: that remark refuses.
+        The campaign with every record once, and a remark for every id that was left out. The same samples under
+        different conditions are refused: one of the two statements is wrong.
     """
     first: dict[bytes, Run] = {}
     remarks = []
@@ -34,14 +34,14 @@ def _remark(earlier: Run, run: Run) -> Remark:
         return Remark(
             Outcome.LEFT_OUT,
             (run.id,),
-            f"the same samples as run {earlier.id}, counted once",
-            "leave it out, or name its own file",
+            f"the same samples as run {earlier.id}, so counted once",
+            "remove the run, or correct its file name",
         )
     return Remark(
         Outcome.REFUSED,
         (earlier.id, run.id),
-        "the same samples under another spring or wind",
-        "name each run's own file, or leave one of them out",
+        "the same samples with different springs or wind speeds",
+        "correct the file names, or remove one of the runs",
     )
 
 

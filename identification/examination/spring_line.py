@@ -1,4 +1,4 @@
-"""Whether the stated springs agree with one another: wind-off, Kr/ωn² is one inertia."""
+"""Whether the stated springs agree: with the wind off, Kr/ωn² is the same inertia for all of them."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2, norm
 
-from identification.examination.labels import SPRING_TOLERANCE
 from identification.examination.swings import Swing
+from identification.policy import MISFIT_RATE, SPRING_TOLERANCE
 from identification.remark import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
 
-_FALSE_ALARM_RATE = 1e-3  # of sets of springs that are as good as SPRING_TOLERANCE
-_LEAST = 3  # springs that it takes to say which one is off
+_LEAST = 3  # springs needed to say which one is wrong
 
-_REMEDY = "weigh that spring again; a tilted axis or a rod that twists looks alike, and the diagnosis tells"
+_REMEDY = "calibrate that spring again; a tilted axis or a flexible rod looks similar, run the diagnosis"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +54,7 @@ class _Springs:
     def disagree(self) -> bool:
         """Whether the springs' inertias differ beyond chance."""
         away = (self.inertia - self.mean()[0]) / self.std
-        return float(away @ away) > float(chi2.isf(_FALSE_ALARM_RATE, self.stiffness.size - 1))
+        return float(away @ away) > float(chi2.isf(MISFIT_RATE, self.stiffness.size - 1))
 
 
 def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
@@ -65,8 +64,8 @@ def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
         swings: of the runs; only those with the wind off and a stated spring count.
 
     Returns:
-        One remark, on the one spring that is off where three or more tell which, else on all of them; none
-        where the springs agree within their tolerance.
+        One remark: on the spring that is wrong if three or more show which one it is, else on all of them. None
+        if the springs agree within their tolerance.
     """
     still = [s for s in swings if not s.run.wind_on and s.run.spring_stiffness is not None]
     if len({s.run.spring_stiffness for s in still}) < 2:
@@ -79,12 +78,12 @@ def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
 
 
 def _relative_std(group: Sequence[Swing]) -> float:
-    """Of the mean of ln k: what the amplitude does to k is common to the runs of a spring."""
+    """Of the mean of ln k: the effect of the amplitude on k is common to the runs of a spring."""
     return float(np.mean([s.stiffness_std / s.stiffness for s in group]))
 
 
 def _the_one(springs: _Springs) -> int | None:
-    """The spring without which the others agree and which is itself beyond chance; None where there is not one."""
+    """The spring that differs beyond chance while the others agree; None if there is no single one."""
     scores = []
     for place in range(springs.stiffness.size):
         rest = springs.without(place)
@@ -92,7 +91,7 @@ def _the_one(springs: _Springs) -> int | None:
         score = abs(springs.inertia[place] - mean) / float(np.hypot(std, springs.std[place]))
         scores.append(-1.0 if rest.disagree() else score)
     best = int(np.argmax(scores))
-    beyond = float(norm.isf(0.5 * _FALSE_ALARM_RATE / springs.stiffness.size))
+    beyond = float(norm.isf(0.5 * MISFIT_RATE / springs.stiffness.size))
     return best if scores[best] > beyond else None
 
 
@@ -102,8 +101,8 @@ def _one(springs: _Springs, place: int) -> Remark:
     return Remark(
         Outcome.NOTED,
         springs.runs[place],
-        f"their spring acts about {said} than the {springs.stiffness[place]:g} N m/rad stated, by the other "
-        f"springs' frequencies",
+        f"their spring appears {said} than the stated {springs.stiffness[place]:g} N m/rad, judged by the "
+        f"frequencies of the other springs",
         _REMEDY,
     )
 
@@ -113,7 +112,7 @@ def _several(springs: _Springs) -> Remark:
     return Remark(
         Outcome.NOTED,
         tuple(name for group in springs.runs for name in group),
-        f"with the wind off Kr/omega_n^2 differs by {spread:.0f} % between the stated springs, and which one is "
-        f"off cannot be told",
-        "weigh the springs again; a tilted axis or a rod that twists looks alike, and the diagnosis tells",
+        f"with the wind off Kr/omega_n^2 differs by {spread:.0f} % between the stated springs; which one is wrong "
+        f"cannot be determined",
+        "calibrate the springs again; a tilted axis or a flexible rod looks similar, run the diagnosis",
     )

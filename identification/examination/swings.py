@@ -1,4 +1,4 @@
-"""Stiffness over inertia and decay rate of each run, and how far they may be trusted."""
+"""Stiffness over inertia and decay rate of each run, with standard deviations."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
 
 _UNKNOWNS = 5  # decay rate, stiffness, zero, initial angle and rate
-_LEAST_SAMPLES = 30  # of a part of a record whose poles are taken by themselves
-_E_FOLDING = 0.5  # e-folds of the first part: both parts then know the frequency about as well
+_LEAST_SAMPLES = 30  # of a part of a record whose poles are found separately
+_E_FOLDING = 0.5  # e-folds in the first part: both parts then determine the frequency about equally well
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +25,8 @@ class Swing:
     Args:
         run: the run.
         stiffness: k = ωn², 1/s².
-        stiffness_std: its standard deviation, 1/s², the change of k along the run included: a frequency that
-            depends on the amplitude is known no better than that.
+        stiffness_std: its standard deviation, 1/s². It includes the change of k along the run: a frequency that
+            depends on the amplitude is not known better than that.
         rate: a = ζωn, 1/s; negative where the motion grows.
         rate_std: its standard deviation, 1/s.
         motion: reading less the sensor's zero, thinned, shape (n,), rad.
@@ -41,16 +41,16 @@ class Swing:
 
 
 def swing_of(run: Run) -> Swing | None:
-    """Measure a run's oscillation by its poles, which need no start and no iteration.
+    """Measure a run's oscillation by its poles, which need no starting values and no iteration.
 
-    The residual is taken to be correlated over half a cycle, so that what the decay does not explain widens the
-    standard deviations.
+    The residual is taken to be correlated over half a cycle, so a decay that does not explain the record has
+    larger standard deviations.
 
     Args:
-        run: the run; its spring and wind are of no concern here.
+        run: the run; its spring and wind are not used.
 
     Returns:
-        The oscillation; None where there is none.
+        The oscillation; None if there is none.
     """
     frequency = starting_frequency(run.record)
     if frequency is None:
@@ -76,13 +76,13 @@ def swing_of(run: Run) -> Swing | None:
 
 
 def _poles(reading: Reading, omega: float) -> PencilDecay | None:
-    """The oscillation of a stretch; None where its poles are no oscillation's."""
+    """The oscillation of a part of a record; None if its poles are not those of an oscillation."""
     found = pencil_decay(reading.yaw, float(reading.time[-1]) / (reading.time.size - 1), omega)
     return found if found is not None and found.decay.omega_d > 0.0 else None
 
 
 def _change_along(reading: Reading, decay: Decay) -> float:
-    """Change of k between the run's first part and the rest, 1/s²; 0 where the record is too short to say."""
+    """Change of k between the run's first part and the rest, 1/s²; 0 if the record is too short."""
     length = float(reading.time[-1])
     split = 0.5 * length if decay.rate <= 0.0 else min(0.5 * length, _E_FOLDING / decay.rate)
     at = int(np.searchsorted(reading.time, max(split, 2.0 * np.pi / decay.omega_d)))

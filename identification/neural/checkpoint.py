@@ -1,4 +1,4 @@
-"""An interrupted training on disk: safetensors, with the spec it belongs to."""
+"""The checkpoint of a training as safetensors, with the specification it belongs to."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """How far a training has come.
+    """The progress of a training.
 
     Args:
-        ended: trainings that ended, network by network and start by start.
-        running: the one that has begun; None between two.
+        ended: finished trainings, network by network and start by start.
+        running: the current training; None between two.
     """
 
     ended: tuple[Progress, ...] = ()
@@ -39,13 +39,13 @@ class Checkpoint:
         """As safetensors.
 
         Args:
-            spec: of the training, as JSON; read again only for the same one.
+            spec: of the training, as JSON; the checkpoint is valid only for the same one.
         """
         told = [*self.ended, *([] if self.running is None else [self.running])]
         tensors = {f"weights.{number}": one.weights for number, one in enumerate(told)}
         state = [
             [one.held.alpha, one.held.beta, one.damping, one.iteration, one.finished] for one in told
-        ]  # Python writes floats so that they read back to the same bits
+        ]  # Python writes floats so that they are read back exactly
         document = {"spec": spec, "state": state, "ended": len(self.ended)}
         return save(tensors or {"none": np.zeros(1)}, {"training": json_line(document)})
 
@@ -55,10 +55,10 @@ class Checkpoint:
 
         Args:
             content: the file's.
-            spec: of the training that is to go on, as JSON.
+            spec: of the training to be resumed, as JSON.
 
         Returns:
-            None where it is no checkpoint of that spec.
+            The progress; None where it is not a checkpoint of that specification.
         """
         try:
             # A safetensors file is the length of its header, the header as JSON, and the tensors.
@@ -77,7 +77,7 @@ class Checkpoint:
 
 
 def _progress(weights: Array, state: Sequence[float]) -> Progress:
-    """Where one training stood; raises ValueError or TypeError where the file does not say."""
+    """The progress of one training; raises ValueError or TypeError for a malformed file."""
     alpha, beta, damping, iteration, finished = state
     numbers = np.array([alpha, beta, damping], dtype=np.float64)
     if weights.size not in map(parameter_count, SIZES.values()) or weights.dtype != np.float64:
@@ -85,12 +85,12 @@ def _progress(weights: Array, state: Sequence[float]) -> Progress:
     if not (np.isfinite(weights).all() and np.isfinite(numbers).all() and min(alpha, beta, damping) >= 0.0):
         raise ValueError("not finite")
     if not isinstance(iteration, int) or iteration < 0 or not isinstance(finished, bool | int):
-        raise TypeError("no number of steps")
+        raise TypeError("not a number of steps")
     return Progress(weights, Hyperparameters(alpha, beta), damping, iteration, bool(finished))
 
 
 def read_checkpoint(path: Path, spec: dict[str, Any]) -> Checkpoint | None:
-    """A checkpoint of this very training.
+    """Read the checkpoint of a training.
 
     Args:
         path: of the file; need not exist.
@@ -100,6 +100,6 @@ def read_checkpoint(path: Path, spec: dict[str, Any]) -> Checkpoint | None:
         None where there is none, or it belongs to another training.
 
     Raises:
-        TunnelError: when there is something that cannot be read.
+        TunnelError: when the file exists but cannot be read.
     """
     return Checkpoint.from_bytes(read_regular(path, limits.WEIGHTS_BYTES), spec) if path.exists() else None

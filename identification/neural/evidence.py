@@ -25,11 +25,11 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True)
 class Hyperparameters:
-    """How much the data and the prior weigh.
+    """The weights of the data and of the prior.
 
     Args:
-        alpha: α, of the weights' squares; dimensionless, for scaled quantities.
-        beta: β, of the errors' squares; likewise.
+        alpha: α, of the squared network weights; dimensionless, for scaled quantities.
+        beta: β, of the squared errors; likewise.
     """
 
     alpha: float
@@ -44,7 +44,7 @@ class Hyperparameters:
         return self.beta / (self.beta + self.alpha * weights)
 
     def effective_parameters(self, eigenvalues: Array) -> float:
-        """γ, how many parameters the data decide.
+        """γ, the effective number of parameters determined by the data.
 
         Args:
             eigenvalues: λ of JᵀJ, those that are not zero, shape (k,).
@@ -55,10 +55,10 @@ class Hyperparameters:
 def updated(
     held: Hyperparameters, eigenvalues: Array, squared_errors: float, squared_weights: float, samples: int
 ) -> Hyperparameters:
-    """One step of the evidence's re-estimation of α and β.
+    """One re-estimation of α and β by the evidence.
 
     Args:
-        held: the present ones.
+        held: the present values.
         eigenvalues: λ of JᵀJ, those that are not zero, shape (k,).
         squared_errors: E_D, in squared units of the scaled output.
         squared_weights: E_W, (1).

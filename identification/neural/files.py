@@ -1,6 +1,6 @@
-"""Weights as safetensors, with the training record beside them as JSON; no pickle anywhere.
+"""Weights as safetensors, with the training record beside them as JSON, without pickle.
 
-``paper.safetensors`` and ``paper.json`` in ``identification/neural/weights`` are those that ship.
+The packaged ones are ``paper.safetensors`` and ``paper.json`` in ``identification/neural/weights``.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def weights_bytes(damping: Network, frequency: Network) -> bytes:
 
 
 def read_networks(weights: Path) -> Networks:
-    """Networks that ``tunnel train`` has written.
+    """Read networks written by ``tunnel train``.
 
     Args:
         weights: the safetensors file; its record is the ``.json`` of the same name beside it.
@@ -61,7 +61,7 @@ def read_networks(weights: Path) -> Networks:
         The networks.
 
     Raises:
-        TunnelError: when either file is missing, is not what it should be, or the two do not belong together.
+        TunnelError: when a file is missing or malformed, or the two do not belong together.
     """
     remedy = "name the .safetensors file that tunnel train wrote, with its .json beside it"
     content = read_regular(weights, limits.WEIGHTS_BYTES, missing=remedy, readable=remedy)
@@ -71,14 +71,14 @@ def read_networks(weights: Path) -> Networks:
 
 @cache
 def shipped_networks() -> Networks:
-    """The networks that come with the package."""
+    """The packaged networks."""
     folder = resources.files("identification") / "neural" / "weights"
     weights = (folder / f"{SHIPPED}.safetensors").read_bytes()
     return networks_of(weights, (folder / f"{SHIPPED}.json").read_text(encoding="utf-8"), SHIPPED)
 
 
 def shipped_record() -> dict[str, Any]:
-    """The training record of the networks that come with the package."""
+    """The training record of the packaged networks."""
     folder = resources.files("identification") / "neural" / "weights"
     found: dict[str, Any] = json.loads((folder / f"{SHIPPED}.json").read_text(encoding="utf-8"))
     return found
@@ -90,17 +90,20 @@ def networks_of(weights: bytes, record: bytes | str, where: str) -> Networks:
     Args:
         weights: safetensors.
         record: JSON.
-        where: what to call them in an error.
+        where: their name in errors.
 
     Returns:
         The networks.
 
     Raises:
-        TunnelError: when they are not what they should be, or do not belong together.
+        TunnelError: when they are malformed, or do not belong together.
     """
-    remedy = "train them anew with tunnel train"
+    remedy = "train them again with tunnel train"
     document = parse_json(record, where, remedy)
-    with as_described("not weights with their training record", where, remedy), _as_value_error():
+    with (
+        as_described("not the weights and training record of two networks", where, remedy),
+        _as_value_error(),
+    ):
         if document["weights_sha256"] != hashlib.sha256(weights).hexdigest():
             raise TunnelError(
                 "weights and training record do not belong together", where=where, remedy=remedy
@@ -112,7 +115,7 @@ def networks_of(weights: bytes, record: bytes | str, where: str) -> Networks:
 
 @contextmanager
 def _as_value_error() -> Iterator[None]:
-    """The error of safetensors has no base but Exception."""
+    """The error of safetensors has no base class but Exception."""
     try:
         yield
     except SafetensorError as error:

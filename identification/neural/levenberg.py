@@ -1,11 +1,12 @@
 """Full-batch Levenberg–Marquardt with the evidence's regularisation, in torch float64.
 
-Each step solves (βJᵀJ + (α + μ)I) δ = −(βJᵀe + αw) by the singular values of J, so that γ stays right where β is
-large; a step that lowers F = βE_D + αE_W is taken and μ divided by ten, one that does not is tried again with ten
+Each step solves (βJᵀJ + (α + μ)I) δ = −(βJᵀe + αw) by the singular values of J, so that γ remains accurate where
+β is large. A step that lowers F = βE_D + αE_W is accepted and μ divided by ten; otherwise it is repeated with ten
 times the μ. After every step α and β are re-estimated. Sources: Hagan and Menhaj, IEEE Trans. Neural Networks 5
 (1994) 989–993, doi 10.1109/72.329697, and those of `identification.neural.evidence`.
 
-One thread and one order of operations: the same start gives the same bits on the same machine and torch.
+With one thread and a fixed order of operations, the same start gives identical weights on the same machine and
+version of torch.
 """
 
 from __future__ import annotations
@@ -28,22 +29,22 @@ if TYPE_CHECKING:
 
 _FIRST = Hyperparameters(0.01, 1.0)
 _FIRST_DAMPING = 5e-3
-_LARGEST_DAMPING = 1e10  # of β: the steps are rounding then
+_LARGEST_DAMPING = 1e10  # of β: steps are then of the order of rounding errors
 _SMALLEST_DAMPING = 1e-20  # of β
 _FACTOR = 10.0
-_STANDS_OUT = 1e-4  # a direction whose βλ is less of α than this is left to the prior
+_STANDS_OUT = 1e-4  # directions with βλ/α below this are left to the prior
 
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """Where a training stands; enough to go on from.
+    """The state of a training, sufficient to resume it.
 
     Args:
         weights: shape (n,).
         held: α and β.
         damping: μ; dimensionless.
         iteration: number of steps taken.
-        finished: whether no step lowers F any more.
+        finished: whether no step lowers F any longer.
     """
 
     weights: Array
@@ -83,7 +84,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a training came to.
+    """The result of a training.
 
     Args:
         held: α and β.
@@ -114,7 +115,7 @@ def first_weights(sizes: tuple[int, ...], rng: np.random.Generator) -> Array:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Let torch use one thread within, as many as before afterwards."""
+    """Limit torch to one thread inside the context."""
     import torch
 
     threads = torch.get_num_threads()
@@ -126,7 +127,7 @@ def one_thread() -> Iterator[None]:
 
 
 def _layers(weights: Tensor, sizes: tuple[int, ...]) -> list[tuple[Tensor, Tensor]]:
-    # Slicing and reshaping are torch's as they are NumPy's.
+    # Slicing and reshaping are the same in torch and NumPy.
     return cast("list[tuple[Tensor, Tensor]]", split(cast("Array", weights), sizes))
 
 
@@ -171,14 +172,14 @@ def outputs_only(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor) -> Ten
 
 
 def advance(progress: Progress, problem: Problem) -> Progress:
-    """One step of Levenberg–Marquardt, and α and β anew before it.
+    """One step of Levenberg–Marquardt, after a re-estimation of α and β.
 
     Args:
-        progress: where the training stands.
-        problem: what is trained on.
+        progress: state of the training.
+        problem: the training pairs.
 
     Returns:
-        Where it stands then; ``finished`` where no step lowers F.
+        The new state; ``finished`` where no step lowers F.
     """
     import torch
 
@@ -208,11 +209,11 @@ def advance(progress: Progress, problem: Problem) -> Progress:
 
 
 def conclude(progress: Progress, problem: Problem) -> tuple[Network, Outcome]:
-    """The trained network with its posterior, and what the training came to.
+    """The trained network with its posterior, and the result of the training.
 
     Args:
-        progress: where the training ended.
-        problem: what was trained on.
+        progress: final state of the training.
+        problem: the training pairs.
 
     Returns:
         Both.

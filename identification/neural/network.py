@@ -21,7 +21,7 @@ class Scaling:
 
     Args:
         mean: shape (n,).
-        deviation: shape (n,); 1 where only the mean is taken off.
+        deviation: shape (n,); 1 where only the mean is removed.
     """
 
     mean: tuple[float, ...]
@@ -29,7 +29,7 @@ class Scaling:
 
     @classmethod
     def of(cls, values: Array) -> Scaling:
-        """That of training values, shape (N, n)."""
+        """The scaling of training values, shape (N, n)."""
         return cls(tuple(values.mean(axis=0).tolist()), tuple(values.std(axis=0).tolist()))
 
     def apply(self, values: Array) -> Array:
@@ -60,7 +60,7 @@ class Network:
     prior_precision: float
 
     def value(self, inputs: Array) -> Array:
-        """The output for rows of inputs, shape (N, inputs), in the output's unit: shape (N,)."""
+        """The outputs, shape (N,), in their unit, for rows of inputs, shape (N, inputs)."""
         hidden = self.inputs.apply(inputs)
         layers = split(self.weights, self.sizes)
         for matrix, bias in layers[:-1]:

@@ -1,4 +1,4 @@
-"""The trained pair of networks: from a shape and t3 to ζ and ωn, and where their word ends."""
+"""The trained pair of networks: from a shape and t3 to ζ and ωn, with errors and training range."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True)
 class Errors:
-    """What is left between a network and the truth over its range, noise-free.
+    """The errors of the networks over their range, noise-free.
 
     Args:
         zeta: largest absolute error of ζ, (1).
@@ -38,9 +38,9 @@ class Errors:
 
     @classmethod
     def from_json_dict(cls, data: dict[str, Any]) -> Errors:
-        """The inverse of `to_json_dict`; raises ValueError or TypeError where it is none."""
+        """The inverse of `to_json_dict`; raises ValueError or TypeError for a malformed document."""
         if not all(isinstance(value, float | int) and isfinite(value) for value in data.values()):
-            raise ValueError("an error that is no finite number")
+            raise ValueError("an error that is not a finite number")
         return cls(**data)
 
 
@@ -51,7 +51,7 @@ class Networks:
     Args:
         damping: 100-5-5-1, shape to ζ.
         frequency: 2-2-5-1, ζ and t3 to ωn.
-        spec: what they were trained on.
+        spec: of the training data.
         errors: on the test set.
     """
 
@@ -89,10 +89,10 @@ class Networks:
         return float(by_zeta) * omega, float(by_time) * omega / t3
 
     def own_stds(self, zeta: float, t3: float) -> tuple[float, float]:
-        """Standard deviations that the networks add by themselves, of ζ and, relative, of ωn.
+        """Standard deviations due to the networks, of ζ and, relative, of ωn.
 
-        That of the weights' posterior at the clean response of this ζ, and the largest error of the test set as the
-        half width of a uniform distribution (GUM 4.3.7).
+        They combine the posterior of the weights at the noise-free response of this ζ and the largest error of the
+        test set as the half-width of a rectangular distribution (GUM 4.3.7).
 
         Args:
             zeta: damping ratio.
@@ -119,10 +119,10 @@ class Networks:
 
 
 def held_out_errors(networks: Networks, rng: np.random.Generator) -> Errors:
-    """Errors on responses that were not trained on.
+    """Errors on responses outside the training set.
 
     Args:
-        networks: both; the second is fed the first's ζ.
+        networks: both; the second uses the ζ of the first.
         rng: draws the responses.
     """
     zeta, omega = held_out_points(networks.spec, rng)

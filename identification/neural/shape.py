@@ -1,13 +1,14 @@
-"""What the first network sees: three cycles of a free decay, as 100 numbers that hang on ζ alone.
+"""The input of the first network: three cycles of a free decay, as 100 numbers that depend on ζ alone.
 
 From a zero crossing on, every free decay is an impulse response (paper, eq. 12): e^{−ζωn t} sin ωd t. With time in
-units of t3, the time of three damped cycles, ωn leaves it:
+units of t3, the time of three damped cycles, it no longer depends on ωn:
 
     y(τ) = e^{−6πκτ} sin 6πτ,   κ = ζ/√(1 − ζ²),   τ = t/t3 from 0 to 1.
 
-Each of the 100 numbers is the mean over its hundredth of that axis. Their own mean is taken off, and they are
-divided by the largest value of the first half cycle, so that neither amplitude nor sensor zero is left in them. The
-largest value is that of a quartic through the half cycle's points, which noise moves less than their maximum.
+Each of the 100 numbers is the mean over a hundredth of that axis. Their mean is removed, and they are divided by
+the largest value of the first half cycle, so that they depend neither on the amplitude nor on the sensor's zero.
+The largest value is that of a quartic through the points of the half cycle, which is less sensitive to noise than
+their maximum.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ class Shape:
 
     Args:
         inputs: the network's, shape (100,).
-        scale: what the points were divided by: the amplitude, in the unit of the points.
-        peak_weights: how the points make the scale, shape (100,).
+        scale: divisor of the points, the amplitude, in the unit of the points.
+        peak_weights: weights of the points in the scale, shape (100,).
     """
 
     inputs: Array
@@ -47,7 +48,7 @@ class Shape:
 
 
 def normalise(points: Array) -> Shape:
-    """Take off the mean and scale the first half cycle's largest value to 1.
+    """Remove the mean and scale the first half cycle's largest value to 1.
 
     Args:
         points: means over the hundredths of three cycles from a zero crossing on, the first half cycle positive,

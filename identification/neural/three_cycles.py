@@ -1,12 +1,12 @@
-"""Finds consecutive three-cycle windows in a record, from its zero crossings alone.
+"""Consecutive windows of three cycles in a record, from its zero crossings alone.
 
 A window begins at a zero crossing and lasts t3, the time of three damped cycles: six half cycles. The seven
-crossings are t_k = t0 + k t3/6, fitted by least squares with the weights their slopes give them, so that the late
-ones, which noise swallows where ζ is large, count little. The half cycles' means are z + m (−r)^k for any linear
+crossings are t_k = t0 + k t3/6, fitted by least squares with weights from their slopes, so that the late
+ones, which are lost in noise where ζ is large, count little. The half cycles' means are z + m (−r)^k for any linear
 decay; their regression on one another gives the sensor's zero z and the decay per half cycle r, at any ζ.
 
-Every step is linear in the reading once the crossings are placed. So each result carries the weights by which the
-samples make it, and white noise is propagated through all of it by the delta method.
+Every step is linear in the reading once the crossings are known. So each result has the weights of the samples in
+it, and white noise is propagated through all steps by the delta method.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from identification.decay.first_guess import starting_decay
-from identification.decay.readable import LEAST_SAMPLES
 from identification.neural.shape import CYCLES, POINTS, Shape, normalise
+from identification.policy import LEAST_SAMPLES
 from tunnel_sim.vocabulary.record import Array, Record
 
 HALVES = 2 * CYCLES
-_SAMPLES_PER_CYCLE = 134  # kept of a denser record; four to each of the 100 points
+_SAMPLES_PER_CYCLE = 134  # a denser record is thinned to these; about four per point of the 100
 _LEAST_PER_CYCLE = 8.0
 # Of a half cycle, either side of a crossing, that its quintic is fitted to; a cubic biases ζ by 0.1 %.
 _REACH = 0.25
@@ -30,7 +30,7 @@ _TERMS = 6
 _EXPONENTS = np.arange(_TERMS)[:, None]
 _ROUNDS = 8
 _SETTLED = 1e-10  # of a half cycle
-_CLEAR = 20.0  # amplitude over the noise of a crossing's level, at which linear propagation holds
+_CLEAR = 20.0  # amplitude over the noise of a crossing's level for which linear propagation is valid
 _BAND = 4.0  # a crossing counts when the smoothed reading goes this many standard deviations beyond
 _SHARE = 0.004  # or this share of the largest swing
 
@@ -45,7 +45,7 @@ class ThreeCycles:
         zero: of the sensor, rad.
         decay: envelope's ratio over half a cycle, (1).
         shape: the first network's inputs.
-        noise: how the samples' noise reaches the results.
+        noise: propagation of the samples' noise to the results.
     """
 
     start_s: float
@@ -58,13 +58,13 @@ class ThreeCycles:
 
 @dataclass(frozen=True, eq=False)
 class Propagation:
-    """How the samples' white noise reaches the points, the window's start and t3.
+    """Propagation of the samples' white noise to the points, the start of the window and t3.
 
     Args:
         std: of one sample, rad.
         points: weights of the samples in the 100 points, shape (100, n).
         timing: weights of the samples in t0 and t3, s/rad, shape (2, n).
-        by_timing: how the points move with t0 and t3, rad/s, shape (100, 2).
+        by_timing: derivatives of the points by t0 and t3, rad/s, shape (100, 2).
         first: index of the first sample that has a weight.
     """
 
@@ -75,7 +75,7 @@ class Propagation:
     first: int
 
     def weights(self, shape: Shape, gradient: Array) -> Array:
-        """How the samples' noise, in standard deviations, makes errors of ζ and t3.
+        """Errors of ζ and t3 per standard deviation of each sample's noise.
 
         Args:
             shape: the window's.
@@ -91,7 +91,7 @@ class Propagation:
 
 @dataclass(frozen=True, eq=False)
 class _Trace:
-    """A record thinned by block means, which keep a decay's rate and frequency, with its spline and noise."""
+    """A record thinned by block means, with its spline and noise."""
 
     time: Array
     yaw: Array
@@ -106,7 +106,7 @@ class _Trace:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a window lies, and how it decays there."""
+    """The place of a window, and its decay."""
 
     start: float
     half: float
@@ -116,7 +116,7 @@ class _Place:
 
 
 def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, ...], float]:
-    """The windows of a record, one after the other, until it ends or the oscillation sinks into the noise.
+    """The windows of a record, one after the other, until it ends or the oscillation is lost in the noise.
 
     Args:
         record: the reading of one run.
@@ -160,7 +160,7 @@ def _thinned(record: Record, period: float, noise_std: float) -> _Trace:
 
 
 def _rough_crossings(trace: _Trace, period: float) -> Array:
-    # Of the smoothed reading through the level its later half oscillates about, with hysteresis.
+    # Of the smoothed reading through the mean level of its later half, with hysteresis.
     width = max(1, round(period / trace.step / 10.0))
     if trace.yaw.size < 2 * width or period / trace.step < _LEAST_PER_CYCLE:
         return np.zeros(0)
@@ -172,20 +172,20 @@ def _rough_crossings(trace: _Trace, period: float) -> Array:
     outside = np.flatnonzero(np.abs(away) > band)
     change = np.flatnonzero(np.diff(np.sign(away[outside])) != 0.0)
     before, after = outside[change], outside[change + 1]
-    # Straight from the last clear sample on one side to the first on the other.
+    # Linear interpolation from the last clear sample on one side to the first on the other.
     share = away[before] / (away[before] - away[after])
     return np.asarray(time[before] + share * (time[after] - time[before]))
 
 
 def _level(trace: _Trace, period: float) -> float:
-    # The mean over the last whole cycles: the zero to within a small share of what is left of the swing.
+    # The mean over the last whole cycles: the zero to within a small share of the remaining amplitude.
     cycles = max(1, int(0.5 * trace.yaw.size * trace.step / period))
     count = min(trace.yaw.size, round(cycles * period / trace.step))
     return float(trace.yaw[-count:].mean())
 
 
 def _refined(trace: _Trace, place: _Place) -> _Place | None:
-    # Crossings, zero and decay by turns; None where the decay is lost in noise.
+    # Crossings, zero and decay in turn; None where the decay is lost in noise.
     number = np.arange(HALVES + 1)
     for _ in range(_ROUNDS):
         instants = np.asarray(place.start + place.half * number, dtype=np.float64)
@@ -217,7 +217,7 @@ def _zero_and_decay(trace: _Trace, instants: Array) -> tuple[float, float]:
 
 
 def _line_weights(decay: float) -> Array:
-    # Start and half cycle from the crossings, each with the weight of its slope: shape (2, 7).
+    # Start and half cycle from the crossings, weighted by their slopes: shape (2, 7).
     number = np.arange(HALVES + 1)
     weights = np.asarray(decay, dtype=np.float64) ** number
     columns = np.column_stack((np.ones(HALVES + 1), number)) * weights[:, None]
@@ -225,7 +225,7 @@ def _line_weights(decay: float) -> Array:
 
 
 def _fit_rows(trace: _Trace, instant: float, half: float) -> tuple[slice, Array]:
-    # The samples about an instant, and their weights in level and slope of a quintic there: shape (2, m).
+    # The samples around an instant, and their weights in level and slope of a quintic there: shape (2, m).
     low, high = np.searchsorted(trace.time, (instant - _REACH * half, instant + _REACH * half))
     low, high = max(0, min(int(low), trace.time.size - _TERMS - 1)), max(int(high), int(low) + _TERMS + 1)
     part = slice(low, min(high, trace.time.size))
@@ -275,7 +275,7 @@ def _window(trace: _Trace, place: _Place) -> ThreeCycles | None:
 
 
 def _shares(trace: _Trace, edges: Array, part: slice) -> Array:
-    # What each sample's cell contributes to the mean between two edges: shape (edges − 1, samples).
+    # Contribution of each sample to the mean between two edges: shape (edges − 1, samples).
     left = trace.time[part] - 0.5 * trace.step
     covered = np.clip(edges[:, None] - left, 0.0, trace.step)
     return np.asarray(np.diff(covered, axis=0) / np.diff(edges)[:, None])
@@ -284,7 +284,7 @@ def _shares(trace: _Trace, edges: Array, part: slice) -> Array:
 def _timing_weights(
     trace: _Trace, place: _Place, instants: Array, level_weights: Array, part: slice
 ) -> Array:
-    # A level dc above the zero moves its crossing by −dc/slope; the zero by the half cycles' means.
+    # A level dc above the zero moves its crossing by −dc/slope; the zero follows from the means of the half cycles.
     means = _shares(trace, instants, part)
     pairs = (means[1:] + place.decay * means[:-1]) / (1.0 + place.decay)
     slopes = place.slope * (-place.decay) ** np.arange(HALVES + 1)
@@ -294,7 +294,7 @@ def _timing_weights(
 
 
 def _by_timing(trace: _Trace, edges: Array, points: Array, t3: float) -> Array:
-    # Moves of the points with t0 and with t3, from the curve's values at their edges; averaged against noise.
+    # Derivatives of the points by t0 and t3, from the curve at their edges; averaged to reduce noise.
     inner = 0.5 * (points[1:] + points[:-1])
     ends = trace.spline(edges[[0, -1]])
     values = np.concatenate(([float(ends[0])], inner, [float(ends[1])]))

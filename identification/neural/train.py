@@ -1,6 +1,6 @@
-"""Trains both networks from a seed: several starts each, the start of the largest evidence kept.
+"""Training of both networks from a seed: several starts each, of which the one with the largest evidence is kept.
 
-The training can be stopped after any step and gone on with from its checkpoint, to the same bits.
+The training can be stopped after any step and resumed from its checkpoint with an identical result.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSp
 from tunnel_sim.files.json_text import json_line
 
 NETWORKS = (DAMPING, FREQUENCY)
-_START, _TEST = 0, 2  # what a generator is for
+_START, _TEST = 0, 2  # purposes of the random generators
 _DATA = DataSpec()
 _NO_ERRORS = Errors(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class TrainingSpec:
-    """Everything a training hangs on.
+    """Everything a training depends on.
 
     Args:
         seed: of the first weights, the noise and the test set.
         data: the responses.
-        starts: number of trainings of each network, from weights of their own.
+        starts: number of trainings of each network, from different weights.
         damping_steps: number of Levenberg–Marquardt steps of the first network, at most.
         frequency_steps: number of those of the second.
     """
@@ -63,20 +63,20 @@ class TrainingSpec:
         return self.damping_steps if which == DAMPING else self.frequency_steps
 
     def work(self, which: str) -> int:
-        """What a step costs, in steps of the second network."""
+        """Cost of a step, in steps of the second network."""
         if which == FREQUENCY:
             return 1
         return max(1, self.data.zeta_count * parameter_count(SIZES[DAMPING]) // 12_000)
 
     @property
     def total_work(self) -> int:
-        """That of all steps."""
+        """Cost of all steps."""
         return sum(self.starts * self.steps(which) * self.work(which) for which in NETWORKS)
 
 
 @dataclass(frozen=True)
 class Trained:
-    """What a training gives.
+    """The result of a training.
 
     Args:
         networks: both networks with their errors.
@@ -99,10 +99,10 @@ def train(
     """Train both networks.
 
     Args:
-        spec: what and how.
-        resume: where an interrupted training of the same spec stood.
-        tell: is told the work done and what is being done, after every step.
-        keep: is given a checkpoint after every step; what it raises ends the training.
+        spec: of the training.
+        resume: progress of an interrupted training of the same specification.
+        tell: called after every step with the work done and a description.
+        keep: called with a checkpoint after every step; an exception from it ends the training.
 
     Returns:
         The networks with their file and record.
@@ -122,7 +122,7 @@ def problem_of(spec: TrainingSpec, which: str) -> Problem:
     """The scaled training pairs of a network.
 
     Args:
-        spec: what and how.
+        spec: of the training.
         which: ``damping`` or ``frequency``.
     """
     return Problem.of(training_pairs(spec.data, which), SIZES[which], unit_deviation=which == FREQUENCY)

@@ -1,4 +1,4 @@
-"""What the networks are trained on and tested against: impulse responses over the paper's range."""
+"""Training and test data of the networks: impulse responses over the paper's range."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LOGARITHMIC, LINEAR = "logarithmic", "linear"
 
 @dataclass(frozen=True)
 class DataSpec:
-    """Which impulse responses.
+    """Range and number of the impulse responses.
 
     Args:
         zeta_range: damping ratios, the paper's 0.001 to 0.35 (1).
@@ -26,7 +26,7 @@ class DataSpec:
         zeta_count: number of damping ratios of the first network's set, evenly spaced.
         grid: numbers of damping ratios and of natural frequencies of the second network's set.
         frequency_scale: ``logarithmic`` or ``linear``: how t3 and ωn enter the second network before their mean is
-            taken off.
+            removed.
         test_count: number of responses of the test set, drawn at random over the range.
     """
 
@@ -43,13 +43,13 @@ class DataSpec:
 
     @classmethod
     def from_json_dict(cls, data: dict[str, Any]) -> DataSpec:
-        """The inverse of `to_json_dict`; raises ValueError, TypeError or KeyError where it is none."""
+        """The inverse of `to_json_dict`; raises ValueError, TypeError or KeyError for a malformed document."""
         pairs = {name: tuple(data[name]) for name in ("zeta_range", "omega_range", "grid")}
         for low, high in (pairs["zeta_range"], pairs["omega_range"], pairs["grid"]):
             if not (0.0 < float(low) < inf and 0.0 < float(high) < inf):
-                raise ValueError("a range that is none")
+                raise ValueError("an empty range")
         if data["frequency_scale"] not in (LOGARITHMIC, LINEAR):
-            raise ValueError("a scale that is not known")
+            raise ValueError("an unknown scale")
         return cls(**{**data, **pairs})
 
     def to_network(self, values: Array) -> Array:
@@ -101,7 +101,7 @@ def training_pairs(spec: DataSpec, which: str) -> Pairs:
 def held_out_points(spec: DataSpec, rng: np.random.Generator) -> tuple[Array, Array]:
     """Damping ratios and frequencies [rad/s] that no training set holds, shapes (test_count,).
 
-    Half of them are even in the logarithm, so that the low ends of the range are tested too.
+    Half of them are uniform in the logarithm, so that the low ends of the range are tested too.
 
     Args:
         spec: the range.

@@ -1,1 +1,1 @@
-"""Estimates against the truth."""
+"""Comparison of estimates with the truth."""

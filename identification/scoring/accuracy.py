@@ -1,7 +1,7 @@
-"""How good estimates are beside their truth: bias, RMSE, RMSE over the bound, coverage and failures.
+"""The accuracy of estimates: bias, RMSE, RMSE over the bound, coverage and failures.
 
-Every figure comes with the sampling error of the trials it rests on. Pure functions of numbers: who estimated
-what, and from which records, is the caller's. Whether a method got worse is `identification.scoring.comparison`'s.
+Every figure has the sampling error that follows from the number of trials. These are pure functions of numbers; the
+caller knows the estimators and the records. `identification.scoring.comparison` tests whether a method got worse.
 Standard errors of bias and RMSE are those of means (delta method for the root); shares have Wilson's intervals
 (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209–212, doi 10.1080/01621459.1927.10502953).
 """
@@ -16,20 +16,21 @@ from typing import Any
 import numpy as np
 
 from identification.estimate import Quantity
+from identification.statistics.wilson import wilson_interval
 from tunnel_sim.vocabulary.record import Array, read_only
 
 NOMINAL_COVERAGE = 0.95
 INTERVAL = 1.959963984540054
 """Half the width of a 95 % interval in standard deviations."""
-_LEAST = 2  # trials that give a sampling error at all
+_LEAST = 2  # trials needed for a sampling error
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One estimate beside its truth.
+    """One estimate with its truth.
 
     Args:
-        truth: what was to be found, in the quantity's unit.
+        truth: true value, in the quantity's unit.
         found: the estimate; None where the method failed.
         bound: smallest standard deviation any unbiased estimator can have, in the same unit; None where it is
             not known.
@@ -62,12 +63,12 @@ class Trials:
 
     @property
     def count(self) -> int:
-        """Number of trials, the failed ones with them."""
+        """Number of trials, failures included."""
         return self.error.size + self.failures
 
     @property
     def covered(self) -> int:
-        """How many 95 % intervals, ± 1.96 reported standard deviations, hold the truth."""
+        """Number of 95 % intervals, ± 1.96 reported standard deviations, that contain the truth."""
         return int(np.sum(np.abs(self.error) <= INTERVAL * self.std))
 
     @property
@@ -110,11 +111,11 @@ def collect(outcomes: Iterable[Outcome]) -> Trials:
 
 @dataclass(frozen=True)
 class Proportion:
-    """How many of how many.
+    """A share, such as that of trials that failed.
 
     Args:
-        count: number that have it.
-        total: number of all, above 0.
+        count: number of cases.
+        total: number of trials, above 0.
     """
 
     count: int
@@ -128,10 +129,7 @@ class Proportion:
     @property
     def interval(self) -> tuple[float, float]:
         """Wilson's interval of 95 %, as shares."""
-        n, p, z = self.total, self.value, INTERVAL
-        centre = (p + z**2 / (2 * n)) / (1 + z**2 / n)
-        half = z / (1 + z**2 / n) * sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
-        return max(0.0, centre - half), min(1.0, centre + half)
+        return wilson_interval(self.count, self.total)
 
     def to_json_dict(self) -> dict[str, Any]:
         """Count, total, share and interval."""
@@ -140,9 +138,9 @@ class Proportion:
 
 @dataclass(frozen=True)
 class Score:
-    """What trials say of a method. A figure is None where fewer than two trials gave an estimate.
+    """The figures of a method. A figure is None where fewer than two trials gave an estimate.
 
-    Each `Quantity` here is a figure with the standard error that the number of trials leaves it.
+    Each `Quantity` is a figure with its standard error.
 
     Args:
         count: number of trials.
@@ -176,7 +174,7 @@ class Score:
 
 
 def score(trials: Trials) -> Score:
-    """Judge the trials of one method and one quantity.
+    """Score the trials of one method and one quantity.
 
     Args:
         trials: at least one.

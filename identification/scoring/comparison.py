@@ -1,8 +1,8 @@
-"""Whether a method got worse: its trials against those of a baseline, at a stated rate of false alarms.
+"""Whether a method got worse than a baseline, at a stated false-alarm rate.
 
-Every test is exact, or nearly so, whatever the distribution of the errors: ranks and counts only. If nothing
-changed, trials of the baseline and of now are exchangeable, and so is whatever is chosen by looking at both
-together (a direction, a threshold). Many tests share one false-alarm rate by Holm's method.
+The tests use only ranks and counts, so they are exact, or nearly so, for any distribution of the errors. If nothing
+changed, old and new trials are exchangeable, and so is any choice made from both together (a direction, a
+threshold). Many tests share one false-alarm rate by Holm's method.
 
 Sources: rank sum over strata, P. van Elteren, Bull. Int. Stat. Inst. 37 (1960) 351–361; Fisher's exact test;
 S. Holm, Scand. J. Stat. 6 (1979) 65–70.
@@ -16,19 +16,17 @@ from typing import Literal
 
 import numpy as np
 
+from identification.policy import DIFFERENCE_RATE, LEAST_CHANGE, OUTLIER_MEDIANS
 from identification.scoring.accuracy import NOMINAL_COVERAGE, Trials
 from tunnel_sim.vocabulary.record import Array
 
 Aspect = Literal["bias", "spread", "outliers", "coverage", "failures"]
 ASPECTS: tuple[Aspect, ...] = ("bias", "spread", "outliers", "coverage", "failures")
-FALSE_ALARM_RATE = 0.01
-_MATERIAL = 0.02  # of the spread, where trials are on the same records
-_FAR_OUT = 6.0  # medians of the error's size: four standard deviations where errors are normal
 
 
 @dataclass(frozen=True)
 class Change:
-    """One aspect of one method, before and now.
+    """One aspect of one method, in the baseline and now.
 
     Args:
         aspect: ``bias`` and ``spread`` (sizes of errors) in units of the bound, or of the truth where there is no
@@ -66,7 +64,7 @@ def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ..
     scaled = [_scaled(old, new) for old, new in pairs]
     same = all(
         np.array_equal(old.truth, new.truth) for old, new in pairs
-    )  # truths are drawn: so are the records
+    )  # the truths are drawn, so equal truths mean equal records
     return (
         _bias(scaled, same),
         _spread(scaled, same),
@@ -80,8 +78,8 @@ def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ..
     )
 
 
-def holm(p_values: Sequence[float], rate: float = FALSE_ALARM_RATE) -> tuple[bool, ...]:
-    """Which of many tests are significant, so that a false alarm among all of them has a probability of ``rate``.
+def holm(p_values: Sequence[float], rate: float = DIFFERENCE_RATE) -> tuple[bool, ...]:
+    """Which of several tests are significant, with a probability of ``rate`` for any false alarm among them.
 
     Args:
         p_values: one per test.
@@ -106,21 +104,21 @@ def _scaled(old: Trials, new: Trials) -> tuple[Array, Array]:
 
 
 def _bias(scaled: Sequence[tuple[Array, Array]], same: bool) -> Change:
-    # Each cell's direction is that of all its errors, old and new: moved further that way is worse.
+    # The direction of a cell is that of all its errors, old and new: a move in this direction is worse.
     turned = []
     for old, new in scaled:
         both = np.concatenate((old, new))
         direction = 1.0 if both.size == 0 or both.mean() >= 0.0 else -1.0
         turned.append((direction * old, direction * new))
     before, now = (_mean_size(scaled, side) for side in (0, 1))
-    least = before + (_MATERIAL * _root_mean_square(scaled, 0) if same else 0.0)
+    least = before + (LEAST_CHANGE * _root_mean_square(scaled, 0) if same else 0.0)
     return Change("bias", before, now, _larger(turned, same) if now > least else 1.0)
 
 
 def _spread(scaled: Sequence[tuple[Array, Array]], same: bool) -> Change:
     sizes = [(np.abs(old), np.abs(new)) for old, new in scaled]
     before, now = (_root_mean_square(scaled, side) for side in (0, 1))
-    least = before * (1.0 + _MATERIAL if same else 1.0)
+    least = before * (1.0 + LEAST_CHANGE if same else 1.0)
     return Change("spread", before, now, _larger(sizes, same) if now > least else 1.0)
 
 
@@ -128,7 +126,7 @@ def _outliers(scaled: Sequence[tuple[Array, Array]]) -> Change:
     counts = np.zeros((2, 2), dtype=int)
     for pair in scaled:
         both = np.abs(np.concatenate(pair))
-        limit = _FAR_OUT * float(np.median(both)) if both.size else 0.0
+        limit = OUTLIER_MEDIANS * float(np.median(both)) if both.size else 0.0
         for side, values in enumerate(pair):
             counts[side] += int(np.sum(np.abs(values) > limit)), values.size
     (old, old_total), (new, new_total) = counts.tolist()
@@ -149,7 +147,7 @@ def _coverage(pairs: Sequence[tuple[Trials, Trials]]) -> Change:
 
 
 def _shares(aspect: Aspect, old: tuple[int, int], new: tuple[int, int]) -> Change:
-    """A share that is worse the larger it is."""
+    """A share for which larger is worse."""
     from scipy.stats import fisher_exact
 
     if 0 in (old[1], new[1]):
@@ -162,12 +160,12 @@ def _shares(aspect: Aspect, old: tuple[int, int], new: tuple[int, int]) -> Chang
 
 
 def _larger(cells: Sequence[tuple[Array, Array]], same: bool) -> float:
-    """One-sided p-value of the new values being the larger ones."""
+    """One-sided p-value for larger new values."""
     return _signed_rank(cells) if same else _rank_sum(cells)
 
 
 def _signed_rank(cells: Sequence[tuple[Array, Array]]) -> float:
-    """By pairs, ranked within each cell; pairs without a difference say nothing."""
+    """Of pairs, ranked within each cell; pairs without a difference do not count."""
     from scipy.special import ndtr
     from scipy.stats import rankdata
 
@@ -192,7 +190,7 @@ def _rank_sum(cells: Sequence[tuple[Array, Array]]) -> float:
         if n == 0 or m == 0:
             continue
         ranks = rankdata(np.concatenate((old, new)))
-        # Weighed by 1/(n + m + 1), as van Elteren does; the variance is that of the ranks met, ties and all.
+        # Weighted by 1/(n + m + 1) after van Elteren; the variance is that of the actual ranks, with ties.
         weight = 1.0 / (n + m + 1)
         excess += weight * (float(ranks[n:].sum()) - m * (n + m + 1) / 2.0)
         variance += weight**2 * n * m / (n + m) * float(ranks.var(ddof=1))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from tunnel_sim.vocabulary.record import Array
 
 _WORST_CONDITION = 1e13
-_SMALLEST = 1e-290  # of a variance or an information: its square root and its inverse keep all their digits
+_SMALLEST = (
+    1e-290  # of a variance or an information: its square root and its inverse still have full precision
+)
 
 
 def eliminate(information: Array, score: Array, keep: int) -> tuple[Array, Array]:
@@ -41,7 +44,7 @@ def scaled_solve(matrix: Array, right: Array) -> Array:
     """
     diagonal = matrix.diagonal()
     if not diagonal.min() > 0.0:
-        raise np.linalg.LinAlgError("an unknown has no influence on the reading")
+        raise np.linalg.LinAlgError("an unknown does not influence the reading")
     scale = np.sqrt(diagonal)
     unit = scale if right.ndim == 1 else scale[:, None]
     if scale.size == 2:
@@ -51,10 +54,10 @@ def scaled_solve(matrix: Array, right: Array) -> Array:
 
 
 def _solve_two(correlation: float, right: Array) -> Array:
-    # A pair is the commonest system by far, and LAPACK's calling costs ten times its solution.
+    # Systems of two are by far the most common, and calling LAPACK costs ten times their solution.
     pivot = 1.0 - correlation**2
     if not pivot > 0.0:
-        raise np.linalg.LinAlgError("two unknowns have one influence")
+        raise np.linalg.LinAlgError("two unknowns have the same influence")
     second = (right[1] - correlation * right[0]) / pivot
     return np.array((right[0] - correlation * second, second))
 
@@ -78,8 +81,8 @@ def inverse(information: Array) -> Array:
 def determined(matrix: Array) -> bool:
     """Whether a symmetric matrix is positive definite to working precision, whatever the units of its unknowns.
 
-    This is asked of an information matrix before it is inverted, and of a covariance before it is used: where the
-    answer is no, the data do not tell the unknowns apart, and a status says so in place of a number.
+    An information matrix is checked before it is inverted, and a covariance before it is used. If it fails, the
+    data do not separate the unknowns, and a status says so instead of a number.
 
     Args:
         matrix: shape (m, m).
@@ -108,7 +111,4 @@ def embed(link: Array, *, with_zero: bool) -> Array:
     """
     if not with_zero:
         return link
-    extended = np.zeros((3, link.shape[1] + 1))
-    extended[:2, :-1] = link
-    extended[2, -1] = 1.0
-    return extended
+    return np.asarray(block_diag(link, 1.0))

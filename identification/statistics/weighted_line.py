@@ -1,4 +1,4 @@
-"""Straight lines through points of known variance, and what their scatter says of it."""
+"""Straight lines through points of known variance, with a test of their scatter."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from identification.policy import MISFIT_RATE
 from identification.statistics.information import inverse, scaled_solve
 from tunnel_sim.vocabulary.record import Array
-
-_FALSE_ALARM_RATE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +28,7 @@ class WeightedFit:
 
 
 def weighted_fit(columns: Array, target: Array, variance: Array) -> WeightedFit:
-    """Least squares with known variances; they are raised by the scatter where that is beyond chance.
+    """Least squares with known variances, which are raised where the scatter is beyond chance.
 
     Args:
         columns: one per unknown, shape (n, p) with n above p.
@@ -45,7 +44,7 @@ def weighted_fit(columns: Array, target: Array, variance: Array) -> WeightedFit:
     residual = target - columns @ values
     freedom = target.size - values.size
     scatter = float(residual @ (weights * residual))
-    beyond = scatter > float(chi2.isf(_FALSE_ALARM_RATE, freedom))
+    beyond = scatter > float(chi2.isf(MISFIT_RATE, freedom))
     return WeightedFit(values, inverse(normal) * (scatter / freedom if beyond else 1.0), residual)
 
 

@@ -1,8 +1,8 @@
-"""Standard deviations that stay honest when the model does not explain the data.
+"""Standard deviations that remain valid when the model does not explain the data.
 
-Where it does, the covariance is the inverse of Fisher's information. Where it does not, the residual is not
-white: the variances are widened by its power in the band of the oscillation, or to the scatter of the runs,
-whichever is more. The diagnosis widens by the same scatter.
+If it does, the covariance is the inverse of Fisher's information. If it does not, the residual is not white: the
+variances are widened by its power in the band of the oscillation, or to the scatter of the runs, whichever is
+larger. The diagnosis uses the same scatter.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tunnel_sim.vocabulary.record import Array
 
 
 def widened_covariance(covariance: Array, least_std: Array) -> Array:
-    """Raise the standard deviations that fall short, keeping the correlations.
+    """Raise standard deviations to a lower limit, keeping the correlations.
 
     Args:
         covariance: shape (p, p).
@@ -36,7 +36,7 @@ def fisher_covariance(normal: Array, noise: NoiseLevel) -> Array:
 
     Args:
         normal: JᵀJ, shape (p, p).
-        noise: the level it rests on.
+        noise: the level and its slow ratio.
 
     Returns:
         Shape (p, p).
@@ -45,14 +45,14 @@ def fisher_covariance(normal: Array, noise: NoiseLevel) -> Array:
 
 
 def scatter_of_runs(influences: Array, speaking: NDArray[np.int64]) -> Array:
-    """How far the runs move parameters about their joint estimate, whatever colours the residuals.
+    """Standard deviations of parameters from the scatter of the runs, whatever the spectrum of the residuals.
 
     The sandwich estimator with a run as the cluster (Liang & Zeger, Biometrika 73 (1986) 13,
-    doi 10.1093/biomet/73.1.13), widened by Student's t for the few runs that bear on a parameter.
+    doi 10.1093/biomet/73.1.13), widened by Student's t for the small number of runs that determine a parameter.
 
     Args:
-        influences: of every run, what its residual contributes to the parameters, shape (runs, q).
-        speaking: how many runs bear on each parameter, shape (q,).
+        influences: contribution of every run's residual to the parameters, shape (runs, q).
+        speaking: number of runs that determine each parameter, shape (q,).
 
     Returns:
         Standard deviations, shape (q,): 1.96 of them on either side are a 95 % interval.

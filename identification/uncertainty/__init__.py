@@ -1,1 +1,1 @@
-"""What an estimate is worth: information, bounds, budgets."""
+"""The uncertainty of an estimate: bounds, scatter, budgets."""

@@ -6,15 +6,15 @@ First order after JCGM 100:2008 (GUM), correlated inputs after its 5.2:
 
 - Noise: the estimator's own covariance.
 - Inputs: an error common to all runs scales the coefficients in closed form, whatever the method:
-  (Cnβ, Cnr) ∝ Kr, V^(−2, −1), ρ^−1, A^−1, l^(−1, −2). An error of one spring's or one run's own is moved through
+  (Cnβ, Cnr) ∝ Kr, V^(−2, −1), ρ^−1, A^−1, l^(−1, −2). An error of a single spring or run is propagated through
   the estimator itself, one input at a time by one standard uncertainty (Kragten, Analyst 119 (1994) 2161–2165,
   doi 10.1039/AN9941902161).
-- Scatter: how far the wind-off and the wind-on runs scatter about the coefficients they share, as far as it is more
-  than noise and the individual errors of the inputs explain (see `identification.uncertainty.scatter`).
-- Model: how far other methods, or the first half of every record, move the answer beyond chance; the largest move
-  is the half-width of a rectangular distribution (GUM 4.3.7).
+- Scatter: how far the wind-off and the wind-on runs scatter about the coefficients they share, as far as it
+  exceeds what noise and the individual errors of the inputs explain (see `identification.uncertainty.scatter`).
+- Model: how far other methods, or the first half of every record, change the result beyond chance; the largest
+  change is the half-width of a rectangular distribution (GUM 4.3.7).
 
-What this cannot see is what no repeat and no other method of the same model shows: see the diagnosis.
+Errors that neither repeats nor other methods with the same model show are not included: run the diagnosis.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.estimate import PARAMETERS, Estimate, Quantity
+from identification.policy import DIFFERENCE_DEVIATIONS
 from identification.uncertainty.input_uncertainty import InputUncertainties
 from identification.uncertainty.scatter import error_groups, scaled, side_scatter
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -43,10 +44,9 @@ _POWERS: Mapping[str, tuple[float, float, float, float, float]] = {
     "air_density": (-1.0, -1.0, 0.0, 0.0, 0.0),
     "frontal_area": (-1.0, -1.0, 0.0, 0.0, 0.0),
     "reference_length": (-1.0, -2.0, 0.0, 0.0, 0.0),
-    "yaw_inertia": (0.0, 0.0, 0.0, 0.0, 0.0),  # the nominal one decides nothing: Izz is identified
+    "yaw_inertia": (0.0, 0.0, 0.0, 0.0, 0.0),  # the nominal inertia has no influence: Izz is identified
     "clock": (0.0, 1.0, 2.0, 1.0, 2.0),
 }
-_CHANCE = 2.58  # of a move, in its standard deviations: once in a hundred
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +56,10 @@ class Component:
     Args:
         name: what is uncertain.
         kind: GUM's evaluation: ``A`` by statistics, ``B`` by other means.
-        covariance: what it adds, shape (p, p), in the products of the quantities' units; a correlation may take
-            away.
-        note: why it is zero or could not be had; empty where there is nothing to say.
-        known: whether it could be had; where not, its covariance is zero and the total leaves it out.
+        covariance: what it adds, shape (p, p), in the products of the quantities' units; a correlation may
+            reduce it.
+        note: why it is zero or unknown; otherwise empty.
+        known: whether it could be determined; if not, its covariance is zero and the total omits it.
     """
 
     name: str
@@ -96,7 +96,7 @@ class Budget:
         return sqrt(float(self.covariance[place, place]))
 
     def share(self, component: Component, name: str) -> float:
-        """Share of the quantity's variance that a component makes, a fraction.
+        """Share of a component in the variance of a quantity, as a fraction.
 
         Args:
             component: one of the budget's.
@@ -136,21 +136,21 @@ def make_budget(
     Args:
         campaign: what was identified.
         estimate: its estimate.
-        identify: the estimator that made it; it is asked again with changed campaigns.
+        identify: the estimator that made it; it is called again with changed campaigns.
         inputs: how well the stated inputs are known.
         others: other estimators, by name, whose spread counts as the choice of model.
-        told: told what is being done.
+        told: called with a description of each step.
 
     Returns:
         The budget.
 
     Raises:
-        TunnelError: when the estimate has no coefficients to make a budget of.
+        TunnelError: when the estimate has no coefficients.
     """
     names = tuple(name for name in _NAMES if getattr(estimate, name) is not None)
     if not set(names) & set(PARAMETERS):
         raise TunnelError(
-            "no coefficient to make a budget of",
+            "no coefficients, so no uncertainty budget",
             where=campaign.name,
             remedy="state spring_stiffness, or leave --budget and --uncertainties out",
         )
@@ -250,7 +250,7 @@ def _values(estimate: Estimate, budget: Budget) -> Array | None:
 def _scatter(
     campaign: Campaign, estimate: Estimate, budget: Budget, inputs: InputUncertainties
 ) -> list[Component]:
-    """Of the wind-off and of the wind-on runs, as far as nothing above explains it."""
+    """The scatter of the wind-off and of the wind-on runs, as far as the components above do not explain it."""
     found = []
     sides = side_scatter(campaign, estimate.runs, inputs.individual)
     for side, label in zip(sides, ("wind-off", "wind-on"), strict=True):
@@ -258,23 +258,23 @@ def _scatter(
         shared = [name for name in side.names if name in budget.names]
         mine, theirs = [budget.names.index(n) for n in shared], [side.names.index(n) for n in shared]
         covariance[np.ix_(mine, mine)] = side.covariance[np.ix_(theirs, theirs)]
-        note = "" if covariance.any() else "explained by what is above"
-        note = note if side.known else "not known, since the campaign has no run to spare"
+        note = "" if covariance.any() else "explained by the components above"
+        note = note if side.known else "unknown, because the campaign has no redundant runs"
         found.append(Component(f"scatter of the {label} runs", "A", covariance, note, known=side.known))
     return found
 
 
 def _model(budget: Budget, own_std: Array, rivals: Mapping[str, Estimate]) -> Component:
-    """The largest move beyond chance, as the half-width of a rectangular distribution."""
+    """The largest change beyond chance, as the half-width of a rectangular distribution."""
     largest, blamed = np.zeros(len(budget.names)), []
     for name, rival in rivals.items():
         values = _values(rival, budget)
         if values is None:
             continue
         move = np.abs(values - budget.values)
-        # Of two unbiased answers to the same records, the better one is uncorrelated with their difference.
+        # Of two unbiased estimates from the same records, the better one is uncorrelated with their difference.
         chance = np.sqrt(np.abs(_deviations(rival, budget) ** 2 - own_std**2))
-        move = np.where(move > _CHANCE * chance, move, 0.0)
+        move = np.where(move > DIFFERENCE_DEVIATIONS * chance, move, 0.0)
         if np.any(move > 0.0):
             blamed.append(name)
         largest = np.maximum(largest, move)

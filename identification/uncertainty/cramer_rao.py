@@ -1,6 +1,6 @@
 """The Cramér–Rao bound: the smallest standard deviations any unbiased estimator can reach.
 
-Exact Fisher information of real damped sinusoids in white Gaussian noise at the sample times given, with the
+Exact Fisher information of real damped sinusoids in white Gaussian noise at given sample times, with the
 closed-form sensitivities of `damped_oscillation`. For long records of light damping it tends to
 
     std(ζ)/ζ = 4 (S/A) √(σ/fs),   std(f)/f = ζ · std(ζ)/ζ,
@@ -28,7 +28,7 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True)
 class SinusoidBound:
-    """Standard deviations no unbiased estimator of one damped sinusoid goes below.
+    """Smallest standard deviations of any unbiased estimator of one damped sinusoid.
 
     Args:
         amplitude: of the envelope at the first sample, rad.
@@ -161,11 +161,11 @@ def campaign_bound(
             release angles at rest.
 
     Returns:
-        The bound of the parameters the campaign separates.
+        The bound of the parameters that the campaign separates.
 
     Raises:
-        TunnelError: when a run states no spring stiffness, the rig no size although the wind blows, or a run
-            neither its initial state nor a release angle.
+        TunnelError: when a run states no spring stiffness, the rig states no size although the wind is on, or a
+            run has neither an initial state nor a release angle.
     """
     if any(run.spring_stiffness is None for run in campaign.runs):
         raise TunnelError(

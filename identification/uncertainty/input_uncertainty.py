@@ -5,13 +5,13 @@ The campaign format states Kr, V, ρ, A and l as exact numbers; how well they ar
     schema_version = 1
 
     [common]                      # one error for all runs: calibration of an instrument, a dimension
-    spring_stiffness = 0.005      # relative standard uncertainties throughout: 0.005 is half a per cent
+    spring_stiffness = 0.005      # relative standard uncertainties throughout: 0.005 is 0.5 %
     wind_speed = 0.01
     air_density = 0.003
     frontal_area = 0.005
     reference_length = 0.001
 
-    [individual]                  # an error of its own for every spring, or every wind-on run
+    [individual]                  # a separate error for every spring, or every wind-on run
     spring_stiffness = 0.002
     wind_speed = 0.005
 
@@ -30,7 +30,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from tunnel_sim.files.toml_input import StrictModel, check_version, load_toml, shown, validate
+from tunnel_sim.files.toml_input import StrictModel, read_document, shown
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
 
@@ -39,15 +39,15 @@ COMMON = (
 )  # fmt: skip
 """Inputs whose error may be common to all runs; ``clock`` is the scale of the time axis."""
 INDIVIDUAL = ("spring_stiffness", "wind_speed", "air_density")
-"""Inputs that may have an error of their own in every spring, or in every wind-on run."""
+"""Inputs that may have a separate error for every spring, or for every wind-on run."""
 
 _Relative = Annotated[float, Field(ge=0.0, lt=0.5)]
-_MEANING = "a relative standard uncertainty from 0 to 0.5, such as 0.01 for one per cent"
+_MEANING = "a relative standard uncertainty from 0 to 0.5, such as 0.01 for 1 %"
 
 
 @dataclass(frozen=True)
 class InputUncertainties:
-    """Relative standard uncertainties of what a campaign states; what is not named is taken as exact.
+    """Relative standard uncertainties of the stated inputs; inputs that are not named are exact.
 
     Args:
         common: by name of `COMMON`: one error for all runs.
@@ -124,9 +124,8 @@ def load_uncertainties(path: Path) -> InputUncertainties:
     Raises:
         TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
     """
-    raw = load_toml(path, missing="name a TOML of uncertainties, see docs/how-to/state-uncertainties.md")
-    check_version(raw, path)
-    document = validate(_Document, raw, path)
+    missing = "name a TOML of uncertainties, see docs/how-to/state-uncertainties.md"
+    document = read_document(_Document, path, missing=missing)
     where = shown(path)
     common = {name: value for name, value in document.common.model_dump().items() if value > 0.0}
     individual = {name: value for name, value in document.individual.model_dump().items() if value > 0.0}
@@ -142,9 +141,9 @@ def load_uncertainties(path: Path) -> InputUncertainties:
                 )
         if first == second or {first, second} in [{a, b} for a, b, _ in pairs]:
             raise TunnelError(
-                f"{first} and {second} are correlated twice, or one input with itself",
+                f"{first} and {second} are correlated twice, or an input is correlated with itself",
                 where=where,
-                remedy="name every pair once",
+                remedy="name every pair of different inputs once",
             )
         pairs.append((first, second, table.coefficient))
     found = InputUncertainties(common, individual, tuple(pairs))

@@ -1,12 +1,12 @@
-"""How far runs scatter about the coefficients they share, beyond what is known to be uncertain about them.
+"""The scatter of runs about the coefficients they share, beyond their known uncertainties.
 
 Every run's decay rate a and stiffness k are linear in shared parameters (see `derivatives`); their residuals
-about the generalised least-squares fit are squared and summed, weighed by the runs' own variances, for wind-off and
-wind-on runs and for a and k apart. Where a sum exceeds, by more than chance, what noise and the stated individual
-errors of the inputs make it on the average, every run of it is given the variance of its own residual: a jackknife,
-linearised (J. G. MacKinnon & H. White, J. Econometrics 29 (1985) 305–325, doi 10.1016/0304-4076(85)90158-7).
-Repeats of a run count by themselves, no pairing is needed. The chance of a weighted sum of squares is
-Satterthwaite's, Biometrics Bull. 2 (1946) 110–114, doi 10.2307/3002019.
+about the generalised least-squares fit are squared, weighted by the runs' variances and summed, separately for
+wind-off and wind-on runs and for a and k. If a sum exceeds its expectation from noise and the stated individual
+errors of the inputs by more than chance, every run in it gets the variance of its own residual: a linearised
+jackknife (J. G. MacKinnon & H. White, J. Econometrics 29 (1985) 305–325, doi 10.1016/0304-4076(85)90158-7).
+Repeats count as separate runs; no pairing is needed. The distribution of a weighted sum of squares is approximated
+as by Satterthwaite, Biometrics Bull. 2 (1946) 110–114, doi 10.2307/3002019.
 """
 
 from __future__ import annotations
@@ -18,14 +18,12 @@ import numpy as np
 
 from identification.campaign.derivatives import Design, build_design, combine, derivatives
 from identification.estimate import RunEstimate
+from identification.policy import DIFFERENCE_RATE, LEAST_FREE_SHARE, LEAST_SCATTER_FREEDOM
 from identification.statistics.information import inverse
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.record import Array
 
-FALSE_ALARM_RATE = 0.01
-_LEAST_DEGREES = 0.5
 _STEP = 1e-4
-_LEAST_FREE = 0.1  # of a residual that the run's own pull leaves; of less, nothing can be told
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +31,7 @@ class SideScatter:
     """The scatter of the wind-off or of the wind-on runs.
 
     Args:
-        known: whether the runs leave a degree of freedom to see it by.
+        known: whether the runs leave a degree of freedom to determine it.
         ratio: largest of the sums of squares over its expectation, of a or of k (1).
         names: parameters of the covariance.
         covariance: what the excess adds to that of the parameters, shape (p, p); zero within chance.
@@ -64,8 +62,8 @@ def side_scatter(
 
     Args:
         campaign: the runs' conditions.
-        estimates: one per run, with ωn and ζ where they could be had.
-        individual: relative standard uncertainties of inputs that err run by run, or spring by spring.
+        estimates: one per run, with ωn and ζ where they were identified.
+        individual: relative standard uncertainties of inputs with separate errors by run or by spring.
 
     Returns:
         Wind-off, wind-on.
@@ -130,7 +128,7 @@ def _diagonal(blocks: Sequence[Array]) -> Array:
 def _input_covariance(
     runs: Sequence[Run], rig: RigProperties, design: Design, shared: Array, individual: Mapping[str, float]
 ) -> Array:
-    """Covariance of the (a, k) that runs seem to have because their inputs are not what is stated."""
+    """Covariance of the runs' (a, k) due to the errors of their stated inputs."""
     total = np.zeros((2 * len(runs),) * 2)
     before = np.concatenate(design.links) @ shared
     for name, size in individual.items():
@@ -188,19 +186,19 @@ def _side(fit: _Fit, covariance: Array, mine: Array) -> SideScatter:
     for row in (0, 1):  # decay rates, then stiffnesses
         chosen = (mine & (np.arange(size) % 2 == row)).astype(np.float64)
         root = np.sqrt(chosen * np.diag(fit.weight))
-        # The weighed residuals of these rows are a linear map of errors of this covariance.
+        # The weighted residuals of these rows are a linear map of errors with this covariance.
         residual_map = root[:, None] * (np.eye(size) - fit.hat)
         spread = residual_map @ covariance @ residual_map.T
-        if float(np.trace(residual_map @ fit.noise @ residual_map.T)) < _LEAST_DEGREES:
+        if float(np.trace(residual_map @ fit.noise @ residual_map.T)) < LEAST_SCATTER_FREEDOM:
             continue
         seen = True
         expected = float(np.trace(spread))
         degrees = expected**2 / float(np.sum(spread**2))
         ratio = float(np.sum((root * fit.residual) ** 2)) / expected
         largest = max(largest, ratio)
-        if ratio > float(chdtri(degrees, FALSE_ALARM_RATE)) / degrees:
-            # As the jackknife does, every run is given the variance of its own residual, freed of its own pull.
-            freed = fit.residual / np.maximum(1.0 - np.diag(fit.hat), _LEAST_FREE)
+        if ratio > float(chdtri(degrees, DIFFERENCE_RATE)) / degrees:
+            # As in the jackknife, every run gets the variance of its own residual, corrected for its leverage.
+            freed = fit.residual / np.maximum(1.0 - np.diag(fit.hat), LEAST_FREE_SHARE)
             excess = np.maximum(freed**2 - np.diag(covariance), 0.0)
             added += (fit.influence * (chosen * excess)) @ fit.influence.T
     return SideScatter(seen, largest, fit.names, added)

@@ -157,29 +157,21 @@ def checkpoint() -> tuple[Any, bytes]:
 @cache
 def answer_document() -> dict[str, Any]:
     """A diagnosis of one cause, as JSON's types."""
-    from diagnosis.result import (
-        Candidate,
-        Coefficients,
-        Confirmation,
-        Diagnosis,
-        GapSummary,
-        NoiseSummary,
-        ParameterEstimate,
-        RunGap,
-        Where,
-    )
+    from diagnosis import result
 
     values = {
-        "cn_beta": ParameterEstimate(0.45, 0.01, "1/rad"),
-        "cn_r": ParameterEstimate(-0.1, 0.01, "1/rad"),
+        "cn_beta": result.ParameterEstimate(0.45, 0.01, "1/rad"),
+        "cn_r": result.ParameterEstimate(-0.1, 0.01, "1/rad"),
     }
-    friction = {"friction_moment": ParameterEstimate(0.004, 1e-5, "N m")}
-    gap = GapSummary(True, 2.0, 0.1, 0.99, (RunGap("r1", 2.0, 0.1),), 1e-3, 1e-9, {"lag": 1e-9})
-    return Diagnosis(
-        "c1", ("coulomb_friction",), "words", gap, Where("damping", "always", ("r1",), (0.0, 1.0), (0.0, 0.1)),
-        (Candidate("coulomb_friction", 0.9, 0.1, 0.99, friction), Candidate("none", 0.1, 2.0, 0.0)),
-        ("quadratic_damping",), None, Coefficients(values, values), Confirmation(True, 0.0, "r1", 0.0, 1e-5),
-        NoiseSummary(5e-4, None, "estimated", ""),
+    friction = {"friction_moment": result.ParameterEstimate(0.004, 1e-5, "N m")}
+    gap = result.GapSummary(True, 2.0, 0.1, 0.99, (result.RunGap("r1", 2.0, 0.1),), 1e-3, 1e-9, {"lag": 1e-9})
+    return result.Diagnosis(
+        "c1", ("coulomb_friction",), "words", gap,
+        result.Where("damping", "always", ("r1",), (0.0, 1.0), (0.0, 0.1)),
+        (result.Candidate("coulomb_friction", 0.9, 0.1, 0.99, friction), result.Candidate("none", 0.1, 2.0, 0.0)),
+        ("quadratic_damping",), None, result.Coefficients(values, values),
+        result.Confirmation(True, 0.0, "r1", 0.0, 1e-5),
+        result.NoiseSummary(5e-4, None, "estimated", ""),
     ).to_json_dict() | {"wall_s": 3.0}  # fmt: skip
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import queue
 import shutil
@@ -13,6 +12,8 @@ import tempfile
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
+
+from scipy.stats import binomtest
 
 from tests.mutation.choose import Chooser
 from tests.mutation.draw import PACKAGES, Mutant, draw
@@ -106,22 +107,15 @@ def _tell(number: int, trial: Trial) -> None:
 def _summary(trials: list[Trial]) -> None:
     counts = Counter(trial.outcome for trial in trials)
     caught = counts["killed"]
-    low, high = _wilson(caught, len(trials))
+    shares = binomtest(caught, len(trials)).proportion_ci(method="wilson")
     print(f"\n{dict(counts)}")
     print(
-        f"killed {caught} of {len(trials)}: {caught / len(trials):.1%} (95 % Wilson {low:.1%} to {high:.1%})"
+        f"killed {caught} of {len(trials)}: {caught / len(trials):.1%} "
+        f"(95 % Wilson {shares.low:.1%} to {shares.high:.1%})"
     )
     for trial in trials:
         if trial.outcome != "killed":
             print(f"{trial.outcome}: {trial.mutant.words(ROOT)}")
-
-
-def _wilson(hits: int, trials: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a share."""
-    z, share = 1.959964, hits / trials
-    centre = (share + z * z / (2 * trials)) / (1 + z * z / trials)
-    reach = z / (1 + z * z / trials) * math.sqrt(share * (1 - share) / trials + z * z / (4 * trials**2))
-    return centre - reach, centre + reach
 
 
 if __name__ == "__main__":

@@ -10,20 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from diagnosis import result
 from diagnosis.blind import answer, answer_set, answers_folder, make_blind, score_set
 from diagnosis.blind.cases import case
 from diagnosis.blind.score import Score
 from diagnosis.blind.statistics import Share, calibration
-from diagnosis.result import (
-    Candidate,
-    Coefficients,
-    Confirmation,
-    Diagnosis,
-    GapSummary,
-    NoiseSummary,
-    ParameterEstimate,
-    Where,
-)
 from tests.reference.rigs import rig
 from tests.unit.gone_reader import unheard
 from tunnel_lab.cli import main
@@ -59,14 +50,15 @@ def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12
     """A diagnosis with given causes, as its JSON."""
     name = " + ".join(causes) or "none"
     values = {
-        k: ParameterEstimate(v, s, "1/rad") for k, v, s in zip(("cn_beta", "cn_r"), cn, std, strict=True)
+        k: result.ParameterEstimate(v, s, "1/rad")
+        for k, v, s in zip(("cn_beta", "cn_r"), cn, std, strict=True)
     }
-    return Diagnosis(
+    return result.Diagnosis(
         "c", tuple(causes), "words",
-        GapSummary(bool(causes), 2.0, 0.1, closed, (), 0.001, 0.5),
-        Where(None, None), (Candidate(name, probability, 0.1, closed),), tuple(rivals), None,
-        Coefficients(values, values), Confirmation(True, 0.0, "r01", 0.0, 1e-5),
-        NoiseSummary(5e-4, None, "estimated", ""),
+        result.GapSummary(bool(causes), 2.0, 0.1, closed, (), 0.001, 0.5),
+        result.Where(None, None), (result.Candidate(name, probability, 0.1, closed),), tuple(rivals), None,
+        result.Coefficients(values, values), result.Confirmation(True, 0.0, "r01", 0.0, 1e-5),
+        result.NoiseSummary(5e-4, None, "estimated", ""),
     ).to_json_dict()  # fmt: skip
 
 

@@ -17,7 +17,6 @@ from docs.studies.campaign_policies import (
     from_csv,
     median_interval,
     play,
-    share_interval,
     to_csv,
 )
 from tunnel_lab.envs.campaign import CampaignEnv
@@ -123,11 +122,6 @@ def test_the_interval_of_a_median_covers_95_percent_and_not_much_more(count):
     missed = 2.0 * binom.cdf(int(low) - 1, count, 0.5)
     tighter = 2.0 * binom.cdf(int(low), count, 0.5)
     assert missed <= 0.05 < tighter
-
-
-def test_the_interval_of_a_share_is_wilsons():
-    assert share_interval(0, 50) == pytest.approx((0.0, 0.0713), abs=1e-3)
-    assert share_interval(45, 50) == pytest.approx((0.7864, 0.9565), abs=1e-3)
 
 
 def rows():

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from identification.campaign.springs import FALSE_ALARM_RATE, fit_springs, wind_off_line
+from identification.campaign.springs import fit_springs, wind_off_line
 from identification.datasets import paper_springs
+from identification.policy import SPRING_FLAG_RATE
 from tunnel_sim.vocabulary.errors import TunnelError
 
 ROWS = paper_springs()
@@ -20,7 +21,7 @@ def test_table_two():
     assert [number for number, flag in enumerate(fit.flagged, 1) if flag] == [4, 7]
     assert round(fit.residual_percent[3]) == -12
     assert round(fit.residual_percent[6]) == 10
-    assert fit.p_value < FALSE_ALARM_RATE
+    assert fit.p_value < SPRING_FLAG_RATE
 
 
 def test_line_agrees_with_polyfit():
@@ -44,8 +45,8 @@ def test_false_alarm_rate_holds(count):
         for _ in range(trials)
     )
     # Binomial: outside once in 1e4.
-    spread = 3.9 * np.sqrt(FALSE_ALARM_RATE * (1.0 - FALSE_ALARM_RATE) / trials)
-    assert abs(alarms / trials - FALSE_ALARM_RATE) < spread
+    spread = 3.9 * np.sqrt(SPRING_FLAG_RATE * (1.0 - SPRING_FLAG_RATE) / trials)
+    assert abs(alarms / trials - SPRING_FLAG_RATE) < spread
 
 
 def test_two_bad_springs_do_not_mask_each_other():

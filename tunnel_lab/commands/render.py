@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
+from tunnel_lab.terminal.run_options import AngleOption, EffectOption, SpringOption, WindOption
+
 NAME = "render"
 _DEFAULT = (Path("tunnel-output/rig.mp4"), Path("tunnel-output/rig.png"))
 
 PLAN_HELP = "A campaign's plan (TOML); without one the rig with its default spring at 10 m/s."
 RUN_HELP = "Which run of the plan; its first by default."
-EFFECT_HELP = "Add an effect beyond the nominal model, as often as wanted; tunnel effects lists them."
 
 
 def run(
@@ -22,13 +23,11 @@ def run(
         typer.Option("--out", "-o", metavar="FILE", help="An .mp4 or a .png, as often as wanted."),
     ] = None,
     run_id: Annotated[str | None, typer.Option("--run", metavar="ID", help=RUN_HELP)] = None,
-    spring: Annotated[int | None, typer.Option("--spring", help="Number of the spring in Table II.")] = None,
-    wind: Annotated[float | None, typer.Option("--wind", help="Wind speed, m/s.")] = None,
-    angle: Annotated[float | None, typer.Option("--angle", help="Release angle, degrees.")] = None,
+    spring: SpringOption = None,
+    wind: WindOption = None,
+    angle: AngleOption = None,
     duration: Annotated[float | None, typer.Option("--duration", help="Of the run, s.")] = None,
-    effect: Annotated[
-        list[str] | None, typer.Option("--effect", metavar="NAME:PARAMETER=VALUE", help=EFFECT_HELP)
-    ] = None,
+    effect: EffectOption = None,
     seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed of the noise.")] = None,
     at: Annotated[float, typer.Option("--at", help="When the picture is taken, s from the release.")] = 2.0,
     fps: Annotated[int, typer.Option("--fps", min=1, max=120, help="Frames per second of the film.")] = 25,

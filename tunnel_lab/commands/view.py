@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tunnel_lab.commands.render import EFFECT_HELP, PLAN_HELP, RUN_HELP
+from tunnel_lab.commands.render import PLAN_HELP, RUN_HELP
+from tunnel_lab.terminal.run_options import AngleOption, EffectOption, SpringOption, WindOption
 
 NAME = "view"
 
@@ -15,13 +16,11 @@ NAME = "view"
 def run(
     plan: Annotated[Path | None, typer.Argument(help=PLAN_HELP)] = None,
     run_id: Annotated[str | None, typer.Option("--run", metavar="ID", help=RUN_HELP)] = None,
-    spring: Annotated[int | None, typer.Option("--spring", help="Number of the spring in Table II.")] = None,
-    wind: Annotated[float | None, typer.Option("--wind", help="Wind speed, m/s.")] = None,
-    angle: Annotated[float | None, typer.Option("--angle", help="Release angle, degrees.")] = None,
+    spring: SpringOption = None,
+    wind: WindOption = None,
+    angle: AngleOption = None,
+    effect: EffectOption = None,
     duration: Annotated[float | None, typer.Option("--duration", help="Until the next release, s.")] = None,
-    effect: Annotated[
-        list[str] | None, typer.Option("--effect", metavar="NAME:PARAMETER=VALUE", help=EFFECT_HELP)
-    ] = None,
     seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed of what effects draw.")] = None,
     speed: Annotated[
         float, typer.Option("--speed", min=0.01, max=100.0, help="Factor on real time; the window only.")
@@ -58,16 +57,8 @@ def run(
     from tunnel_lab.show.request import Request, shown_run
     from tunnel_sim.vocabulary.errors import TunnelError
 
-    request = Request(
-        plan=None if plan is None else str(plan),
-        run=run_id,
-        spring=spring,
-        wind_speed=wind,
-        release_angle_deg=angle,
-        duration=duration,
-        effects=tuple(effect or ()),
-        seed=seed,
-    )
+    file, effects = None if plan is None else str(plan), tuple(effect or ())
+    request = Request(file, run_id, spring, wind, angle, duration, effects, seed)
     if not web and (port or browser):
         raise TunnelError(
             "is for the browser only", where="--port" if port else "--browser", remedy="add --web"

@@ -15,15 +15,7 @@ from tunnel_lab.terminal.effect_option import parse_effect
 from tunnel_sim.effects import effect_from
 from tunnel_sim.files.plan_schema import check_size, first_twice
 from tunnel_sim.files.reading import as_described, check_count, check_shape
-from tunnel_sim.files.toml_input import (
-    OneLine,
-    SampleRate,
-    StrictModel,
-    check_version,
-    load_toml,
-    shown,
-    validate,
-)
+from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, read_document, shown
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -239,9 +231,8 @@ def load_grid(path: Path) -> Grid:
     Raises:
         TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
     """
-    raw = load_toml(path, missing="name a grid such as the packaged score-grid.toml, or leave it out")
-    check_version(raw, path)
-    document = validate(GridDocument, raw, path)
+    missing = "name a grid such as the packaged score-grid.toml, or leave it out"
+    document = read_document(GridDocument, path, missing=missing)
     where = shown(path)
     _check_effects(document, where)
     _check_sizes(document, where)

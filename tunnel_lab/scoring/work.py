@@ -4,13 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
-import os
-import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -19,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from tunnel_lab.scoring.grid import Cell, Grid, check_trials
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import output_folder, write_json
+from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -28,13 +24,10 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 ItemT = TypeVar("ItemT")
-ResultT = TypeVar("ResultT")
 Row = dict[str, Any]
 Told = Callable[[int, int], None]
 UNIT_TRIALS = 5
 """Trials done together: what an interruption costs at most, in each process."""
-
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -229,38 +222,6 @@ def resumed(
     return done
 
 
-def in_processes(
-    work: Callable[[ItemT], ResultT], items: Sequence[ItemT], jobs: int
-) -> Iterator[tuple[ItemT, ResultT]]:
-    """Do work in processes of one thread each.
-
-    Args:
-        work: what to do; a function of a module, and its result, have to go from process to process.
-        items: what to do it to.
-        jobs: number of processes; 0 works in this one.
-
-    Yields:
-        Items with their results, as they come.
-    """
-    if jobs == 0 or not items:
-        yield from ((item, work(item)) for item in items)
-        return
-    context = multiprocessing.get_context("spawn")
-    with (
-        _one_thread_each(),
-        ProcessPoolExecutor(min(jobs, len(items)), mp_context=context, initializer=_die_quietly) as pool,
-    ):
-        try:
-            waiting = {pool.submit(work, item): item for item in items}  # items need not be hashable
-            for finished in as_completed(waiting):
-                yield waiting[finished], finished.result()
-        except BaseException:  # an interruption above all: nobody waits for what nobody will read
-            pool.shutdown(wait=False, cancel_futures=True)
-            for child in multiprocessing.active_children():
-                child.terminate()
-            raise
-
-
 def fingerprint(document: Mapping[str, Any], estimators: Sequence[str]) -> str:
     """What results hang on: the conditions, the estimators' names and the code of the packages below.
 
@@ -300,26 +261,6 @@ def _kept(parts: Path, name: str, mark: str) -> list[Row] | None:
     rows = document.get("rows")
     whole = isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
     return rows if whole and document.get("fingerprint") == mark else None
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Children inherit one thread for linear algebra: bits must not hang on the number of processors."""
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-def _die_quietly() -> None:
-    """On Ctrl-C a child just ends; the parent says what there is to say."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def describe(cell: Cell) -> Row:

@@ -6,7 +6,16 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
-from tunnel_sim.files.plan_schema import EffectTable, NotNegative, Positive, ReleaseAngle
+from tunnel_sim.files.plan_schema import (
+    EffectTable,
+    NotNegative,
+    Positive,
+    ReleaseAngles,
+    Repeats,
+    Springs,
+    Stiffnesses,
+    WindSpeeds,
+)
 from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel
 
 
@@ -73,15 +82,11 @@ class ConditionsTable(StrictModel):
     """``[conditions]`` or ``[[conditions]]``: the runs of a campaign; each table, and each duration, is one."""
 
     name: OneLine | None = Field(default=None, description="a short name in quotes")
-    springs: list[int] = Field(default=[], description="a list of spring numbers of Table II, such as [5, 6]")
-    spring_stiffness: list[Positive] = Field(default=[], description="a list of positive numbers in N m/rad")
-    wind_speeds: list[NotNegative] = Field(
-        min_length=1, description="a list of speeds in m/s, 0 for wind-off, such as [0, 10]"
-    )
-    release_angles_deg: list[ReleaseAngle] = Field(
-        min_length=1, description="a list of angles in degrees, such as [20]"
-    )
-    repeats: int = Field(default=1, ge=1, le=1000, description="a whole number from 1 to 1000")
+    springs: Springs = Field(default=[])
+    spring_stiffness: Stiffnesses = Field(default=[])
+    wind_speeds: WindSpeeds
+    release_angles_deg: ReleaseAngles
+    repeats: Repeats = 1
     duration: ManyPositive = Field(description="a positive number or a list of them, s")
     air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
 

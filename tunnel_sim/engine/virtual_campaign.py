@@ -21,6 +21,7 @@ from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, Truth
+from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
 
 
@@ -91,21 +92,30 @@ def _draw(plan: CampaignPlan) -> _Drawn:
     return [(rng, EffectChain.draw(run, effects, rng)) for run, rng in zip(stated, rngs, strict=True)]
 
 
+def stated_run(condition: Condition, record: Record) -> Run:
+    """A run as a campaign lists it, without the truth.
+
+    Args:
+        condition: the stated conditions.
+        record: what the sensor read.
+    """
+    return Run(
+        id=condition.id,
+        record=record,
+        wind_speed=condition.wind_speed,
+        spring_stiffness=condition.spring_stiffness,
+        air_density=condition.air_density if condition.wind_speed > 0.0 else None,
+        release_angle=condition.release_angle,
+    )
+
+
 def _campaign(plan: CampaignPlan, rig: Rig, motions: Sequence[Motion], drawn: _Drawn) -> Campaign:
     records = [
         read_motion(motion, plan.sensor, rng, chain)
         for motion, (rng, chain) in zip(motions, drawn, strict=True)
     ]
     runs = tuple(
-        Run(
-            id=condition.id,
-            record=record,
-            wind_speed=condition.wind_speed,
-            spring_stiffness=condition.spring_stiffness,
-            air_density=condition.air_density if condition.wind_speed > 0.0 else None,
-            release_angle=condition.release_angle,
-        )
-        for condition, record in zip(plan.conditions, records, strict=True)
+        stated_run(condition, record) for condition, record in zip(plan.conditions, records, strict=True)
     )
     return Campaign(
         name=plan.name,

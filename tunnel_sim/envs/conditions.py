@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from tunnel_sim.effects import ALL_EFFECTS, Effect
-from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
+from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings, stated_run
 from tunnel_sim.envs.config import FreeDecayConfig, angle_limit
 from tunnel_sim.envs.errors import EnvError, as_env_error
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.aero import aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
@@ -64,15 +65,7 @@ class RunPlan:
         Returns:
             The run; it knows nothing of the truth.
         """
-        condition = self.condition
-        return Run(
-            id=condition.id,
-            record=record,
-            wind_speed=condition.wind_speed,
-            spring_stiffness=condition.spring_stiffness,
-            air_density=condition.air_density if condition.wind_speed > 0.0 else None,
-            release_angle=condition.release_angle,
-        )
+        return stated_run(self.condition, record)
 
     def statement(self) -> dict[str, float]:
         """What the operator is told at the start, SI units."""
@@ -188,8 +181,13 @@ def drawn_springs(rig: Rig) -> list[float]:
         N m/rad; all springs where none is stiff enough.
     """
     body = rig.body
-    pressure = 0.5 * rig.air.density * WIND_SPEED[1] ** 2
-    needed = STIFFNESS_MARGIN * pressure * body.frontal_area * body.length * CN_BETA[1]
+    needed = STIFFNESS_MARGIN * aerodynamic_stiffness(
+        CN_BETA[1],
+        air_density=rig.air.density,
+        wind_speed=WIND_SPEED[1],
+        frontal_area=body.frontal_area,
+        reference_length=body.length,
+    )
     return [value for value in rig.springs.values() if value > needed] or list(rig.springs.values())
 
 

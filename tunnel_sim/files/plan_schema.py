@@ -30,6 +30,17 @@ def _release_angle(angle: float) -> float:
 HashableT = TypeVar("HashableT", bound=Hashable)
 ReleaseAngle = Annotated[float, AfterValidator(_release_angle)]
 
+Springs = Annotated[list[int], Field(description="a list of spring numbers of Table II, such as [5, 6]")]
+Stiffnesses = Annotated[list[Positive], Field(description="a list of positive numbers in N m/rad")]
+WindSpeeds = Annotated[
+    list[NotNegative],
+    Field(min_length=1, description="a list of speeds in m/s, 0 for wind-off, such as [0, 10]"),
+]
+ReleaseAngles = Annotated[
+    list[ReleaseAngle], Field(min_length=1, description="a list of angles in degrees, such as [20]")
+]
+Repeats = Annotated[int, Field(ge=1, le=1000, description="a whole number from 1 to 1000")]
+
 
 class TruthTable(StrictModel):
     """``[truth]``."""
@@ -64,15 +75,11 @@ class PlanDocument(StrictModel):
     name: OneLine = Field(description="a short name in quotes")
     description: str = Field(default="", description="text in quotes, or leave it out")
     seed: int = Field(ge=0, description="a whole number, zero or more")
-    springs: list[int] = Field(default=[], description="a list of spring numbers of Table II, such as [5, 6]")
-    spring_stiffness: list[Positive] = Field(default=[], description="a list of positive numbers in N m/rad")
-    wind_speeds: list[NotNegative] = Field(
-        min_length=1, description="a list of speeds in m/s, 0 for wind-off, such as [0, 10]"
-    )
-    release_angles_deg: list[ReleaseAngle] = Field(
-        min_length=1, description="a list of angles in degrees, such as [20]"
-    )
-    repeats: int = Field(default=1, ge=1, le=1000, description="a whole number from 1 to 1000")
+    springs: Springs = Field(default=[])
+    spring_stiffness: Stiffnesses = Field(default=[])
+    wind_speeds: WindSpeeds
+    release_angles_deg: ReleaseAngles
+    repeats: Repeats = 1
     duration: Positive = Field(description="a positive number in s")
     air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
     truth: TruthTable = Field(description="a [truth] table with cn_beta and cn_r")

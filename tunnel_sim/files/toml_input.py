@@ -127,6 +127,25 @@ def check_version(document: Mapping[str, Any], path: Path) -> None:
         raise TunnelError(what, where=shown(path), remedy=remedy)
 
 
+def read_document(model: type[ModelT], path: Path, *, missing: str) -> ModelT:
+    """Read and validate a TOML file that states a ``schema_version``.
+
+    Args:
+        model: the model of the whole file.
+        path: the file.
+        missing: the remedy when there is no such file.
+
+    Returns:
+        The validated document.
+
+    Raises:
+        TunnelError: for the first thing that is wrong.
+    """
+    document = load_toml(path, missing=missing)
+    check_version(document, path)
+    return validate(model, document, path)
+
+
 def validate(model: type[ModelT], document: Mapping[str, Any], path: Path) -> ModelT:
     """Validate a document against its model.
 

@@ -48,7 +48,7 @@ def test_without_a_file_the_inputs_count_as_exact(tunnel: Tunnel, tiny_campaign:
     status, out, _ = tunnel("identify", tiny_campaign, "--budget", "--model", "conventional")
     assert status == 0
     assert "wind_speed" not in out
-    assert "has no run to spare" in out
+    assert "has no redundant runs" in out
     assert "choice of model" in out
 
 

