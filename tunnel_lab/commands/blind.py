@@ -129,7 +129,7 @@ def score(
     [bold]Exit status[/bold]
       0 scored, 2 bad input: not all answered, or a file is not what was sealed.
     """
-    from diagnosis._diagnose import vocabulary
+    from diagnosis import vocabulary
     from diagnosis.blind import score_set
     from tunnel_lab.diagnosis_view import blind_page
     from tunnel_lab.terminal.tables import say, show_tables

@@ -63,7 +63,7 @@ def run(
       0 answered, whatever the verdict; 2 bad input; 130 interrupted. A file is
       written whole or not at all.
     """
-    from diagnosis._diagnose import vocabulary
+    from diagnosis import vocabulary
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.json_text import json_text
@@ -115,7 +115,7 @@ def diagnose_with_progress(campaign: Campaign, kinds: tuple[type[Effect], ...]) 
     Returns:
         The diagnosis.
     """
-    from diagnosis._diagnose import diagnose
+    from diagnosis import diagnose
 
     with step_display() as tell:
         return diagnose(campaign, kinds=kinds, progress=tell)
