@@ -61,7 +61,7 @@ def test_the_import_contracts_hold() -> None:
         ("identification/estimate.py", "import mujoco"),
         ("identification/estimate.py", "import tunnel_sim.engine.model"),
         ("tunnel_sim/vocabulary/record.py", "import identification.estimate"),
-        ("identification/estimate.py", "import tunnel_lab.terminal.formatting"),
+        ("identification/estimate.py", "import tunnel_lab.terminal.tables"),
     ],
 )
 def test_a_planted_breach_is_caught(tmp_path: Path, module: str, line: str) -> None:

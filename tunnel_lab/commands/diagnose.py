@@ -155,16 +155,15 @@ def show(document: dict[str, Any]) -> None:
     Args:
         document: of a diagnosis.
     """
-    from tunnel_lab.terminal import diagnosis_tables as parts
-    from tunnel_lab.terminal.tables import say, show_tables
+    from diagnosis import printing as parts
+    from tunnel_lab.terminal.tables import rich_table, say, show_tables
 
     say(document["verdict"])
     for line in (parts.where_line(document), *parts.rival_lines(document)):
         if line:
             say(line)
     say("")
-    show_tables(
-        parts.candidates_table(document), parts.gap_table(document), parts.coefficients_table(document)
-    )
+    shown = (parts.candidates_table, parts.gap_table, parts.coefficients_table)
+    show_tables(*(rich_table(table(document)) for table in shown))
     for line in parts.closing_lines(document):
         say(line)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tunnel_lab.terminal.formatting import COEFFICIENTS, at_bound, significant, unit_mark, with_std
+from identification.printing.numbers import COEFFICIENTS, at_bound, significant, unit_mark, with_std
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 
