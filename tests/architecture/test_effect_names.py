@@ -6,14 +6,14 @@ import ast
 from pathlib import Path
 
 import pytest
+from test_layers import PACKAGES
 
 from tunnel_sim.effects import ALL_EFFECTS
 
 ROOT = Path(__file__).parents[2]
 NAMES = {kind.name for kind in ALL_EFFECTS}
-PACKAGES = ("tunnel_sim", "identification", "diagnosis", "tunnel_lab")
 #: The effects themselves, and the independent simulator that has forms of its own for them.
-HOMES = (ROOT / "tunnel_sim" / "effects", ROOT / "tunnel_sim" / "reference")
+HOMES = (ROOT / "tunnel_sim" / "effects", ROOT / "tunnel_reference")
 FILES = [
     path
     for package in PACKAGES
