@@ -28,13 +28,10 @@ class FileTable:
 
 
 class RunReader(Protocol):
-    """A module that reads one kind of run file.
-
-    Args:
-        LIMIT: the largest file it reads, bytes.
-    """
+    """A module that reads one kind of run file."""
 
     LIMIT: int
+    """The largest file it reads, bytes."""
 
     def read(self, content: bytes, where: str, most: int) -> FileTable:
         """The table.
