@@ -49,8 +49,7 @@ def modules() -> Iterator[ModuleType]:
         root = importlib.import_module(package)
         yield root
         for found in pkgutil.walk_packages(root.__path__, package + "."):
-            if not any(part.startswith("_") for part in found.name.split(".")):
-                yield importlib.import_module(found.name)
+            yield importlib.import_module(found.name)
 
 
 def public_objects() -> Iterator[tuple[str, Any]]:
