@@ -21,7 +21,7 @@ from mujoco import rollout, sysid
 from rich.console import Console
 from rich.table import Table
 
-from diagnosis._diagnose import diagnose
+from diagnosis import diagnose
 from diagnosis.detection.sensor_noise import campaign_noise
 from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.problem import Problem, campaign_rig

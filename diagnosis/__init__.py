@@ -1,1 +1,48 @@
-"""The diagnosis of the sim-to-real gap: where the nominal model departs, why, and how far it closes."""
+"""The diagnosis of the sim-to-real gap: where the nominal model departs, why, and how far it closes.
+
+The names below load on first use.
+"""
+
+from typing import TYPE_CHECKING
+
+from tunnel_sim.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from diagnosis._diagnose import diagnose, vocabulary
+    from diagnosis.result import (
+        Candidate,
+        Coefficients,
+        Diagnosis,
+        GapSummary,
+        ParameterEstimate,
+        RunGap,
+        Where,
+    )
+else:
+    __getattr__, __dir__ = lazy_names(
+        __name__,
+        {
+            "._diagnose": ("diagnose", "vocabulary"),
+            ".result": (
+                "Candidate",
+                "Coefficients",
+                "Diagnosis",
+                "GapSummary",
+                "ParameterEstimate",
+                "RunGap",
+                "Where",
+            ),
+        },
+    )
+
+__all__ = [
+    "Candidate",
+    "Coefficients",
+    "Diagnosis",
+    "GapSummary",
+    "ParameterEstimate",
+    "RunGap",
+    "Where",
+    "diagnose",
+    "vocabulary",
+]

@@ -6,6 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import polars as pl
+
+from diagnosis.printing import diagnosis_parts
+from identification.printing.frames import wide_frame
+from identification.printing.table import as_html, as_text
 from identification.remark import Remark
 
 SCHEMA_VERSION = 1
@@ -287,6 +292,50 @@ class Diagnosis:
             "maps": None if self.maps is None else dict(self.maps),
             "provenance": dict(self.provenance),
         }
+
+    def __str__(self) -> str:
+        """The verdict, the answers weighed and the coefficients as short tables, and the caveats."""
+        return as_text(diagnosis_parts(self.to_json_dict()))
+
+    def _repr_html_(self) -> str:
+        """The same for notebooks."""
+        return as_html(diagnosis_parts(self.to_json_dict()))
+
+    def candidates_frame(self) -> pl.DataFrame:
+        """A row for each answer weighed: effect, probability, excess_after and closed, as in `Candidate`."""
+        kinds = {"effect": pl.String, **dict.fromkeys(("probability", "excess_after", "closed"), pl.Float64)}
+        rows = [{name: getattr(candidate, name) for name in kinds} for candidate in self.candidates]
+        return pl.DataFrame(rows, schema=kinds)
+
+    def parameters_frame(self) -> pl.DataFrame:
+        """A row for each fitted parameter of each answer: effect, parameter, value, std, unit and bound."""
+        kinds = {"effect": pl.String, "parameter": pl.String, "value": pl.Float64, "std": pl.Float64}
+        rows = [
+            {"effect": candidate.effect, "parameter": name, **given.to_json_dict()}
+            for candidate in self.candidates
+            for name, given in candidate.parameters.items()
+        ]
+        return pl.DataFrame(rows, schema={**kinds, "unit": pl.String, "bound": pl.String})
+
+    def coefficients_frame(self) -> pl.DataFrame:
+        """A row for each coefficient: its unit, and ``before`` and ``after`` with each ``_std``."""
+        before, after = _estimates(self.coefficients.before), _estimates(self.coefficients.after)
+        rows = [
+            {
+                "quantity": name,
+                "unit": (before.get(name) or after[name])["unit"],
+                "before": before.get(name),
+                "after": after.get(name),
+            }
+            for name in {**before, **after}
+        ]
+        return wide_frame(rows, {"quantity": pl.String, "unit": pl.String}, ("before", "after"))
+
+    def runs_frame(self) -> pl.DataFrame:
+        """A row for each run: id, its excess before and after, and held_out, as in `RunGap`."""
+        kinds = {"id": pl.String, "before": pl.Float64, "after": pl.Float64, "held_out": pl.Boolean}
+        rows = [{name: getattr(run, name) for name in kinds} for run in self.gap.runs]
+        return pl.DataFrame(rows, schema=kinds)
 
 
 def _estimates(values: Mapping[str, ParameterEstimate]) -> dict[str, Any]:

@@ -1,6 +1,59 @@
-"""Identification of free-decay campaigns, measured or simulated; MuJoCo is never imported here."""
+"""Identification of free-decay campaigns, measured or simulated; MuJoCo is never imported here.
 
-from identification._identify import identify
-from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, WindowEstimate
+The names below load on first use.
+"""
 
-__all__ = ["Estimate", "NoiseLevel", "Quantity", "RunEstimate", "Status", "WindowEstimate", "identify"]
+from typing import TYPE_CHECKING
+
+from tunnel_sim.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from identification._identify import identify
+    from identification.datasets import (
+        MEASURED_CAMPAIGNS,
+        measured_campaign,
+        paper_derivatives,
+        paper_springs,
+        paper_windows,
+    )
+    from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, WindowEstimate
+    from identification.estimators import ALL_ESTIMATORS, Estimator, make_estimator
+    from identification.remark import Remark
+    from identification.status import Status
+else:
+    __getattr__, __dir__ = lazy_names(
+        __name__,
+        {
+            "._identify": ("identify",),
+            ".datasets": (
+                "MEASURED_CAMPAIGNS",
+                "measured_campaign",
+                "paper_derivatives",
+                "paper_springs",
+                "paper_windows",
+            ),
+            ".estimate": ("Estimate", "NoiseLevel", "Quantity", "RunEstimate", "WindowEstimate"),
+            ".estimators": ("ALL_ESTIMATORS", "Estimator", "make_estimator"),
+            ".remark": ("Remark",),
+            ".status": ("Status",),
+        },
+    )
+
+__all__ = [
+    "ALL_ESTIMATORS",
+    "MEASURED_CAMPAIGNS",
+    "Estimate",
+    "Estimator",
+    "NoiseLevel",
+    "Quantity",
+    "Remark",
+    "RunEstimate",
+    "Status",
+    "WindowEstimate",
+    "identify",
+    "make_estimator",
+    "measured_campaign",
+    "paper_derivatives",
+    "paper_springs",
+    "paper_windows",
+]

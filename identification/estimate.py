@@ -13,7 +13,11 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
+import polars as pl
 
+from identification.printing.estimate_tables import estimate_parts
+from identification.printing.frames import long_frame, wide_frame
+from identification.printing.table import as_html, as_text
 from identification.remark import Remark
 from identification.status import Status as Status
 from identification.status import by_gravity as by_gravity
@@ -268,6 +272,30 @@ class Estimate:
         """The covariance as an array, shape (p, p), rows and columns as in ``parameters``."""
         size = len(self.parameters)
         return np.array(self.covariance, dtype=np.float64).reshape(size, size)
+
+    def __str__(self) -> str:
+        """The coefficients and the first runs as short tables, and what is to be said of them."""
+        return as_text(estimate_parts(self.to_json_dict()))
+
+    def _repr_html_(self) -> str:
+        """The same for notebooks."""
+        return as_html(estimate_parts(self.to_json_dict()))
+
+    def coefficients_frame(self) -> pl.DataFrame:
+        """A row for each coefficient: value, std, unit, and the ends low and high of its 95 % interval."""
+        document = self.to_json_dict()
+        return long_frame({name: document[name] for name in _CAMPAIGN_QUANTITIES})
+
+    def runs_frame(self) -> pl.DataFrame:
+        """A row for each run: its id and status, and the quantities of `RunEstimate` with each ``_std``."""
+        rows = [run.to_json_dict() for run in self.runs]
+        return wide_frame(rows, {"id": pl.String, "status": pl.String}, _RUN_QUANTITIES)
+
+    def windows_frame(self) -> pl.DataFrame:
+        """A row for each window of each run: ``run``, then the fields of `WindowEstimate` with each ``_std``."""
+        rows = [{"run": run.id} | window.to_json_dict() for run in self.runs for window in run.windows]
+        times = {"start_s": pl.Float64, "duration_s": pl.Float64, "cycles": pl.Int64}
+        return wide_frame(rows, {"run": pl.String, **times}, ("amplitude", "omega_n", "zeta"))
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name; None where there is no value."""

@@ -95,7 +95,7 @@ def tunnel(
         typer.echo(context.get_help())
 
 
-for _command in (
+COMMANDS = (
     demo,
     simulate,
     identify,
@@ -108,7 +108,10 @@ for _command in (
     view,
     render,
     train,
-):
+)
+"""Every command that is one function, in the order of the help."""
+
+for _command in COMMANDS:
     app.command(_command.NAME, cls=getattr(_command, "COMMAND", None))(_command.run)
 app.add_typer(blind.app, name=blind.NAME)
 

@@ -7,5 +7,16 @@ the fits use), `answer_set` diagnoses them without the key, `score_set` checks a
 from diagnosis.blind.answer import answer_set, answers_folder
 from diagnosis.blind.make import make_blind
 from diagnosis.blind.score import Score, score_set
+from tunnel_reference.draw import DEFAULT_SHARES, Mixture
+from tunnel_reference.make import parse_shares
 
-__all__ = ["Score", "answer_set", "answers_folder", "make_blind", "score_set"]
+__all__ = [
+    "DEFAULT_SHARES",
+    "Mixture",
+    "Score",
+    "answer_set",
+    "answers_folder",
+    "make_blind",
+    "parse_shares",
+    "score_set",
+]

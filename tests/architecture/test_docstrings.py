@@ -15,26 +15,14 @@ from typing import Any
 
 import pydantic
 import pytest
+from test_layers import PACKAGES
 
-PACKAGES = ("tunnel_sim", "identification", "diagnosis", "tunnel_lab")
+from tunnel_lab import cli
+
 # Typer turns the arguments of a command into its help; test_cli.py reads that.
-COMMANDS = {
-    f"tunnel_lab.commands.{name}.run"
-    for name in (
-        "demo",
-        "simulate",
-        "identify",
-        "diagnose",
-        "plot",
-        "springs",
-        "effects",
-        "score",
-        "sweep",
-        "view",
-        "render",
-        "train",
-    )
-} | {f"tunnel_lab.commands.blind.{name}" for name in ("make", "diagnose", "score")}
+COMMANDS = {f"{command.__name__}.run" for command in cli.COMMANDS} | {
+    f"tunnel_lab.commands.blind.{name}" for name in ("make", "diagnose", "score")
+}
 EXEMPT = {"tunnel_lab.cli.tunnel", *COMMANDS}
 # The reference simulator is a test oracle with conventions of its own, not an interface.
 ORACLES = ("tunnel_reference.",)
@@ -61,8 +49,7 @@ def modules() -> Iterator[ModuleType]:
         root = importlib.import_module(package)
         yield root
         for found in pkgutil.walk_packages(root.__path__, package + "."):
-            if not any(part.startswith("_") for part in found.name.split(".")):
-                yield importlib.import_module(found.name)
+            yield importlib.import_module(found.name)
 
 
 def public_objects() -> Iterator[tuple[str, Any]]:

@@ -6,15 +6,15 @@ import ast
 from pathlib import Path
 
 import pytest
+from test_layers import PACKAGES
 
 from tunnel_sim.effects import ALL_EFFECTS
 
 ROOT = Path(__file__).parents[2]
 NAMES = {kind.name for kind in ALL_EFFECTS}
-PACKAGES = ("tunnel_sim", "identification", "diagnosis", "tunnel_lab")
-#: The effects themselves, and the moment law, some of whose terms bear the same names.
-#: The independent simulator, `tunnel_reference`, has forms of its own for them.
-HOMES = (ROOT / "tunnel_sim" / "effects", ROOT / "tunnel_sim" / "physics")
+#: The effects themselves, the moment law, some of whose terms bear the same names, and the independent simulator,
+#: which has forms of its own for them.
+HOMES = (ROOT / "tunnel_sim" / "effects", ROOT / "tunnel_sim" / "physics", ROOT / "tunnel_reference")
 FILES = [
     path
     for package in PACKAGES

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -12,9 +13,8 @@ import grimp
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = tuple(
-    tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["root_packages"],
-)
+TOOLS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]
+PACKAGES = tuple(TOOLS["importlinter"]["root_packages"])
 # An editable installation would lead import-linter back to the original sources, wherever it is started.
 LINT_IMPORTS = """
 import sys
@@ -50,6 +50,15 @@ def imported_by(script: str) -> set[str]:
     return set(done.stdout.splitlines()[-1].split())
 
 
+def test_every_package_is_checked_and_shipped() -> None:
+    found = {path.parent.name for path in ROOT.glob("*/__init__.py")} - {"tests", "benchmarks", "docs"}
+    assert found - {"mjcf"} == set(PACKAGES)
+    assert set(TOOLS["scikit-build"]["wheel"]["packages"]) == {*PACKAGES, "mjcf"}
+    assert set(TOOLS["mypy"]["packages"]) == {*PACKAGES, "docs.studies"}
+    (imported,) = re.findall(r"^import (diagnosis.*)$", (ROOT / ".ci" / "run").read_text(), re.MULTILINE)
+    assert set(imported.split(", ")) == set(PACKAGES)
+
+
 def test_the_import_contracts_hold() -> None:
     done = lint_imports(ROOT)
     assert done.returncode == 0, done.stdout
@@ -61,7 +70,12 @@ def test_the_import_contracts_hold() -> None:
         ("identification/estimate.py", "import mujoco"),
         ("identification/estimate.py", "import tunnel_sim.engine.model"),
         ("tunnel_sim/vocabulary/record.py", "import identification.estimate"),
-        ("identification/estimate.py", "import tunnel_lab.terminal.formatting"),
+        ("identification/estimate.py", "import tunnel_lab.terminal.tables"),
+        ("tunnel_sim/physics/steps.py", "import tunnel_sim.effects.base"),
+        ("identification/statistics/weighted_line.py", "import identification.decay.peaks"),
+        ("diagnosis/result.py", "import diagnosis.study"),
+        ("tunnel_reference/forms.py", "import tunnel_sim.physics.motion"),
+        ("tunnel_lab/cli.py", "import tunnel_reference.forms"),
     ],
 )
 def test_a_planted_breach_is_caught(tmp_path: Path, module: str, line: str) -> None:
@@ -74,6 +88,20 @@ def test_a_planted_breach_is_caught(tmp_path: Path, module: str, line: str) -> N
     done = lint_imports(tmp_path)
     assert done.returncode == 1, done.stdout
     assert "BROKEN" in done.stdout
+
+
+def test_the_reference_simulator_rests_on_values_and_files_alone() -> None:
+    graph = grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
+    foreign = {
+        name
+        for module in graph.modules
+        if module.startswith("tunnel_reference")
+        for name in graph.find_upstream_modules(module)
+        if name.split(".")[0] in {*PACKAGES, "mujoco", "scipy"}
+    }
+    own = ("tunnel_reference", "tunnel_sim.vocabulary", "tunnel_sim.files")
+    assert {name for name in foreign if not name.startswith(own)} == set()
+    assert "tunnel_sim.files.campaign_io" in foreign
 
 
 def test_mujoco_is_imported_only_where_the_engine_runs() -> None:

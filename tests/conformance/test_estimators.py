@@ -12,7 +12,8 @@ from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, camp
 from tunnel_sim.vocabulary.errors import TunnelError
 
 NAMES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
-# Relative error on a noise-free campaign of the nominal model. A new estimator states its own here.
+# Relative error on a noise-free campaign of the nominal model, where it is not ORDINARY_ACCURACY.
+ORDINARY_ACCURACY = 1e-3
 ACCURACY = {
     "output_error": 1e-6,
     "conventional": 0.02,
@@ -30,6 +31,10 @@ each_estimator = pytest.mark.parametrize("name", ALL_ESTIMATORS)
 @pytest.fixture(scope="module")
 def noisy():
     return campaign(noise=5e-4, resolution=RESOLUTION, rng=np.random.default_rng(11))
+
+
+def accuracy(name):
+    return ACCURACY.get(name, ORDINARY_ACCURACY)
 
 
 def numbers(value):
@@ -69,7 +74,7 @@ def checked(estimate, data):
 
 def test_registry_is_explicit_and_consistent():
     assert len(set(ALL_ESTIMATORS)) == len(ENTRIES) >= 2
-    assert set(ACCURACY) == set(ALL_ESTIMATORS)
+    assert set(ACCURACY) <= set(ALL_ESTIMATORS)
     for name in ALL_ESTIMATORS:
         assert make_estimator(name).name == name
     for entry in ENTRIES:
@@ -84,8 +89,8 @@ def test_recovers_the_truth_from_noise_free_records(name):
     assert estimate.statuses == (Status.OK,)
     for quantity in NAMES:
         truth = getattr(Truth(), quantity)
-        assert getattr(estimate, quantity).value == pytest.approx(truth, rel=ACCURACY[name])
-    assert estimate.wind_off_inertia.value == pytest.approx(Truth().yaw_inertia, rel=ACCURACY[name])
+        assert getattr(estimate, quantity).value == pytest.approx(truth, rel=accuracy(name))
+    assert estimate.wind_off_inertia.value == pytest.approx(Truth().yaw_inertia, rel=accuracy(name))
 
 
 @each_estimator
@@ -101,7 +106,7 @@ def test_noisy_records_are_identified_within_their_own_deviations(name, noisy):
     for quantity in NAMES:
         found, truth = getattr(estimate, quantity), getattr(Truth(), quantity)
         # Six deviations, and the method's own stated error where it is not unbiased.
-        allowed = 6.0 * found.std + ACCURACY[name] * abs(truth)
+        allowed = 6.0 * found.std + accuracy(name) * abs(truth)
         assert abs(found.value - truth) < allowed
 
 

@@ -61,7 +61,7 @@ def draw(campaign: Campaign, found: Any, folder: Path) -> None:
 
 def diagnose_campaign(folder: Path, rng: Rng) -> None:
     """A diagnosis with a small vocabulary: shown, written and, now and then, reported."""
-    from diagnosis._diagnose import diagnose
+    from diagnosis import diagnose
     from tunnel_lab.commands.diagnose import show
     from tunnel_lab.diagnosis_view import write_report
     from tunnel_sim.effects import ALL_EFFECTS

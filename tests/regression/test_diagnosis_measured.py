@@ -6,7 +6,7 @@ damped by vortices off its bilge keels, with the square of the rate (identificat
 
 import pytest
 
-from diagnosis._diagnose import diagnose
+from diagnosis import diagnose
 from identification.datasets import measured_campaign
 
 pytestmark = pytest.mark.slow

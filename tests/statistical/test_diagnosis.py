@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from diagnosis._diagnose import diagnose
+from diagnosis import diagnose
 from diagnosis.blind.make import make_blind
 from diagnosis.investigate import investigate
 from diagnosis.policy import GAP_FALSE_ALARM_RATE

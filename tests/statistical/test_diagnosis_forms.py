@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis._diagnose import diagnose
+from diagnosis import diagnose
 from tests.reference.rigs import rig
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of

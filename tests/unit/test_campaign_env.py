@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_with_sb3
 
 import tunnel_sim.envs  # registers
-from diagnosis._diagnose import diagnose
+from diagnosis import diagnose
 from identification import identify
 from identification.campaign.belief import information_gain
 from tunnel_lab.envs.campaign import CampaignEnv

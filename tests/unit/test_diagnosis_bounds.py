@@ -10,9 +10,9 @@ import pytest
 from diagnosis.detection.mains import refine_frequency, remove_hum
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.problem import Point, Problem
+from diagnosis.printing import parameter_lines
 from diagnosis.result import ParameterEstimate
 from tests.unit.gap_campaigns import INTERVAL, NOISE, campaign, nominal
-from tunnel_lab.terminal.diagnosis_tables import parameter_lines
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.record import Record
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis._diagnose import diagnose, vocabulary
+from diagnosis import diagnose, vocabulary
 from diagnosis.detection.comparable import comparable_runs, frequency
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis._diagnose import diagnose
+from diagnosis import diagnose
 from tests.unit.gap_campaigns import campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -13,11 +13,13 @@ from typing import Any
 import pytest
 from rich.table import Table
 
+from diagnosis import printing
 from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
+from identification.printing.table import TextTable
 from identification.status import Status
 from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.unit.shown_numbers import assert_shows
-from tunnel_lab.terminal import diagnosis_tables, tables
+from tunnel_lab.terminal import tables
 
 Document = dict[str, Any]
 Y_UNIT = re.compile(r"\[[^\]]*\]|N m s²/rad²|N m/rad|m/s|N m|1/rad")
@@ -28,9 +30,10 @@ def given() -> Document:
     return copy.deepcopy(document())
 
 
-def rows(table: Table) -> list[list[str]]:
+def rows(table: Table | TextTable) -> list[list[str]]:
     """The cells of a table, units and brackets of units left out."""
-    columns = [[str(cell) for cell in column.cells] for column in table.columns]
+    plain = tables.rich_table(table) if isinstance(table, TextTable) else table
+    columns = [[str(cell) for cell in column.cells] for column in plain.columns]
     return [[Y_UNIT.sub("", cell) for cell in row] for row in zip(*columns, strict=True)]
 
 
@@ -43,7 +46,7 @@ def short(text: str) -> tuple[float, float]:
 
 
 def test_answers(given: Document) -> None:
-    *listed, last = rows(diagnosis_tables.candidates_table(given))
+    *listed, last = rows(printing.candidates_table(given))
     assert len(listed) == 4
     for cells, candidate in zip(listed, given["candidates"], strict=False):
         assert cells[0] == candidate["effect"]
@@ -61,23 +64,23 @@ def test_answers(given: Document) -> None:
 def test_answers_that_have_no_probability_are_counted_with_theirs(given: Document) -> None:
     for candidate in given["candidates"][1:]:
         candidate["probability"] = 0.0046
-    *listed, last = rows(diagnosis_tables.candidates_table(given))
+    *listed, last = rows(printing.candidates_table(given))
     assert len(listed) == 1
     assert_shows(last[0], [6])
     assert_shows(last[1], [6 * 0.0046])
     for candidate in given["candidates"]:
         candidate["probability"] = 0.005
-    assert len(rows(diagnosis_tables.candidates_table(given))) == 7  # six and the rest
+    assert len(rows(printing.candidates_table(given))) == 7  # six and the rest
     for candidate in given["candidates"]:
         candidate["probability"] = 0.0
-    assert len(rows(diagnosis_tables.candidates_table(given))) == 2  # one always, and the rest
+    assert len(rows(printing.candidates_table(given))) == 2  # one always, and the rest
     given["candidates"] = given["candidates"][:1]
-    assert len(rows(diagnosis_tables.candidates_table(given))) == 1
+    assert len(rows(printing.candidates_table(given))) == 1
 
 
 def test_the_gap(given: Document) -> None:
     gap = given["gap"]
-    whole, *runs = rows(diagnosis_tables.gap_table(given))
+    whole, *runs = rows(printing.gap_table(given))
     assert_shows(whole[1].replace("+", ""), [gap["excess_before"]])
     assert_shows(whole[2].replace("+", ""), [gap["excess_after"]])
     for cells, run in zip(runs, gap["runs"], strict=True):
@@ -88,42 +91,42 @@ def test_the_gap(given: Document) -> None:
 
 
 def test_a_gap_without_a_name_has_nothing_after(given: Document) -> None:
-    cells = rows(diagnosis_tables.gap_table(given | {"causes": ["unknown"]}))
+    cells = rows(printing.gap_table(given | {"causes": ["unknown"]}))
     assert [row[2] for row in cells] == ["–"] * 4
     given["gap"]["detected"] = False
-    assert rows(diagnosis_tables.gap_table(given)) == []
+    assert rows(printing.gap_table(given)) == []
 
 
 def test_coefficients(given: Document) -> None:
     before, after = given["coefficients"]["before"], given["coefficients"]["after"]
-    for cells, name in zip(rows(diagnosis_tables.coefficients_table(given)), before, strict=True):
+    for cells, name in zip(rows(printing.coefficients_table(given)), before, strict=True):
         old, new = before[name], after[name]
         assert_shows(cells[1], [old["value"], old["std"]])
         assert_shows(cells[2], [new["value"], new["std"]])
         assert_shows(cells[3].replace("+", ""), [100 * (new["value"] - old["value"]) / abs(old["value"])])
     before["cn_r"]["value"] = 0.0
-    assert rows(diagnosis_tables.coefficients_table(given))[1][3] == "+0 %"
+    assert rows(printing.coefficients_table(given))[1][3] == "+0 %"
     del after["cn_beta"]
-    assert len(rows(diagnosis_tables.coefficients_table(given))) == 1
+    assert len(rows(printing.coefficients_table(given))) == 1
 
 
 def test_the_run_to_make(given: Document) -> None:
     run = given["next_run"]
     keys = ("spring_stiffness", "wind_speed", "release_angle", "duration", "separation")
-    assert_shows(diagnosis_tables.run_words(run).replace(" rad", ""), [run[key] for key in keys])
-    calm = diagnosis_tables.run_words(run | {"wind_speed": 0.0})
+    assert_shows(printing.run_words(run).replace(" rad", ""), [run[key] for key in keys])
+    calm = printing.run_words(run | {"wind_speed": 0.0})
     assert_shows(calm, [run[key] for key in keys if key != "wind_speed"])
-    assert len(diagnosis_tables.rival_lines(given)) == 2
-    assert len(diagnosis_tables.rival_lines(given | {"next_run": None})) == 2
-    assert diagnosis_tables.rival_lines(given | {"next_run": None, "ambiguous_with": []}) == []
+    assert len(printing.rival_lines(given)) == 2
+    assert len(printing.rival_lines(given | {"next_run": None})) == 2
+    assert printing.rival_lines(given | {"next_run": None, "ambiguous_with": []}) == []
 
 
 def test_noise_and_confirmation(given: Document) -> None:
-    first, second = diagnosis_tables.closing_lines(given)
+    first, second = printing.closing_lines(given)
     assert_shows(first, [given["noise"]["std"]])
     assert_shows(second, [given["confirmation"]["largest_difference_rad"]])
     given["confirmation"]["agrees"] = False
-    assert len(diagnosis_tables.closing_lines(given)) == 1
+    assert len(printing.closing_lines(given)) == 1
 
 
 @pytest.mark.parametrize(
@@ -131,7 +134,7 @@ def test_noise_and_confirmation(given: Document) -> None:
     [(0.9996, "> 0.999"), (0.9994, "0.999"), (0.0006, "0.001"), (0.0004, "< 0.001")],
 )
 def test_probabilities(value: float, text: str) -> None:
-    assert diagnosis_tables.probability(value) == text
+    assert printing.probability(value) == text
 
 
 @pytest.mark.parametrize(
@@ -139,7 +142,7 @@ def test_probabilities(value: float, text: str) -> None:
     [(1.0, "100.0 %"), (0.9996, "> 99.9 %"), (0.982, "98.2 %"), (0.0, "0.0 %"), (-0.02, "-2.0 %")],
 )
 def test_shares(value: float, text: str) -> None:
-    assert diagnosis_tables.share(value) == text
+    assert printing.share(value) == text
 
 
 def quantity(value: float, std: float, unit: str = "1/rad") -> Quantity:

@@ -62,12 +62,10 @@ def make(
     [bold]Exit status[/bold]
       0 made, 2 bad input, 130 interrupted; nothing is left half made.
     """
-    from diagnosis.blind import make_blind
+    from diagnosis.blind import DEFAULT_SHARES, Mixture, make_blind, parse_shares
     from diagnosis.blind.files import SEAL, read_document
     from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import say
-    from tunnel_reference.draw import DEFAULT_SHARES, Mixture
-    from tunnel_reference.make import parse_shares
     from tunnel_sim.files.writing import refuse_unwritable
 
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
@@ -129,7 +127,7 @@ def score(
     [bold]Exit status[/bold]
       0 scored, 2 bad input: not all answered, or a file is not what was sealed.
     """
-    from diagnosis._diagnose import vocabulary
+    from diagnosis import vocabulary
     from diagnosis.blind import score_set
     from tunnel_lab.diagnosis_view import blind_page
     from tunnel_lab.terminal.tables import say, show_tables

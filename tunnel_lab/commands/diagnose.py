@@ -63,7 +63,7 @@ def run(
       0 answered, whatever the verdict; 2 bad input; 130 interrupted. A file is
       written whole or not at all.
     """
-    from diagnosis._diagnose import vocabulary
+    from diagnosis import vocabulary
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.json_text import json_text
@@ -115,7 +115,7 @@ def diagnose_with_progress(campaign: Campaign, kinds: tuple[type[Effect], ...]) 
     Returns:
         The diagnosis.
     """
-    from diagnosis._diagnose import diagnose
+    from diagnosis import diagnose
 
     with step_display() as tell:
         return diagnose(campaign, kinds=kinds, progress=tell)
@@ -155,16 +155,15 @@ def show(document: dict[str, Any]) -> None:
     Args:
         document: of a diagnosis.
     """
-    from tunnel_lab.terminal import diagnosis_tables as parts
-    from tunnel_lab.terminal.tables import say, show_tables
+    from diagnosis import printing as parts
+    from tunnel_lab.terminal.tables import rich_table, say, show_tables
 
     say(document["verdict"])
     for line in (parts.where_line(document), *parts.rival_lines(document)):
         if line:
             say(line)
     say("")
-    show_tables(
-        parts.candidates_table(document), parts.gap_table(document), parts.coefficients_table(document)
-    )
+    shown = (parts.candidates_table, parts.gap_table, parts.coefficients_table)
+    show_tables(*(rich_table(table(document)) for table in shown))
     for line in parts.closing_lines(document):
         say(line)

@@ -71,8 +71,8 @@ def show(springs: SpringTable, source: str) -> None:
     from math import pi
 
     from identification.campaign.springs import fit_springs
+    from identification.printing.numbers import with_std
     from tunnel_lab.terminal import tables
-    from tunnel_lab.terminal.formatting import with_std
 
     fit = fit_springs(springs.stiffness, springs.frequency_hz)
     rows = tables.table(

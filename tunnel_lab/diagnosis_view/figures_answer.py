@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from identification.printing.numbers import coefficient_label
 from tunnel_lab.diagnosis_view.figures_common import (
     ACCENT,
     AFTER,
@@ -17,7 +18,7 @@ from tunnel_lab.diagnosis_view.figures_common import (
     plain,
     quiet,
 )
-from tunnel_lab.terminal.formatting import coefficient_label, figure_text
+from tunnel_lab.plotting.figure_text import figure_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

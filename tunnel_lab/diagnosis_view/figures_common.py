@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.terminal.formatting import figure_text
+from tunnel_lab.plotting.figure_text import figure_text
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:

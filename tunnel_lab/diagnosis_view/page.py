@@ -7,10 +7,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from identification.printing.numbers import significant
 from tunnel_lab.diagnosis_view import view
 from tunnel_lab.diagnosis_view.figures import diagnosis_figures
 from tunnel_lab.diagnosis_view.svg import inline_svg
-from tunnel_lab.terminal.formatting import significant
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from diagnosis.policy import LISTED_PROBABILITY
-from tunnel_lab.terminal.formatting import COEFFICIENTS, at_bound, significant, unit_mark, with_std
+from identification.printing.numbers import COEFFICIENTS, at_bound, significant, unit_mark, with_std
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 

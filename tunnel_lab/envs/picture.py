@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.campaign.belief import Belief, update_belief
+from identification.printing.numbers import SYMBOLS
 from tunnel_lab.envs.session import Knowledge, answers, probabilities
-from tunnel_lab.terminal.tables import SYMBOLS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

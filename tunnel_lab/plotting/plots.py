@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tunnel_lab.terminal.formatting import figure_text, unit
-from tunnel_lab.terminal.tables import SYMBOLS
+from identification.printing.numbers import SYMBOLS, unit
+from tunnel_lab.plotting.figure_text import figure_text
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.text import Text
 
+from identification.printing.numbers import significant
 from tunnel_lab.scoring.breakdown import NO_EFFECT, Bias
 from tunnel_lab.scoring.tables import NAMES
-from tunnel_lab.terminal.formatting import significant
 from tunnel_lab.terminal.tables import table
 
 if TYPE_CHECKING:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.text import Text
 
+from identification.printing.numbers import SYMBOLS, concise, significant
 from identification.scoring.accuracy import Proportion, Score, mean_figure, overall, score
 from tunnel_lab.scoring.check import Finding, Verdict
 from tunnel_lab.scoring.results import Results, groups_of
-from tunnel_lab.terminal.formatting import concise, significant
-from tunnel_lab.terminal.tables import SYMBOLS, table
+from tunnel_lab.terminal.tables import table
 
 if TYPE_CHECKING:
     from rich.table import Table

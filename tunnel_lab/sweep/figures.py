@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from identification.printing.numbers import SYMBOLS, concise, significant, unit
 from tunnel_lab.plotting.plots import COLOURS, MARKERS
 from tunnel_lab.sweep.summary import AXES, OVERALL, SEVERITY, Line, Pace
-from tunnel_lab.terminal.formatting import concise, significant, unit
-from tunnel_lab.terminal.tables import SYMBOLS, table
+from tunnel_lab.terminal.tables import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

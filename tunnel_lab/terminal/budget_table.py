@@ -9,8 +9,8 @@ import numpy as np
 from rich.text import Text
 
 from identification.estimate import PARAMETERS
-from tunnel_lab.terminal.formatting import significant, unit
-from tunnel_lab.terminal.tables import SYMBOLS, table
+from identification.printing.numbers import SYMBOLS, significant, unit
+from tunnel_lab.terminal.tables import table
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -10,19 +10,13 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from tunnel_lab.terminal.formatting import concise, in_stds, significant, unit, with_std
+from identification.printing import estimate_tables as printing
+from identification.printing.numbers import SYMBOLS, concise, in_stds, significant, unit, with_std
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate, Quantity, RunEstimate, Status
+    from identification.printing.table import TextTable
     from tunnel_sim.vocabulary.campaign import Campaign
-
-SYMBOLS: Mapping[str, str] = {
-    "cn_beta": "Cnβ",
-    "cn_r": "Cnr",
-    "yaw_inertia": "Izz",
-    "mechanical_damping": "Cr",
-}
-"""How the paper writes the quantities of an estimate, by their name in its JSON."""
 
 
 BRACKETS = "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10."
@@ -92,6 +86,21 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
     return result
 
 
+def rich_table(plain: TextTable) -> Table:
+    """A plain table in the house's style.
+
+    Args:
+        plain: the table.
+
+    Returns:
+        The same with rules and colours.
+    """
+    result = table(plain.title, *plain.columns, right=plain.right)
+    for row in plain.rows:
+        result.add_row(*map(Text, row))
+    return result
+
+
 def coefficients_table(estimate: Estimate) -> Table:
     """The campaign's coefficients, those that could be had.
 
@@ -101,16 +110,7 @@ def coefficients_table(estimate: Estimate) -> Table:
     Returns:
         A table; without rows when the campaign gives normalised form only.
     """
-    result = table(f"{estimate.campaign} by {estimate.estimator}", "quantity", "estimate ± std")
-    for name, symbol in SYMBOLS.items():
-        quantity: Quantity | None = getattr(estimate, name)
-        if quantity is not None:
-            result.add_row(_named(symbol, quantity.unit), with_std(quantity.value, quantity.std))
-    if estimate.wind_off_inertia is not None:
-        quantity = estimate.wind_off_inertia
-        label = _named("Izz, gradient of Kr over ωn²", quantity.unit)
-        result.add_row(label, with_std(quantity.value, quantity.std))
-    return result
+    return rich_table(printing.coefficients_table(estimate.to_json_dict()))
 
 
 def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Table:
@@ -209,15 +209,7 @@ def status_lines(estimate: Estimate) -> list[str]:
     Returns:
         A line for each status other than "identified", with the runs it concerns and the remedy.
     """
-    runs: dict[str, list[str]] = {status.value: [] for status in estimate.statuses if status.name != "OK"}
-    for run in estimate.runs:
-        for status in run.statuses:
-            if status.name != "OK":
-                runs.setdefault(status.value, []).append(run.id)
-    return [
-        f"{text} ({', '.join(ids)})" if ids and len(ids) < len(estimate.runs) else text
-        for text, ids in runs.items()
-    ]
+    return printing.status_lines(estimate.to_json_dict())
 
 
 def _named(symbol: str, unit_name: str) -> Text:

@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from tunnel_sim.files.reading import check_count, decoded, frame_schema, read_frame, read_regular
+from tunnel_sim.files.reading import read_regular
 from tunnel_sim.files.toml_input import one_line
 from tunnel_sim.files.writing import encoded
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
+if TYPE_CHECKING:
+    from tunnel_sim.files.run_table import FileTable, RunReader
+
 RUN_FORMATS = ("parquet", "csv")
-_USED = ("time_s", "yaw_rad", "yaw_deg")
+"""Formats that are written."""
+
+READERS: Mapping[str, str] = {
+    ".csv": "tunnel_sim.files.run_csv",
+    ".parquet": "tunnel_sim.files.run_parquet",
+}
+"""Modules that read a kind of run file (`RunReader`), by its ending. A new kind is one module and one line."""
+
 _COLUMNS = "a column yaw_rad or yaw_deg, and time_s unless [sensor] sample_rate is given"
 
 
@@ -29,7 +40,7 @@ def read_table(
     """Read the columns of a run file; others than those of the format are left alone.
 
     Args:
-        path: a ``.csv`` or ``.parquet`` file.
+        path: a file with one of the endings in `READERS`.
         where: file and run, for messages.
         timed: whether times are needed, as no ``sample_rate`` is stated.
         most: how many samples it may hold.
@@ -42,22 +53,23 @@ def read_table(
         TunnelError: no such file, not a regular one, too large, not a table, a column missing or twice, a value
             missing or not a number.
     """
-    readers = {".csv": _read_csv, ".parquet": _read_parquet}
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
+    kinds = " or ".join(READERS)
+    module = READERS.get(path.suffix.lower())
+    if module is None:
         raise TunnelError(
-            f"unsupported file type '{one_line(path.suffix)}'", where=where, remedy="use .csv or .parquet"
+            f"unsupported file type '{one_line(path.suffix)}'", where=where, remedy=f"use {kinds}"
         )
+    reader = cast("RunReader", import_module(module))
     content = read_regular(
         path,
-        limits.CSV_BYTES if reader is _read_csv else limits.DATA_BYTES,
+        reader.LIMIT,
         where=where,
         missing="put the file there or correct 'file' in campaign.toml",
-        readable="name a readable .csv or .parquet file",
+        readable=f"name a readable {kinds} file",
     )
     if not content.strip():
         raise TunnelError("the file is empty", where=where, remedy=f"give it {_COLUMNS}")
-    return _columns(reader(content, where, most), where, timed=timed)
+    return _columns(reader.read(content, where, most), where, timed=timed)
 
 
 def table_bytes(record: Record, path: Path) -> bytes:
@@ -75,60 +87,8 @@ def table_bytes(record: Record, path: Path) -> bytes:
     return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
 
 
-@dataclass(frozen=True)
-class _Table:
-    """What a run file holds: at least the columns that are used, the names of all, and the first row's number."""
-
-    frame: pl.DataFrame
-    names: Sequence[str]
-    first_line: int
-
-
-def _read_csv(content: bytes, where: str, most: int) -> _Table:
-    """The table as text; rows are counted by lines."""
-    if not content.isascii():  # which needs no second copy of a large file
-        decoded(content, where)
-    columns = content.partition(b"\n")[0].count(b",") + 1
-    check_count(columns, limits.COLUMNS, "columns", where, "leave out columns that nobody reads")
-    check_count(content.count(b"\n") - 1, most, "samples", where, "split the file, or thin it out")
-    try:
-        rows = pl.read_csv(content, has_header=False, infer_schema=False, quote_char=None)
-    except pl.exceptions.PolarsError as error:
-        raise TunnelError(
-            f"not a comma-separated table ({one_line(error, 60)})",
-            where=where,
-            remedy="give every line one value for each column, with commas between and decimal points",
-        ) from None
-    names = [str(name or "").strip().strip('"').strip() for name in rows.row(0)]
-    if any(_is_number(name) for name in names):
-        raise TunnelError(
-            "no header line", where=where, remedy="name the columns in the first line, such as time_s,yaw_rad"
-        )
-    if len(names) == 1 and re.search(r"[;\t]", names[0]):
-        raise TunnelError("not comma-separated", where=where, remedy="put commas between the columns")
-    twice = next((name for name in names if name in _USED and names.count(name) > 1), None)
-    if twice is not None:
-        raise TunnelError(f"the column {twice} is there twice", where=where, remedy="leave one of them out")
-    # Other columns that have no name, or share one, are kept apart by their position; nobody asks for them.
-    rows.columns = [
-        name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)
-    ]
-    return _Table(rows.slice(1), rows.columns, 2)
-
-
-def _read_parquet(content: bytes, where: str, most: int) -> _Table:
-    """The columns that are used; rows are counted from 1."""
-    remedy = "write the file again, as Parquet or as CSV"
-    schema = frame_schema(content, where, remedy, rows=most, counted="samples")
-    used = [name for name in schema if name in _USED]
-    for name in used:
-        if not schema[name].is_numeric():
-            raise _not_numbers(name, schema[name], where)
-    return _Table(read_frame(content, where, remedy, used), tuple(schema), 1)
-
-
-def _columns(held: _Table, where: str, *, timed: bool) -> tuple[Array | None, Array, str]:
-    names, first_line = held.names, held.first_line
+def _columns(held: FileTable, where: str, *, timed: bool) -> tuple[Array | None, Array, str]:
+    names = held.names
     if "yaw_rad" in names and "yaw_deg" in names:
         raise TunnelError("both yaw_rad and yaw_deg", where=where, remedy="leave one of them out")
     column = next((name for name in ("yaw_rad", "yaw_deg") if name in names), None)
@@ -148,13 +108,13 @@ def _columns(held: _Table, where: str, *, timed: bool) -> tuple[Array | None, Ar
         )
     used = [name for name in ("time_s", column) if name in names]
     table = held.frame.select(used)
-    if first_line == 2:
+    if held.text:
         table = _without_blank_end(table)
     if table.height == 0:
         raise TunnelError(
             "the file has no samples", where=where, remedy="record the run again or leave it out"
         )
-    values = {name: _numbers(table.get_column(name), first_line, where) for name in used}
+    values = {name: _numbers(table.get_column(name), held.text, where) for name in used}
     return values.get("time_s"), values[column], column
 
 
@@ -165,9 +125,9 @@ def _without_blank_end(table: pl.DataFrame) -> pl.DataFrame:
     return table.head(int(filled[-1]) + 1 if filled.size else 0)
 
 
-def _numbers(series: pl.Series, first_line: int, where: str) -> Array:
+def _numbers(series: pl.Series, text: bool, where: str) -> Array:
     """The values of a column as finite floats, or a message naming the first that is not."""
-    if series.dtype == pl.String and first_line == 2:
+    if series.dtype == pl.String and text:
         numbers = series.str.strip_chars(' \t\r"').cast(pl.Float64, strict=False)
     else:
         numbers = series.cast(pl.Float64)
@@ -179,24 +139,8 @@ def _numbers(series: pl.Series, first_line: int, where: str) -> Array:
         said = "no value" if cell is None or not str(cell).strip() else one_line(cell, 30)
         raise TunnelError(
             f"{series.name} is {said}{'' if said == 'no value' else ', not a finite number,'} in "
-            f"{'line' if first_line == 2 else 'row'} {at + first_line} ({bad.size} such)",
+            f"{f'line {at + 2}' if text else f'row {at + 1}'} ({bad.size} such)",
             where=where,
             remedy="cut the record before it, or leave the run out",
         )
     return values
-
-
-def _not_numbers(name: str, dtype: pl.DataType, where: str) -> TunnelError:
-    return TunnelError(
-        f"the column {name} holds {one_line(dtype, 30)}, not numbers",
-        where=where,
-        remedy=f"write {name} as floating-point numbers",
-    )
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

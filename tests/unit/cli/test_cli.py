@@ -12,12 +12,13 @@ from pathlib import Path
 
 import pytest
 
+from tunnel_lab import cli
 from tunnel_sim.vocabulary.errors import TunnelError
 
 Outcome = tuple[int, str, str]
 Tunnel = Callable[..., Outcome]
 
-COMMANDS = ("demo", "simulate", "identify", "plot", "springs", "effects", "score", "sweep")
+COMMANDS = tuple(command.NAME for command in cli.COMMANDS)
 
 
 def assert_refused(outcome: Outcome, *parts: str) -> None:

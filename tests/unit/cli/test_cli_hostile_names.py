@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tests.reference.free_decays import Setting, campaign
+from tunnel_lab.plotting.figure_text import figure_text
 from tunnel_lab.plotting.plots import run_label, spectrum_figure
-from tunnel_lab.terminal.formatting import figure_text
 from tunnel_sim.files.campaign_io import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from decays import campaign, grid, reading, run, stated
 
-from diagnosis._diagnose import diagnose
+from diagnosis import diagnose
 from identification import identify
 from identification.estimate import Estimate, Status
 from identification.examination.examine import examine

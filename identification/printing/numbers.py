@@ -7,6 +7,14 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+SYMBOLS: Mapping[str, str] = {
+    "cn_beta": "Cnβ",
+    "cn_r": "Cnr",
+    "yaw_inertia": "Izz",
+    "mechanical_damping": "Cr",
+}
+"""How the paper writes the quantities of an estimate, by their name in its JSON."""
+
 COEFFICIENTS: Mapping[str, str] = {
     "cn_beta": "Cnβ",
     "cn_r": "Cnr",
@@ -131,20 +139,6 @@ def in_stds(error: float, std: float | None) -> str:
         return "–"
     ratio = error / std
     return f"{ratio:+.1f} σ" if abs(ratio) < 1000.0 else f"{ratio:+.0e} σ"
-
-
-def figure_text(text: str) -> str:
-    """A text of the user's, such as the id of a run, as matplotlib has to be given it to show it as it is.
-
-    Dollar signs would begin a formula, and a legend leaves out what begins with an underscore.
-
-    Args:
-        text: one line.
-
-    Returns:
-        The text with its dollar signs escaped, and with a blank before a leading underscore.
-    """
-    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
 
 
 def unit(text: str) -> str:

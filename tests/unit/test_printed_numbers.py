@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tunnel_lab.terminal.formatting import (
+from identification.printing.numbers import (
     coefficient_label,
     concise,
     in_stds,

@@ -1,17 +1,13 @@
-"""A diagnosis as lines and tables for a terminal, rendered from its JSON document."""
+"""A diagnosis as lines and tables, from its JSON document."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rich.text import Text
-
+from identification.printing.numbers import at_bound, coefficient_label, significant, unit_mark, with_std
+from identification.printing.table import TextTable
 from identification.remark import Remark
-from tunnel_lab.terminal.formatting import at_bound, coefficient_label, significant, unit_mark, with_std
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 SHOWN_PROBABILITY = 0.005
 """Answers less probable than this are counted, not listed."""
@@ -22,7 +18,27 @@ SHOWN_ANSWERS = 6
 Document = Mapping[str, Any]
 
 
-def candidates_table(document: Document) -> Table:
+def diagnosis_parts(document: Document) -> list[str | TextTable]:
+    """What is printed of a diagnosis.
+
+    Args:
+        document: of a diagnosis.
+
+    Returns:
+        The verdict, where the gap is and what cannot be told apart, the answers weighed and the coefficients, and
+        the caveats.
+    """
+    return [
+        document["verdict"],
+        where_line(document),
+        *rival_lines(document),
+        candidates_table(document),
+        coefficients_table(document),
+        *closing_lines(document),
+    ]
+
+
+def candidates_table(document: Document) -> TextTable:
     """The answers weighed, most probable first.
 
     Args:
@@ -31,29 +47,29 @@ def candidates_table(document: Document) -> Table:
     Returns:
         A table with probability, share of the gap closed and parameters; a last row counts what is left out.
     """
-    from tunnel_lab.terminal.tables import table
-
-    result = table(
-        f"Answers for {document['campaign']}",
-        *("answer", "probability", "share closed", "parameters"),
-        right=("probability", "share closed"),
-    )
+    rows = []
     shown = [
         c for c in document["candidates"][:SHOWN_ANSWERS] if c["probability"] >= SHOWN_PROBABILITY
     ] or document["candidates"][:1]
     for candidate in shown:
         fitted = candidate["effect"] not in ("none", "unknown")
-        result.add_row(
-            Text(candidate["effect"]),
+        row = (
+            candidate["effect"],
             probability(candidate["probability"]),
             share(candidate["closed"]) if fitted else "–",
-            Text("\n".join(parameter_lines(candidate["parameters"]))),
+            "\n".join(parameter_lines(candidate["parameters"])),
         )
+        rows.append(row)
     left = document["candidates"][len(shown) :]
     if left:
         together = sum(candidate["probability"] for candidate in left)
-        result.add_row(Text(f"{len(left)} more, together"), probability(together), "", "")
-    return result
+        rows.append((f"{len(left)} more, together", probability(together), "", ""))
+    return TextTable(
+        f"Answers for {document['campaign']}",
+        ("answer", "probability", "share closed", "parameters"),
+        tuple(rows),
+        right=("probability", "share closed"),
+    )
 
 
 def parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -80,7 +96,7 @@ def parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return lines
 
 
-def gap_table(document: Document) -> Table:
+def gap_table(document: Document) -> TextTable:
     """The gap before and after, all runs first.
 
     Args:
@@ -89,22 +105,20 @@ def gap_table(document: Document) -> Table:
     Returns:
         A table of excesses in multiples of the noise power; without rows where no gap was found.
     """
-    from tunnel_lab.terminal.tables import table
-
     gap = document["gap"]
-    result = table(
+    named = document["causes"] != ["unknown"]
+    rows = []
+    if gap["detected"]:
+        rows.append(("all", _excess(gap["excess_before"]), _excess(gap["excess_after"]) if named else "–"))
+        for run in gap["runs"]:
+            after = _excess(run["after"]) + ("" if run["held_out"] else " (fitted)")
+            rows.append((run["id"], _excess(run["before"]), after if named else "–"))
+    return TextTable(
         "Gap (× noise power)",
-        *("run", "before", "after, held out"),
+        ("run", "before", "after, held out"),
+        tuple(rows),
         right=("before", "after, held out"),
     )
-    if not gap["detected"]:
-        return result
-    named = document["causes"] != ["unknown"]
-    result.add_row("all", _excess(gap["excess_before"]), _excess(gap["excess_after"]) if named else "–")
-    for row in gap["runs"]:
-        after = _excess(row["after"]) + ("" if row["held_out"] else " (fitted)")
-        result.add_row(Text(row["id"]), _excess(row["before"]), after if named else "–")
-    return result
 
 
 def _excess(value: float) -> str:
@@ -112,7 +126,7 @@ def _excess(value: float) -> str:
     return f"{round(value, 3) + 0.0:+.3f}"
 
 
-def coefficients_table(document: Document) -> Table:
+def coefficients_table(document: Document) -> TextTable:
     """The coefficients of the nominal model before and after the causes are added.
 
     Args:
@@ -121,23 +135,22 @@ def coefficients_table(document: Document) -> Table:
     Returns:
         A table with one standard deviation and the change; without rows where there are none.
     """
-    from tunnel_lab.terminal.tables import table
-
-    result = table(
-        "Coefficients ± one standard deviation", "", "before", "after", "change", right=("change",)
-    )
+    rows = []
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
     for name in before:
         if name in after:
             one, two = before[name], after[name]
             change = 100.0 * (two["value"] - one["value"]) / abs(one["value"]) if one["value"] else 0.0
-            result.add_row(
-                Text(coefficient_label(name, one["unit"])),
+            row = (
+                coefficient_label(name, one["unit"]),
                 with_std(one["value"], one["std"]),
                 with_std(two["value"], two["std"]),
                 f"{change:+.2g} %",
             )
-    return result
+            rows.append(row)
+    return TextTable(
+        "Coefficients ± one standard deviation", ("", "before", "after", "change"), tuple(rows), ("change",)
+    )
 
 
 def where_line(document: Document) -> str:

@@ -1,0 +1,1 @@
+"""How results are printed: numbers with their standard deviations, plain tables, and Polars frames."""

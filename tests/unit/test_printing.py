@@ -1,0 +1,184 @@
+"""What print, a notebook and Polars show of an estimate and of a diagnosis. Texts are worked out by hand."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import polars as pl
+import pytest
+
+from diagnosis import Candidate, Coefficients, Diagnosis, GapSummary, ParameterEstimate, RunGap, Where
+from diagnosis.result import Confirmation, NoiseSummary
+from identification import Estimate, Quantity, Remark, RunEstimate, Status, WindowEstimate
+from identification.printing.table import TextTable, as_html, as_text
+from identification.remark import Outcome
+
+ZETA = Quantity(0.0123, 0.00045, "1")
+OMEGA = Quantity(12.34, 0.056, "rad/s", (12.2, 12.5))
+WINDOW = WindowEstimate(0.25, 1.5, Quantity(0.31, 0.0012, "rad"), OMEGA, ZETA)
+
+
+@pytest.fixture
+def estimate() -> Estimate:
+    runs = (
+        RunEstimate("on", omega_n=OMEGA, zeta=ZETA, windows=(WINDOW,)),
+        RunEstimate("<off>", (Status.NO_OSCILLATION,)),
+    )
+    return Estimate(
+        "by hand",
+        "own",
+        runs,
+        (Status.NO_WIND_ON,),
+        cn_beta=Quantity(0.4513, 0.0024, "1/rad"),
+        yaw_inertia=Quantity(0.1014, 0.0013, "kg m2"),
+        remarks=(Remark(Outcome.CUT, ("on",), "it starts late", "cut it"),),
+    )
+
+
+ESTIMATE = """\
+by hand by own
+quantity     estimate ± std
+----------------------------
+Cnβ [1/rad]  0.4513 ± 0.0024
+Izz [kg m²]  0.1014 ± 0.0013
+
+Runs of by hand ± one standard deviation
+run    ωn [rad/s]      ζ [1]              status
+--------------------------------------------------------
+on     12.340 ± 0.056  0.01230 ± 0.00045  ok
+<off>  –               –                  no oscillation
+
+Note: run on: it starts late; cut it
+Note: no wind-on runs, so no cn_beta and cn_r: add runs with the wind on
+Note: no decaying motion above the noise: check the sensor, or let the record start at
+the release (<off>)"""
+
+
+def test_an_estimate_prints_as_tables(estimate: Estimate) -> None:
+    assert str(estimate).splitlines() == ESTIMATE.splitlines()
+
+
+def test_many_runs_are_counted_not_listed(estimate: Estimate) -> None:
+    many = dataclasses.replace(estimate, runs=estimate.runs[:1] * 20)
+    assert str(many).count("12.340 ± 0.056") == 16
+    assert "and 4 more runs" in str(many)
+
+
+def test_a_notebook_shows_the_same_with_names_escaped(estimate: Estimate) -> None:
+    page = estimate._repr_html_()
+    assert '<td style="text-align: left">12.340 ± 0.056</td>' in page
+    assert "&lt;off&gt;" in page
+    assert "<off>" not in page
+
+
+def test_an_estimate_as_frames(estimate: Estimate) -> None:
+    coefficients = estimate.coefficients_frame()
+    assert coefficients.columns == ["quantity", "value", "std", "unit", "low", "high"]
+    row = coefficients.row(by_predicate=pl.col("quantity") == "cn_beta", named=True)
+    assert (row["value"], row["std"], row["unit"]) == (0.4513, 0.0024, "1/rad")
+    assert (row["low"], row["high"]) == pytest.approx((0.446596, 0.456004))
+    assert coefficients.row(by_predicate=pl.col("quantity") == "cn_r")[1:] == (None,) * 5
+
+    runs = estimate.runs_frame()
+    assert runs.select("id", "status", "omega_n", "omega_n_std", "zeta").rows() == [
+        ("on", "ok", 12.34, 0.056, 0.0123),
+        ("<off>", "no_oscillation", None, None, None),
+    ]
+    (window,) = estimate.windows_frame().rows(named=True)
+    assert (window["run"], window["start_s"], window["cycles"]) == ("on", 0.25, 3)
+    assert (window["amplitude"], window["amplitude_std"]) == (0.31, 0.0012)
+
+
+def test_the_interval_of_the_method_is_kept() -> None:
+    found = Estimate("c", "own", (), cn_r=OMEGA).coefficients_frame()
+    row = found.row(by_predicate=pl.col("quantity") == "cn_r", named=True)
+    assert (row["low"], row["high"]) == (12.2, 12.5)
+
+
+def test_frames_without_rows_keep_their_columns() -> None:
+    empty = Estimate("c", "own", ())
+    filled = Estimate("c", "own", (RunEstimate("r", windows=(WINDOW,)),))
+    assert empty.windows_frame().schema == filled.windows_frame().schema
+    assert empty.runs_frame().height == 0
+
+
+@pytest.fixture
+def diagnosis() -> Diagnosis:
+    friction = {
+        "friction_moment": ParameterEstimate(0.00399, 0.00006, "N m"),
+        "ratio": ParameterEstimate(2.0, None, "1", "upper"),
+    }
+    return Diagnosis(
+        campaign="by hand",
+        causes=("coulomb_friction",),
+        verdict="The gap comes from coulomb friction.",
+        gap=GapSummary(
+            True, 19.0, 0.01, 0.99, (RunGap("a", 19.0, 0.01), RunGap("b", 18.0, 0.02, False)), 0.01, 1e-9
+        ),
+        where=Where("damping", "always"),
+        candidates=(
+            Candidate("coulomb_friction", 0.97, 0.01, 0.99, friction),
+            Candidate("none", 0.03, 19.0, 0.0),
+        ),
+        ambiguous_with=(),
+        next_run=None,
+        coefficients=Coefficients(
+            {"cn_r": ParameterEstimate(-0.3132, 0.0225, "1/rad")},
+            {
+                "cn_r": ParameterEstimate(-0.2574, 0.0118, "1/rad"),
+                "zeta": ParameterEstimate(0.01, 0.001, "1"),
+            },
+        ),
+        confirmation=Confirmation(True, 1e-6, "a", 1e-7, 1e-5),
+        noise=NoiseSummary(4e-4, None, "estimated", "from the records"),
+        blind_spots=("a drift",),
+        cautions=("few runs",),
+    )
+
+
+def test_a_diagnosis_prints_verdict_tables_and_caveats(diagnosis: Diagnosis) -> None:
+    text = str(diagnosis)
+    assert text.startswith("The gap comes from coulomb friction.\n")
+    lines = text.splitlines()
+    assert "coulomb_friction        0.970        99.0 %  friction_moment =" in lines
+    assert any(line.strip() == "0.003990 ± 0.000060 N m" for line in lines)
+    assert any(line.strip() == "2.000 (at its upper bound)" for line in lines)
+    assert "Cnr [1/rad]  -0.313 ± 0.022  -0.257 ± 0.012   +18 %" in lines
+    assert "Caution: few runs" in lines
+    assert lines[-2:] == ["These runs cannot show:", "- a drift"]
+    assert "<p>Caution: few runs</p>" in diagnosis._repr_html_()
+
+
+def test_a_diagnosis_as_frames(diagnosis: Diagnosis) -> None:
+    assert diagnosis.candidates_frame().rows() == [
+        ("coulomb_friction", 0.97, 0.01, 0.99),
+        ("none", 0.03, 19.0, 0.0),
+    ]
+    assert diagnosis.parameters_frame().rows() == [
+        ("coulomb_friction", "friction_moment", 0.00399, 0.00006, "N m", None),
+        ("coulomb_friction", "ratio", 2.0, None, "1", "upper"),
+    ]
+    assert diagnosis.coefficients_frame().rows() == [
+        ("cn_r", "1/rad", -0.3132, 0.0225, -0.2574, 0.0118),
+        ("zeta", "1", None, None, 0.01, 0.001),
+    ]
+    assert diagnosis.runs_frame().rows() == [("a", 19.0, 0.01, True), ("b", 18.0, 0.02, False)]
+
+
+def test_a_cell_of_several_lines_keeps_its_column() -> None:
+    table = TextTable("t", ("a", "b"), (("x", "1\n22"), ("longer", "3")), right=("b",))
+    assert table.text().splitlines() == [
+        "t",
+        "a        b",
+        "----------",
+        "x        1",
+        "        22",
+        "longer   3",
+    ]
+    assert "1<br>22" in table.html()
+
+
+def test_tables_without_rows_and_empty_paragraphs_are_left_out() -> None:
+    parts = ("", TextTable("t", ("a",), ()), "said")
+    assert as_text(parts) == "said"
+    assert as_html(parts) == "<div><p>said</p></div>"

@@ -1,0 +1,46 @@
+"""What a reader of run files gives: a table that nobody has looked into yet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import polars as pl
+
+USED_COLUMNS = ("time_s", "yaw_rad", "yaw_deg")
+"""The columns of a run file that are read; others are left alone."""
+
+
+@dataclass(frozen=True)
+class FileTable:
+    """The table of a run file.
+
+    Args:
+        frame: at least those of `USED_COLUMNS` that the file has.
+        names: of all columns.
+        text: whether values are still texts, below a line of headings.
+    """
+
+    frame: pl.DataFrame
+    names: Sequence[str]
+    text: bool = False
+
+
+class RunReader(Protocol):
+    """A module that reads one kind of run file."""
+
+    LIMIT: int
+    """The largest file it reads, bytes."""
+
+    def read(self, content: bytes, where: str, most: int) -> FileTable:
+        """The table.
+
+        Args:
+            content: of the file.
+            where: file and run, for messages.
+            most: how many samples it may hold.
+
+        Raises:
+            TunnelError: when it is no such table, or too large.
+        """
