@@ -32,7 +32,7 @@ def localise(
         campaign: the records.
         nominal: fit of the nominal model.
         best: fit with the causes added; None where none was added.
-        causes: effect names; empty: no gap; ``unknown``: a gap without a name.
+        causes: effect names; empty: no gap; ``unknown``: an unexplained gap.
 
     Returns:
         The answer in fields and in words, and the maps it is read from.
