@@ -38,7 +38,7 @@ def cautions(
     fitted = [run.id for run in runs if not run.held_out]
     if named and len(fitted) == len(runs):
         found.append(
-            "No run could be held out of the fit, so the closure stated is that of the fitted runs and not a prediction. "
+            "No run could be held out of the fit, so the closure is that of the fitted runs, not a prediction. "
             "Repeat every spring, with the wind off and on."
         )
     elif named and fitted:

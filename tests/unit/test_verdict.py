@@ -19,7 +19,13 @@ def gap(*held_out: bool) -> GapSummary:
 
 def said(*causes: str, closed_on: str = "somewhere", both_winds: bool = True) -> str:
     return verdict(
-        causes, before=2.0, after=0.1, closed=0.95, probability=0.9, closed_on=closed_on, both_winds=both_winds
+        causes,
+        before=2.0,
+        after=0.1,
+        closed=0.95,
+        probability=0.9,
+        closed_on=closed_on,
+        both_winds=both_winds,
     )
 
 

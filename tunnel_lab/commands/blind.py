@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tunnel_lab.commands.diagnose import split_names
+from tunnel_lab.terminal.options import split_names
 
 NAME = "blind"
 HELP = """Blind checks: campaigns with sealed truth, diagnosed, then scored.

@@ -121,13 +121,14 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
         The campaign and one estimate per estimator.
     """
     from identification import identify
-    from tunnel_lab.commands.simulate import simulate_with_progress
+    from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import console
-    from tunnel_sim.engine.virtual_campaign import truth_document
+    from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
     from tunnel_sim.files.campaign_io import write_campaign
     from tunnel_sim.files.writing import write_json
 
-    campaign = simulate_with_progress(plan)
+    with bar("simulating runs", len(plan.conditions)) as tell:
+        campaign = simulate_campaign(plan, progress=lambda done, total: tell(done, total, ""))
     write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
     estimates = []
     for name in SHOWN:
@@ -181,11 +182,11 @@ def show_measured(campaign: Campaign, estimate: Estimate) -> None:
         campaign: the runs.
         estimate: of it.
     """
-    from tunnel_lab.commands.identify import show
+    from tunnel_lab.terminal.estimate_output import show_estimate
     from tunnel_lab.terminal.tables import say
 
     say(f"Measured: {campaign.name}, {len(campaign.runs)} runs. {campaign.description}\n")
-    show(campaign, estimate, windows=True)
+    show_estimate(campaign, estimate, windows=True)
 
 
 def draw(

@@ -64,6 +64,7 @@ def run(
       written whole or not at all.
     """
     from diagnosis._diagnose import vocabulary
+    from tunnel_lab.terminal.options import split_names
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.json_text import json_text
@@ -91,18 +92,6 @@ def run(
     for path in (json, report):
         if path is not None:
             say(f"Written: {path}")
-
-
-def split_names(words: list[str] | None) -> tuple[str, ...]:
-    """Names given one by one, after commas, or both.
-
-    Args:
-        words: as typed.
-
-    Returns:
-        Names without blanks, in the order given.
-    """
-    return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())
 
 
 def diagnose_with_progress(campaign: Campaign, kinds: tuple[type[Effect], ...]) -> Diagnosis:

@@ -91,6 +91,8 @@ def run(
       0 identified, 1 nothing could be identified, 2 bad input.
     """
     from identification import identify
+    from tunnel_lab.terminal.estimate_output import show_estimate
+    from tunnel_lab.terminal.options import known_estimator
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.json_text import json_text
@@ -115,7 +117,7 @@ def run(
     else:
         if json is not None:
             write_json(json, document)
-        show(data, estimate, windows=len(data.runs) <= FEW_RUNS if windows is None else windows)
+        show_estimate(data, estimate, windows=len(data.runs) <= FEW_RUNS if windows is None else windows)
         if found is not None:
             show_budget(found)
         if json is not None:
@@ -187,24 +189,6 @@ def show_budget(budget: Budget) -> None:
     tables.say("The standard deviations above are the combined ones.")
 
 
-def known_estimator(name: str) -> None:
-    """Refuse a name that is no estimator's.
-
-    Args:
-        name: as typed.
-
-    Raises:
-        TunnelError: when there is no such estimator, with the closest name.
-    """
-    from identification.estimators import ALL_ESTIMATORS
-    from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-
-    if name not in ALL_ESTIMATORS:
-        raise TunnelError(
-            f"there is no estimator {name!r}", where="--estimator", remedy=did_you_mean(name, ALL_ESTIMATORS)
-        )
-
-
 def with_weights(name: str, weights: Path | None) -> str | Estimator:
     """The estimator by its name, or the networks with weights of their own.
 
@@ -225,23 +209,3 @@ def with_weights(name: str, weights: Path | None) -> str | Estimator:
     from identification.estimators.neural import NeuralNetwork
 
     return NeuralNetwork(weights)
-
-
-def show(campaign: Campaign, estimate: Estimate, *, windows: bool) -> None:
-    """Print an estimate.
-
-    Args:
-        campaign: what was identified.
-        estimate: its estimate.
-        windows: whether to show every run's windows, too.
-    """
-    from tunnel_lab.terminal import tables
-
-    tables.show_tables(tables.coefficients_table(estimate), tables.runs_table(campaign, estimate))
-    if windows:
-        tables.show_tables(*map(tables.windows_table, estimate.runs))
-    tables.say(tables.BRACKETS)
-    for remark in estimate.remarks:
-        tables.say(f"Note: {remark}")
-    for line in tables.status_lines(estimate):
-        tables.say(f"Note: {line}")

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tunnel_lab.terminal.options import EFFECT_HELP, PLAN_HELP, RUN_HELP
+
+if TYPE_CHECKING:
+    from tunnel_lab.show.film import Look
+    from tunnel_lab.show.request import Request
+
 NAME = "render"
 _DEFAULT = (Path("tunnel-output/rig.mp4"), Path("tunnel-output/rig.png"))
-
-PLAN_HELP = "A campaign's plan (TOML); without one the rig with its default spring at 10 m/s."
-RUN_HELP = "Which run of the plan; its first by default."
-EFFECT_HELP = "Add an effect beyond the nominal model, as often as wanted; tunnel effects lists them."
 
 
 def run(
@@ -53,7 +55,7 @@ def run(
     [bold]Exit status[/bold]
       0 written, 2 bad input or no way to render here; nothing is written then.
     """
-    from tunnel_lab.show.film import Look, write_still
+    from tunnel_lab.show.film import Look, checked_camera, write_still
     from tunnel_lab.show.request import Request, shown_run
     from tunnel_lab.terminal.tables import say
 
@@ -79,21 +81,13 @@ def run(
         say(f"Written: {path}")
 
 
-def _film(request: object, look: object, path: Path) -> None:
-    """Write the film under a progress bar, where standard error is a terminal."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+def _film(request: Request, look: Look, path: Path) -> None:
+    """Write the film under a progress bar."""
+    from tunnel_lab.show.film import write_film
+    from tunnel_lab.terminal.progress import bar
 
-    from tunnel_lab.show.film import Look, write_film
-    from tunnel_lab.show.request import Request
-    from tunnel_lab.terminal.tables import console
-
-    assert isinstance(request, Request)
-    assert isinstance(look, Look)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    terminal = console(stderr=True)
-    with Progress(*columns, console=terminal, disable=not terminal.is_terminal) as bar:
-        task = bar.add_task("drawing frames", total=None)
-        write_film(request, look, path, lambda done, total: bar.update(task, completed=done, total=total))
+    with bar("drawing frames") as tell:
+        write_film(request, look, path, lambda done, total: tell(done, total, ""))
 
 
 def _targets(out: list[Path] | None) -> list[Path]:
@@ -124,22 +118,3 @@ def _pixels(size: str) -> tuple[int, int]:
         remedy = "give two even numbers from 160 to 3840, such as 1280x720"
         raise TunnelError(f"{size!r} is no size", where="--size", remedy=remedy)
     return numbers[0], numbers[1]
-
-
-def checked_camera(name: str) -> str:
-    """The name of a camera, if there is one.
-
-    Args:
-        name: as typed.
-
-    Raises:
-        TunnelError: when the rig has no such camera.
-    """
-    from tunnel_lab.show.film import CAMERAS
-    from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-
-    if name not in CAMERAS:
-        raise TunnelError(
-            f"there is no camera {name!r}", where="--camera", remedy=did_you_mean(name, CAMERAS)
-        )
-    return name

@@ -137,7 +137,7 @@ def chosen(names: list[str] | None) -> tuple[str, ...]:
         TunnelError: when one is unknown, with the closest name.
     """
     from identification.estimators import ALL_ESTIMATORS
-    from tunnel_lab.commands.identify import known_estimator
+    from tunnel_lab.terminal.options import known_estimator
 
     if not names:
         return ALL_ESTIMATORS

@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    from tunnel_sim.vocabulary.campaign import Campaign
-    from tunnel_sim.vocabulary.plan import CampaignPlan
 
 NAME = "simulate"
 
@@ -70,8 +66,9 @@ def run(
       0 written, 2 bad input; nothing is written then.
     """
     from tunnel_lab.terminal.effect_option import parse_effect
+    from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import say
-    from tunnel_sim.engine.virtual_campaign import plan_effects, truth_document
+    from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign, truth_document
     from tunnel_sim.files.campaign_io import write_campaign
     from tunnel_sim.files.plan_file import load_plan
 
@@ -82,7 +79,8 @@ def run(
     loaded = replace(loaded, effects=loaded.effects + added)
     plan_effects(loaded)  # refuses what cannot be injected before anything is simulated
     refuse_occupied(out, overwrite=overwrite)
-    campaign = simulate_with_progress(loaded)
+    with bar("simulating runs", len(loaded.conditions)) as tell:
+        campaign = simulate_campaign(loaded, progress=lambda done, total: tell(done, total, ""))
     folder = write_campaign(
         campaign, out, run_format=format.value, truth=truth_document(loaded), overwrite=overwrite
     )
@@ -107,27 +105,3 @@ def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
         raise TunnelError("is a file, not a folder", where=str(folder), remedy="name another --out")
     if folder.exists() and not overwrite:
         raise TunnelError("exists already", where=str(folder), remedy="name another --out or add --overwrite")
-
-
-def simulate_with_progress(plan: CampaignPlan) -> Campaign:
-    """Simulate a plan under a progress bar, where standard error is a terminal.
-
-    Args:
-        plan: the campaign's plan.
-
-    Returns:
-        The campaign.
-    """
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    from tunnel_lab.terminal.tables import console
-    from tunnel_sim.engine.virtual_campaign import simulate_campaign
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    terminal = console(stderr=True)
-    # No bar into a file or pipe: standard error stays one line there when something goes wrong later.
-    with Progress(*columns, console=terminal, disable=not terminal.is_terminal) as progress:
-        task = progress.add_task("simulating runs", total=len(plan.conditions))
-        return simulate_campaign(
-            plan, progress=lambda done, total: progress.update(task, completed=done, total=total)
-        )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tunnel_lab.commands.render import EFFECT_HELP, PLAN_HELP, RUN_HELP
+from tunnel_lab.terminal.options import EFFECT_HELP, PLAN_HELP, RUN_HELP
 
 NAME = "view"
 
@@ -54,7 +54,7 @@ def run(
     [bold]Exit status[/bold]
       0 closed, 2 bad input, no display or no free port, 130 interrupted.
     """
-    from tunnel_lab.commands.render import checked_camera
+    from tunnel_lab.show.film import checked_camera
     from tunnel_lab.show.request import Request, shown_run
     from tunnel_sim.vocabulary.errors import TunnelError
 

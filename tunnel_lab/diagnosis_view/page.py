@@ -116,7 +116,9 @@ def _confirmation_rows(document: Document) -> list[tuple[str, str]]:
     """The model behind the excesses, and the difference of the integrator used for fitting."""
     found = document["confirmation"]
     if found["failure"]:
-        return [("Excesses computed by", f"the integrator used for fitting; MuJoCo failed: {found['failure']}")]
+        return [
+            ("Excesses computed by", f"the integrator used for fitting; MuJoCo failed: {found['failure']}")
+        ]
     apart = f"{found['largest_difference_rad']:.1e} rad at most"
     rms = f"{found['rms_difference_rad']:.1e} rad root mean square in {found['run']}"
     return [

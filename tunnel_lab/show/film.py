@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tunnel_lab.show.rendering import REMEDY, backends
 from tunnel_lab.show.request import Request, ShownRun, shown_run
 from tunnel_sim.files.writing import write_whole
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -38,6 +38,22 @@ _SHADOW, _SAMPLES = (
     2048,
     4,
 )  # of a moving picture: a quarter of the still's time, no difference to see in motion
+
+
+def checked_camera(name: str) -> str:
+    """The name of a camera, or an error.
+
+    Args:
+        name: as typed.
+
+    Raises:
+        TunnelError: when the rig has no such camera.
+    """
+    if name not in CAMERAS:
+        raise TunnelError(
+            f"there is no camera {name!r}", where="--camera", remedy=did_you_mean(name, CAMERAS)
+        )
+    return name
 
 
 @dataclass(frozen=True)
