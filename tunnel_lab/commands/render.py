@@ -1,4 +1,4 @@
-"""``tunnel render``: a run as a film and as a picture, the trace beside the swinging body."""
+"""``tunnel render``: a run as a film and as a picture."""
 
 from __future__ import annotations
 
@@ -21,28 +21,28 @@ def run(
     plan: Annotated[Path | None, typer.Argument(help=PLAN_HELP)] = None,
     out: Annotated[
         list[Path] | None,
-        typer.Option("--out", "-o", metavar="FILE", help="An .mp4 or a .png, as often as wanted."),
+        typer.Option("--out", "-o", metavar="FILE", help="An .mp4 or .png file. May be repeated."),
     ] = None,
     run_id: Annotated[str | None, typer.Option("--run", metavar="ID", help=RUN_HELP)] = None,
     spring: Annotated[int | None, typer.Option("--spring", help="Number of the spring in Table II.")] = None,
     wind: Annotated[float | None, typer.Option("--wind", help="Wind speed, m/s.")] = None,
     angle: Annotated[float | None, typer.Option("--angle", help="Release angle, degrees.")] = None,
-    duration: Annotated[float | None, typer.Option("--duration", help="Of the run, s.")] = None,
+    duration: Annotated[float | None, typer.Option("--duration", help="Duration of the run, s.")] = None,
     effect: Annotated[
         list[str] | None, typer.Option("--effect", metavar="NAME:PARAMETER=VALUE", help=EFFECT_HELP)
     ] = None,
     seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed of the noise.")] = None,
-    at: Annotated[float, typer.Option("--at", help="When the picture is taken, s from the release.")] = 2.0,
+    at: Annotated[float, typer.Option("--at", help="Time of the picture, s from the release.")] = 2.0,
     fps: Annotated[int, typer.Option("--fps", min=1, max=120, help="Frames per second of the film.")] = 25,
     speed: Annotated[
-        float, typer.Option("--speed", min=0.01, max=100.0, help="Of the film; 0.5 is half as fast.")
+        float, typer.Option("--speed", min=0.01, max=100.0, help="Speed of the film; 0.5 is half as fast.")
     ] = 1.0,
     size: Annotated[str, typer.Option("--size", metavar="WIDTHxHEIGHT", help="Pixels.")] = "1280x720",
     camera: Annotated[str, typer.Option("--camera", help="overview, above or side.")] = "overview",
 ) -> None:
-    """Film a run: the swinging body, and beside it the angle as the sensor reads it.
+    """Film a run: the oscillating model, and the sensor's reading beside it.
 
-    Writes MP4 (H.264) and PNG, each whole or not at all; by default
+    Writes MP4 (H.264) and PNG files; by default
     tunnel-output/rig.mp4 and tunnel-output/rig.png. Frames are drawn off-screen
     with EGL or OSMesa; no display is needed. A frame takes about a fifth of a
     second without a graphics card.
@@ -91,7 +91,7 @@ def _film(request: Request, look: Look, path: Path) -> None:
 
 
 def _targets(out: list[Path] | None) -> list[Path]:
-    """The files to write, refused before the work is done where they cannot be."""
+    """The files to write; those that cannot be written are refused before the work."""
     from tunnel_sim.files.writing import output_folder
     from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -116,5 +116,5 @@ def _pixels(size: str) -> tuple[int, int]:
     numbers = [int(part) if part.isdecimal() else 0 for part in (width, height)]
     if not cross or any(n % 2 or not 160 <= n <= 3840 for n in numbers):
         remedy = "give two even numbers from 160 to 3840, such as 1280x720"
-        raise TunnelError(f"{size!r} is no size", where="--size", remedy=remedy)
+        raise TunnelError(f"{size!r} is not a size", where="--size", remedy=remedy)
     return numbers[0], numbers[1]

@@ -1,4 +1,4 @@
-"""``tunnel simulate``: a campaign from a plan, into a folder."""
+"""``tunnel simulate``: simulate a campaign."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ class Format(StrEnum):
 
 
 def run(
-    plan: Annotated[Path, typer.Argument(help="The campaign's plan, a TOML file.")],
+    plan: Annotated[Path, typer.Argument(help="Plan of the campaign, a TOML file.")],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")],
     format: Annotated[Format, typer.Option("--format", help="Format of the run files.")] = Format.PARQUET,
     seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Seed of the noise, in place of the plan's.")
+        int | None, typer.Option("--seed", min=0, help="Seed of the noise; overrides the plan's.")
     ] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(
             "--effect",
             metavar="NAME:PARAMETER=VALUE",
-            help="Add an effect beyond the nominal model, as often as wanted; further parameters after commas. "
-            "tunnel effects lists them.",
+            help="Add an effect to the nominal model; separate further parameters by commas. May be repeated; "
+            "tunnel effects lists the effects.",
         ),
     ] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the campaign that is in the folder already.")
+        bool, typer.Option("--overwrite", help="Replace a campaign that is already in the folder.")
     ] = False,
 ) -> None:
     r"""Simulate a campaign: springs × wind speeds × release angles × repeats.
 
     The folder then holds campaign.toml, a file for each run (time in s, yaw
-    angle in rad) and truth.json with what was injected. The same plan and seed
+    angle in rad), and truth.json with the injected values. The same plan and seed
     give the same campaign, to the last bit.
 
     [bold]A plan[/bold]
@@ -88,10 +88,10 @@ def run(
 
 
 def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
-    """Refuse, before the work is done, a folder the writer would refuse after it.
+    """Refuse an unsuitable folder before the work is done.
 
     Args:
-        folder: where the campaign shall go.
+        folder: where the campaign is to go.
         overwrite: whether what is there may be replaced.
 
     Raises:
@@ -100,7 +100,7 @@ def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
     from tunnel_sim.files.leftovers import clear_leftovers
     from tunnel_sim.vocabulary.errors import TunnelError
 
-    clear_leftovers(folder.resolve().parent)  # what a killed command set aside is there again
+    clear_leftovers(folder.resolve().parent)  # restore what a killed command had set aside
     if folder.exists() and not folder.is_dir():
         raise TunnelError("is a file, not a folder", where=str(folder), remedy="name another --out")
     if folder.exists() and not overwrite:

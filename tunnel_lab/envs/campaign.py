@@ -279,7 +279,9 @@ def _checked_severities(
         severity = effect_class(name).parameters()[0]
         if not 0.0 < low <= high < np.inf:
             remedy = f"give the range of {severity.name} in {severity.unit}"
-            raise TunnelError(f"{name}: ({low!r}, {high!r}) is no range above 0", where=where, remedy=remedy)
+            raise TunnelError(
+                f"{name}: ({low!r}, {high!r}) is not a range above 0", where=where, remedy=remedy
+            )
     return {name: (float(low), float(high)) for name, (low, high) in given.items()}
 
 
