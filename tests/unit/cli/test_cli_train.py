@@ -35,7 +35,7 @@ def test_interrupted_and_gone_on_with_to_the_same_bits(tmp_path, monkeypatch, ca
     monkeypatch.setattr(module, "advance", interrupted)
     assert main(["train", str(out), *QUICK]) == 130
     assert not out.exists()
-    assert "the same command goes on" in capsys.readouterr().err
+    assert "the same command continues" in capsys.readouterr().err
     assert main(["train", str(out), "--seed", "9", *QUICK]) == 2
     assert "--restart" in capsys.readouterr().err
     assert main(["train", str(out), *QUICK]) == 0
