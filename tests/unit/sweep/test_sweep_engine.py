@@ -125,8 +125,8 @@ def test_a_changed_file_is_refused_and_a_comment_is_no_change(sweep: Sweep, here
     run_sweep(sweep, tmp_path / "out", here)
     before = contents(tmp_path / "out")
     for text, said in (
-        (SMALL.replace("seed = 1", "seed = 2"), "whose seed is not that of the file"),
-        (SMALL.replace("0.02]", "0.03]"), "whose effects is not that of the file"),
+        (SMALL.replace("seed = 1", "seed = 2"), "whose seed differs from the file's"),
+        (SMALL.replace("0.02]", "0.03]"), "whose effects differs from the file's"),
     ):
         (tmp_path / "changed.toml").write_text(text, encoding="utf-8")
         with pytest.raises(TunnelError, match=said):
