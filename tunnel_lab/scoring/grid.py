@@ -188,7 +188,7 @@ class Grid:
         Raises:
             TunnelError: when it is not a grid, or too large.
         """
-        where, remedy = "the grid as JSON", "write it anew"
+        where, remedy = "the grid as JSON", "write it again"
         check_shape(data, where, remedy)
         with as_described("is not a grid", where, remedy):
             grid: Grid = _GRID.validate_python(data | {"trials_of": tuple(data["trials_of"].items())})

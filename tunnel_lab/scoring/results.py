@@ -107,8 +107,8 @@ def write_trials(path: Path, results: Results) -> Path:
     import polars as pl
 
     frame = trials_frame(results)
-    told = json_line(results.grid.to_json_dict(), sort_keys=True)
-    return write_whole(path, parquet(frame.with_columns(pl.lit(told).alias("grid"))))
+    described = json_line(results.grid.to_json_dict(), sort_keys=True)
+    return write_whole(path, parquet(frame.with_columns(pl.lit(described).alias("grid"))))
 
 
 def trials_frame(results: Results) -> pl.DataFrame:

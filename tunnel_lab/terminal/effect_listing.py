@@ -24,13 +24,13 @@ _PAGE_HEAD = """# Effects
 
 <!-- Written by `tunnel effects --markdown docs/reference/effects.md`: change the registry, not this page. -->
 
-What the nominal model leaves out, by the names under which `tunnel simulate` injects it and the diagnosis
-answers. `always` acts with the wind off too, `wind_on` only with the wind on.
+Effects that the nominal model leaves out. `tunnel simulate` injects them by these names, and the diagnosis answers
+with them. `always` acts with the wind on or off, `wind_on` only with the wind on.
 
 {directions}
 
-Every effect's first parameter is its severity; at zero the record is that of no effect to the last bit. A
-number in a plan or on the command line is in the unit given here:
+The first parameter of an effect is its severity. At zero the record is identical to one without the effect, to the
+last bit. Numbers in a plan or on the command line are in the units given here:
 
 ```toml
 [[effects]]
@@ -42,8 +42,8 @@ parameters = {{ friction_moment = 0.004 }}   # N m
 tunnel simulate plan.toml --out c --effect coulomb_friction:friction_moment=0.004
 ```
 
-Real effects never have exactly these forms; a name stands for a family. What no free decay can show of them
-is said in [what no free decay can show](../theory/what-no-free-decay-can-show.md).
+Real effects never have exactly these forms; a name stands for a family. Some of their properties cannot be seen in
+any free decay: see [what no free decay can show](../theory/what-no-free-decay-can-show.md).
 
 """
 
