@@ -79,7 +79,7 @@ def tunnel(
       tunnel blind                       blind tests of the diagnosis
       tunnel score                       errors of each estimator
       tunnel sweep sweep.toml --out s    many campaigns, resumable
-      tunnel view                        the rig live, in a window or browser
+      tunnel view                        the rig in real time, in a window or browser
       tunnel render                      a film of a run, and a picture
       tunnel train w.safetensors         train the paper's networks from a seed
 

@@ -51,7 +51,7 @@ def run(
     and compared. The answer is one or two effects, "none" (there is no gap) or
     "unknown" (no effect of the vocabulary explains it), each with a probability.
     Gap and coefficients are given before and after the effects are added; the
-    gap after is predicted for runs held out of the fit, where runs can be.
+    gap after is predicted for runs held out of the fit, where possible.
 
     [bold]Examples[/bold]
       tunnel diagnose my-campaign
