@@ -69,7 +69,7 @@ def _source(name: str, *, both_winds: bool) -> str:
 
 
 def cnr_note(causes: Sequence[str]) -> str:
-    """What the coefficients after mean, where a cause changes their meaning."""
+    """A note on the coefficients after, where a cause changes their meaning."""
     return " ".join(
         effect_class(name).caveat for name in causes if name != "unknown" and effect_class(name).caveat
     )
@@ -96,14 +96,14 @@ def blind_spots(
         normalised: whether stiffness is not stated.
 
     Returns:
-        Clauses, those true of every free decay last.
+        Clauses; those that apply to every free decay come last.
     """
     found = []
     if normalised:
         found.append("anything about single springs: the runs state no stiffness")
     elif springs < 2:
         found.append(
-            "structural against viscous damping, gravity or a wrong spring: there is one spring only"
+            "structural as opposed to viscous damping, gravity, or a wrong stiffness: there is one spring only"
         )
     if not wind_on:
         found.append("any effect of the air: there is no run with the wind on")
@@ -112,7 +112,5 @@ def blind_spots(
             "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
         )
     if wind_on and not wind_off:
-        found.append(
-            "mechanical against aerodynamic versions of one effect: there is no run with the wind off"
-        )
+        found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
     return (*found, *BLIND_SPOTS)
