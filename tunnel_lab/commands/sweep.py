@@ -71,7 +71,7 @@ def run(
       tunnel sweep --summary results
 
     [bold]Exit status[/bold]
-      0 finished, 1 an estimator ended in an error of its own, 2 bad input,
+      0 finished, 1 an estimator raised an exception, 2 bad input,
       130 interrupted (finished work is kept).
     """
     from tunnel_sim.vocabulary.errors import TunnelError
@@ -124,7 +124,10 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
     estimates = sweep.size * len(sweep.document.estimators)
     say(f"Written: {out} ({sweep.size} cases, {sweep.runs} runs, {estimates} estimates)")
     if outcome.crashes:
-        say(f"{outcome.crashes} estimates ended in an error: see status 'raised' in the results", stderr=True)
+        say(
+            f"{outcome.crashes} estimates raised an exception: see status 'raised' in the results",
+            stderr=True,
+        )
         raise typer.Exit(1)
 
 

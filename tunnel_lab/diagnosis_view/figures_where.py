@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_SIGMAS = 3.0  # cells and bands that stand out by less are drawn as noise
+_SIGMAS = 3.0  # cells and bands below this are drawn as noise
 _MOST_CURVES = 16
 _UNITS: dict[str, str] = {"rad/s2": "rad/s²"}
 

@@ -35,7 +35,7 @@ def write_report(document: Document, campaign: Campaign, path: Path) -> Path:
     Args:
         document: the diagnosis as JSON's types (``Diagnosis.to_json_dict``), with its ``maps`` where there are any.
         campaign: the records.
-        path: the HTML file; replaced when it exists, written whole or not at all.
+        path: the HTML file; replaced when it exists, written completely or not at all.
 
     Returns:
         The same path.

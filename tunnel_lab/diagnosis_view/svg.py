@@ -1,4 +1,4 @@
-"""Figures as SVG that can stand inside an HTML page."""
+"""Figures as SVG elements of an HTML page."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
 
 
 def _in_page(tag: str, name: str) -> str:
-    """A tag with ids of its own in the page."""
+    """A tag with ids that are unique in the page."""
     tag = _ID.sub(rf'id="{name}-\1"', _NAMES.sub("", tag))
     return _REFERENCE.sub(rf"\1{name}-\2", tag)
 

@@ -100,7 +100,7 @@ def make_menu(
     """Check and convert the arguments of an environment.
 
     Args:
-        rig: whose spring table the numbers stand for.
+        rig: the rig whose springs the numbers refer to.
         springs: numbers of the rig's springs.
         wind_speeds: m/s, 0 or more.
         release_angles_deg: degrees, above 0.

@@ -38,7 +38,7 @@ RUNS_PER_PLOT = 6
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure as a PNG, whole or not at all.
+    """Write a figure as a PNG, completely or not at all.
 
     Args:
         figure: the figure.

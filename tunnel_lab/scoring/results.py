@@ -95,7 +95,7 @@ def _group(cell: Cell) -> str:
 
 
 def write_trials(path: Path, results: Results) -> Path:
-    """Write the trials with their grid as Parquet, whole or not at all.
+    """Write the trials with their grid as Parquet, completely or not at all.
 
     Args:
         path: the file; replaced when it exists.

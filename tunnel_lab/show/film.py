@@ -89,7 +89,7 @@ class Look:
 def write_film(
     request: Request, look: Look, path: Path, progress: Callable[[int, int], None] | None = None
 ) -> None:
-    """Write a run as MP4 (H.264), whole or not at all.
+    """Write a run as MP4 (H.264), completely or not at all.
 
     Args:
         request: which run.
@@ -104,7 +104,7 @@ def write_film(
 
 
 def write_still(request: Request, look: Look, path: Path, at: float) -> None:
-    """Write one frame of the film as PNG, whole or not at all.
+    """Write one frame of the film as PNG, completely or not at all.
 
     Args:
         request: which run.

@@ -26,7 +26,7 @@ class Outcome:
     Args:
         store: its folder.
         found: number of shards that were finished already.
-        crashes: number of estimates that ended in an error of the estimator itself, in the shards done now.
+        crashes: number of estimates that raised an exception, in the shards done now.
     """
 
     store: Store

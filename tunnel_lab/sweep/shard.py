@@ -52,7 +52,7 @@ class Finished:
         records: likewise; None where they are not stored.
         timings: likewise, but different every time.
         made_with: what the bits of the results depend on besides the sweep.
-        crashes: number of estimates that ended in an error of the estimator itself.
+        crashes: number of estimates that raised an exception.
     """
 
     index: int

@@ -226,7 +226,7 @@ def _named(symbol: str, unit_name: str) -> Text:
 
 
 def _concise(quantity: Quantity | None) -> str:
-    """A quantity whose unit stands in the heading."""
+    """A quantity without its unit, which is in the heading."""
     return "–" if quantity is None else concise(quantity.value, quantity.std)
 
 
