@@ -78,7 +78,7 @@ def _diagnosed(campaign: Campaign) -> tuple[tuple[str, ...], float, dict[str, fl
 
 
 def full_size(console: Console) -> None:
-    """The campaign the time limit is stated for: 12 runs of 10 s at 1 kHz."""
+    """The campaign of the time limit: 12 runs of 10 s at 1 kHz."""
     table = Table(title="One diagnosis, 12 runs of 10 s at 1 kHz (targets: 30 s on two cores, 2 GiB)")
     for head in ("campaign", "answer", "seconds", "peak MiB", "seconds by step"):
         table.add_column(head, justify="right" if head in ("seconds", "peak MiB") else "left")
@@ -94,11 +94,11 @@ def full_size(console: Console) -> None:
 
 
 class SysidFit:
-    """One candidate as a problem of `mujoco.sysid`: its parameters, residual and optimiser, our MuJoCo model.
+    """One candidate as a problem of `mujoco.sysid`: its parameters, residual and optimiser, with our MuJoCo model.
 
     sysid takes releases as fixed and measures at a model's sensors. Here releases are parameters, written by a
     custom rollout, and what the sensor adds (zero, effects on the reading) is a modified residual; both are
-    extension points of sysid. A model is made from one compiled model per run, which spares sysid compilations.
+    extension points of sysid. Each run uses one compiled model, which saves sysid compilations.
     """
 
     def __init__(self, lead: StartingPoint) -> None:
@@ -149,7 +149,7 @@ class SysidFit:
         return sysid.ModelSequences(run.id, model.spec, run.id, self._state(model), control, sensors)
 
     def residual(self, x: np.ndarray, params: Any, **_: Any) -> tuple[list[np.ndarray], list[Any], list[Any]]:
-        """sysid's residual, run by run; every run has a model of its own."""
+        """sysid's residual by run; every run has its own model."""
         found = [
             sysid.residual(
                 x, params, [sequence],

@@ -1,6 +1,6 @@
 """Steps per second of FreeDecay-v0: the native vector environment against bare mujoco.batch and Gymnasium's async.
 
-Run as ``python benchmarks/envs.py``; see README.md beside it. Both sides of a ratio are measured by turns.
+Run as ``python benchmarks/envs.py``; see README.md beside it. Both sides of a ratio are measured in turn.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def vector(count: int, mode: str, preset: str) -> Any:
     """A vector environment of one kind."""
     arguments = {"preset": preset, "duration": DURATION}
     if preset == "operator":
-        arguments["wind_limit"] = 20.0  # sampled set-points stay where the springs hold
+        arguments["wind_limit"] = 20.0  # sampled set-points stay within the stable range
         arguments["moment_limit"] = 0.05
     return gymnasium.make_vec(NAME, num_envs=count, vectorization_mode=mode, **arguments)
 
@@ -85,8 +85,8 @@ def vector(count: int, mode: str, preset: str) -> Any:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=256, help="runs side by side, against mujoco.batch")
-    parser.add_argument("--workers", type=int, default=32, help="runs side by side, against async")
+    parser.add_argument("--count", type=int, default=256, help="runs in parallel, against mujoco.batch")
+    parser.add_argument("--workers", type=int, default=32, help="runs in parallel, against async")
     parser.add_argument("--periods", type=int, default=40, help="control periods of a repetition")
     parser.add_argument("--repetitions", type=int, default=9, help="repetitions of each side")
     options = parser.parse_args()

@@ -1,7 +1,7 @@
 """Estimators side by side with other packages: RMSE over the Cramér–Rao bound and time, on the same records.
 
-Run as ``python benchmarks/estimators.py``; see README.md beside it. Every record goes through every method in
-turn, so that other load on the machine meets all of them.
+Run as ``python benchmarks/estimators.py``; see README.md beside it. Every record goes through all methods in
+turn, so that other load on the machine affects all of them.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SLOW = {"mujoco.sysid"}  # gets the first record of every third cell only
 
 @dataclass
 class Tally:
-    """What one method did: errors over the bound, 95 % intervals that held, times, failures."""
+    """Results of one method: errors over the bound, coverage of 95 % intervals, times, failures."""
 
     zeta: dict[int, float] = field(default_factory=dict)
     omega: list[float] = field(default_factory=list)
@@ -58,7 +58,7 @@ def records(count: int, seed: int) -> Iterator[tuple[tuple[float, ...], int, Cam
 
 
 def own(name: str) -> Method:
-    """One of ours as a method of one record; output error also without its windows, which the others lack."""
+    """One of ours as a method of one record; output error also without windows, which the others do not have."""
     plain = name.endswith(", no windows")
     estimator = OutputError(cycles_per_window=NO_WINDOWS) if plain else make_estimator(name)
 
@@ -114,13 +114,13 @@ def measure(methods: dict[str, Method], count: int, seed: int) -> dict[str, Tall
 
 
 def rms(values: Iterable[float]) -> float:
-    """Root of the mean square; NaN of none."""
+    """Root mean square; NaN where there are none."""
     squares = np.square(list(values))
     return float(np.sqrt(squares.mean())) if squares.size else np.nan
 
 
 def beats(mine: Tally, peer: Tally) -> bool:
-    """Whether one is no worse in RMSE of ζ on the records that the other had, fails no more, and is quicker."""
+    """Whether one has no larger RMSE of ζ on the records of the other, no more failures, and is faster."""
     shared = [mine.zeta[place] for place in peer.zeta if place in mine.zeta]
     return bool(
         len(shared) == len(peer.zeta)
@@ -130,7 +130,7 @@ def beats(mine: Tally, peer: Tally) -> bool:
 
 
 def show(console: Console, tallies: dict[str, Tally], ours: list[str]) -> None:
-    """The table, and who is ahead."""
+    """The table, and which methods are better."""
     table = Table(title="RMSE over the Cramér–Rao bound; 20 s at 1 kHz, ζ 0.002–0.05, 0.8–4 Hz, S/A 0.1–1 %")
     for head in ("method", "ζ", "ωn", "ζ, worst cell", "95 % held", "failed", "ms per record", "records"):
         table.add_column(head, justify="left" if head == "method" else "right")

@@ -1,7 +1,7 @@
-"""Other packages' ways to ωn and ζ of one record, each told no more than the record and its sample rate.
+"""Estimates of ωn and ζ of one record by other packages, each given only the record and its sample rate.
 
-Every function takes times (s), reading (rad) and sample rate (Hz), and gives (ωn in rad/s, ζ). Those that
-cannot take twenty thousand samples get block means of sixteen to the cycle, like the matrix pencil here.
+Every function takes times (s), reading (rad) and sample rate (Hz), and returns (ωn in rad/s, ζ). Those that
+cannot process twenty thousand samples get block means of sixteen to the cycle, like our matrix pencil.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def by_curve_fit(time: np.ndarray, yaw: np.ndarray, rate: float) -> tuple[float,
 
 
 def thinned(yaw: np.ndarray, rate: float) -> tuple[np.ndarray, float]:
-    """Block means less their mean, and their rate."""
+    """Block means minus their mean, and their rate."""
     factor = max(1, int(rate / (BLOCKS_PER_CYCLE * spectral_frequency(yaw, rate))))
     count = yaw.size // factor
     means = yaw[: count * factor].reshape(count, factor).mean(axis=1)
@@ -48,7 +48,7 @@ def thinned(yaw: np.ndarray, rate: float) -> tuple[np.ndarray, float]:
 
 
 def by_pyyeti(_: np.ndarray, yaw: np.ndarray, rate: float) -> tuple[float, float]:
-    """pyyeti's eigensystem realisation, with room for the zero: of its modes the one at the spectrum's peak."""
+    """pyyeti's eigensystem realisation, with an order for the zero; the mode at the spectrum's peak."""
     from pyyeti.era import ERA
 
     means, slow = thinned(yaw, rate)
@@ -90,7 +90,7 @@ RIG = """
 
 
 def by_sysid(time: np.ndarray, yaw: np.ndarray, rate: float) -> tuple[float, float]:
-    """mujoco.sysid on a hinge of unit inertia: stiffness, damping, release and zero, at the record's own step."""
+    """mujoco.sysid on a hinge of unit inertia: stiffness, damping, release and zero, at the record's time step."""
     import mujoco
     from mujoco import rollout, sysid
 
@@ -154,7 +154,7 @@ def _sysid_installed() -> bool:
 
 
 def present() -> tuple[dict[str, Method], dict[str, str]]:
-    """The peers that can run here, and for the others what would install them."""
+    """The installed packages, and the commands that install the others."""
     methods: dict[str, Method] = {"scipy curve_fit": by_curve_fit}
     absent = {}
     if importlib.util.find_spec("pyoma2"):

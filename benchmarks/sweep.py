@@ -1,7 +1,7 @@
 """A sweep from end to end against the bare simulation of its runs, processes against threads, and memory.
 
-Run as ``python benchmarks/sweep.py``; see README.md beside it. Every sweep is done in a process of its own, start
-included. The bare rate is that of ``mujoco.batch`` stepping the same runs, nothing recorded, on as many threads.
+Run as ``python benchmarks/sweep.py``; see README.md beside it. Every sweep is done in a separate process, including
+its start. The bare rate is that of ``mujoco.batch`` stepping the same runs, nothing recorded, on as many threads.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]
 
 
 def apart(*words: str | int | Path) -> dict[str, float]:
-    """One measurement in a process of its own."""
+    """One measurement in a separate process."""
     done = subprocess.run(
         [sys.executable, __file__, *map(str, words)], stdout=subprocess.PIPE, text=True, check=True
     )
@@ -135,7 +135,7 @@ def write(folder: Path, runs: int, estimators: str) -> Path:
 
 
 def compare(folder: Path, options: argparse.Namespace) -> None:
-    """Each kind of sweep and the bare rate by turns."""
+    """Each kind of sweep and the bare rate, in turn."""
     kinds = {
         "simulate only, records kept": ("", options.workers, 1),
         "conventional": ("conventional", options.workers, 1),
@@ -178,7 +178,7 @@ def grow(folder: Path, options: argparse.Namespace) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--small", type=int, default=400, help="runs of each sweep that is compared by turns")
+    parser.add_argument("--small", type=int, default=400, help="runs of each sweep that is compared in turn")
     parser.add_argument("--turns", type=int, default=3, help="turns")
     parser.add_argument("--large", type=int, default=10_000, help="runs of the largest sweep")
     parser.add_argument("--only", choices=("compare", "grow"), help="one half of it")

@@ -1,7 +1,7 @@
 """Throughput of the rig's model: with the plugin against without, and batches on two threads against one.
 
 Run as ``python benchmarks/throughput.py``; see README.md beside it. Every repetition measures both sides one
-after the other, so that other load on the machine meets both, and the ratio is taken within the repetition.
+after the other, so that other load on the machine affects both, and the ratio is taken within the repetition.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SIMULATIONS = 32
 
 
 def without_plugin(settings: RunSettings) -> mujoco.MjModel:
-    """The same model, with the plugin and its sensor taken out."""
+    """The same model, without the plugin and its sensor."""
     spec = build_spec(load_rig(), settings)
     spec.delete(spec.sensor("aerodynamic_moment"))
     for plugin in list(spec.plugins):
@@ -76,7 +76,7 @@ def batching(model: mujoco.MjModel, steps: int, threads: int) -> Callable[[], fl
 
 
 def plain_threads(model: mujoco.MjModel, steps: int, threads: int) -> Callable[[], float]:
-    """The same work without mujoco.batch, on Python threads: elapsed time, s. What the machine has to give."""
+    """The same work without mujoco.batch, on Python threads: elapsed time, s. It shows what the machine can do."""
     data = [mujoco.MjData(model) for _ in range(threads)]
 
     def share(one: mujoco.MjData) -> None:
@@ -96,7 +96,7 @@ def plain_threads(model: mujoco.MjModel, steps: int, threads: int) -> Callable[[
 def interleaved(
     one: Callable[[], float], other: Callable[[], float], repetitions: int
 ) -> tuple[list[float], list[float]]:
-    """Times of both, measured by turns; the first turn warms up and is not kept."""
+    """Times of both, measured in turn; the first turn warms up and is discarded."""
     times: tuple[list[float], list[float]] = ([], [])
     for turn in range(repetitions + 1):
         order = (0, 1) if turn % 2 else (1, 0)
@@ -108,7 +108,7 @@ def interleaved(
 
 
 def ratio(one: list[float], other: list[float]) -> tuple[float, float]:
-    """How many times as fast the second is as the first: median over repetitions, and of the best times."""
+    """Speed of the second relative to the first: median over repetitions, and of the best times."""
     return median(a / b for a, b in zip(one, other, strict=True)), min(one) / min(other)
 
 

@@ -39,13 +39,13 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
 
 
 def candidates_table(document: Document) -> TextTable:
-    """The answers weighed, most probable first.
+    """The answers considered, most probable first.
 
     Args:
         document: of a diagnosis.
 
     Returns:
-        A table with probability, share of the gap closed and parameters; a last row counts what is left out.
+        A table with probability, share of the gap closed and parameters; a last row counts the others.
     """
     rows = []
     shown = [
@@ -73,15 +73,15 @@ def candidates_table(document: Document) -> TextTable:
 
 
 def parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Fitted parameters, name and value on a line each: a terminal of 80 columns holds no more beside an answer.
+    """Fitted parameters, name and value on separate lines, which fit beside an answer in 80 columns.
 
     Args:
-        parameters: value, std and unit by name; a std of zero means that the value was given, not fitted, and
-            none that it is not known.
+        parameters: value, std and unit by name; a std of zero means that the value was given, not fitted;
+            None means that it is not known.
 
     Returns:
-        Lines such as ``friction_moment =`` and ``  0.003991 ± 0.000006 N m``; of a pair, each effect's
-        below its name.
+        Lines such as ``friction_moment =`` and ``  0.003991 ± 0.000006 N m``; for a pair, those of
+        each effect below its name.
     """
     lines: list[str] = []
     effect = ""
@@ -111,14 +111,10 @@ def gap_table(document: Document) -> TextTable:
     if gap["detected"]:
         rows.append(("all", _excess(gap["excess_before"]), _excess(gap["excess_after"]) if named else "–"))
         for run in gap["runs"]:
-            after = _excess(run["after"]) + ("" if run["held_out"] else " (fitted)")
-            rows.append((run["id"], _excess(run["before"]), after if named else "–"))
-    return TextTable(
-        "Gap (× noise power)",
-        ("run", "before", "after, held out"),
-        tuple(rows),
-        right=("before", "after, held out"),
-    )
+            left = _excess(run["after"]) + ("" if run["held_out"] else " (fitted)")
+            rows.append((run["id"], _excess(run["before"]), left if named else "–"))
+    after = "after, held out" if any(run["held_out"] for run in gap["runs"]) else "after"
+    return TextTable("Gap (× noise power)", ("run", "before", after), tuple(rows), right=("before", after))
 
 
 def _excess(value: float) -> str:
@@ -160,19 +156,14 @@ def where_line(document: Document) -> str:
         document: of a diagnosis.
 
     Returns:
-        A line; empty where there is no gap.
+        A line; empty where the document has no words on it.
     """
-    where = document["where"]
-    if where["words"]:
-        return f"Where: {where['words']}"
-    if where["channel"] is None:
-        return ""
-    when = {"wind_on": "with the wind on", "always": "with the wind on and off"}.get(where["condition"], "")
-    return f"Where: {where['channel']}, {when}".rstrip(", ")
+    words = document["where"]["words"]
+    return f"Where: {words}" if words else ""
 
 
 def rival_lines(document: Document) -> list[str]:
-    """What cannot be told from the causes, and the run that would tell.
+    """Effects that the runs cannot distinguish from the causes, and the run that could.
 
     Args:
         document: of a diagnosis.
@@ -183,12 +174,12 @@ def rival_lines(document: Document) -> list[str]:
     rivals, run = document["ambiguous_with"], document["next_run"]
     lines = []
     if rivals:
-        lines.append(f"These runs do not tell it from: {', '.join(rivals)}")
+        lines.append(f"These runs cannot distinguish it from: {', '.join(rivals)}")
     if run is not None:
-        lines.append(f"A run that would tell: {run_words(run)}")
+        lines.append(f"A run that could: {run_words(run)}")
     elif rivals:
         lines.append(
-            "Which run would tell cannot be worked out from these: state every spring_stiffness, add runs"
+            "The run that could cannot be computed from these runs: state every spring_stiffness, or add runs"
         )
     return lines
 
@@ -211,7 +202,7 @@ def run_words(run: Mapping[str, float]) -> str:
 
 
 def closing_lines(document: Document) -> list[str]:
-    """Notes below the tables: the noise, the MuJoCo model's word, a coefficient's meaning, blind spots.
+    """Notes below the tables: noise, check by the MuJoCo model, meaning of the coefficients, caveats, blind spots.
 
     Args:
         document: of a diagnosis.
@@ -224,11 +215,13 @@ def closing_lines(document: Document) -> list[str]:
     checked = document["confirmation"]
     if checked["agrees"]:
         apart = f"{checked['largest_difference_rad']:.1e} rad"
-        lines.append(f"Excesses are the MuJoCo model's, which lies within {apart} of the fits")
+        lines.append(f"Excesses are computed by the MuJoCo model, which agrees with the fits within {apart}")
     if note:
         lines.append(f"Note: {note}")
-    lines += [f"Caution: {Remark.from_json_dict(remark)}" for remark in document.get("remarks", ())]
-    lines += [f"Caution: {text}" for text in document["cautions"]]
+    remarks = [str(Remark.from_json_dict(remark)) for remark in document.get("remarks", ())]
+    if caveats := [*remarks, *document["cautions"]]:
+        lines.append("Caveats:")
+        lines += [f"- {text}" for text in caveats]
     if document["blind_spots"]:
         lines.append("These runs cannot show:")
         lines += [f"- {text}" for text in document["blind_spots"]]
@@ -250,7 +243,7 @@ def probability(value: float) -> str:
 
 
 def share(value: float) -> str:
-    """A share in per cent, never rounded up to all.
+    """A share in per cent, never rounded up to 100 %.
 
     Args:
         value: share, 0 to 1.

@@ -14,6 +14,8 @@ from identification.printing.table import as_html, as_text
 from identification.remark import Remark
 
 SCHEMA_VERSION = 1
+_HELD_OUT = "on runs held out of the fit"
+_FITTED = "in the fitted runs (none could be held out)"
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,19 @@ class GapSummary:
     p_value: float
     tests: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def closed_on(self) -> str:
+        """The runs that ``closed`` was measured on, in words."""
+        return _HELD_OUT if any(run.held_out for run in self.runs) else _FITTED
+
+    @property
+    def after_on(self) -> str:
+        """The runs that ``excess_after`` was measured on, in words."""
+        count = sum(run.held_out for run in self.runs)
+        if 0 < count < len(self.runs):
+            return f"in all runs, {count} of {len(self.runs)} held out of the fit"
+        return self.closed_on
+
 
 @dataclass(frozen=True)
 class Where:
@@ -107,7 +122,7 @@ class Where:
 
 @dataclass(frozen=True)
 class Candidate:
-    """An answer weighed.
+    """An answer that was considered.
 
     Args:
         effect: name, ``none`` or ``unknown``; two names joined by `` + `` for a pair.
@@ -132,7 +147,7 @@ class Coefficients:
         before: by name: ``cn_beta`` and ``cn_r``; these times the rig's sizes that are not stated
             (``cn_beta_area_length``, ``cn_r_area_length2``); or ``omega_n`` and ``zeta`` in normalised form.
         after: likewise.
-        note: what is meant by them, where that needs saying (a lag changes what Cnr means).
+        note: how to read them, where a cause changes their meaning (a lag changes what Cnr means).
     """
 
     before: Mapping[str, ParameterEstimate]
@@ -196,20 +211,20 @@ class Diagnosis:
 
     Args:
         campaign: its name.
-        causes: effect names, sorted; empty: no gap; ``unknown``: a gap nothing in the vocabulary closes.
+        causes: effect names, sorted; empty: no gap; ``unknown``: a gap that no effect of the vocabulary closes.
         verdict: the answer in plain words.
         gap: how large, before and after.
         where: where it is.
-        candidates: answers weighed, best first, ``none`` and ``unknown`` among them.
-        ambiguous_with: effects these runs cannot tell from the causes.
-        next_run: the run expected to tell them apart; None where not needed.
+        candidates: the answers considered, most probable first, ``none`` and ``unknown`` among them.
+        ambiguous_with: effects that these runs cannot distinguish from the causes.
+        next_run: the run expected to distinguish them; None where not needed.
         coefficients: before and after.
         confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is.
         noise: what the gap is measured against.
         blind_spots: what these runs cannot show, in sentences.
         seconds: wall time by step, s.
-        cautions: what the answer rests on less firmly than its figures look, in sentences.
-        maps: the pictures' data in JSON's types.
+        cautions: caveats, in sentences.
+        maps: data of the figures, in JSON's types.
         provenance: versions.
         remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
     """
@@ -244,6 +259,8 @@ class Diagnosis:
                 "excess_before": self.gap.excess_before,
                 "excess_after": self.gap.excess_after,
                 "closed": self.gap.closed,
+                "after_on": self.gap.after_on,
+                "closed_on": self.gap.closed_on,
                 "runs": [
                     {"id": run.id, "before": run.before, "after": run.after, "held_out": run.held_out}
                     for run in self.gap.runs

@@ -61,27 +61,27 @@ def tunnel(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
     ] = False,
 ) -> None:
-    """A virtual wind tunnel: simulate free-decay runs of a yawing model, identify and diagnose real ones.
+    """A virtual wind tunnel: simulate, identify and diagnose free-decay runs of a yawing model.
 
-    A model on a vertical rod and a spring is released at a yaw angle. The
-    swings that follow, with the wind off and on, give its yaw-moment derivatives
-    Cnβ and Cnr (1/rad), the inertia Izz (kg m²) and the rig's own damping Cr
-    (N m s/rad), each with a standard deviation.
+    A model on a vertical rod and a spring is released at a yaw angle and
+    oscillates. From runs with the wind off and on, the program identifies the
+    yaw-moment derivatives Cnβ and Cnr (1/rad), the inertia Izz (kg m²) and the
+    rig's damping Cr (N m s/rad), each with a standard deviation.
 
     [bold]Start here[/bold]
-      tunnel demo                        the whole chain, with pictures of it
-      tunnel springs                     the paper's spring table, its inertia
-      tunnel simulate plan.toml --out c  a campaign of your own, into folder c
-      tunnel identify c --json est.json  its coefficients; measured ones alike
-      tunnel diagnose c                  why the model departs from it
-      tunnel plot c                      its figures
-      tunnel effects                     what a plan may add to the model
-      tunnel blind                       checks of the diagnosis, truth sealed
-      tunnel score                       how good each estimator is, and where not
+      tunnel demo                        the whole chain, with figures
+      tunnel springs                     inertia from the paper's spring table
+      tunnel simulate plan.toml --out c  simulate a campaign into folder c
+      tunnel identify c --json est.json  its coefficients; also of measured runs
+      tunnel diagnose c                  why the model does not fit it
+      tunnel plot c                      figures of it
+      tunnel effects                     effects that a plan can add
+      tunnel blind                       blind tests of the diagnosis
+      tunnel score                       errors of each estimator
       tunnel sweep sweep.toml --out s    many campaigns, resumable
-      tunnel view                        the rig live, in a window or browser
+      tunnel view                        the rig in real time, in a window or browser
       tunnel render                      a film of a run, and a picture
-      tunnel train w.safetensors         the paper's networks anew, from a seed
+      tunnel train w.safetensors         train the paper's networks from a seed
 
     [bold]Units[/bold]
       SI and radians throughout.

@@ -1,4 +1,4 @@
-"""What an answer rests on less firmly than its figures look, each with the remedy."""
+"""Caveats of an answer, each with its remedy."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def cautions(
     fitted = [run.id for run in runs if not run.held_out]
     if named and len(fitted) == len(runs):
         found.append(
-            "No run could be held out of the fit, so the closure stated is that of the fitted runs, no prediction. "
+            "No run could be held out of the fit, so the closure is that of the fitted runs, not a prediction. "
             "Repeat every spring, with the wind off and on."
         )
     elif named and fitted:

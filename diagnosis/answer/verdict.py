@@ -23,17 +23,19 @@ def verdict(
     after: float,
     closed: float,
     probability: float,
-    held_out: bool = True,
+    closed_on: str,
+    both_winds: bool,
 ) -> str:
     """The answer in one paragraph.
 
     Args:
         causes: names; empty for no gap.
         before: excess of the nominal model, in units of the noise variance.
-        after: excess on held-out runs with the causes added, in units of the noise variance.
-        closed: share of the gap closed there.
+        after: excess with the causes added, in units of the noise variance.
+        closed: share of the gap closed, 0 to 1.
         probability: of the answer, a fraction.
-        held_out: whether any run could be held out; else ``after`` and ``closed`` are those of the fitted runs.
+        closed_on: the runs that ``closed`` was measured on, in words (`GapSummary.closed_on`).
+        both_winds: whether the campaign has runs with the wind off and runs with the wind on.
 
     Returns:
         Sentences.
@@ -48,20 +50,22 @@ def verdict(
             f"There is a gap ({before:.2f} times the noise power), and no effect of the vocabulary explains it. "
             f"Do not trust the coefficients beyond the intervals given."
         )
-    sources = "; ".join(_source(name) for name in causes)
-    runs = "on runs held out of the fit" if held_out else "in the fitted runs (none could be held out)"
+    sources = "; ".join(_source(name, both_winds=both_winds) for name in causes)
     return (
         f"The gap ({before:.2f} times the noise power) comes from {plain(causes)} "
         f"(probability {probability:.2f}): "
         f"{sources}. With {'it' if len(causes) == 1 else 'them'} added, {100.0 * closed:.1f} % of the gap "
-        f"closes {runs}, and {max(after, 0.0):.3f} times the noise power is left."
+        f"closes {closed_on}, and {max(after, 0.0):.3f} times the noise power is left."
     )
 
 
-def _source(name: str) -> str:
+def _source(name: str, *, both_winds: bool) -> str:
+    """What an effect acts on and, where the campaign can show it, whether it needs the wind."""
     kind = effect_class(name)
-    when = "with the wind on" if kind.condition == "wind_on" else "with the wind on and off"
-    return f"{_CHANNEL_WORDS[kind.channel]}, {when}"
+    acts_on = _CHANNEL_WORDS[kind.channel]
+    if not both_winds:
+        return acts_on
+    return f"{acts_on}, with the wind {'on' if kind.condition == 'wind_on' else 'on and off'}"
 
 
 def cnr_note(causes: Sequence[str]) -> str:
@@ -99,7 +103,7 @@ def blind_spots(
         found.append("an error of a single spring: the runs state no stiffness")
     elif springs < 2:
         found.append(
-            "gravity, a wrong spring, or structural as opposed to viscous damping: there is one spring only"
+            "structural as opposed to viscous damping, gravity, or a wrong stiffness: there is one spring only"
         )
     if not wind_on:
         found.append("any effect of the air: there is no run with the wind on")

@@ -149,7 +149,9 @@ def _balanced_start(base: Fit, kind: type[Effect]) -> StartingPoint | None:
 
 
 def _own_start(base: Fit, kind: type[Effect], found: OwnNumbers) -> StartingPoint:
-    problem = Problem(base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.free_forms)
+    problem = Problem(
+        base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.free_forms
+    )
     infos = [info for info in kind.parameters() if not info.form]
     values = [np.clip(value, info.lower, info.upper) for value, info in zip(found.values, infos, strict=True)]
     release = np.column_stack([base.point.release, found.numbers])

@@ -179,4 +179,4 @@ def _by_drift(found: Survey) -> Finding:
         return Finding("stiffness", "the frequency shifts along the decay more than the damping does")
     if damping > DRIFT_RATIO * max(frequency, 0.0) and damping > 0.0:
         return Finding("damping", "the damping shifts along the decay more than the frequency does")
-    return Finding(None, "frequency and damping shift alike, so these runs do not say on what it acts")
+    return Finding(None, "the frequency and the damping shift by similar amounts along the decay")

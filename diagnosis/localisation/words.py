@@ -117,7 +117,8 @@ def _bands(found: Survey, bands: tuple[str, ...]) -> str:
 
 def _nature(channel: Finding, condition: Finding, both: bool) -> str:
     """Channel and condition; without runs of both kinds the latter goes unsaid."""
-    acts = f"It acts on {_CHANNEL_WORDS[channel.value]}" if channel.value else "On what it acts is open"
+    words = _CHANNEL_WORDS.get(channel.value or "")
+    acts = f"It acts on {words}" if words else "What it acts on cannot be determined"
     if condition.value is None:
         return f"{acts}: {channel.reason}; {condition.reason}."
     when = _CONDITION_WORDS[condition.value]

@@ -1,4 +1,4 @@
-"""Numbers as a person reads them: two significant digits of the standard deviation decide the rest."""
+"""Formatting of numbers: two significant digits of the standard deviation determine the others."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ COEFFICIENTS: Mapping[str, str] = {
     "omega_n": "ωn",
     "zeta": "ζ",
 }
-"""Coefficients of a diagnosis as the paper writes them, those times sizes that are not stated included."""
+"""Symbols of the coefficients of a diagnosis, also of those multiplied by sizes that are not stated."""
 
 FIXED_DECIMALS = 9
-"""Beyond this many decimals, a million or below a ten-thousandth a number takes a power of ten."""
+"""A number with more decimals than this, above a million or below a ten-thousandth has a power of ten."""
 
 NEGLIGIBLE = 1e-9
-"""A standard deviation below this share of the value no longer decides how many digits are worth printing."""
+"""A standard deviation below this share of the value does not determine the number of digits."""
 
 
 def unit_mark(unit: str) -> str:
-    """A unit as it is set: powers raised.
+    """A unit with raised powers.
 
     Args:
         unit: of a document, such as ``m3/rad`` or ``N m s2/rad2``.
@@ -154,7 +154,7 @@ def unit(text: str) -> str:
 
 
 def _special(value: float, std: float | None) -> str:
-    """The text of what has no digits to round to; empty for the rest."""
+    """The text of a value that cannot be rounded by its standard deviation; empty for others."""
     if not math.isfinite(value):
         return "not finite"
     if std is None or not math.isfinite(std):
@@ -175,7 +175,7 @@ def _exponent(value: float, digits: int) -> int:
 
 
 def at_bound(given: Mapping[str, Any]) -> str:
-    """What is said beside a parameter that stopped at the end of its range.
+    """The mark of a parameter that stopped at the end of its range.
 
     Args:
         given: value, std and unit, and ``bound`` where there is one.

@@ -6,27 +6,43 @@ import re
 from pathlib import Path
 
 import pytest
-from test_readme import assert_same, output_of, toml_block
+from test_readme import BLOCK, HOW_TO, ROOT, assert_same, output_of, sessions, toml_block
 from test_tutorials import printed, steps
 
 from tunnel_lab.scoring.packaged import packaged_baseline
 
-PAGES = Path(__file__).parents[2] / "docs" / "how-to"
-BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+PAGES = HOW_TO
+INDEX = ROOT / "docs" / "README.md"
 
 
-def test_the_budget_shown_is_the_real_one(tmp_path: Path) -> None:
-    page = (PAGES / "state-uncertainties.md").read_text(encoding="utf-8")
-    blocks = BLOCK.findall(page)
-    (known,) = [text for kind, text in blocks if kind == "toml"]
-    (session,) = [text for kind, text in blocks if kind == "console"]
-    (tmp_path / "known.toml").write_text(known, encoding="utf-8")
+@pytest.mark.parametrize(
+    ("page", "typed"),
+    [
+        ("run-the-demo", ["demo"]),
+        ("identify-a-record", ["springs"]),
+        ("diagnose-a-campaign", ["simulate", "diagnose"]),
+        ("state-uncertainties", ["simulate", "identify"]),
+    ],
+)
+def test_shown_output_is_real_output(page: str, typed: list[str], tmp_path: Path) -> None:
+    text = (PAGES / f"{page}.md").read_text(encoding="utf-8")
     (tmp_path / "plan.toml").write_text(toml_block("wind_speeds"), encoding="utf-8")
-    said = re.split(r"^\$ ", session, flags=re.MULTILINE)[1:]
-    assert len(said) == 2
-    for text in said:
-        typed, *shown = text.splitlines()
-        assert_same(shown, output_of(typed, tmp_path))
+    for kind, known in BLOCK.findall(text):
+        if kind == "toml":
+            (tmp_path / "known.toml").write_text(known, encoding="utf-8")
+    assert [command.split()[1] for command, _ in sessions(text)] == typed
+    for command, shown in sessions(text):
+        assert_same(shown, output_of(command, tmp_path))
+
+
+def test_every_page_with_output_is_run() -> None:
+    pages = [page.stem for page in PAGES.glob("*.md") if sessions(page.read_text(encoding="utf-8"))]
+    assert sorted(pages) == [
+        "diagnose-a-campaign",
+        "identify-a-record",
+        "run-the-demo",
+        "state-uncertainties",
+    ]
 
 
 def test_the_figures_for_choosing_are_those_of_the_packaged_score(tmp_path: Path) -> None:
@@ -44,7 +60,14 @@ def test_every_estimator_that_is_scored_has_its_line() -> None:
     assert [name for name in scored if f"| `{name}` |" not in page] == []
 
 
-@pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [INDEX, *sorted(PAGES.glob("*.md"))], ids=lambda page: page.stem)
 def test_the_links_lead_somewhere(page: Path) -> None:
     links = [link for link in re.findall(r"\]\(([^)]+)\)", page.read_text()) if "://" not in link]
     assert [link for link in links if not (page.parent / link.partition("#")[0]).exists()] == []
+
+
+def test_the_index_names_every_page() -> None:
+    links = re.findall(r"\]\(([^)#]+)\)", INDEX.read_text(encoding="utf-8"))
+    folders = [INDEX.parent / name for name in ("how-to", "tutorials", "reference", "theory")]
+    pages = [*INDEX.parent.glob("*.md"), *(page for folder in folders for page in folder.rglob("*.md"))]
+    assert {page.relative_to(INDEX.parent).as_posix() for page in pages} - {"README.md"} <= set(links)

@@ -33,7 +33,7 @@ def identify_campaign(folder: Path, rng: Rng) -> None:
     from identification import identify
     from identification.estimate import Estimate
     from identification.estimators import ALL_ESTIMATORS
-    from tunnel_lab.commands.identify import show
+    from tunnel_lab.terminal.estimate_output import show_estimate
     from tunnel_sim.files.json_text import json_text
 
     campaign = accepted_campaign(folder, rng)
@@ -42,7 +42,7 @@ def identify_campaign(folder: Path, rng: Rng) -> None:
     document = json.loads(json_text(found.to_json_dict()))
     check_numbers(document, name)
     assert Estimate.from_json_dict(document) == found, f"{name}: the estimate is not what its JSON says"
-    show(campaign, found, windows=True)
+    show_estimate(campaign, found, windows=True)
     if rng.random() < PICTURES:
         draw(campaign, found, folder)
 

@@ -37,6 +37,8 @@ def document() -> dict[str, Any]:
             "excess_before": 27.35,
             "excess_after": 0.1234,
             "closed": 0.9876,
+            "after_on": "in all runs, two held out",
+            "closed_on": "on runs held out of the fit",
             "runs": [
                 {"id": "alpha", "before": 31.72, "after": -0.0567, "held_out": True},
                 {"id": "beta", "before": 4.583, "after": 0.2345, "held_out": False},

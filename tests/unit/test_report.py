@@ -158,7 +158,7 @@ def test_numbers_are_those_of_the_document(page, document):
 def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, document, data):
     assert "There is one run only." in page
     assert "the MuJoCo model" in page
-    assert "1.2e-05 rad at the most" in page
+    assert "1.2e-05 rad at most" in page
     assert "within 4.0e-05 rad" in page
     changed = {"maps": None, "cautions": [], "confirmation": document["confirmation"] | {"agrees": False}}
     other = render_report(document | changed, data)

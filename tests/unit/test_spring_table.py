@@ -37,7 +37,7 @@ def test_springs_keep_their_names(tmp_path: Path) -> None:
         ("", "is empty"),
         ("# only a comment\n", "is empty"),
         (HEADER, "has 0 springs"),
-        (HEADER + "1,1,0.5\n2,2,0.7\n", "has 2 springs; a line needs three or more"),
+        (HEADER + "1,1,0.5\n2,2,0.7\n", "has 2 springs; give three or more"),
         ("stiffness,frequency_Hz\n1,2\n", "unknown column 'stiffness'; did you mean 'stiffness_N_m_per_rad'"),
         ("spring,frequency_Hz\n1,2\n", "needs one column stiffness_N_m_per_rad"),
         ("frequency_Hz,frequency_Hz,stiffness_N_m_per_rad\n1,2,3\n", "needs one column frequency_Hz"),

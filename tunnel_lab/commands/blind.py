@@ -1,4 +1,4 @@
-"""``tunnel blind``: campaigns with sealed truth, answered and scored."""
+"""``tunnel blind``: blind tests of the diagnosis."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from tunnel_lab.commands.diagnose import split_names
+from tunnel_lab.terminal.options import split_names
 
 NAME = "blind"
-HELP = """Blind checks: campaigns with sealed truth, diagnosed, then scored.
+HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.
 
 Campaigns are drawn and simulated by the reference simulator, whose integrator
-and forms of effects are not those of the fits. Their truth goes into a key
-only; its salted SHA-256 is published beside the data.
+and forms of effects are not those of the fits. Their truth is written
+to a separate key, whose salted SHA-256 is published with the data.
 
 [bold]Order[/bold]
   tunnel blind make set --count 200 --seed 1
@@ -27,7 +27,7 @@ app = typer.Typer(help=HELP, rich_markup_mode="rich", no_args_is_help=True)
 Folder = Annotated[Path, typer.Argument(help="Folder of the set.")]
 Excluded = Annotated[
     list[str] | None,
-    typer.Option("--exclude", metavar="EFFECT", help="Withhold effects from the vocabulary; their campaigns "
+    typer.Option("--exclude", metavar="EFFECT", help="Leave effects out of the vocabulary; their campaigns "
                  "then count as unknown."),
 ]  # fmt: skip
 KeyFile = Annotated[
@@ -54,13 +54,14 @@ def make(
 ) -> None:
     """Make a set: campaigns without truth, the sealed key, and its published hash.
 
-    Every campaign draws springs, speeds, releases, coefficients and noise; one
-    effect, two, none, or one outside the vocabulary, in the textbook's form or
-    another, sized to 1–100 times the noise power. The same seed gives the same
-    campaigns. Allow two minutes and half a second more for each campaign.
+    Springs, speeds, releases, coefficients and noise of every campaign are drawn
+    at random. It has one effect, two, none, or one outside the vocabulary, in the
+    textbook form or another, sized to 1–100 times the noise power. The same seed
+    gives the same campaigns. This takes two minutes plus half a second for each
+    campaign.
 
     [bold]Exit status[/bold]
-      0 made, 2 bad input, 130 interrupted; nothing is left half made.
+      0 made, 2 bad input, 130 interrupted; no incomplete set is left.
     """
     from diagnosis.blind import DEFAULT_SHARES, Mixture, make_blind, parse_shares
     from diagnosis.blind.files import SEAL, read_document
@@ -84,15 +85,18 @@ def make(
 def diagnose(
     folder: Folder,
     exclude: Excluded = None,
-    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Campaigns diagnosed at a time.")] = 1,
+    jobs: Annotated[
+        int, typer.Option("--jobs", min=1, help="Number of campaigns diagnosed at the same time.")
+    ] = 1,
 ) -> None:
-    """Answer every campaign of a set; go on where an interrupted run ended.
+    """Diagnose every campaign of a set; continue where an interrupted run ended.
 
-    One JSON for each campaign goes to FOLDER/answers (answers-without-… with
-    --exclude), its SHA-256 to the seal.json beside it. The key is not read.
+    The answers go to FOLDER/answers (answers-without-… with --exclude), one JSON
+    file for each campaign; their SHA-256 goes to the seal.json in the same
+    folder. The key is not read.
 
     [bold]Exit status[/bold]
-      0 all answered, 2 bad input, 130 interrupted (what is answered stays).
+      0 all answered, 2 bad input, 130 interrupted (finished answers are kept).
     """
     from diagnosis.blind import answer_set, answers_folder
     from tunnel_lab.terminal.progress import bar
@@ -111,21 +115,21 @@ def score(
     exclude: Excluded = None,
     key: KeyFile = None,
     markdown: Annotated[
-        Path | None, typer.Option("--markdown", metavar="FILE", help="Write the score as a page, too.")
+        Path | None, typer.Option("--markdown", metavar="FILE", help="Also write the score as a page.")
     ] = None,
     json: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write all figures and cases as JSON, too.")
+        Path | None, typer.Option("--json", metavar="FILE", help="Also write all figures and cases as JSON.")
     ] = None,
 ) -> None:
-    """Verify all hashes, open the key and count.
+    """Verify all hashes, open the key and score the answers.
 
-    Shown are exact matches by kind with Wilson's intervals, alarms, calibration,
-    closure on held-out runs, errors of Cnβ and Cnr before and after, and what was
-    answered to each truth. A folder without seal.json but with a truth.json in
-    every campaign is scored as an open set, and said to be one.
+    The output gives exact matches by kind with Wilson intervals, false alarms,
+    calibration, closure on held-out runs, errors of Cnβ and Cnr before and after,
+    and the answers by true cause. A folder without seal.json but with a
+    truth.json in every campaign is scored as an open set and labelled as one.
 
     [bold]Exit status[/bold]
-      0 scored, 2 bad input: not all answered, or a file is not what was sealed.
+      0 scored, 2 bad input: an answer is missing, or a file does not match its hash.
     """
     from diagnosis import vocabulary
     from diagnosis.blind import score_set

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.plan import CampaignPlan
 
 SHOWN = ("output_error", "conventional", "neural_network")
-"""Estimators of the comparison: the default, and the paper's two. `tunnel score` compares them all."""
+"""Estimators of the comparison: the default and the two of the paper. `tunnel score` compares them all."""
 NAME = "demo"
 MEASURED = "rotary-pendulum"
 CHECKED_ESTIMATOR = "output_error"
 CHECK_STDS = 4.0
-"""The check fails beyond this many standard deviations: one honest demo in four thousand."""
+"""The check fails beyond this many standard deviations; its false-alarm rate is one in four thousand."""
 
 
 def run(
@@ -28,15 +28,15 @@ def run(
         Path, typer.Option("--out", "-o", metavar="FOLDER", help="Where campaign, estimates and figures go.")
     ] = Path("tunnel-output"),
     seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Seed of the noise, in place of the plan's.")
+        int | None, typer.Option("--seed", min=0, help="Seed of the noise; overrides the plan's.")
     ] = None,
 ) -> None:
     """Simulate the paper's campaign, identify it, compare it with the truth.
 
-    The rig of the paper swings with the wind off and on; every estimator gives
-    Cnβ and Cnr (1/rad), Izz (kg m²) and Cr (N m s/rad) beside what was
-    injected. Then come real swings of a pendulum, by windows of a few cycles.
-    Campaign, estimates (JSON) and figures (PNG) stay in FOLDER.
+    The paper's rig is simulated with the wind off and on. Three estimators give
+    Cnβ and Cnr (1/rad), Izz (kg m²) and Cr (N m s/rad), shown beside the injected
+    values. Measured swings of a pendulum follow, by windows of a few cycles.
+    Campaign, estimates (JSON) and figures (PNG) are kept in FOLDER.
 
     [bold]Examples[/bold]
       tunnel demo
@@ -54,7 +54,7 @@ def run(
     plan = paper_plan()
     if seed is not None:
         plan = replace(plan, seed=seed)
-    # Everything is written before anything is printed: whoever reads may stop before the end.
+    # Everything is written before anything is printed: the reader of a pipe may close it early.
     campaign, estimates = simulated_part(plan, folder)
     measured = measured_part(folder)
     problem = draw(folder, campaign, estimates, plan, measured[1])
@@ -87,7 +87,7 @@ def truth_of(plan: CampaignPlan) -> dict[str, float]:
 
 
 def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
-    """The checks that fail: estimates that are missing, or far from the truth for their own deviation.
+    """The checks that fail: estimates that are missing, or too far from the truth for their standard deviation.
 
     Args:
         estimates: one per estimator.
@@ -95,7 +95,7 @@ def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
 
     Returns:
         A clause for each; the distance is checked for the maximum-likelihood estimator only, whose
-        deviations are meant to be exact.
+        standard deviations should be exact.
     """
     found = [f"{e.estimator}: {e.status.value}" for e in estimates if e.status.failed]
     for estimate in estimates:
@@ -121,13 +121,14 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
         The campaign and one estimate per estimator.
     """
     from identification import identify
-    from tunnel_lab.commands.simulate import simulate_with_progress
+    from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import console
-    from tunnel_sim.engine.virtual_campaign import truth_document
+    from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
     from tunnel_sim.files.campaign_io import write_campaign
     from tunnel_sim.files.writing import write_json
 
-    campaign = simulate_with_progress(plan)
+    with bar("simulating runs", len(plan.conditions)) as tell:
+        campaign = simulate_campaign(plan, progress=lambda done, total: tell(done, total, ""))
     write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
     estimates = []
     for name in SHOWN:
@@ -181,11 +182,11 @@ def show_measured(campaign: Campaign, estimate: Estimate) -> None:
         campaign: the runs.
         estimate: of it.
     """
-    from tunnel_lab.commands.identify import show
+    from tunnel_lab.terminal.estimate_output import show_estimate
     from tunnel_lab.terminal.tables import say
 
     say(f"Measured: {campaign.name}, {len(campaign.runs)} runs. {campaign.description}\n")
-    show(campaign, estimate, windows=True)
+    show_estimate(campaign, estimate, windows=True)
 
 
 def draw(

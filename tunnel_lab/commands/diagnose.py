@@ -1,4 +1,4 @@
-"""``tunnel diagnose``: where the nominal model departs from the runs, which effect causes it, how far it closes."""
+"""``tunnel diagnose``: where the nominal model does not fit, and which effect explains it."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ NAME = "diagnose"
 STEPS = {
     "noise": "estimating the noise",
     "nominal fit": "fitting the nominal model",
-    "single effects": "trying effects",
-    "pairs": "trying pairs of effects",
-    "random moments": "weighing random moments",
-    "where, and how far it closes": "locating the gap, holding runs out",
+    "single effects": "fitting effects",
+    "pairs": "fitting pairs of effects",
+    "random moments": "fitting random moments",
+    "where, and how far it closes": "locating the gap, predicting held-out runs",
 }
-"""Steps of the study in words; anything else it tells is the name of an effect or a pair."""
+"""Steps of the study in words; any other progress message is the name of an effect or a pair."""
 
 
 def run(
@@ -37,21 +37,21 @@ def run(
     ] = None,
     effects: Annotated[
         list[str] | None,
-        typer.Option("--effects", metavar="A,B", help="Answer with these effects only."),
+        typer.Option("--effects", metavar="A,B", help="Consider these effects only."),
     ] = None,
     exclude: Annotated[
         list[str] | None,
-        typer.Option("--exclude", metavar="C", help="Withhold these effects; tunnel effects lists all."),
+        typer.Option("--exclude", metavar="C", help="Leave these effects out; tunnel effects lists all."),
     ] = None,
 ) -> None:
-    """Say why the nominal model departs from a campaign's runs, and how far the gap closes.
+    """Find out why the nominal model does not fit the runs of a campaign.
 
-    The nominal model is fitted to all runs. What it leaves is tested against the
-    noise; then every effect of the vocabulary, and pairs of them, are fitted and
-    weighed. The answer is one or two effects, "none" (there is no gap) or
-    "unknown" (no effect known here closes it), each with a probability. Gap and
-    coefficients are given before and after; "after" is predicted for runs held
-    out of the fit.
+    The nominal model is fitted to all runs, and its residuals are tested against
+    the noise. Then every effect of the vocabulary, and pairs of them, are fitted
+    and compared. The answer is one or two effects, "none" (there is no gap) or
+    "unknown" (no effect of the vocabulary explains it), each with a probability.
+    Gap and coefficients are given before and after the effects are added; the
+    gap after is predicted for runs held out of the fit, where possible.
 
     [bold]Examples[/bold]
       tunnel diagnose my-campaign
@@ -60,10 +60,11 @@ def run(
       tunnel diagnose my-campaign --json - | jq .causes
 
     [bold]Exit status[/bold]
-      0 answered, whatever the verdict; 2 bad input; 130 interrupted. A file is
-      written whole or not at all.
+      0 diagnosed, whatever the answer; 2 bad input; 130 interrupted. Files are
+      written completely or not at all.
     """
     from diagnosis import vocabulary
+    from tunnel_lab.terminal.options import split_names
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.json_text import json_text
@@ -76,7 +77,7 @@ def run(
             refuse_unwritable(path)
     data = read_campaign(campaign)
     document = diagnose_with_progress(data, kinds).to_json_dict()
-    # Files first: whoever reads what is printed may stop before its end.
+    # Files first: the reader of a pipe may close it early.
     if json is not None and not to_stdout:
         write_json(json, document)
     if report is not None:
@@ -93,20 +94,8 @@ def run(
             say(f"Written: {path}")
 
 
-def split_names(words: list[str] | None) -> tuple[str, ...]:
-    """Names given one by one, after commas, or both.
-
-    Args:
-        words: as typed.
-
-    Returns:
-        Names without blanks, in the order given.
-    """
-    return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())
-
-
 def diagnose_with_progress(campaign: Campaign, kinds: tuple[type[Effect], ...]) -> Diagnosis:
-    """Diagnose, telling step and effect on standard error where that is a terminal.
+    """Diagnose, with step and effect on standard error where that is a terminal.
 
     Args:
         campaign: the runs.
@@ -126,7 +115,7 @@ def step_display() -> Iterator[Callable[[str], None]]:
     """A spinner with the step, the effect tried and the time.
 
     Yields:
-        What to tell each step to.
+        The function to call with each step.
     """
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 

@@ -13,18 +13,21 @@ NAME = "effects"
 def run(
     name: Annotated[
         str | None,
-        typer.Argument(help="An effect to show whole. Default: a list of all.", show_default=False),
+        typer.Argument(help="An effect to show in full. Default: a list of all.", show_default=False),
     ] = None,
-    json: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write them as JSON.")] = None,
+    json: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the effects as JSON.")
+    ] = None,
     markdown: Annotated[
-        Path | None, typer.Option("--markdown", metavar="FILE", help="Write them as a reference page.")
+        Path | None, typer.Option("--markdown", metavar="FILE", help="Write the effects as a reference page.")
     ] = None,
 ) -> None:
-    """What the nominal model leaves out: every effect by name.
+    """List the effects that the nominal model leaves out.
 
-    These names are what tunnel simulate injects. Each has a channel (stiffness,
-    damping, forcing, sensor or calibration), a condition (always or wind_on), an
-    equation, and parameters with units, of which the first is the severity.
+    tunnel simulate injects them by these names, and tunnel diagnose finds them.
+    Each effect has a channel (stiffness, damping, forcing, sensor or
+    calibration), a condition (always or wind_on), an equation, and parameters
+    with units. The first parameter is the severity.
 
     [bold]Examples[/bold]
       tunnel effects
@@ -54,7 +57,7 @@ def run(
     if name is None:
         tables.show_tables(effect_listing.listing(kinds))
         tables.say(effect_listing.ABOUT_DIRECTIONS)
-        tables.say("All about one: tunnel effects NAME")
+        tables.say("Details of one effect: tunnel effects NAME")
         return
     for line in effect_listing.lines(kinds[0]):
         tables.say(line)

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 NAME = "identify"
 COMMAND = command_with_estimators()
 FEW_RUNS = 3
-"""Up to this many runs, the windows are shown without being asked for."""
+"""For up to this many runs the windows are shown by default."""
 
 
 def run(
     campaign: Annotated[Path, typer.Argument(help="Folder of the campaign: campaign.toml and its runs.")],
     estimator: Annotated[
-        str, typer.Option("--estimator", "-e", metavar="NAME", help="One of those listed above.")
+        str, typer.Option("--estimator", "-e", metavar="NAME", help="One of the estimators listed above.")
     ] = "output_error",
     json: Annotated[
         Path | None,
@@ -33,7 +33,7 @@ def run(
     weights: Annotated[
         Path | None,
         typer.Option(
-            "--weights", metavar="FILE", help="Networks that tunnel train wrote; with neural_network."
+            "--weights", metavar="FILE", help="Networks written by tunnel train; for neural_network."
         ),
     ] = None,
     windows: Annotated[
@@ -45,14 +45,14 @@ def run(
         ),
     ] = None,
     budget: Annotated[
-        bool, typer.Option("--budget", help="Carry scatter and choice of model too; show what dominates.")
+        bool, typer.Option("--budget", help="Add scatter and choice of model; show the dominant source.")
     ] = False,
     uncertainties: Annotated[
         Path | None,
         typer.Option(
             "--uncertainties",
             metavar="FILE",
-            help="How well Kr, V, ρ, A and l are known, TOML; implies --budget.",
+            help="Uncertainties of Kr, V, ρ, A and l (TOML); implies --budget.",
         ),
     ] = None,
     models: Annotated[
@@ -60,7 +60,7 @@ def run(
         typer.Option(
             "--model",
             metavar="NAME",
-            help="Another estimator whose spread counts; with --budget. Repeatable.",
+            help="Another estimator for the choice of model; with --budget. May be repeated.",
         ),
     ] = None,
 ) -> None:
@@ -69,8 +69,8 @@ def run(
     Every run gives its natural frequency ωn (rad/s) and damping ratio ζ. Runs
     with a stated spring, with the wind off and on, together give Cnβ and Cnr
     (1/rad), Izz (kg m²) and Cr (N m s/rad). Without spring_stiffness the runs
-    stay in normalised form: ωn and ζ. Every estimate comes with one standard
-    deviation, and every note with what to do about it.
+    stay in normalised form: ωn and ζ. Every estimate has a standard deviation,
+    and every note says what to do.
 
     [bold]Estimators[/bold]
       {estimators}
@@ -82,15 +82,17 @@ def run(
       tunnel identify my-campaign --uncertainties known.toml --model conventional
 
     [bold]Uncertainty[/bold]
-      Without more, standard deviations are those of the reading's noise. With
-      --budget the scatter of the runs and the choice of model are added, with
-      --uncertainties those of the stated Kr, V, ρ, A and l; what is reported is
-      then the combined standard uncertainty, and a table says what dominates.
+      By default, standard deviations are due to sensor noise only. --budget adds
+      the scatter of the runs and the choice of model. --uncertainties also adds
+      those of the stated Kr, V, ρ, A and l. The combined standard uncertainty is
+      then reported, and a table shows which source dominates.
 
     [bold]Exit status[/bold]
       0 identified, 1 nothing could be identified, 2 bad input.
     """
     from identification import identify
+    from tunnel_lab.terminal.estimate_output import show_estimate
+    from tunnel_lab.terminal.options import known_estimator
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.json_text import json_text
@@ -100,7 +102,7 @@ def run(
     for name in (estimator, *(models or ())):
         known_estimator(name)
     if models and not budget and uncertainties is None:
-        raise TunnelError("goes with --budget only", where="--model", remedy="add --budget, or leave it out")
+        raise TunnelError("needs --budget", where="--model", remedy="add --budget, or leave it out")
     if json is not None and str(json) != "-":
         refuse_unwritable(json)
     data = read_campaign(campaign)
@@ -115,7 +117,7 @@ def run(
     else:
         if json is not None:
             write_json(json, document)
-        show(data, estimate, windows=len(data.runs) <= FEW_RUNS if windows is None else windows)
+        show_estimate(data, estimate, windows=len(data.runs) <= FEW_RUNS if windows is None else windows)
         if found is not None:
             show_budget(found)
         if json is not None:
@@ -136,15 +138,15 @@ def budgeted(
     Args:
         campaign: what was identified.
         estimate: its estimate.
-        chosen: the estimator it is by, which is asked again with changed campaigns.
-        uncertainties: file of the inputs' uncertainties; where None they are taken as exact.
-        models: further estimators whose spread counts.
+        chosen: the estimator that made it, which is called again with changed campaigns.
+        uncertainties: file of the inputs' uncertainties; None takes them as exact.
+        models: further estimators for the choice of model.
 
     Returns:
         The widened estimate and the budget.
 
     Raises:
-        TunnelError: when the file is wrong, or there is no coefficient to make a budget of.
+        TunnelError: when the file is wrong, or there is no coefficient to budget.
     """
     from functools import partial
 
@@ -187,30 +189,12 @@ def show_budget(budget: Budget) -> None:
     tables.say("The standard deviations above are the combined ones.")
 
 
-def known_estimator(name: str) -> None:
-    """Refuse a name that is no estimator's.
-
-    Args:
-        name: as typed.
-
-    Raises:
-        TunnelError: when there is no such estimator, with the closest name.
-    """
-    from identification.estimators import ALL_ESTIMATORS
-    from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-
-    if name not in ALL_ESTIMATORS:
-        raise TunnelError(
-            f"there is no estimator {name!r}", where="--estimator", remedy=did_you_mean(name, ALL_ESTIMATORS)
-        )
-
-
 def with_weights(name: str, weights: Path | None) -> str | Estimator:
-    """The estimator by its name, or the networks with weights of their own.
+    """The estimator's name, or the network estimator with the given weights.
 
     Args:
         name: of a known estimator.
-        weights: a file of ``tunnel train``; None for what ships.
+        weights: a file written by ``tunnel train``; None for the packaged weights.
 
     Raises:
         TunnelError: when the estimator has no weights.
@@ -225,23 +209,3 @@ def with_weights(name: str, weights: Path | None) -> str | Estimator:
     from identification.estimators.neural import NeuralNetwork
 
     return NeuralNetwork(weights)
-
-
-def show(campaign: Campaign, estimate: Estimate, *, windows: bool) -> None:
-    """Print an estimate.
-
-    Args:
-        campaign: what was identified.
-        estimate: its estimate.
-        windows: whether to show every run's windows, too.
-    """
-    from tunnel_lab.terminal import tables
-
-    tables.show_tables(tables.coefficients_table(estimate), tables.runs_table(campaign, estimate))
-    if windows:
-        tables.show_tables(*map(tables.windows_table, estimate.runs))
-    tables.say(tables.BRACKETS)
-    for remark in estimate.remarks:
-        tables.say(f"Note: {remark}")
-    for line in tables.status_lines(estimate):
-        tables.say(f"Note: {line}")

@@ -17,7 +17,7 @@ def run(
     campaign: Annotated[Path, typer.Argument(help="Folder of the campaign: campaign.toml and its runs.")],
     out: Annotated[
         Path,
-        typer.Option("--out", "-o", metavar="FOLDER", help="Where the figures go, in a folder of their own."),
+        typer.Option("--out", "-o", metavar="FOLDER", help="Where the figures go, in a subfolder."),
     ] = Path("tunnel-output"),
 ) -> None:
     """Draw a campaign: angle traces, spectra, and ζ and ωn against the amplitude.

@@ -1,45 +1,53 @@
-"""``tunnel render``: a run as a film and as a picture, the trace beside the swinging body."""
+"""``tunnel render``: a run as a film and as a picture."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tunnel_lab.terminal.run_options import AngleOption, EffectOption, SpringOption, WindOption
+from tunnel_lab.terminal.options import (
+    PLAN_HELP,
+    RUN_HELP,
+    AngleOption,
+    EffectOption,
+    SpringOption,
+    WindOption,
+)
+
+if TYPE_CHECKING:
+    from tunnel_lab.show.film import Look
+    from tunnel_lab.show.request import Request
 
 NAME = "render"
 _DEFAULT = (Path("tunnel-output/rig.mp4"), Path("tunnel-output/rig.png"))
-
-PLAN_HELP = "A campaign's plan (TOML); without one the rig with its default spring at 10 m/s."
-RUN_HELP = "Which run of the plan; its first by default."
 
 
 def run(
     plan: Annotated[Path | None, typer.Argument(help=PLAN_HELP)] = None,
     out: Annotated[
         list[Path] | None,
-        typer.Option("--out", "-o", metavar="FILE", help="An .mp4 or a .png, as often as wanted."),
+        typer.Option("--out", "-o", metavar="FILE", help="An .mp4 or .png file. May be repeated."),
     ] = None,
     run_id: Annotated[str | None, typer.Option("--run", metavar="ID", help=RUN_HELP)] = None,
     spring: SpringOption = None,
     wind: WindOption = None,
     angle: AngleOption = None,
-    duration: Annotated[float | None, typer.Option("--duration", help="Of the run, s.")] = None,
+    duration: Annotated[float | None, typer.Option("--duration", help="Duration of the run, s.")] = None,
     effect: EffectOption = None,
     seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed of the noise.")] = None,
-    at: Annotated[float, typer.Option("--at", help="When the picture is taken, s from the release.")] = 2.0,
+    at: Annotated[float, typer.Option("--at", help="Time of the picture, s from the release.")] = 2.0,
     fps: Annotated[int, typer.Option("--fps", min=1, max=120, help="Frames per second of the film.")] = 25,
     speed: Annotated[
-        float, typer.Option("--speed", min=0.01, max=100.0, help="Of the film; 0.5 is half as fast.")
+        float, typer.Option("--speed", min=0.01, max=100.0, help="Speed of the film; 0.5 is half as fast.")
     ] = 1.0,
     size: Annotated[str, typer.Option("--size", metavar="WIDTHxHEIGHT", help="Pixels.")] = "1280x720",
     camera: Annotated[str, typer.Option("--camera", help="overview, above or side.")] = "overview",
 ) -> None:
-    """Film a run: the swinging body, and beside it the angle as the sensor reads it.
+    """Film a run: the oscillating model, and the sensor's reading beside it.
 
-    Writes MP4 (H.264) and PNG, each whole or not at all; by default
+    Writes MP4 (H.264) and PNG files; by default
     tunnel-output/rig.mp4 and tunnel-output/rig.png. Frames are drawn off-screen
     with EGL or OSMesa; no display is needed. A frame takes about a fifth of a
     second without a graphics card.
@@ -52,7 +60,7 @@ def run(
     [bold]Exit status[/bold]
       0 written, 2 bad input or no way to render here; nothing is written then.
     """
-    from tunnel_lab.show.film import Look, write_still
+    from tunnel_lab.show.film import Look, checked_camera, write_still
     from tunnel_lab.show.request import Request, shown_run
     from tunnel_lab.terminal.tables import say
 
@@ -78,25 +86,17 @@ def run(
         say(f"Written: {path}")
 
 
-def _film(request: object, look: object, path: Path) -> None:
-    """Write the film under a progress bar, where standard error is a terminal."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+def _film(request: Request, look: Look, path: Path) -> None:
+    """Write the film under a progress bar."""
+    from tunnel_lab.show.film import write_film
+    from tunnel_lab.terminal.progress import bar
 
-    from tunnel_lab.show.film import Look, write_film
-    from tunnel_lab.show.request import Request
-    from tunnel_lab.terminal.tables import console
-
-    assert isinstance(request, Request)
-    assert isinstance(look, Look)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    terminal = console(stderr=True)
-    with Progress(*columns, console=terminal, disable=not terminal.is_terminal) as bar:
-        task = bar.add_task("drawing frames", total=None)
-        write_film(request, look, path, lambda done, total: bar.update(task, completed=done, total=total))
+    with bar("drawing frames") as tell:
+        write_film(request, look, path, lambda done, total: tell(done, total, ""))
 
 
 def _targets(out: list[Path] | None) -> list[Path]:
-    """The files to write, refused before the work is done where they cannot be."""
+    """The files to write; those that cannot be written are refused before the work."""
     from tunnel_sim.files.writing import output_folder
     from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -121,24 +121,5 @@ def _pixels(size: str) -> tuple[int, int]:
     numbers = [int(part) if part.isdecimal() else 0 for part in (width, height)]
     if not cross or any(n % 2 or not 160 <= n <= 3840 for n in numbers):
         remedy = "give two even numbers from 160 to 3840, such as 1280x720"
-        raise TunnelError(f"{size!r} is no size", where="--size", remedy=remedy)
+        raise TunnelError(f"{size!r} is not a size", where="--size", remedy=remedy)
     return numbers[0], numbers[1]
-
-
-def checked_camera(name: str) -> str:
-    """The name of a camera, if there is one.
-
-    Args:
-        name: as typed.
-
-    Raises:
-        TunnelError: when the rig has no such camera.
-    """
-    from tunnel_lab.show.film import CAMERAS
-    from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-
-    if name not in CAMERAS:
-        raise TunnelError(
-            f"there is no camera {name!r}", where="--camera", remedy=did_you_mean(name, CAMERAS)
-        )
-    return name

@@ -1,4 +1,4 @@
-"""``tunnel score``: estimators against records of known truth, and against their own past."""
+"""``tunnel score``: errors of the estimators, and a comparison with a baseline."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 NAME = "score"
 PACKAGED = "packaged"
-"""The word for the baseline that is installed."""
+"""Name of the installed baseline."""
 
 
 def run(
@@ -31,19 +31,22 @@ def run(
         typer.Option("--out", metavar="FOLDER", help="Keep trials and scores (Parquet) and a figure here."),
     ] = None,
     trials: Annotated[
-        int | None, typer.Option("--trials", min=2, help="Records in each cell, in place of the grid's.")
+        int | None, typer.Option("--trials", min=2, help="Records in each cell; overrides the grid's.")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Other records than the grid's seed draws.")
+        int | None, typer.Option("--seed", min=0, help="Seed of the records; overrides the grid's.")
     ] = None,
     jobs: Annotated[
-        int, typer.Option("--jobs", min=0, help="Processes; 0 works in this one. It changes no figure.")
+        int,
+        typer.Option("--jobs", min=0, help="Number of processes; 0 uses this one. Results do not change."),
     ] = 2,
-    cells: Annotated[bool, typer.Option("--cells", help="Show every cell, too.")] = False,
+    cells: Annotated[bool, typer.Option("--cells", help="Also show every cell.")] = False,
     check: Annotated[
         str | None,
         typer.Option(
-            "--check", metavar="BASELINE", help="Exit with 1 when an estimator got worse; or 'packaged'."
+            "--check",
+            metavar="BASELINE",
+            help="Exit with 1 if an estimator is worse than this file, or 'packaged'.",
         ),
     ] = None,
     write_baseline: Annotated[
@@ -51,7 +54,7 @@ def run(
     ] = None,
     breakdown: Annotated[
         bool,
-        typer.Option("--breakdown", help="Map the bias under each unmodelled effect instead."),
+        typer.Option("--breakdown", help="Show the bias caused by each unmodelled effect instead."),
     ] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a finished score in the folder.")
@@ -61,19 +64,19 @@ def run(
 
     Every estimator sees the same simulated records: single decays over ζ,
     frequency (Hz), noise and length (s), and campaigns over wind speed (m/s),
-    with effects on or off. With --out an interrupted score goes on where it
-    ended; the same seed gives the same figures, whatever the number of
-    processes (the milliseconds apart).
+    with effects on or off. With --out an interrupted score continues where
+    it ended. The same seed gives the same results (except the times) with any
+    number of processes.
 
     --check compares with a baseline in five aspects: bias, spread, outliers,
-    coverage and failures. All its tests together raise a false alarm once in a
-    hundred checks. Without a grid, the baseline's own records are scored, so
-    that unchanged code compares to the last bit.
+    coverage and failures. The false-alarm rate of all tests together is
+    1 %. Without a grid, the baseline's own records are scored, so that unchanged
+    code reproduces the baseline to the last bit.
 
-    --breakdown puts each unmodelled effect into a campaign of twelve
-    runs of the reference simulator, 1 and 10 times as strong as the noise, and
-    shows the bias of Cnβ and Cnr in % and in reported standard deviations
-    (three realisations, or --trials). Allow some minutes.
+    --breakdown adds each unmodelled effect to a campaign of twelve runs of the
+    reference simulator, at 1 and 10 times the noise power, and shows the bias of
+    Cnβ and Cnr in % and in reported standard deviations (three realisations, or
+    --trials). This takes a few minutes.
 
     [bold]Examples[/bold]
       tunnel score
@@ -85,7 +88,7 @@ def run(
 
     [bold]Exit status[/bold]
       0 scored, 1 an estimator got worse, 2 bad input,
-      130 interrupted (what is done stays in --out).
+      130 interrupted (finished work is kept in --out).
     """
     from tunnel_lab.scoring import check as checking
     from tunnel_lab.scoring import tables
@@ -128,7 +131,7 @@ def chosen(names: list[str] | None) -> tuple[str, ...]:
     """The estimators to score.
 
     Args:
-        names: as typed; several may stand in one word, with commas. None takes all.
+        names: as typed; a word may hold several, separated by commas. None takes all.
 
     Returns:
         Names of the registry, each once.
@@ -137,7 +140,7 @@ def chosen(names: list[str] | None) -> tuple[str, ...]:
         TunnelError: when one is unknown, with the closest name.
     """
     from identification.estimators import ALL_ESTIMATORS
-    from tunnel_lab.commands.identify import known_estimator
+    from tunnel_lab.terminal.options import known_estimator
 
     if not names:
         return ALL_ESTIMATORS
@@ -156,7 +159,7 @@ def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results
     gone = [name for name in baseline.estimators if name not in names]
     if everything and gone:
         raise TunnelError(
-            f"the baseline knows {', '.join(gone)}, which the registry does not",
+            f"the baseline has {', '.join(gone)}, which the registry does not have",
             where="--check",
             remedy="write a new baseline with --write-baseline, or name what to score with --estimator",
         )
@@ -201,7 +204,7 @@ def _keep(out: Path, results: Results) -> list[Path]:
 
 
 def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
-    """Only an interrupted score may be in the folder, or, with ``overwrite``, a finished one."""
+    """Refuse a folder that holds anything but an interrupted score, unless ``overwrite``."""
     from tunnel_sim.files.leftovers import clear_leftovers
     from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -222,12 +225,14 @@ def _refuse_unwritable(path: Path | None) -> None:
 
 
 def _refuse_of_the_grid(given: dict[str, object]) -> None:
-    """The breakdown map has conditions of its own."""
+    """Refuse options that do not apply to the breakdown, which has its own conditions."""
     from tunnel_sim.vocabulary.errors import TunnelError
 
     for name, value in given.items():
         if value is not None:
-            raise TunnelError("does not go with --breakdown", where=name, remedy="leave one of them out")
+            raise TunnelError(
+                "cannot be combined with --breakdown", where=name, remedy="leave one of them out"
+            )
 
 
 def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, trials: int | None) -> None:

@@ -1,17 +1,13 @@
-"""``tunnel simulate``: a campaign from a plan, into a folder."""
+"""``tunnel simulate``: simulate a campaign."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    from tunnel_sim.vocabulary.campaign import Campaign
-    from tunnel_sim.vocabulary.plan import CampaignPlan
 
 NAME = "simulate"
 
@@ -24,29 +20,29 @@ class Format(StrEnum):
 
 
 def run(
-    plan: Annotated[Path, typer.Argument(help="The campaign's plan, a TOML file.")],
+    plan: Annotated[Path, typer.Argument(help="Plan of the campaign, a TOML file.")],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")],
     format: Annotated[Format, typer.Option("--format", help="Format of the run files.")] = Format.PARQUET,
     seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Seed of the noise, in place of the plan's.")
+        int | None, typer.Option("--seed", min=0, help="Seed of the noise; overrides the plan's.")
     ] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(
             "--effect",
             metavar="NAME:PARAMETER=VALUE",
-            help="Add an effect beyond the nominal model, as often as wanted; further parameters after commas. "
-            "tunnel effects lists them.",
+            help="Add an effect to the nominal model; separate further parameters by commas. May be repeated; "
+            "tunnel effects lists the effects.",
         ),
     ] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the campaign that is in the folder already.")
+        bool, typer.Option("--overwrite", help="Replace a campaign that is already in the folder.")
     ] = False,
 ) -> None:
     r"""Simulate a campaign: springs × wind speeds × release angles × repeats.
 
     The folder then holds campaign.toml, a file for each run (time in s, yaw
-    angle in rad) and truth.json with what was injected. The same plan and seed
+    angle in rad), and truth.json with the injected values. The same plan and seed
     give the same campaign, to the last bit.
 
     [bold]A plan[/bold]
@@ -70,8 +66,9 @@ def run(
       0 written, 2 bad input; nothing is written then.
     """
     from tunnel_lab.terminal.effect_option import parse_effect
+    from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import say
-    from tunnel_sim.engine.virtual_campaign import plan_effects, truth_document
+    from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign, truth_document
     from tunnel_sim.files.campaign_io import write_campaign
     from tunnel_sim.files.plan_file import load_plan
 
@@ -82,7 +79,8 @@ def run(
     loaded = replace(loaded, effects=loaded.effects + added)
     plan_effects(loaded)  # refuses what cannot be injected before anything is simulated
     refuse_occupied(out, overwrite=overwrite)
-    campaign = simulate_with_progress(loaded)
+    with bar("simulating runs", len(loaded.conditions)) as tell:
+        campaign = simulate_campaign(loaded, progress=lambda done, total: tell(done, total, ""))
     folder = write_campaign(
         campaign, out, run_format=format.value, truth=truth_document(loaded), overwrite=overwrite
     )
@@ -90,10 +88,10 @@ def run(
 
 
 def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
-    """Refuse, before the work is done, a folder the writer would refuse after it.
+    """Refuse an unsuitable folder before the work is done.
 
     Args:
-        folder: where the campaign shall go.
+        folder: where the campaign is to go.
         overwrite: whether what is there may be replaced.
 
     Raises:
@@ -102,32 +100,8 @@ def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
     from tunnel_sim.files.leftovers import clear_leftovers
     from tunnel_sim.vocabulary.errors import TunnelError
 
-    clear_leftovers(folder.resolve().parent)  # what a killed command set aside is there again
+    clear_leftovers(folder.resolve().parent)  # restore what a killed command had set aside
     if folder.exists() and not folder.is_dir():
         raise TunnelError("is a file, not a folder", where=str(folder), remedy="name another --out")
     if folder.exists() and not overwrite:
         raise TunnelError("exists already", where=str(folder), remedy="name another --out or add --overwrite")
-
-
-def simulate_with_progress(plan: CampaignPlan) -> Campaign:
-    """Simulate a plan under a progress bar, where standard error is a terminal.
-
-    Args:
-        plan: the campaign's plan.
-
-    Returns:
-        The campaign.
-    """
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    from tunnel_lab.terminal.tables import console
-    from tunnel_sim.engine.virtual_campaign import simulate_campaign
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    terminal = console(stderr=True)
-    # No bar into a file or pipe: standard error stays one line there when something goes wrong later.
-    with Progress(*columns, console=terminal, disable=not terminal.is_terminal) as progress:
-        task = progress.add_task("simulating runs", total=len(plan.conditions))
-        return simulate_campaign(
-            plan, progress=lambda done, total: progress.update(task, completed=done, total=total)
-        )

@@ -1,4 +1,4 @@
-"""``tunnel springs``: the rig's inertia from a table of springs, and the springs that leave the line."""
+"""``tunnel springs``: the rig's inertia from a table of springs."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ def run(
         ),
     ] = None,
 ) -> None:
-    """Izz from springs of known stiffness and their wind-off frequencies.
+    """Compute Izz from springs of known stiffness and their wind-off frequencies.
 
     Izz (kg m²) is the gradient of Kr (N m/rad) against ωn² (rad²/s²) by least
-    squares. Each spring's residual says by how much its stated stiffness leaves
-    that line; one that leaves it too far is flagged: measure it again.
+    squares. The residual of a spring is the deviation of its stated stiffness
+    from that line. Springs that deviate too far are marked: measure them again.
 
     [bold]Examples[/bold]
       tunnel springs
       tunnel springs my-springs.csv
 
     [bold]Exit status[/bold]
-      0 fitted, 1 no inertia could be had, 2 bad input.
+      0 fitted, 1 inertia not found, 2 bad input.
     """
     from tunnel_lab.terminal.spring_table import read_spring_table
 
@@ -94,7 +94,7 @@ def show(springs: SpringTable, source: str) -> None:
         )
     tables.show_tables(rows)
     if fit.inertia.value <= 0.0:
-        problem = "stiffness does not rise with frequency: check the table; no inertia can be had from it"
+        problem = "stiffness does not rise with frequency, so this table gives no inertia: check it"
         tables.say(problem, stderr=True)
         raise typer.Exit(1)
     tables.say(f"Izz (gradient) = {with_std(fit.inertia.value, fit.inertia.std)} kg m²")

@@ -1,4 +1,4 @@
-"""``tunnel sweep``: many campaigns, simulated and estimated, and what people look at in them."""
+"""``tunnel sweep``: simulate and estimate many campaigns, and summarise them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAME = "sweep"
 def run(
     file: Annotated[Path | None, typer.Argument(help="The sweep file (TOML).", show_default=False)] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Where the results are and go.")
+        Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Folder of the results.")
     ] = None,
     workers: Annotated[
         int | None,
@@ -33,26 +33,26 @@ def run(
     ] = None,
     summary: Annotated[
         Path | None,
-        typer.Option("--summary", metavar="FOLDER", help="Draw and tabulate what is finished in a folder."),
+        typer.Option("--summary", metavar="FOLDER", help="Draw and tabulate the finished part of a sweep."),
     ] = None,
 ) -> None:
-    r"""Simulate and estimate a product of campaigns; go on where it stopped.
+    r"""Simulate and estimate a product of campaigns; continue where it stopped.
 
-    Every case is a campaign: one rig, conditions, sensor, truth and effect of
-    those in the file. Its seed hangs on what it holds, so results are the same
-    to the bit with any number of workers, on one machine or a cluster. They go
-    to FOLDER/results, a Parquet dataset in the order of the cases. Interrupted
-    or killed, the same command does what is left.
+    Every case is a campaign: one rig, conditions, sensor, truth and effect from
+    the file. Its seed is computed from these, so results are identical to the bit
+    with any number of workers, on one machine or a cluster. They go to
+    FOLDER/results, a Parquet dataset in the order of the cases. After an
+    interruption the same command does the rest.
 
-    A Dask scheduler has no password: who reaches its port can run any code on
-    its workers and here. Use --scheduler in a network that you trust.
+    A Dask scheduler has no password: anyone who reaches its port can run any code
+    on its workers and here. Use --scheduler only in a network that you trust.
 
     [bold]A sweep file[/bold]
       name = "noise-and-friction"
       seed = 1
       replicates = 10              # of every case, with other noise
       estimators = ["output_error", "conventional"]
-      records = false              # true keeps the runs, too
+      records = false              # true also keeps the runs
       conditions.springs = [5, 8]            # of the paper's Table II
       conditions.wind_speeds = [0.0, 15.0]   # m/s; 0 is wind-off
       conditions.release_angles_deg = [20.0]
@@ -71,8 +71,8 @@ def run(
       tunnel sweep --summary results
 
     [bold]Exit status[/bold]
-      0 finished, 1 an estimator ended in an error of its own, 2 bad input,
-      130 interrupted (what is finished stays).
+      0 finished, 1 an estimator raised an exception, 2 bad input,
+      130 interrupted (finished work is kept).
     """
     from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -92,7 +92,7 @@ def run(
 
 
 def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None) -> None:
-    """Do a sweep, or what is left of it.
+    """Run a sweep, or the rest of it.
 
     Args:
         file: the sweep file.
@@ -111,7 +111,7 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
 
     if workers is not None and scheduler not in (None, "local"):
         raise TunnelError(
-            "its workers are started on their machines",
+            "its workers are started on their own machines",
             where=f"--scheduler {scheduler}",
             remedy="leave out --workers",
         )
@@ -124,7 +124,10 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
     estimates = sweep.size * len(sweep.document.estimators)
     say(f"Written: {out} ({sweep.size} cases, {sweep.runs} runs, {estimates} estimates)")
     if outcome.crashes:
-        say(f"{outcome.crashes} estimates ended in an error: see status 'raised' in the results", stderr=True)
+        say(
+            f"{outcome.crashes} estimates raised an exception: see status 'raised' in the results",
+            stderr=True,
+        )
         raise typer.Exit(1)
 
 
@@ -142,7 +145,7 @@ def _work(workers: int | None, scheduler: str | None, sweep: Sweep) -> Work:
 
 
 def show_summary(folder: Path) -> None:
-    """Tabulate and draw what is finished in a folder.
+    """Tabulate and draw the finished part of a sweep.
 
     Args:
         folder: of a sweep.
@@ -172,7 +175,7 @@ def show_summary(folder: Path) -> None:
             written.append(plots.save(drawn, target / f"{name}.png"))
     done, shards = len(store.finished()), store.sweep.shards
     if done < shards:
-        say(f"Finished: {done} of {shards} shards; the same command goes on with the rest\n")
+        say(f"Finished: {done} of {shards} shards; run the same command again for the rest\n")
     show_tables(
         figures.overall_table(lines),
         *map(figures.axis_table, grouped.values()),

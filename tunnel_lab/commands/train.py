@@ -15,39 +15,45 @@ CHECKPOINT_EVERY_S = 5.0
 
 
 def run(
-    out: Annotated[Path, typer.Argument(help="File to write, .safetensors; its record goes beside it.")],
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of first weights and test set.")] = 1,
+    out: Annotated[
+        Path, typer.Argument(help="File to write (.safetensors), with a record (.json) beside it.")
+    ],
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, help="Seed of the initial weights and the test set.")
+    ] = 1,
     zeta: Annotated[
         tuple[float, float], typer.Option("--zeta", help="Range of damping ratios.", metavar="LOW HIGH")
     ] = (0.001, 0.35),
     omega: Annotated[
         tuple[float, float], typer.Option("--omega", help="Range of ωn, rad/s.", metavar="LOW HIGH")
     ] = (0.4, 26.0),
-    starts: Annotated[int, typer.Option("--starts", min=1, help="Trainings of each network.")] = 3,
+    starts: Annotated[
+        int, typer.Option("--starts", min=1, help="Number of training runs of each network.")
+    ] = 3,
     damping_steps: Annotated[
-        int, typer.Option("--damping-steps", min=1, help="Steps of the first network, at most.")
+        int, typer.Option("--damping-steps", min=1, help="Largest number of steps of the first network.")
     ] = 400,
     frequency_steps: Annotated[
-        int, typer.Option("--frequency-steps", min=1, help="Steps of the second network, at most.")
+        int, typer.Option("--frequency-steps", min=1, help="Largest number of steps of the second network.")
     ] = 3000,
     linear: Annotated[
-        bool, typer.Option("--linear", help="Feed the second network t3 and ωn, not their logarithms.")
+        bool, typer.Option("--linear", help="Give the second network t3 and ωn instead of their logarithms.")
     ] = False,
     restart: Annotated[
-        bool, typer.Option("--restart", help="Begin anew where a training was stopped.")
+        bool, typer.Option("--restart", help="Start again instead of continuing an interrupted training.")
     ] = False,
 ) -> None:
     """Train the paper's networks: 100-5-5-1 for ζ, 2-2-5-1 for ωn.
 
     Full-batch Levenberg-Marquardt with Bayesian regularisation on impulse
     responses over the ranges given. Each network is trained from several random
-    starts, and the start of the largest evidence is kept. Shown, and kept as
-    JSON beside the weights, are the effective number of parameters γ, α, β and
-    the errors on responses that were not trained on. The same seed gives the
-    same bits on the same machine. Half a minute on an idle core.
+    starts, and the one with the largest evidence is kept. The effective number of
+    parameters γ, α, β and the errors on test responses are shown and written as
+    JSON beside the weights. The same seed gives the same bits on the same machine.
+    Training takes half a minute on an idle core.
 
-    A training that is interrupted leaves OUT.part.safetensors; the same command
-    goes on from there, to the same bits.
+    An interrupted training leaves OUT.part.safetensors; the same command continues
+    from there and gives the same bits.
 
     [bold]Examples[/bold]
       tunnel train mine.safetensors --seed 7
@@ -55,13 +61,13 @@ def run(
       tunnel identify c -e neural_network --weights mine.safetensors
 
     [bold]Exit status[/bold]
-      0 trained, 2 bad input, 130 interrupted (what was trained stays).
+      0 trained, 2 bad input, 130 interrupted (finished work is kept).
     """
     from identification.neural.train import TrainingSpec
     from identification.neural.training_set import LINEAR, LOGARITHMIC, DataSpec
 
     if out.suffix != ".safetensors":
-        _refuse(f"{out}", "does not end in .safetensors", "name the file of the weights so")
+        _refuse(f"{out}", "does not end in .safetensors", "give the file this suffix")
     _check_range("--zeta", zeta, 0.0, 0.95)
     _check_range("--omega", omega, 0.0, 1e4)
     data = DataSpec(zeta_range=zeta, omega_range=omega, frequency_scale=LINEAR if linear else LOGARITHMIC)
@@ -83,7 +89,7 @@ def _train(out: Path, spec: TrainingSpec, *, restart: bool) -> None:
         refuse_unwritable(path)
     resume = None if restart else read_checkpoint(partial, spec.to_json_dict())
     if partial.exists() and resume is None and not restart:
-        _refuse(str(partial), "is of another training", "add --restart, or name another file")
+        _refuse(str(partial), "belongs to another training", "add --restart, or name another file")
     latest, written = resume or Checkpoint(), monotonic()
 
     def keep(checkpoint: Checkpoint) -> None:
@@ -100,7 +106,7 @@ def _train(out: Path, spec: TrainingSpec, *, restart: bool) -> None:
             )
     except KeyboardInterrupt:
         write_whole(partial, latest.to_bytes(spec.to_json_dict()))
-        say(f"Kept: {partial}; the same command goes on from there", stderr=True)
+        say(f"Kept: {partial}; the same command continues from there", stderr=True)
         raise
     write_whole(out, trained.weights)
     write_json(out.with_suffix(".json"), trained.record)
@@ -125,7 +131,7 @@ def _show(record: dict[str, Any]) -> None:
     show_tables(result)
     errors = record["errors"]
     say(
-        f"On {record['data']['test_count']} other responses: ζ to {errors['zeta']:.1e} "
+        f"On {record['data']['test_count']} test responses: errors of ζ up to {errors['zeta']:.1e} "
         f"({100 * errors['zeta_relative']:.2g} % of ζ at most), "
         f"ωn to {100 * errors['omega_relative']:.2g} %"
     )
@@ -135,7 +141,7 @@ def _check_range(option: str, limits: tuple[float, float], above: float, below: 
     if not above < limits[0] < limits[1] < below:
         _refuse(
             option,
-            f"{limits[0]:g} {limits[1]:g} is no range",
+            f"{limits[0]:g} {limits[1]:g} is not a range",
             f"give LOW HIGH between {above:g} and {below:g}",
         )
 

@@ -1,4 +1,4 @@
-"""``tunnel view``: the rig live, in a window or in a browser."""
+"""``tunnel view``: the rig in real time, in a window or a browser."""
 
 from __future__ import annotations
 
@@ -7,8 +7,14 @@ from typing import Annotated
 
 import typer
 
-from tunnel_lab.commands.render import PLAN_HELP, RUN_HELP
-from tunnel_lab.terminal.run_options import AngleOption, EffectOption, SpringOption, WindOption
+from tunnel_lab.terminal.options import (
+    PLAN_HELP,
+    RUN_HELP,
+    AngleOption,
+    EffectOption,
+    SpringOption,
+    WindOption,
+)
 
 NAME = "view"
 
@@ -20,29 +26,32 @@ def run(
     wind: WindOption = None,
     angle: AngleOption = None,
     effect: EffectOption = None,
-    duration: Annotated[float | None, typer.Option("--duration", help="Until the next release, s.")] = None,
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed of what effects draw.")] = None,
+    duration: Annotated[
+        float | None, typer.Option("--duration", help="Time until the next release, s.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed of random effects.")] = None,
     speed: Annotated[
-        float, typer.Option("--speed", min=0.01, max=100.0, help="Factor on real time; the window only.")
+        float, typer.Option("--speed", min=0.01, max=100.0, help="Factor on real time; window only.")
     ] = 1.0,
     camera: Annotated[
-        str, typer.Option("--camera", help="overview, above or side; the window only.")
+        str, typer.Option("--camera", help="overview, above or side; window only.")
     ] = "overview",
     web: Annotated[bool, typer.Option("--web", help="Show it in a browser instead of a window.")] = False,
     port: Annotated[
-        int, typer.Option("--port", min=0, max=65535, help="Of --web; 0 takes the first free from 8080 on.")
+        int,
+        typer.Option("--port", min=0, max=65535, help="Port of --web; 0 takes the first free one from 8080."),
     ] = 0,
-    browser: Annotated[bool, typer.Option("--browser", help="With --web: open a browser's tab.")] = False,
+    browser: Annotated[bool, typer.Option("--browser", help="With --web: open a browser tab.")] = False,
 ) -> None:
-    """Watch the rig live: the model swings in real time and is released anew when the run is over.
+    """Watch the rig in real time; the model is released again when a run is over.
 
-    In the window (MuJoCo's viewer) space pauses, R releases anew, the mouse turns
-    the view; a figure shows the angle. It needs a display.
+    In the window (MuJoCo's viewer) space pauses, R releases the model again and the
+    mouse turns the view; a figure shows the angle. The window needs a display.
 
-    --web serves the same to a browser (MuJoCo Studio's web viewer, WebGL 2), with
-    pause, speed and reset there. It needs no display, listens on all network
-    interfaces, asks for no password and does not check the Origin of a page:
-    use it in a network that you trust.
+    --web serves the same to a browser (MuJoCo Studio's web viewer, WebGL 2), which
+    has controls for pause, speed and reset. It needs no display. It listens on
+    all network interfaces, asks for no password and does not check the Origin of
+    a page: use it only in a network that you trust.
 
     [bold]Examples[/bold]
       tunnel view
@@ -53,16 +62,14 @@ def run(
     [bold]Exit status[/bold]
       0 closed, 2 bad input, no display or no free port, 130 interrupted.
     """
-    from tunnel_lab.commands.render import checked_camera
+    from tunnel_lab.show.film import checked_camera
     from tunnel_lab.show.request import Request, shown_run
     from tunnel_sim.vocabulary.errors import TunnelError
 
     file, effects = None if plan is None else str(plan), tuple(effect or ())
     request = Request(file, run_id, spring, wind, angle, duration, effects, seed)
     if not web and (port or browser):
-        raise TunnelError(
-            "is for the browser only", where="--port" if port else "--browser", remedy="add --web"
-        )
+        raise TunnelError("needs --web", where="--port" if port else "--browser", remedy="add --web")
     name = checked_camera(camera)
     shown = shown_run(request)
     if web:

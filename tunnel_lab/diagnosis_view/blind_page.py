@@ -44,7 +44,7 @@ class Section:
 
 
 def sections(score: Score) -> list[Section]:
-    """All of a score that is shown, in order.
+    """The sections of a score, in order.
 
     Args:
         score: of a set.
@@ -70,7 +70,7 @@ def as_table(section: Section) -> Table:
 
 
 def origin_lines(score: Score) -> list[str]:
-    """What was scored, and the hashes that hold it to its word.
+    """The scored set, and the hashes that seal it.
 
     Args:
         score: of a set.
@@ -84,7 +84,7 @@ def origin_lines(score: Score) -> list[str]:
     if score.sealed:
         lines.append(f"Key     sha256 {score.key_sha256} (verified, with every campaign)")
     else:
-        lines.append("Open set: the truth lay beside the data, so this is no blind check")
+        lines.append("Open set: the truth was beside the data, so this is not a blind test")
     lines.append(f"Answers sha256 {score.answers_sha256} (verified)")
     return lines
 
@@ -103,11 +103,11 @@ def markdown(score: Score, folder: str) -> str:
     lines = [
         "# Blind check",
         "",
-        "Campaigns with hidden causes, drawn and simulated by the reference simulator (`tunnel_reference`:",
-        "another integrator, another friction law, and for every effect further forms than the one fitted),",
-        "diagnosed without their truth and scored against the sealed key. Half of all effects have the textbook",
-        "form; `outside` campaigns hold an effect that belongs to no family. Intervals are Wilson's at 95 %.",
-        "This page is written by the commands below; nothing in it is typed by hand.",
+        "The campaigns are drawn and simulated by the reference simulator (`tunnel_reference`). It has another",
+        "integrator, another friction law, and more forms of every effect than the fitted one. The campaigns",
+        "are diagnosed without their truth, and the answers are scored against the sealed key. Half of all",
+        "effects have the textbook form; `outside` campaigns have an effect that belongs to no family. Intervals",
+        "are Wilson's at 95 %. This page is written by the commands below; nothing in it is typed by hand.",
         "",
         "```bash",
         *_commands(score, folder),
@@ -147,8 +147,8 @@ def _exact(score: Score) -> Section:
 
 def _alarms(score: Score) -> Section:
     entries = {
-        "a cause called where none acts": score.false_alarms(),
-        "no cause called where one acts": score.missed(),
+        "a cause named where none acts": score.false_alarms(),
+        "no cause named where one acts": score.missed(),
         "truth named as rival in a wrong answer": score.rivals(),
     }
     rows = tuple((name, *_share(found)) for name, found in entries.items() if found.total)
@@ -168,7 +168,10 @@ def _closure(score: Score) -> Section:
     rows = (("at least 0.95 of the gap closed", *_share(share)),) if share.total else ()
     note = f"Closed: median {median:.4f}, 5th percentile {low:.4f}"
     return Section(
-        "Closure on held-out runs, causes named rightly", ("", "number", "of", "share", "95 %"), rows, note
+        "Closure on held-out runs, where the causes are right",
+        ("", "number", "of", "share", "95 %"),
+        rows,
+        note,
     )
 
 
@@ -192,7 +195,7 @@ def _coefficients(score: Score) -> Section:
         )
     headings = ("campaigns", "error before [%]", "after [%]", "≤ 3 std before", "after", "95 %")
     note = (
-        "Errors are medians of |estimate − truth| over |truth|; ≤ 3 std counts errors within three standard "
+        "Errors are medians of |estimate − truth| / |truth|; ≤ 3 std counts errors within three standard "
         "deviations of the estimate."
     )
     return Section("Coefficients before and after the causes are added", headings, tuple(rows), note)
@@ -223,7 +226,7 @@ def _time(score: Score) -> Section:
 
 
 def _matrix(score: Score) -> list[str]:
-    """The confusion matrix in full: truths down, answers across."""
+    """The full confusion matrix: true causes in rows, answers in columns."""
     found = score.confusion()
     names = sorted({*found, *(name for row in found.values() for name in row)}, key=_order)
     across = [name for name in names if name != "withheld"]
@@ -236,7 +239,7 @@ def _matrix(score: Score) -> list[str]:
     ]
     key = ", ".join(f"{number} {name}" for name, number in numbers.items())
     return [
-        "## Confusion matrix", "", "Truths down, answers across; `two or more` counts any pair as answered.", "",
+        "## Confusion matrix", "", "True causes in rows, answers in columns; `two or more` counts any pair.", "",
         *_rows(headings, rows), "", f"Columns: {key}.",
     ]  # fmt: skip
 
@@ -248,7 +251,7 @@ def _row(withheld: bool, truth: Sequence[str]) -> str:
 
 
 def _order(name: str) -> tuple[int, str]:
-    """Effects by name, then pairs, none, unknown, and what is not answered."""
+    """Effects by name, then pairs, none, unknown, and no answer."""
     last = ("two or more", "none", "unknown", "withheld", "no answer")
     return (last.index(name) + 1 if name in last else 0, name)
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 SHOWN = 8
-"""Candidates drawn: the rest have next to no probability."""
+"""Number of candidates drawn; the others are improbable."""
 
 
 def candidates_figure(document: Document) -> Figure:
@@ -36,7 +36,7 @@ def candidates_figure(document: Document) -> Figure:
         document: a diagnosis.
 
     Returns:
-        A bar for each of the first eight answers, with its figure in words.
+        A bar for each of the first eight answers, with its probability.
     """
     shown = document["candidates"][:SHOWN]
     fig = figure(0.8 + 0.34 * len(shown))
@@ -68,7 +68,7 @@ def closure_figure(document: Document) -> Figure:
         document: a diagnosis.
 
     Returns:
-        A pair of points per run.
+        A pair of points per run; the second is filled where the run was held out of the fit.
     """
     runs = document["gap"]["runs"]
     fig = figure(1.3 + 0.24 * max(len(runs), 4))
@@ -79,7 +79,11 @@ def closure_figure(document: Document) -> Figure:
     axes.hlines(rows, after, before, color="0.8", linewidth=2.5)
     axes.plot(before, rows, "s", color=BEFORE, ms=6, label="nominal model")
     if not np.array_equal(before, after):
-        axes.plot(after, rows, "o", color=AFTER, ms=6, label="with the causes, run held out")
+        held_out = np.array([run["held_out"] for run in runs])
+        for chosen, face, words in ((held_out, AFTER, "held out"), (~held_out, "white", "fitted")):
+            if chosen.any():
+                label = f"with the causes, run {words}"
+                axes.plot(after[chosen], rows[chosen], "o", color=AFTER, mfc=face, ms=6, label=label)
     noise = [run["std"] for run in (document.get("maps") or {"runs": []})["runs"]]
     if noise:
         axes.axvspan(-3.0 * max(noise), 3.0 * max(noise), color="0.92", linewidth=0, label="noise (3σ)")
@@ -89,7 +93,7 @@ def closure_figure(document: Document) -> Figure:
     axes.margins(x=0.04)
     axes.invert_yaxis()
     axes.set_xlabel("excess: mean squared residual over noise variance, minus one")
-    fig.legend(loc="outside upper left", ncols=3, fontsize=8, frameon=False)
+    fig.legend(loc="outside upper left", ncols=4, fontsize=8, frameon=False)
     quiet(axes)
     return fig
 

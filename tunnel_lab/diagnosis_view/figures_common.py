@@ -1,4 +1,4 @@
-"""What the figures of a diagnosis share."""
+"""Helpers of the figures of a diagnosis."""
 
 from __future__ import annotations
 

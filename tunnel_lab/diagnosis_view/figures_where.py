@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_SIGMAS = 3.0  # cells and bands that stand out by less are drawn as noise
+_SIGMAS = 3.0  # cells and bands below this are drawn as noise
 _MOST_CURVES = 16
 _UNITS: dict[str, str] = {"rad/s2": "rad/s²"}
 
@@ -114,7 +114,7 @@ def _profile(axes: Axes, values: Document, edges: str, interval: list[float] | N
 
 
 def _moment(axes: Axes, values: Document) -> None:
-    """The missing moment's energy behind the excess: it shows when something acts, not how long it is seen."""
+    """The missing moment's energy: it shows when a moment acts, not how long the motion after it lasts."""
     beside = axes.twinx()
     share = 100.0 * array(values["moment_share"])
     beside.stairs(share, array(values["edges_s"]), fill=True, color=AFTER, alpha=0.3)
@@ -208,7 +208,7 @@ def _curve(
 
 
 def phase_plane_figure(document: Document) -> Figure | None:
-    """The missing moment over angle and rate, and its means over either.
+    """The missing moment over angle and rate, and its means over each.
 
     Args:
         document: a diagnosis with its maps.

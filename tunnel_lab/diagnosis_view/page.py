@@ -16,16 +16,16 @@ from tunnel_sim.vocabulary.campaign import Campaign
 
 Document = Mapping[str, Any]
 
-#: What a reader who cannot see a figure is told.
+#: Text alternatives of the figures.
 DESCRIPTIONS = {
     "where-runs": "Heat map of the excess of every run over time, with a bar for the excess of the whole run.",
     "where-profiles": "Excess against time, against amplitude, and residual power against frequency.",
     "where-backbones": "Frequency and damping ratio of each run against amplitude, relative to the nominal model.",
-    "where-phase-plane": "Map of the missing moment over angle and rate, and its means over either.",
+    "where-phase-plane": "Map of the missing moment over angle and rate, and its means over each.",
     "which": "Bars: probability of each answer.",
     "how-far": "Excess of every run with the nominal model and with the causes added.",
     "residuals": "Reading and residuals of the runs with the largest gap against time.",
-    "coefficients": "Coefficients before and after the causes are added, with 95 per cent intervals.",
+    "coefficients": "Coefficients before and after the causes are added, with 95 % intervals.",
 }
 
 
@@ -34,8 +34,8 @@ def write_report(document: Document, campaign: Campaign, path: Path) -> Path:
 
     Args:
         document: the diagnosis as JSON's types (``Diagnosis.to_json_dict``), with its ``maps`` where there are any.
-        campaign: the records it is of.
-        path: the HTML file; replaced when it exists, written whole or not at all.
+        campaign: the records.
+        path: the HTML file; replaced when it exists, written completely or not at all.
 
     Returns:
         The same path.
@@ -75,7 +75,7 @@ def _context(document: Document, campaign: Campaign) -> dict[str, Any]:
     answer, kind = view.headline(document)
     candidates, more = view.candidate_rows(document)
     figures = {
-        name: Markup(inline_svg(figure, name, DESCRIPTIONS[name]))  # our own drawing, no text of a user's
+        name: Markup(inline_svg(figure, name, DESCRIPTIONS[name]))  # drawn here: the SVG is already escaped
         for name, figure in diagnosis_figures(document, campaign).items()
     }
     return {
@@ -113,16 +113,18 @@ def _noise_rows(document: Document) -> list[tuple[str, str]]:
 
 
 def _confirmation_rows(document: Document) -> list[tuple[str, str]]:
-    """Which model the excesses are from, and how far the fits' integrator lies from it."""
+    """The model behind the excesses, and the difference of the integrator used for fitting."""
     found = document["confirmation"]
     if found["failure"]:
-        return [("Excesses computed by", f"the fits' own integrator; MuJoCo: {found['failure']}")]
-    apart = f"{found['largest_difference_rad']:.1e} rad at the most"
+        return [
+            ("Excesses computed by", f"the integrator used for fitting; MuJoCo failed: {found['failure']}")
+        ]
+    apart = f"{found['largest_difference_rad']:.1e} rad at most"
     rms = f"{found['rms_difference_rad']:.1e} rad root mean square in {found['run']}"
     return [
         ("Excesses computed by", "the MuJoCo model"),
         (
-            "The fits' own integrator departs by",
+            "Difference of the integrator used for fitting",
             f"{apart}; {rms}, {'within' if found['agrees'] else 'beyond'} {found['tolerance_rad']:.1e} rad",
         ),
     ]

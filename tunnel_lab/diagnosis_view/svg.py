@@ -1,4 +1,4 @@
-"""Figures as SVG that can stand inside an HTML page."""
+"""Figures as SVG elements of an HTML page."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _NOT_HTML = (
     re.compile(r"^.*?(?=<svg)", re.DOTALL),  # the XML declaration and document type, which name an address
     re.compile(r"<metadata>.*?</metadata>\s*", re.DOTALL),
 )
-_TAG = re.compile(r"<[^>]+>")  # text between tags may hold names of runs, which look like anything
-_NAMES = re.compile(r'\s+xmlns(:\w+)?="[^"]*"')  # HTML knows SVG's names by itself
+_TAG = re.compile(r"<[^>]+>")  # text between tags may hold any names of runs
+_NAMES = re.compile(r'\s+xmlns(:\w+)?="[^"]*"')  # HTML needs no namespace for SVG
 _OPENING = re.compile(r"<svg[^>]*>")
 _SIZE = re.compile(r' (width|height)="[^"]*"')
 _ID = re.compile(r'\bid="([^"]+)"')
@@ -27,10 +27,10 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
     Args:
         figure: drawn by matplotlib; its text stays text, in the page's own fonts.
         name: unique in the page; every id in the element begins with it.
-        description: what a reader who cannot see it is told.
+        description: the text alternative.
 
     Returns:
-        The element, the same to the letter for the same figure, without any address outside the page.
+        The element; it is always the same for the same figure and has no address outside the page.
     """
     from matplotlib import rc_context
 
@@ -47,7 +47,7 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
 
 
 def _in_page(tag: str, name: str) -> str:
-    """A tag with ids of its own in the page."""
+    """A tag with ids that are unique in the page."""
     tag = _ID.sub(rf'id="{name}-\1"', _NAMES.sub("", tag))
     return _REFERENCE.sub(rf"\1{name}-\2", tag)
 

@@ -1,4 +1,4 @@
-"""The words and numbers of the page, formatted from the document; nothing is found here."""
+"""The words and numbers of the page, formatted from the document; nothing is computed here."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from tunnel_sim.vocabulary.campaign import Campaign
 
 Document = Mapping[str, Any]
 _EFFECTS = frozenset(kind.name for kind in ALL_EFFECTS)
-_CONDITIONS = {"always": "wind on and off", "wind_on": "wind on only", None: "not told by these runs"}
+_UNDETERMINED = "cannot be determined from these runs"
+_CONDITIONS = {"always": "with or without wind", "wind_on": "only with the wind on", None: _UNDETERMINED}
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ def headline(document: Document) -> tuple[str, str]:
     if not causes:
         return "No gap", "none"
     if causes == ["unknown"]:
-        return "A gap without a name", "unknown"
+        return "Unexplained gap", "unknown"
     names = " and ".join(plain(name) for name in causes)
     if document["ambiguous_with"]:
         return f"{names}, or {' or '.join(plain(n) for n in document['ambiguous_with'])}", "open"
@@ -63,11 +64,11 @@ def facts(document: Document) -> list[Fact]:
     gap, where = document["gap"], document["where"]
     found = [Fact("Gap of the nominal model", excess(gap["excess_before"]), "noise variances")]
     if document["causes"] and document["causes"] != ["unknown"]:
-        left = Fact("With the causes added", excess(gap["excess_after"]), "on runs held out of the fit")
-        found += [left, Fact("Share closed", percent(gap["closed"]), "on runs held out of the fit")]
+        left = Fact("With the causes added", excess(gap["excess_after"]), gap["after_on"])
+        found += [left, Fact("Share closed", percent(gap["closed"]), gap["closed_on"])]
     if document["causes"]:
         found += [
-            Fact("Channel", where["channel"] or "open"),
+            Fact("Channel", where["channel"] or _UNDETERMINED),
             Fact("Condition", _CONDITIONS.get(where["condition"], str(where["condition"]))),
         ]
     if document["candidates"]:
@@ -83,7 +84,7 @@ def percent(value: float) -> str:
         value: 0 to 1, a fraction.
 
     Returns:
-        Text such as ``98.3 %``; shares next to nothing or to all are given as bounds.
+        Text such as ``98.3 %``; shares close to 0 or 1 are given as bounds.
     """
     if value > 0.9995:
         return "> 99.9 %" if value < 1.0 else "100 %"
@@ -93,7 +94,7 @@ def percent(value: float) -> str:
 
 
 def excess(value: float) -> str:
-    """An excess, which means nothing below a thousandth of the noise power.
+    """An excess, which has no meaning below a thousandth of the noise power.
 
     Args:
         value: in noise variances, a ratio.
@@ -140,23 +141,23 @@ def place_rows(document: Document) -> list[tuple[str, str]]:
     """
     where = document["where"]
     return [
-        ("Runs that carry it", ", ".join(where["runs"]) or "–"),
+        ("Runs that show it", ", ".join(where["runs"]) or "–"),
         ("Time", interval(where["time_s"], "s")),
         ("Amplitude", interval(where["amplitude_rad"], "rad")),
         ("Frequency", interval(where["frequency_hz"], "Hz")),
-        ("Channel", where["channel"] or "open"),
+        ("Channel", where["channel"] or _UNDETERMINED),
         ("Condition", _CONDITIONS.get(where["condition"], str(where["condition"]))),
     ]
 
 
 def candidate_rows(document: Document) -> tuple[list[dict[str, Any]], int]:
-    """The answers weighed.
+    """The answers considered.
 
     Args:
         document: the diagnosis.
 
     Returns:
-        Those of some probability (three at least), formatted, and how many more there are.
+        The probable ones (at least three), formatted, and the number of the others.
     """
     candidates = document["candidates"]
     count = max(3, sum(c["probability"] >= LISTED_PROBABILITY for c in candidates))
@@ -192,7 +193,7 @@ def estimate(values: Document) -> str:
 
 
 def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
-    """What is known of every cause, from the vocabulary.
+    """What the vocabulary says of every cause and its rivals.
 
     Args:
         document: the diagnosis.
@@ -225,7 +226,7 @@ def coefficient_rows(document: Document) -> list[dict[str, str]]:
         document: the diagnosis.
 
     Returns:
-        Symbol, both estimates and the shift in words.
+        Symbol, both estimates and the 95 % interval after.
     """
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
     return [
@@ -274,13 +275,13 @@ def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
 
 
 def next_run_rows(document: Document) -> list[tuple[str, str]]:
-    """The run expected to tell rivals apart.
+    """The run expected to distinguish the rivals.
 
     Args:
         document: the diagnosis.
 
     Returns:
-        Labels and values; empty where no run is proposed.
+        Labels and values; empty where none is proposed.
     """
     run = document["next_run"] or {}
     units = {

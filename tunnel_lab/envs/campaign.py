@@ -36,31 +36,31 @@ _LARGE = 1e4  # bound of estimates and covariances in the observation space
 
 
 class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
-    """Choose the runs of a campaign; the reward is what they tell less what they cost.
+    """Choose the runs of a campaign; the reward is the information gained minus the cost.
 
     Arguments that are None take the preset's value (`tunnel_lab.envs.presets`).
 
     Args:
         preset: ``identification`` or ``diagnosis``.
-        springs: numbers of the springs at hand, of the rig's table.
+        springs: numbers of the available springs in the rig's table.
         wind_speeds: m/s; 0 is wind-off.
         release_angles_deg: degrees.
         durations: s.
         noise_std: of the sensor, rad.
         sample_rate: of the sensor, Hz.
-        severities: the effects the diagnosis answers with, each with the range its severity is drawn from, in
+        severities: the effects that the diagnosis considers, each with the range its severity is drawn from, in
             its unit; the diagnosis preset only.
         targets: relative standard deviations (fractions) of Cnβ and Cnr at which an identification ends.
         probability: of one effect (a probability) at which a diagnosis ends.
         costs: rig time of a run.
-        seconds_per_nat: how much rig time a nat is worth, s.
-        max_runs: after so many the episode is truncated.
+        seconds_per_nat: rig time that a nat is worth, s.
+        max_runs: number of runs after which the episode is truncated.
         rig: path of a rig description; None takes the packaged rig.
         expose_truth: put the truth into ``info``; it is never in the observation.
         render_mode: None, ``human`` (a line for each run in the terminal) or ``rgb_array`` (a figure).
 
     Raises:
-        TunnelError: when an argument is out of range or names what does not exist.
+        TunnelError: when an argument is out of range or a name is unknown.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 1}  # noqa: RUF012
@@ -131,7 +131,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         """Begin a campaign on a rig of unknown truth.
 
         Args:
-            seed: of the truth and all noise; None goes on with the generator as it stands.
+            seed: of the truth and all noise; None continues with the present generator.
             options: ``truth`` (coefficients by name, SI) and ``effects`` (parameters by effect) in place of
                 what is drawn.
 
@@ -178,7 +178,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         return self._observation(), float(reward), done, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The last run and how far the campaign has come.
+        """The last run and the progress of the campaign.
 
         Returns:
             For ``rgb_array`` an image of shape (480, 960, 3); None otherwise: ``human`` prints a line.
@@ -236,7 +236,7 @@ def reached(known: Knowledge, targets: tuple[float, float], probability: float) 
     """Whether a campaign has reached its goal.
 
     Args:
-        known: what the runs have told.
+        known: what the runs have shown.
         targets: relative standard deviations of Cnβ and Cnr (fractions), where there is no vocabulary.
         probability: of one effect alone (a probability), where there is a vocabulary.
     """
@@ -274,12 +274,14 @@ def _checked_severities(
         return dict(preset.severities)
     if not preset.severities or not given:
         remedy = "give preset='diagnosis' and at least one effect with the range of its severity"
-        raise TunnelError("severities are the diagnosis preset's", where=where, remedy=remedy)
+        raise TunnelError("severities are for the diagnosis preset only", where=where, remedy=remedy)
     for name, (low, high) in given.items():
         severity = effect_class(name).parameters()[0]
         if not 0.0 < low <= high < np.inf:
             remedy = f"give the range of {severity.name} in {severity.unit}"
-            raise TunnelError(f"{name}: ({low!r}, {high!r}) is no range above 0", where=where, remedy=remedy)
+            raise TunnelError(
+                f"{name}: ({low!r}, {high!r}) is not a range above 0", where=where, remedy=remedy
+            )
     return {name: (float(low), float(high)) for name, (low, high) in given.items()}
 
 

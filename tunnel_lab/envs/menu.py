@@ -1,4 +1,4 @@
-"""What an operator may choose for a run, and what the run costs in rig time."""
+"""The conditions that an operator can choose for a run, and its cost in rig time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tunnel_sim.vocabulary.rig import Rig
 
 @dataclass(frozen=True)
 class Choice:
-    """One run as it is ordered.
+    """The conditions of one run.
 
     Args:
         spring: number of the spring in the rig's table.
@@ -45,7 +45,7 @@ class Menu:
     """The choices; an action is one index into each.
 
     Args:
-        springs: (number, Kr in N m/rad) of the springs at hand.
+        springs: (number, Kr in N m/rad) of the available springs.
         wind_speeds: m/s.
         release_angles: rad.
         durations: s.
@@ -58,11 +58,11 @@ class Menu:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """How many springs, speeds, angles and durations there are."""
+        """Number of springs, speeds, angles and durations."""
         return len(self.springs), len(self.wind_speeds), len(self.release_angles), len(self.durations)
 
     def choice(self, action: Iterable[int]) -> Choice:
-        """The run an action orders.
+        """The run that an action stands for.
 
         Args:
             action: indices of spring, speed, angle and duration.
@@ -73,7 +73,7 @@ class Menu:
         remedy = f"give four whole numbers from 0 to below {', '.join(map(str, self.shape))}"
         numbers = np.asarray(action)
         if numbers.shape != (4,) or not np.issubdtype(numbers.dtype, np.integer):
-            raise TunnelError(f"{action!r} is no action", where="Campaign-v0", remedy=remedy)
+            raise TunnelError(f"{action!r} is not an action", where="Campaign-v0", remedy=remedy)
         spring, speed, angle, duration = (int(i) for i in numbers)
         if not all(0 <= i < n for i, n in zip((spring, speed, angle, duration), self.shape, strict=True)):
             raise TunnelError(
@@ -97,17 +97,17 @@ def make_menu(
     release_angles_deg: Sequence[float],
     durations: Sequence[float],
 ) -> Menu:
-    """Check and convert what an environment is given.
+    """Check and convert the arguments of an environment.
 
     Args:
-        rig: whose spring table the numbers stand for.
+        rig: the rig whose springs the numbers refer to.
         springs: numbers of the rig's springs.
         wind_speeds: m/s, 0 or more.
         release_angles_deg: degrees, above 0.
         durations: s, above 0.
 
     Raises:
-        TunnelError: when a list is empty, repeats itself, or holds what the rig cannot do.
+        TunnelError: when a list is empty, repeats itself, or holds a value that the rig does not allow.
     """
     lists = {
         "springs": springs,
@@ -122,7 +122,7 @@ def make_menu(
         for value in values:
             if isinstance(value, bool) or not (isfinite(value) and value >= least):
                 bound = "of 0 or more" if least == 0.0 else "above 0"
-                raise TunnelError(f"{name}: {value!r} is no number {bound}", remedy="correct the list")
+                raise TunnelError(f"{name}: {value!r} is not a number {bound}", remedy="correct the list")
     return Menu(
         tuple((int(number), rig.spring(number)) for number in springs),
         tuple(map(float, wind_speeds)),
@@ -133,12 +133,12 @@ def make_menu(
 
 @dataclass(frozen=True)
 class Costs:
-    """Rig time of a run, s; what it is made of is assumed, not measured.
+    """Rig time of a run, s; its parts are assumed, not measured.
 
     Args:
-        setup: to bring the model to rest, zero and release it, s.
-        spring_change: to open the section and change the spring, s.
-        speed_change: until the wind stands at another speed, s.
+        setup: time to bring the model to rest, zero the sensor and release the model, s.
+        spring_change: time to open the section and change the spring, s.
+        speed_change: time until the wind has settled at another speed, s.
     """
 
     setup: float = 60.0
@@ -150,7 +150,7 @@ class Costs:
 
         Args:
             choice: the run.
-            last: the run before it; None before the first, for which spring and wind are set up anew.
+            last: the run before it; None for the first run, which needs a change of spring and speed.
 
         Returns:
             s.

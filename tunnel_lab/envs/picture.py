@@ -1,4 +1,4 @@
-"""How a campaign in the making looks: a line for each run, and a figure."""
+"""A campaign in progress, shown as a line for each run and as a figure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DPI = 100
 
 
 def line_of(known: Knowledge) -> str:
-    """The last run and what is known after it, in one line.
+    """The last run and the estimate after it, in one line.
 
     Args:
         known: any.
@@ -87,7 +87,7 @@ def _draw_spread(axes: Axes, known: Knowledge, targets: tuple[float, float]) -> 
         spread = [100.0 * belief.relative_std(name) for belief in history]
         axes.semilogy(range(len(spread)), spread, "o-", color=COLOURS[place], label=SYMBOLS[name])
         axes.axhline(100.0 * target, color=COLOURS[place], linestyle="--", linewidth=1)
-    axes.set_xlabel("runs that tell something")
+    axes.set_xlabel("informative runs")
     axes.set_ylabel("standard deviation [%]")
     axes.set_xticks(range(0, len(history), 1 + len(history) // 10))
     axes.legend(loc="upper right")
@@ -107,7 +107,7 @@ def _draw_probabilities(axes: Axes, known: Knowledge, probability: float) -> Non
 
 
 def beliefs(known: Knowledge) -> list[Belief]:
-    """The belief before the first run and after each that told something.
+    """The belief before the first run and after each informative run.
 
     Args:
         known: any.

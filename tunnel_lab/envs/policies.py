@@ -1,7 +1,7 @@
-"""Policies for ``Campaign-v0``: what a rig engineer would do, and what optimal design proposes.
+"""Policies for ``Campaign-v0``: a rig engineer's plan, and optimal design.
 
-A policy is called with `Knowledge`, which holds all that the runs have told and nothing of the truth, and
-answers with an action. None of them draws random numbers.
+A policy is called with `Knowledge`, which holds the results of the runs but not the truth, and
+returns an action. No policy draws random numbers.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ Policy = Callable[[Knowledge], Action]
 
 
 def scripted(known: Knowledge) -> Action:
-    """What a rig engineer would do: springs in turn, on each the wind off and then the speeds in turn.
+    """A rig engineer's plan: every spring in turn, first with the wind off and then at each speed.
 
-    Every run has the largest release and the longest record. When the plan is through, it begins again.
+    Every run has the largest release and the longest record. After its last run the plan starts again.
 
     Args:
-        known: how many runs there were.
+        known: the number of runs so far.
 
     Returns:
         The action.
@@ -41,16 +41,16 @@ def scripted(known: Knowledge) -> Action:
 
 
 def greedy(known: Knowledge) -> Action:
-    """The run that is expected to tell most about (Cnβ, Cnr) for its rig time.
+    """The run with the largest expected information on (Cnβ, Cnr) per rig time.
 
     Over the whole menu, the expected information gain (exact Fisher information at the present estimate; Izz, Cr,
-    the sensor's zero and every release unknown) over the run's cost. Runs that might not come back are left out.
+    the sensor's zero and every release unknown) over the run's cost. Runs that might diverge are left out.
 
     Args:
-        known: the belief, and what stands on the rig now.
+        known: the belief, and the present spring and speed.
 
     Returns:
-        The action; the scripted one where no run is expected to come back.
+        The action; the scripted one where every run might diverge.
     """
     best, chosen = 0.0, None
     for action in known.conditions.menu.actions():
@@ -69,7 +69,7 @@ def expected_gain(known: Knowledge, choice: Choice) -> float:
         choice: the run.
 
     Returns:
-        nats; 0 where the run might not come back.
+        nats; 0 where the run might diverge.
     """
     conditions = known.conditions
     after = expected_belief(
@@ -83,18 +83,18 @@ def expected_gain(known: Knowledge, choice: Choice) -> float:
 
 
 def separating(known: Knowledge) -> Action:
-    """The run that is expected to tell the two best answers of the diagnosis apart, for its rig time.
+    """The run that is expected to distinguish the two most probable answers best, per rig time.
 
     Over the whole menu, half the squared separation of the two fitted models (the expected log-likelihood ratio,
-    nats; see `diagnosis.answer.next_run.separation`) over the run's cost. With one named answer only, its rival
+    nats; see `diagnosis.answer.next_run.separation`) over the run's cost. If only one effect is named, its rival
     is the nominal model.
 
     Args:
-        known: the study, and what stands on the rig now.
+        known: the study, and the present spring and speed.
 
     Returns:
-        The action; the next of the script while no gap shows, or the runs so far had no wind: what they do not
-        hold, their models cannot predict.
+        The action; the next one of the script while no gap is detected or no run had wind, because the fitted
+        models cannot then predict other runs.
     """
     rivals = None if known.study is None else best_rivals(known.study)
     if rivals is None or not rivals[0].problem.data.wind_on:
@@ -110,7 +110,7 @@ def separating(known: Knowledge) -> Action:
 
 
 def best_rivals(study: Study) -> tuple[Fit, Fit] | None:
-    """The fits of the two most probable answers; the nominal one for the second where there is but one.
+    """The fits of the two most probable answers; the second is the nominal one where only one effect is fitted.
 
     Args:
         study: of the runs so far.
@@ -160,7 +160,7 @@ def run_campaign(
 
     Args:
         env: a ``tunnel_sim/Campaign-v0``, wrapped or not.
-        policy: what chooses the runs.
+        policy: the function that chooses the runs.
         seed: of truth and noise.
         options: of the reset.
 

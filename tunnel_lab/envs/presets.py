@@ -1,4 +1,4 @@
-"""The two presets of ``Campaign-v0``: what is at hand, and how noisy the sensor is."""
+"""The two presets of ``Campaign-v0``: available conditions, and the noise of the sensor."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tunnel_sim.vocabulary.plan import SensorModel
 
 @dataclass(frozen=True)
 class Preset:
-    """Values for arguments that are left out.
+    """Default values of the arguments.
 
     Args:
         springs: numbers of the rig's table.
@@ -55,7 +55,7 @@ PRESETS = _load()
 
 
 def preset_sensor(preset: Preset, noise_std: float | None, sample_rate: float | None) -> SensorModel:
-    """The preset's sensor with what is given in place of its numbers; its reading is continuous.
+    """The preset's sensor with the given values; its reading is not quantised.
 
     Args:
         preset: one of `PRESETS`.

@@ -1,6 +1,6 @@
-"""A campaign in the making: the rig with its hidden truth, and what the runs so far have told.
+"""A campaign in progress: the rig with its hidden truth, and the results of the runs so far.
 
-`Session` holds the truth and makes runs; `Knowledge` is all that the operator, a policy or an observation has.
+`Session` holds the truth and makes runs; `Knowledge` is what the operator, a policy or an observation may use.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ _EMPTY = Record(np.arange(2.0), np.zeros(2))  # of a run that is only planned
 
 @dataclass(frozen=True)
 class Conditions:
-    """What stays the same in all episodes of an environment.
+    """The fixed conditions of all episodes of an environment.
 
     Args:
         rig: geometry, springs, air.
-        sensor: noise, rate and resolution; the zero in it is not used, each episode has its own.
+        sensor: noise, rate and resolution; its zero is not used, because each episode has its own.
         menu: the choices.
         costs: rig time of a run.
         effects: the vocabulary of the diagnosis; empty where the campaign only identifies.
@@ -52,13 +52,13 @@ class Conditions:
 
     @property
     def rig_properties(self) -> RigProperties:
-        """What a campaign states of the rig; the inertia is the nominal one."""
+        """The rig properties that a campaign states; the inertia is the nominal one."""
         body = self.rig.body
         return RigProperties(self.rig.dynamics.yaw_inertia, body.frontal_area, body.length, body.width)
 
     @property
     def sensor_properties(self) -> SensorProperties:
-        """What a campaign states of the sensor."""
+        """The sensor properties that a campaign states."""
         return SensorProperties(
             self.sensor.sample_rate, self.sensor.resolution or None, self.sensor.noise_std
         )
@@ -82,18 +82,18 @@ class Conditions:
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """All that is known at a point of an episode; the truth is not in it.
+    """The knowledge at a point of an episode, without the truth.
 
     Args:
         conditions: rig, sensor, menu and costs.
         prior: the belief before the first run.
         belief: now.
-        choices: the runs ordered so far, lost ones among them.
+        choices: the runs requested so far, including lost ones.
         costs: rig time of each, s.
         runs: the runs made.
-        fits: reading and own fit of the runs that count in the belief, with their links.
+        fits: reading and fit of the runs that the belief uses, with their links.
         study: the last diagnosis; None before the first, or where there is no vocabulary.
-        status: of the last run, ``ok`` or what became of it.
+        status: of the last run, ``ok`` or what went wrong.
     """
 
     conditions: Conditions
@@ -123,7 +123,7 @@ class Knowledge:
         return Campaign("campaign-v0", conditions.rig_properties, conditions.sensor_properties, self.runs)
 
     def cost(self, choice: Choice) -> float:
-        """What a next run would cost, s."""
+        """Cost of a further run, s."""
         return self.conditions.costs.of(choice, self.last)
 
 
@@ -143,7 +143,7 @@ class Session:
     Args:
         conditions: of the environment.
         truth: hidden from the operator.
-        rng: every run takes a generator spawned of it, so that the noise of a run hangs on its number only.
+        rng: parent of the generators of the runs, so that the noise of a run depends on its number only.
     """
 
     def __init__(self, conditions: Conditions, truth: RigTruth, rng: np.random.Generator) -> None:
@@ -152,14 +152,14 @@ class Session:
         self._rng = rng
 
     def perform(self, known: Knowledge, choice: Choice) -> Knowledge:
-        """Make a run and learn from it.
+        """Make a run and update the knowledge.
 
         Args:
             known: before the run.
             choice: the run.
 
         Returns:
-            After it. A run whose motion grows without bound is lost: it costs its time and tells nothing.
+            The knowledge after it. A run whose motion grows without bound is lost: it costs time without result.
         """
         known = replace(
             known,
@@ -196,17 +196,17 @@ class Session:
 
 
 def _identified(known: Knowledge, choice: Choice) -> Knowledge:
-    """Take the last run into the belief."""
+    """Update the belief with the last run."""
     conditions = known.conditions
     fitted = identify_run(known.runs[-1], conditions.sensor_properties)
     if fitted.fit is None:
-        return replace(known, status=f"tells nothing: {_reason(fitted.estimate.status)}")
+        return replace(known, status=f"no information: {_reason(fitted.estimate.status)}")
     fits = (*known.fits, (conditions.link(choice), fitted.reading, fitted.fit))
     links, pairs = [link for link, _, _ in fits], [(reading, fit) for _, reading, fit in fits]
     try:
         belief = update_belief(known.prior, links, pairs, conditions.noise_std)
     except ValueError as error:
-        return replace(known, status=f"tells nothing: {error}")
+        return replace(known, status=f"no information: {error}")
     return replace(known, fits=fits, belief=belief)
 
 
@@ -224,7 +224,7 @@ def _reason(status: Status) -> str:
 
 
 def answers(effects: Sequence[str]) -> tuple[str, ...]:
-    """What the probabilities of a diagnosis are of, in order.
+    """The answers that a diagnosis gives probabilities for, in order.
 
     Args:
         effects: the vocabulary.
@@ -242,8 +242,8 @@ def probabilities(known: Knowledge) -> Array:
         known: any.
 
     Returns:
-        Shape (effects + 3,), summing to 1: equal before the first diagnosis; all on ``none`` but the
-        false-alarm rate while no gap is detected.
+        Shape (effects + 3,), summing to 1. They are equal before the first diagnosis. While no gap is detected,
+        ``none`` has all but the false-alarm rate.
     """
     names = answers(known.conditions.effects)
     found = np.zeros(len(names))
@@ -259,13 +259,13 @@ def probabilities(known: Knowledge) -> Array:
 
 
 def diagnostic_information(known: Knowledge) -> float:
-    """How far the diagnosis has come: ln(answers) less the entropy of the probabilities, nats.
+    """ln(answers) minus the entropy of the probabilities, nats.
 
     Args:
         known: any.
 
     Returns:
-        0 while no gap is detected: that none shows yet tells nothing about which effect it is.
+        0 while no gap is detected: its absence does not show which effect acts.
     """
     if known.study is None or not known.study.weighed:
         return 0.0

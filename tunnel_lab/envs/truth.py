@@ -24,11 +24,11 @@ OPTIONS = ("truth", "effects")
 
 @dataclass(frozen=True)
 class RigTruth:
-    """What is true in an episode, and no observation shows.
+    """The truth of an episode, which no observation contains.
 
     Args:
         coefficients: of the nominal model.
-        effects: what acts beyond it.
+        effects: those added to it.
         sensor_zero: rad.
     """
 
@@ -50,14 +50,14 @@ def draw_truth(
     severities: Mapping[str, tuple[float, float]],
     options: Mapping[str, Any] | None,
 ) -> RigTruth:
-    """Draw an episode's truth; what the options give replaces what was drawn.
+    """Draw an episode's truth; values from the options replace the drawn ones.
 
-    Every number is drawn whatever the options say, so that one option does not change the others' draws.
+    Every number is always drawn, so that one option does not change the other numbers.
 
     Args:
         rng: source.
-        severities: effects one of which acts, each as likely, its severity log-uniform in its range (SI units);
-            none acts where it is empty.
+        severities: the effects, of which one acts, each with the same probability and a severity log-uniform in
+            its range (SI units); no effect acts where it is empty.
         options: ``truth``: coefficients by name, ``sensor_zero`` among them; ``effects``: parameters by effect
             name, empty for none.
 
@@ -99,7 +99,7 @@ def _draw_effect(
 def _numbers(given: Any) -> dict[str, float]:
     known = (*PARAMETERS, "sensor_zero")
     if not isinstance(given, Mapping):
-        raise TunnelError("option truth is no mapping", remedy=f"give some of {', '.join(known)} by name")
+        raise TunnelError("option truth is not a mapping", remedy=f"give some of {', '.join(known)} by name")
     for name, value in given.items():
         if name not in known:
             raise TunnelError(
@@ -117,5 +117,5 @@ def _numbers(given: Any) -> dict[str, float]:
 def _given_effects(given: Any) -> tuple[Effect, ...]:
     if not isinstance(given, Mapping):
         remedy = "give parameters by effect, as {'coulomb_friction': {'friction_moment': 0.004}}"
-        raise TunnelError("option effects is no mapping", remedy=remedy)
+        raise TunnelError("option effects is not a mapping", remedy=remedy)
     return tuple(effect_from(name, dict(parameters)) for name, parameters in given.items())

@@ -1,7 +1,7 @@
-"""Figures of campaigns and estimates. matplotlib is imported inside the functions, never at import.
+"""Figures of campaigns and estimates. matplotlib is imported inside the functions.
 
-Every function returns a figure and writes nothing; ``save`` writes one whole or not at all. The colours are
-those of Okabe and Ito (2008), told apart by colour-blind readers too.
+Every function returns a figure and writes nothing; ``save`` writes one completely or not at all. The colours are
+those of Okabe and Ito (2008), which colour-blind readers can distinguish.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ WIND_OFF, WIND_ON = BLUE, VERMILION
 PANELS_PER_PAGE = 12
 BINS_PER_DECADE = 60
 ONE_RIG = 1.5
-"""Frequencies within this factor go into one plot as they are."""
+"""Frequencies within this factor share one plot in absolute units."""
 RUNS_PER_PLOT = 6
-"""More lines than colours in one plot cannot be told apart."""
+"""More lines than colours cannot be distinguished in one plot."""
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure as a PNG, whole or not at all.
+    """Write a figure as a PNG, completely or not at all.
 
     Args:
         figure: the figure.
@@ -73,7 +73,7 @@ def run_label(run: Run) -> str:
 
 
 def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
-    """The angle against time of every run, a panel each.
+    """Angle against time, one panel for each run.
 
     Args:
         campaign: measured or simulated.
@@ -104,11 +104,11 @@ def _trace_page(runs: Sequence[Run]) -> Figure:
 
 
 def wind_off_on_figure(off: Run, on: Run) -> Figure:
-    """One run with the wind off above one with the wind on, over the same time and angle.
+    """One run with the wind off above one with the wind on, on the same axes.
 
     Args:
         off: the wind-off run.
-        on: the wind-on run, best of the same spring.
+        on: the wind-on run, preferably with the same spring.
 
     Returns:
         A figure of two panels.
@@ -128,7 +128,7 @@ def wind_off_on_figure(off: Run, on: Run) -> Figure:
 
 
 def spectrum_figure(runs: Sequence[Run]) -> Figure:
-    """Power spectral density of the angle, averaged over sixtieths of a decade to quieten the noise.
+    """Power spectral density of the angle, averaged over sixtieths of a decade to reduce the noise.
 
     Args:
         runs: up to six runs, one line each.
@@ -159,14 +159,14 @@ def spectrum_figure(runs: Sequence[Run]) -> Figure:
 def windows_figure(estimate: Estimate) -> Figure:
     """ζ and ωn of the windows of each run against the amplitude, with 95 % intervals.
 
-    A linear rig gives level lines; what rises or falls with the amplitude is not in the linear model.
+    A linear rig gives horizontal lines; a slope shows an effect that the linear model lacks.
 
     Args:
         estimate: of any campaign; runs past the sixth and windows without an estimate are left out.
 
     Returns:
-        A figure of two panels; ωn in rad/s, or, where springs differ, as its difference from that of the
-        run's last window, %.
+        A figure of two panels; ωn is in rad/s or, where springs differ, its difference from that of the
+        run's last window in %.
     """
     shown = [window.omega_n.value for run in estimate.runs[:RUNS_PER_PLOT] for window in run.windows]
     one_rig = bool(shown) and max(shown) < ONE_RIG * min(shown)
@@ -194,11 +194,11 @@ def windows_figure(estimate: Estimate) -> Figure:
 
 
 def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Figure:
-    """What each estimator says of the rig, against what was injected.
+    """Estimates of each estimator against the injected values.
 
     Args:
         estimates: of one simulated campaign, one per estimator.
-        truth: injected values by name, none of them zero, each in the unit of the estimate's quantity of that
+        truth: injected values by name, all nonzero, each in the unit of the estimate's quantity of that
             name.
 
     Returns:

@@ -1,1 +1,1 @@
-"""Estimators against records of known truth: over a grid, against a baseline, under unmodelled effects."""
+"""Scores of estimators on records of known truth: over a grid, against a baseline, and under unmodelled effects."""

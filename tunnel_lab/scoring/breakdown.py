@@ -1,8 +1,8 @@
-"""Where estimators break: the bias that each unmodelled effect causes.
+"""The bias that each unmodelled effect causes in each estimator.
 
-The truth is the reference simulator's, which shares no numerics with estimators or model: a campaign of twelve
-runs on three springs, the textbook's form of every effect sized so that it leaves 1 and 10 times the noise's power
-after the nominal refit.
+The campaigns are made by the reference simulator, which shares no numerics with estimators or model. Each has
+twelve runs on three springs and one effect in its textbook form. The effect is sized so that the residuals of the
+nominal refit exceed the noise by 1 or 10 times its power.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 NO_EFFECT = "no effect"
 SEVERITIES = (1.0, 10.0)
-"""Mean squared residual of the nominal refit over the noise's power, less one."""
+"""Mean squared residual of the nominal refit over the noise power, minus one."""
 QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 EFFECTS: tuple[str, ...] = tuple(kind.name for kind in ALL_EFFECTS)
 REALISATIONS = 3
@@ -56,10 +56,10 @@ class Case:
 
     Args:
         effect: its name, or ``no effect``.
-        severity: what it was sized for, as a ratio to the noise's power; 0 for no effect.
-        reached: noise powers it leaves after the reference's own nominal refit (a ratio).
+        severity: excess that it was sized for, as a ratio to the noise power; 0 for no effect.
+        reached: excess after the reference simulator's own nominal refit, in noise powers (a ratio).
         realisation: number of the realisation, from 0.
-        campaign: what estimators see.
+        campaign: input of the estimators.
         bound: Cramér–Rao bound of the nominal model by quantity, SI.
     """
 
@@ -77,10 +77,10 @@ class Case:
 
 
 def conditions_of(seed: int, *, duration: float = 10.0) -> Conditions:
-    """The campaign all effects act in.
+    """The campaign to which the effects are added.
 
     Args:
-        seed: of the angles actually released from.
+        seed: of the actual release angles.
         duration: of every run, s.
     """
     springs, speeds, degrees = (np.array(column) for column in zip(*_RUNS, strict=True))
@@ -105,19 +105,19 @@ def make_cases(
 ) -> list[Case]:
     """Size the effects and simulate their campaigns.
 
-    Realisations differ in the noise, and in the forcing where it is random; the sign of an effect that has one is
+    Realisations differ in the noise, and in the forcing where it is random. Effects that have a sign are
     positive.
 
     Args:
         seed: of everything random.
         realisations: number of campaigns for each effect and severity.
         effects: names.
-        severities: noise powers to leave after the nominal refit, as ratios.
+        severities: excess to leave after the nominal refit, in noise powers.
         duration: of every run, s.
-        tell_steps: say on standard error how sizing goes.
+        tell_steps: show the progress of sizing on standard error.
 
     Returns:
-        The campaign without effect first, then effects in their order, severities and realisations.
+        The campaign without effect, then by effect, severity and realisation.
     """
     conditions = conditions_of(seed, duration=duration)
     nothing = CampaignDraw("none", conditions, (), 0)
@@ -126,7 +126,7 @@ def make_cases(
         progress=tell_steps,
     )
     several = [_realise(draw, i, seed) for draw in (nothing, *sized) for i in range(realisations)]
-    # A motion that hangs on nothing random is integrated once.
+    # A motion without random forcing is integrated once.
     moving = [draw for i, draw in enumerate(several) if i % realisations == 0 or _random(draw)]
     motions = iter(simulate_motions(moving))
     cases = []
@@ -151,7 +151,7 @@ def _random(draw: CampaignDraw) -> bool:
 
 
 def _realise(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
-    """Another noise, and another forcing where it is random."""
+    """The same case with other noise, and other forcing where it is random."""
     name = draw.effects[0].form.family if draw.effects else NO_EFFECT
     key = EFFECTS.index(name) if draw.effects else len(EFFECTS)
     rng = np.random.default_rng([seed, key, number, 1])
@@ -196,8 +196,8 @@ def break_down(
         estimators: names in the registry.
         seed: the cases were made with.
         jobs: number of processes; 0 works in this one.
-        parts: folder for what is done, so that it can go on after an interruption; None keeps nothing.
-        progress: told cases done and their number.
+        parts: folder for finished work, so that an interrupted score can be continued; None for none.
+        progress: called with the number of finished cases and of all cases.
 
     Returns:
         A row for each case, estimator and quantity, in this order.
@@ -229,16 +229,16 @@ def _estimate_case(estimators: Sequence[str], case: Case) -> list[Row]:
 
 @dataclass(frozen=True)
 class Bias:
-    """What one effect does to one estimator's answer.
+    """The bias that one effect causes in one estimate.
 
     Args:
         effect: its name, or ``no effect``.
-        severity: what it was sized for, as a ratio to the noise's power; 0 for no effect.
-        reached: noise powers it leaves on the average of the realisations (a ratio).
+        severity: excess that it was sized for, as a ratio to the noise power; 0 for no effect.
+        reached: mean excess over the realisations, in noise powers (a ratio).
         estimator: its name.
         quantity: by name.
         score: over the realisations.
-        departs: share of the realisations in which the estimator said that the model departs.
+        departs: share of the realisations in which the estimator reported that the model departs.
     """
 
     effect: str
@@ -251,7 +251,7 @@ class Bias:
 
 
 def biases(rows: Sequence[Row]) -> list[Bias]:
-    """Rows added up over realisations.
+    """Rows summarised over realisations.
 
     Args:
         rows: of `break_down`.

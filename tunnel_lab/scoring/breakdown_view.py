@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 
 SHOWN = ("cn_beta", "cn_r")
 ABOUT = (
-    "Bias in % of the truth; in brackets in reported standard deviations. Severity: noise powers that the effect "
-    "leaves after the nominal refit."
+    "Bias in % of the truth; in brackets in reported standard deviations. Severity: excess residual power after "
+    "the nominal refit, in noise powers."
 )
 _SIDE_BY_SIDE = 3  # estimators in one table of a terminal of 80 columns
 _TINY, _HUGE = 1e-3, 1e2  # % at the ends of the colours
 
 
 def breakdown_tables(found: Sequence[Bias], quantity: str) -> list[Table]:
-    """The bias of one quantity: effects by rows, estimators by columns, three of them side by side.
+    """The bias of one quantity, with effects in rows and estimators in columns, three to a table.
 
     Args:
         found: of `tunnel_lab.scoring.breakdown.biases`.
@@ -64,20 +64,20 @@ def _cell(one: Bias) -> str:
 
 
 def _compact(value: float) -> str:
-    """Two digits, and a sign."""
+    """Two digits and a sign."""
     size = abs(value)
     text = significant(size, 2) if 1e-3 <= size < 1e4 else f"{size:.0e}" if size else "0"
     return f"{'−' if value < 0 else '+'}{text}"
 
 
 def breakdown_figure(found: Sequence[Bias]) -> Figure:
-    """The map: the size of the bias by colour, in % above and in reported standard deviations below.
+    """The bias as a colour map: in % above and in reported standard deviations below.
 
     Args:
         found: of `tunnel_lab.scoring.breakdown.biases`.
 
     Returns:
-        Four panels, Cnβ and Cnr; effects by rows, estimators and severities by columns.
+        Four panels, for Cnβ and Cnr, with effects in rows, estimators and severities in columns.
     """
     from matplotlib.figure import Figure
 
@@ -113,7 +113,7 @@ def _grid(
     *,
     in_percent: bool,
 ) -> Array:
-    """Biases, rows by effect, columns by estimator and severity; NaN where there is none."""
+    """Biases by effect (rows) and by estimator and severity (columns); NaN where there is none."""
     values = np.full((len(effects), len(names), len(severities)), np.nan)
     for one in found:
         figure = one.score.relative_bias if in_percent else one.score.bias_in_stds

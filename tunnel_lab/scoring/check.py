@@ -1,4 +1,4 @@
-"""A score against its baseline: which estimators got worse, beyond what chance does to trials."""
+"""Comparison of a score with its baseline: which estimators are worse beyond sampling error."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 @dataclass(frozen=True)
 class Finding:
-    """One aspect of one estimator, before and now.
+    """One aspect of one estimator in the baseline and now.
 
     Args:
         estimator: its name.
-        where: the cell, or the cells taken together.
+        where: the cell, or the pooled cells.
         quantity: by name.
-        change: the aspect, before and now.
-        worse: whether it is worse beyond chance, all findings of the check considered.
+        change: the aspect in the baseline and now.
+        worse: whether it is worse beyond chance, corrected for the number of findings.
     """
 
     estimator: str
@@ -36,9 +36,9 @@ class Verdict:
 
     Args:
         findings: every test that was made.
-        false_alarm_rate: probability that unchanged estimators have any finding called worse.
+        false_alarm_rate: probability that any finding of unchanged estimators is called worse.
         identical: whether all estimates are the baseline's to the last bit.
-        added: estimators that the baseline does not know; they were not checked.
+        added: estimators that are not in the baseline; they were not checked.
     """
 
     findings: tuple[Finding, ...]
@@ -48,7 +48,7 @@ class Verdict:
 
     @property
     def worse(self) -> tuple[Finding, ...]:
-        """The findings that count, the surest first."""
+        """The findings that are worse, the most significant first."""
         found = [finding for finding in self.findings if finding.worse]
         return tuple(sorted(found, key=lambda finding: finding.change.p_value))
 
@@ -59,24 +59,24 @@ class Verdict:
 
 
 def check(baseline: Results, now: Results, *, rate: float = FALSE_ALARM_RATE) -> Verdict:
-    """Compare a score with its baseline, cell by cell and over all cells of a kind together.
+    """Compare a score with its baseline, by cell and over all cells of a kind.
 
     Args:
-        baseline: trials of before.
+        baseline: trials of the baseline.
         now: trials of the same cells, with the same seed or another.
-        rate: probability of a false alarm among all tests together.
+        rate: false-alarm probability of all tests together.
 
     Returns:
         The verdict.
 
     Raises:
-        TunnelError: when the baseline has cells that were not scored now, or none of the estimators.
+        TunnelError: when the baseline has cells that were not scored now, or has none of the estimators.
     """
     estimators = [name for name in baseline.estimators if name in now.estimators]
     places = _places(baseline, now)
     if not estimators:
         raise TunnelError(
-            "the baseline knows none of the estimators",
+            "the baseline has none of the estimators",
             where="--check",
             remedy=f"score one of {', '.join(baseline.estimators)}",
         )
@@ -114,14 +114,14 @@ def _tests(
 
 
 def _places(baseline: Results, now: Results) -> list[int]:
-    """Where each of the baseline's cells stands in the present grid."""
+    """Index of each of the baseline's cells in the present grid."""
     places = []
     for cell in baseline.grid.cells:
         if cell not in now.grid.cells:
             raise TunnelError(
                 f"the baseline's cell {cell.label!r} is not in the grid",
                 where="--check",
-                remedy="leave the grid out: the baseline's own is then scored",
+                remedy="leave the grid out: the baseline's own grid is then used",
             )
         places.append(now.grid.cells.index(cell))
     return places

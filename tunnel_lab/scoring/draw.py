@@ -1,8 +1,8 @@
-"""A cell's records: drawn, integrated, read through the sensor, with their truth and their bounds.
+"""The records of a cell with their truth and bounds.
 
-The motion is the compiled forward integrator's, the reading the virtual potentiometer's. A trial hangs on the
-seed, its cell and its number only, so that every estimator sees the same records and a cell keeps them in any
-grid.
+The motion comes from the compiled forward integrator, the reading from the virtual potentiometer. A trial depends
+on the seed, its cell and its number only. Therefore every estimator gets the same records, and a cell keeps them
+in any grid.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ class Trial:
     """One campaign of known truth.
 
     Args:
-        campaign: what the estimators see; the noise is not stated, they have to find it.
+        campaign: input of the estimators; it does not state the noise.
         truth: value of each scored quantity, by name, SI.
-        bound: the Cramér–Rao bound of each, by name, SI; of the nominal model, whatever the effect.
+        bound: the Cramér–Rao bound of each, by name, SI; of the nominal model, with or without an effect.
     """
 
     campaign: Campaign
@@ -122,7 +122,7 @@ def _campaign(
     *,
     stated: bool,
 ) -> Campaign:
-    """Runs of (spring, speed, release); unless ``stated``, the spring is not, which leaves normalised form."""
+    """Runs of (spring, speed, release); unless ``stated``, without their spring, which gives normalised form."""
     effects = _effects(cell)
     sensor = SensorModel(
         cell.sample_rate, cell.noise * cell.amplitude, cell.resolution, _ZERO_STD * rng.standard_normal()

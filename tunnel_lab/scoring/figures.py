@@ -52,7 +52,7 @@ def score_figure(results: Results) -> Figure:
             _cells(axes, [""] * len(cells))
         _cells(panels[1, column], [_short(results, cell) for cell in cells])
     panels[0, 0].set_ylabel("RMSE over the Cramér–Rao bound")
-    panels[1, 0].set_ylabel("95 % intervals that hold the truth [%]")
+    panels[1, 0].set_ylabel("95 % intervals that contain the truth [%]")
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 8), frameon=False)
     return figure

@@ -1,4 +1,4 @@
-"""What estimators are scored on: a grid of conditions, one small TOML, and the cells it stands for."""
+"""The grid of conditions that estimators are scored on, a TOML file, and its cells."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class DecaysTable(StrictModel):
 
 
 class CampaignsTable(StrictModel):
-    """``[[campaigns]]``: every spring with the wind off and at one speed; speeds, noises, … make cells."""
+    """``[[campaigns]]``: every spring with the wind off and at one speed; each speed, noise, … makes a cell."""
 
     springs: list[Positive] = Field(min_length=1, description="a list of stiffnesses in N m/rad")
     wind_speeds: list[Positive] = Field(min_length=1, description="a list of speeds in m/s, such as [10, 25]")
@@ -113,7 +113,7 @@ class Cell:
 
     @property
     def label(self) -> str:
-        """The cell in a line; two cells that differ have different ones."""
+        """The cell in one line; different cells have different lines."""
         tail = f"S/A {100 * self.noise:g} %, {self.duration:g} s"
         if (self.amplitude, self.sample_rate, self.resolution) != (0.35, 1000.0, 0.0):
             tail += f", A {self.amplitude:g} rad, {self.sample_rate:g} Hz"
@@ -126,7 +126,7 @@ class Cell:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """What is scored in it, by name in an estimate's JSON."""
+        """The scored quantities, by their names in an estimate's JSON."""
         return DECAY_QUANTITIES if self.kind == "decay" else CAMPAIGN_QUANTITIES
 
     @property
@@ -143,7 +143,7 @@ class Grid:
         name: of the grid.
         seed: of every record.
         trials: number of records, or campaigns, in each cell.
-        trials_of: the same for estimators that see fewer, by name.
+        trials_of: the same for estimators that get fewer, by name.
         cells: at least one, all different.
     """
 
@@ -154,11 +154,11 @@ class Grid:
     cells: tuple[Cell, ...]
 
     def trials_for(self, estimator: str) -> int:
-        """How many trials of each cell an estimator sees: always the first ones."""
+        """Number of trials that an estimator gets of each cell, always the first ones."""
         return min(self.trials, dict(self.trials_of).get(estimator, self.trials))
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Everything that decides the records, in JSON's types."""
+        """Everything that determines the records, in JSON's types."""
         return {
             "name": self.name,
             "seed": self.seed,
@@ -178,14 +178,14 @@ class Grid:
             The grid.
 
         Raises:
-            TunnelError: when it is no grid, or one that is too large.
+            TunnelError: when it is not a grid, or too large.
         """
-        where, remedy = "the grid as JSON", "write it anew"
+        where, remedy = "the grid as JSON", "write it again"
         check_shape(data, where, remedy)
-        with as_described("is no grid", where, remedy):
+        with as_described("is not a grid", where, remedy):
             grid: Grid = _GRID.validate_python(data | {"trials_of": tuple(data["trials_of"].items())})
             if not grid.cells or grid.trials < _LEAST_TRIALS or not all(map(_is_possible, grid.cells)):
-                raise ValueError("a cell or a number of trials that no grid has")
+                raise ValueError("a cell or a number of trials is out of range")
         check_count(len(grid.cells), limits.SCORE_CELLS, "cells", where, "shorten a list")
         for cell in grid.cells:
             check_size(cell.runs, cell.duration, cell.sample_rate, where)
@@ -197,13 +197,13 @@ _LEAST_TRIALS = 2
 
 
 def _is_possible(cell: Cell) -> bool:
-    """Whether a cell's numbers are such as the tables allow."""
+    """Whether the numbers of a cell are within the limits of the tables."""
     positive = (cell.noise, cell.duration, cell.amplitude, cell.sample_rate, *cell.springs)
     return min(positive) > 0.0 and min(cell.resolution, cell.wind_speed) >= 0.0 and 0.0 <= cell.zeta < 1.0
 
 
 def check_trials(grid: Grid, estimators: Sequence[str], where: str) -> None:
-    """Refuse more trials than a table can hold, before any is drawn.
+    """Refuse more trials than a table can hold before any is drawn.
 
     Args:
         grid: the conditions.
@@ -226,10 +226,10 @@ def load_grid(path: Path) -> Grid:
         path: a TOML file like the packaged ``score-grid.toml``.
 
     Returns:
-        The grid; cells in the order of the tables, the last list of a table running fastest.
+        The grid; cells in the order of the tables, the last list of a table varies fastest.
 
     Raises:
-        TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
+        TunnelError: for the first error, in one line that names file, key and remedy.
     """
     missing = "name a grid such as the packaged score-grid.toml, or leave it out"
     document = read_document(GridDocument, path, missing=missing)
@@ -242,14 +242,14 @@ def load_grid(path: Path) -> Grid:
         raise TunnelError("no cells", where=where, remedy="add a [[decays]] or [[campaigns]] table")
     twice = first_twice(cells)
     if twice is not None:
-        raise TunnelError(f"the cell {twice.label!r} is there twice", where=where, remedy="leave one out")
+        raise TunnelError(f"the cell {twice.label!r} occurs twice", where=where, remedy="remove one")
     _check_names(document, where)
     trials_of = tuple(document.trials_of.items())
     return Grid(document.name, document.seed, document.trials, trials_of, tuple(cells))
 
 
 def packaged_grid() -> Grid:
-    """The grid that is scored on where none is named."""
+    """The default grid."""
     with resources.as_file(resources.files("tunnel_lab") / "data" / "score-grid.toml") as path:
         return load_grid(path)
 

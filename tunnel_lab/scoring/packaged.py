@@ -1,4 +1,4 @@
-"""The project's own estimators as they were scored for this version: a baseline and a breakdown map."""
+"""Packaged scores of the estimators of this version: a baseline and a breakdown."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def packaged_baseline() -> Results:
 
 
 def packaged_breakdown() -> pl.DataFrame:
-    """What ``tunnel score --breakdown`` found; columns as in its Parquet file."""
+    """Results of ``tunnel score --breakdown``; columns as in its Parquet file."""
     import polars as pl
 
     with resources.as_file(resources.files("tunnel_lab") / "data" / "score-breakdown.parquet") as path:

@@ -1,6 +1,6 @@
-"""Trials as a table, on disk as Parquet, and what they add up to.
+"""Trials as a table, stored as Parquet, and their scores.
 
-The table of trials is what a baseline is: it carries its grid, so that it can be repeated.
+A baseline is such a table of trials. It contains its grid, so that it can be repeated.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Results:
     """A finished score.
 
     Args:
-        grid: what was scored on.
+        grid: of the score.
         estimators: names, in the order given.
         rows: one per trial, estimator and quantity; see `tunnel_lab.scoring.work`.
     """
@@ -60,7 +60,7 @@ class Results:
 
         Args:
             estimator: its name.
-            cells: indices of the cells that count.
+            cells: indices of the cells to include.
         """
         from statistics import median
 
@@ -72,7 +72,7 @@ class Results:
         )
 
     def raised(self) -> dict[str, list[str]]:
-        """What estimators raised, by estimator; none where all went well."""
+        """Exceptions by estimator; empty where there were none."""
         found: dict[str, set[str]] = {}
         for row in self.rows:
             if row["status"].startswith("raised "):
@@ -81,7 +81,7 @@ class Results:
 
 
 def groups_of(grid: Grid) -> dict[str, list[int]]:
-    """Cells that are added up together, by what they are: decays, campaigns, campaigns with an effect each."""
+    """Cells that are pooled: decays, campaigns, and campaigns with each effect."""
     found: dict[str, list[int]] = {}
     for index, cell in enumerate(grid.cells):
         found.setdefault(_group(cell), []).append(index)
@@ -95,11 +95,11 @@ def _group(cell: Cell) -> str:
 
 
 def write_trials(path: Path, results: Results) -> Path:
-    """Write the trials with their grid as Parquet, whole or not at all.
+    """Write the trials with their grid as Parquet, completely or not at all.
 
     Args:
         path: the file; replaced when it exists.
-        results: what to write.
+        results: to write.
 
     Returns:
         The same path.
@@ -107,15 +107,15 @@ def write_trials(path: Path, results: Results) -> Path:
     import polars as pl
 
     frame = trials_frame(results)
-    told = json_line(results.grid.to_json_dict(), sort_keys=True)
-    return write_whole(path, parquet(frame.with_columns(pl.lit(told).alias("grid"))))
+    described = json_line(results.grid.to_json_dict(), sort_keys=True)
+    return write_whole(path, parquet(frame.with_columns(pl.lit(described).alias("grid"))))
 
 
 def trials_frame(results: Results) -> pl.DataFrame:
     """A row for every trial, estimator and quantity.
 
     Args:
-        results: what to show.
+        results: to show.
 
     Returns:
         Columns as in the rows; ``cell`` is the index of the grid's cell.
@@ -136,11 +136,11 @@ def read_trials(path: Path) -> Results:
         The results, estimators in the order of their first rows.
 
     Raises:
-        TunnelError: when there is no such file, or it is no table of trials.
+        TunnelError: when there is no such file, or it is not a table of trials.
     """
     where, remedy = shown(path), "write one with tunnel score --write-baseline"
     content = read_regular(path, limits.DATA_BYTES, missing=remedy, readable=remedy)
-    with as_described("is no table of trials", where, remedy):
+    with as_described("is not a table of trials", where, remedy):
         schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
         wrong = [name for name, kind in _types().items() if schema.get(name) != kind]
         if wrong or "grid" not in schema:
@@ -155,7 +155,7 @@ def read_trials(path: Path) -> Results:
 
 
 def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
-    """Refuse rows that nothing can be counted by: each estimator has all cells, and an estimate is a whole one."""
+    """Refuse incomplete rows: each estimator must have all cells, and each estimate all values."""
     wanted = {(at, quantity) for at, cell in enumerate(grid.cells) for quantity in cell.quantities}
     found: dict[str, set[tuple[int, str]]] = {}
     for row in rows:

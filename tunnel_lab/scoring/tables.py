@@ -1,4 +1,4 @@
-"""A score as tables for a terminal."""
+"""Tables of a score for the terminal."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ _SHOWN_WORSE = 12
 
 
 def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
-    """One table for each kind of cell, all cells of it taken together.
+    """One table for each kind of cell, with all cells of that kind pooled.
 
     Args:
         results: a finished score.
-        times: whether to show what a record takes, too.
+        times: whether to show the time for a record too.
 
     Returns:
         Tables with a section for each estimator and a row for each quantity.
@@ -60,7 +60,7 @@ def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
 
 
 def _section(one: Table, results: Results, name: str, cells: Sequence[int], *, times: bool = True) -> None:
-    """The estimator's name and its time."""
+    """The estimator's name and time."""
     if one.row_count:
         one.add_section()
     one.columns[0].no_wrap = True
@@ -130,13 +130,13 @@ def _share(share: Proportion | None) -> str:
 
 
 def worse_table(verdict: Verdict) -> Table:
-    """What got worse, the surest first.
+    """The findings that are worse, the most significant first.
 
     Args:
         verdict: of a check.
 
     Returns:
-        A table; without rows where nothing got worse.
+        A table; without rows where none is worse.
     """
     result = table(
         "Worse than the baseline",
@@ -165,7 +165,7 @@ def _before_and_now(finding: Finding) -> tuple[str, str]:
 
 
 def verdict_lines(verdict: Verdict) -> list[str]:
-    """What a check found, in words.
+    """The result of a check in words.
 
     Args:
         verdict: of a check.
@@ -179,14 +179,14 @@ def verdict_lines(verdict: Verdict) -> list[str]:
         names = ", ".join(sorted({finding.estimator for finding in worse}))
         lines = [f"Worse than the baseline: {names} ({len(worse)} of {tests})"]
         if len(worse) > _SHOWN_WORSE:
-            lines.append(f"Shown are the {_SHOWN_WORSE} surest.")
+            lines.append(f"The {_SHOWN_WORSE} most significant are shown.")
         lines.append(
             "bias (size of the mean error) and spread (root mean square error) are in units of the bound"
         )
     elif verdict.identical:
-        lines = ["No estimator got worse: all estimates are the baseline's, to the last bit."]
+        lines = ["No estimator is worse: all estimates equal the baseline to the last bit."]
     else:
-        lines = [f"No estimator got worse beyond sampling error ({tests})."]
+        lines = [f"No estimator is worse beyond sampling error ({tests})."]
     if verdict.added:
         lines.append(f"Not in the baseline, so not checked: {', '.join(verdict.added)}")
     return lines

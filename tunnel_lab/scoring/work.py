@@ -1,4 +1,4 @@
-"""The work of a score: every estimator on every trial, in processes, and on where it was interrupted."""
+"""The work of a score: every estimator on every trial, in processes, continued after an interruption."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ItemT = TypeVar("ItemT")
 Row = dict[str, Any]
 Told = Callable[[int, int], None]
 UNIT_TRIALS = 5
-"""Trials done together: what an interruption costs at most, in each process."""
+"""Trials done together; an interruption loses at most these in each process."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Unit:
 
 
 def units_of(grid: Grid) -> tuple[Unit, ...]:
-    """The grid in pieces of a few trials, cells in turn so that the time left can be told early."""
+    """The grid in units of a few trials, ordered across cells so that the time left can be estimated early."""
     return tuple(
         Unit(cell, first, min(first + UNIT_TRIALS, grid.trials))
         for first in range(0, grid.trials, UNIT_TRIALS)
@@ -95,14 +95,15 @@ def estimate_rows(
 ) -> list[Row]:
     """One estimator on one campaign of known truth, a row for each quantity of the truth.
 
-    An estimator that raises has failed, and its status says what it raised: one bad record must not end the work.
+    An estimator that raises an exception has failed, and its status names the exception: one bad record must not
+    stop the work.
 
     Args:
         estimator: its name in the registry.
-        campaign: what it sees.
+        campaign: its input.
         truth: by quantity, SI; ζ and ωn are those of the first run.
         bound: the Cramér–Rao bound by quantity, SI; quantities without one are left out.
-        about: put in front of every row.
+        about: first columns of every row.
 
     Returns:
         The rows; value and std are None where the estimator failed.
@@ -114,7 +115,7 @@ def estimate_rows(
     try:
         found: Estimate | None = identify(campaign, estimator, throw=False)
         status = "" if found is None else found.status.name.lower()
-    except Exception as error:  # whatever it is, it is this estimator's, and is counted and shown
+    except Exception as error:  # any exception of an estimator is counted and shown
         found, status = None, f"raised {type(error).__name__}"
     milliseconds = 1000.0 * (time.perf_counter() - begun) / len(campaign.runs)
     rows = []
@@ -151,10 +152,10 @@ def score_grid(
     Args:
         grid: the conditions.
         estimators: names in the registry.
-        jobs: processes; 0 works in this one. Apart from the milliseconds the rows are the same to the bit.
-        parts: folder for what is done; an interrupted score goes on from there where grid, estimators and code
-            are the same. None keeps nothing.
-        progress: told trials done and their number.
+        jobs: processes; 0 works in this one. Except for the times, the rows are the same to the bit.
+        parts: folder for finished work, from which an interrupted score continues if grid, estimators and code
+            are the same; None for none.
+        progress: called with the number of finished trials and of all trials.
 
     Returns:
         The rows, in the order of cells, trials and estimators.
@@ -192,15 +193,15 @@ def resumed(
     parts: Path | None,
     tell: Callable[[Sequence[str]], None],
 ) -> dict[str, list[Row]]:
-    """Do work in processes, keeping what is done, and leave out what was done before.
+    """Do work in processes, store what is finished, and skip what was finished before.
 
     Args:
-        work: what to do; a function of a module.
-        items: what to do it to, by the names of their files.
-        mark: what was kept under another mark is done again, see `fingerprint`.
+        work: function of a module.
+        items: its arguments, by the names of their files.
+        mark: work stored under another mark is repeated, see `fingerprint`.
         jobs: number of processes; 0 works in this one.
-        parts: folder for what is done; None keeps nothing.
-        tell: told the names of all that is done, at the start and whenever there is more.
+        parts: folder for finished work; None for none.
+        tell: called with the names of all finished items, at the start and after each.
 
     Returns:
         The rows of every item, by name.
@@ -223,7 +224,7 @@ def resumed(
 
 
 def fingerprint(document: Mapping[str, Any], estimators: Sequence[str]) -> str:
-    """What results hang on: the conditions, the estimators' names and the code of the packages below.
+    """Hash of all that results depend on: conditions, names of the estimators, and code of the packages below.
 
     Args:
         document: the conditions, in JSON's types.
@@ -238,7 +239,7 @@ def fingerprint(document: Mapping[str, Any], estimators: Sequence[str]) -> str:
 
 @cache
 def _code() -> str:
-    """A digest of all files of identification and tunnel_sim, weights and libraries with them."""
+    """A digest of all files of identification and tunnel_sim, including weights and libraries."""
     import identification
     import tunnel_sim
 
@@ -253,7 +254,7 @@ def _code() -> str:
 
 
 def _kept(parts: Path, name: str, mark: str) -> list[Row] | None:
-    """Rows of a unit done before; None where there are none, or other ones."""
+    """Stored rows of a unit; None where there are none, or they have another mark."""
     try:
         document = read_json(parts / f"{name}.json", remedy="score it again")
     except TunnelError:

@@ -1,4 +1,4 @@
-"""A run shown: as a film, as a picture, live in a window or in a browser.
+"""Shows a run as a film or a picture, or in real time in a window or a browser.
 
 ``live``, ``window``, ``web`` and ``stepper`` load the engine; ``request`` and ``film`` do not.
 """

@@ -1,7 +1,7 @@
-"""A film of a run: the swinging body beside the trace of its angle.
+"""A film of a run: the oscillating model beside the trace of its angle.
 
-Frames are rendered off-screen, as `tunnel_lab.show.rendering` does it: in a process of their own, one OpenGL back
-end after another. The trace is drawn twice, faint and full; every frame shows the full one up to the present.
+Frames are rendered off-screen as in `tunnel_lab.show.rendering`: in a child process, trying one OpenGL back end
+after another. The trace is drawn twice, faint and full; every frame shows the full one up to its time.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tunnel_lab.show.rendering import REMEDY, backends
 from tunnel_lab.show.request import Request, ShownRun, shown_run
 from tunnel_sim.files.writing import write_whole
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -31,13 +31,29 @@ if TYPE_CHECKING:
 Image = NDArray[np.uint8]
 CAMERAS = ("overview", "above", "side")
 BODY_SHARE = 0.52
-"""Share of the width that the body's picture takes."""
+"""Share of the width for the picture of the model."""
 FIRST_FRAME_S = 60.0
-"""A back end that has not drawn its first frame by now is taken to hang, s."""
+"""Time limit of a back end for its first frame, s."""
 _SHADOW, _SAMPLES = (
     2048,
     4,
-)  # of a moving picture: a quarter of the still's time, no difference to see in motion
+)  # for a film: a quarter of the time of a still, without visible difference
+
+
+def checked_camera(name: str) -> str:
+    """Check the name of a camera.
+
+    Args:
+        name: as typed.
+
+    Raises:
+        TunnelError: when the rig has no such camera.
+    """
+    if name not in CAMERAS:
+        raise TunnelError(
+            f"there is no camera {name!r}", where="--camera", remedy=did_you_mean(name, CAMERAS)
+        )
+    return name
 
 
 @dataclass(frozen=True)
@@ -73,7 +89,7 @@ class Look:
 def write_film(
     request: Request, look: Look, path: Path, progress: Callable[[int, int], None] | None = None
 ) -> None:
-    """Write a run as MP4 (H.264), whole or not at all.
+    """Write a run as MP4 (H.264), completely or not at all.
 
     Args:
         request: which run.
@@ -88,7 +104,7 @@ def write_film(
 
 
 def write_still(request: Request, look: Look, path: Path, at: float) -> None:
-    """Write one frame of the film as PNG, whole or not at all.
+    """Write one frame of the film as PNG, completely or not at all.
 
     Args:
         request: which run.
@@ -97,7 +113,7 @@ def write_still(request: Request, look: Look, path: Path, at: float) -> None:
         at: s from the release.
 
     Raises:
-        TunnelError: likewise; also when the run is over by then.
+        TunnelError: likewise; also when the run is shorter.
     """
     duration = shown_run(request).settings.duration
     if not 0.0 <= at <= duration:
@@ -108,7 +124,7 @@ def write_still(request: Request, look: Look, path: Path, at: float) -> None:
 def _draw_elsewhere(
     request: Request, look: Look, path: Path, at: float | None, progress: Callable[[int, int], None] | None
 ) -> None:
-    """Have a process of its own draw into a temporary folder, then move what it drew to its place."""
+    """Draw in a child process into a temporary folder, then move the result to its place."""
     order = {"request": request.to_json_dict(), "look": asdict(look), "at": at}
     reasons = []
     with tempfile.TemporaryDirectory() as folder:
@@ -123,7 +139,7 @@ def _draw_elsewhere(
 
 
 def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, int], None] | None) -> str:
-    """Draw with one back end; returns empty when it drew, else why not."""
+    """Draw with one back end; return an empty text on success, else the reason."""
     environment = {**os.environ, "MUJOCO_GL": backend} if backend else dict(os.environ)
     arguments = [sys.executable, "-m", "tunnel_lab.show.film", json.dumps(order)]  # our own module, no shell
     with (
@@ -134,7 +150,7 @@ def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, i
     ):
         try:
             silent = _follow(child, progress)
-        finally:  # also when interrupted: nothing is left behind
+        finally:  # also when interrupted
             if child.poll() is None:
                 child.kill()
         if silent:
@@ -147,7 +163,7 @@ def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, i
 
 
 def _follow(child: subprocess.Popen[str], progress: Callable[[int, int], None] | None) -> bool:
-    """Read the child's progress until it ends; whether it stayed silent too long."""
+    """Read the child's progress until it ends; return whether it exceeded the time limit."""
     import threading
 
     silent = threading.Event()
@@ -210,7 +226,7 @@ def _prepare(model: Model, width: int, height: int) -> None:
 
 
 def _draw(order: dict[str, Any]) -> None:
-    """Draw in this process; what goes wrong ends it."""
+    """Draw in this process; an error ends it."""
     run = shown_run(Request.from_json_dict(order["request"]))
     look, path = Look(**order["look"]), Path(order["path"])
     if order["at"] is not None:

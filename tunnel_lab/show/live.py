@@ -1,4 +1,4 @@
-"""The rig live: a run that goes on in real time and is released anew when it is over."""
+"""A run in real time, which is released again when it is over."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class LiveRun:
-    """A run of the rig with its whole physics, plugin included.
+    """A run of the rig with its full physics, including the plugin.
 
     Args:
         run: what is shown.
@@ -30,12 +30,12 @@ class LiveRun:
         mujoco.mj_forward(self.model.mj, self.data)
 
     def release(self) -> None:
-        """Hold the body at its angle and let go again."""
+        """Hold the model at its release angle and release it again."""
         mujoco.mj_copyData(self.data, self.model.mj, self._released)
         mujoco.mj_forward(self.model.mj, self.data)
 
     def advance(self, seconds: float) -> None:
-        """Go on; a run that is over is released anew.
+        """Advance; a run that is over is released again.
 
         Args:
             seconds: of the run, s.
@@ -43,10 +43,10 @@ class LiveRun:
         self.advance_by(lambda: mujoco.mj_step(self.model.mj, self.data, self._steps(seconds)))
 
     def advance_by(self, step: Callable[[], object]) -> None:
-        """Go on as somebody else's clock has it; a run that is over is released anew.
+        """Advance by an external clock; a run that is over is released again.
 
         Args:
-            step: advances ``data``, or leaves it where it is.
+            step: advances ``data``, or leaves it unchanged.
         """
         if self.data.time >= self.run.settings.duration:
             self.release()
@@ -57,7 +57,7 @@ class LiveRun:
 
     @property
     def angle(self) -> float:
-        """Of the spring's and sensor's end now, rad."""
+        """Present angle at the spring and sensor, rad."""
         return float(self.data.qpos[self.model.yaw_address])
 
 
@@ -65,7 +65,7 @@ class Puppet:
     """The same bodies without the engine plugin, for viewers that do not have it (a browser).
 
     Args:
-        live: whose pose it takes.
+        live: the run that it follows.
     """
 
     def __init__(self, live: LiveRun) -> None:
@@ -92,8 +92,8 @@ def pose(target: mujoco.MjData, source: mujoco.MjData) -> None:
     """Copy time, positions and rates; the two models have the same joints.
 
     Args:
-        target: takes them.
-        source: gives them.
+        target: to copy to.
+        source: to copy from.
     """
     target.time = source.time
     target.qpos[:] = source.qpos
@@ -115,7 +115,7 @@ class History:
         self._angles: list[float] = []
 
     def add(self, time: float, angle: float) -> None:
-        """Take a point in, unless the last one is too near; a time before the last begins anew.
+        """Add a point unless it is too close to the last one; a time before the last one starts a new trace.
 
         Args:
             time: s from the release.

@@ -1,8 +1,8 @@
 """A picture of the rig, rendered off-screen.
 
-Rendering needs an OpenGL back end, which many machines lack, and a back end that is missing may end the
-whole process. So the picture is made in a process of its own, one back end after another, and a failure is
-an answer, not an error.
+Rendering needs an OpenGL back end, which many machines lack, and a missing back end may end the whole process.
+Therefore the picture is made in a child process, trying one back end after another, and a failure is returned
+as a reason, not raised.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ import sys
 from pathlib import Path
 
 TIMEOUT_S = 60.0
-"""A back end that has not drawn one picture by now is taken to hang, s."""
+"""Time limit of a back end for one picture, s."""
 
 SHOWN_ANGLE_DEG = 20.0
 """The yaw angle of the model in the picture, degrees: the largest release of the paper's campaign."""
 
-REMEDY = "install EGL or OSMesa (Debian and Ubuntu: libegl1 or libosmesa6) to have the picture"
+REMEDY = "install EGL or OSMesa (Debian and Ubuntu: libegl1 or libosmesa6) to get the picture"
 
 
 def backends() -> tuple[str, ...]:
-    """The OpenGL back ends worth trying here, best first.
+    """The OpenGL back ends to try, best first.
 
     Returns:
         Values for ``MUJOCO_GL``; only the user's own choice where that variable is set, and an empty
@@ -37,10 +37,10 @@ def backends() -> tuple[str, ...]:
 
 
 def render_rig(path: Path, *, width: int = 1280, height: int = 800, camera: str = "overview") -> str:
-    """Draw the rig, its model yawed as at a release, into a PNG.
+    """Draw the rig with its model at a release angle as a PNG.
 
     Args:
-        path: the PNG to write; written whole or not at all.
+        path: the PNG to write, completely or not at all.
         width: of the picture, pixels.
         height: of the picture, pixels.
         camera: name of a camera of ``mjcf/rig.xml``.
@@ -75,7 +75,7 @@ def render_rig(path: Path, *, width: int = 1280, height: int = 800, camera: str 
 
 
 def _draw(path: Path, width: int, height: int, camera: str) -> None:
-    """Render in this process; what goes wrong ends it."""
+    """Render in this process; an error ends it."""
     from math import radians
 
     import mujoco

@@ -1,4 +1,4 @@
-"""The one run that is shown: live, in a film, or in a picture. From a plan, or from a few options."""
+"""The run that is shown in a window, film or picture, from a plan or from a few options."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PAPER = {"cn_beta": 0.4719, "cn_r": -0.1033}
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked for; what is None takes the plan's or the rig's value.
+    """The options; None takes the value of the plan or the rig.
 
     Args:
         plan: a campaign's description.
@@ -66,8 +66,8 @@ class ShownRun:
     """A run ready to be simulated.
 
     Args:
-        rig: what it is made on.
-        chain: its physics as a campaign states it, and its effects.
+        rig: of the run.
+        chain: its conditions and its effects.
         sensor: the potentiometer.
         title: its conditions in a few words.
         request: what was asked for.
@@ -87,7 +87,7 @@ class ShownRun:
         return follow_fastest(self.rig, self.chain.physics())
 
     def record(self) -> Record:
-        """What the potentiometer reads, simulated anew: the same bits every time."""
+        """The potentiometer's reading, simulated at each call with the same bits."""
         from tunnel_sim.engine.model import build_model
         from tunnel_sim.engine.sensor import read_motion
         from tunnel_sim.engine.simulate import simulate_motion
@@ -134,7 +134,7 @@ def _plan_and_condition(request: Request, rig: Rig) -> tuple[CampaignPlan, Condi
         plan = replace(plan, seed=request.seed)
     added = tuple(parse_effect(text) for text in request.effects)
     condition = _changed(_run_of(plan, request), request, rig)
-    # The run that is shown is the plan's only one: an effect is checked against its spring alone.
+    # Keep only this run, so that effects are checked against its spring alone.
     return replace(plan, effects=plan.effects + added, conditions=(condition,)), condition
 
 
@@ -143,7 +143,7 @@ def _run_of(plan: CampaignPlan, request: Request) -> Condition:
         return plan.conditions[0]
     if request.plan is None:
         raise TunnelError(
-            "there is no plan", where=f"--run {request.run}", remedy="name the plan it is a run of"
+            "there is no plan", where=f"--run {request.run}", remedy="name the plan of this run"
         )
     found = {condition.id: condition for condition in plan.conditions}
     if request.run not in found:
@@ -180,7 +180,7 @@ def _number(option: str, given: float | None, plan: float, low: float, high: flo
 
 
 def _no_plan(rig: Rig) -> CampaignPlan:
-    """The rig as it stands: its default spring, 20°, the paper's coefficients, 10 m/s."""
+    """The default run: the rig's default spring, 20°, the paper's coefficients, 10 m/s."""
     dynamics = rig.dynamics
     condition = Condition(
         id="run",

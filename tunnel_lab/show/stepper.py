@@ -1,4 +1,4 @@
-"""What steps the rig behind MuJoCo Studio's web viewer; imported only when it is used."""
+"""The stepper of the rig behind MuJoCo Studio's web viewer; imported only when used."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from mujoco.studio import messages, step_control
 
 from tunnel_lab.show.live import LiveRun, pose
 
-_YIELD_S = 1e-3  # as Studio's own stepper: else the loop starves the viewer's threads
+_YIELD_S = 1e-3  # as in Studio's own stepper: otherwise the loop starves the viewer's threads
 
 
 class _PuppetMaster(step_control.StepControl):  # type: ignore[misc]  # mujoco is untyped
-    """Studio's pause, speed and single step, on the whole physics instead of the shown model."""
+    """Studio's pause, speed and single step, applied to the full physics instead of the shown model."""
 
     def __init__(self, live: LiveRun) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The trace of a run as it grows, a picture at any time without drawing the axes again."""
+"""The trace of a run up to any time, without drawing the axes again."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _VERMILION = (213, 94, 0)
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Two drawings of the same axes, and where its points are.
+    """Two drawings of the same axes, and the positions of the samples.
 
     Args:
         faint: all of the trace in grey, shape (height, width, 3).

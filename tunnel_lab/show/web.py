@@ -1,7 +1,7 @@
-"""The rig live in a browser: MuJoCo Studio's web viewer.
+"""The rig in real time in a browser: MuJoCo Studio's web viewer.
 
-A browser does not have the engine plugin and refuses a model that names it. So the physics runs here, with the
-plugin, and the browser is shown a puppet: the same bodies in the same pose.
+A browser does not have the engine plugin and refuses a model that names it. Therefore the physics runs here,
+with the plugin, and the browser shows a copy without it: the same bodies in the same pose.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from tunnel_lab.terminal.tables import say
 from tunnel_sim.vocabulary.errors import TunnelError
 
 WARNING = (
-    "Listens on all network interfaces, without a password and without a check of the Origin: whoever reaches this "
-    "port, and any web page open in a browser of this machine, can watch and steer the view. "
-    "Use it in a network that you trust."
+    "The server listens on all network interfaces, without a password or a check of the Origin. Anyone who reaches "
+    "this port, and any web page in a browser of this machine, can watch and control the view. "
+    "Use it only in a network that you trust."
 )
 """MuJoCo 4.0 has no option that binds the loopback only; see docs/reference/limits.md."""
 
@@ -28,7 +28,7 @@ def view_in_browser(run: ShownRun, *, port: int, open_browser: bool, seconds: fl
         run: what is shown.
         port: TCP port (index); 0 takes the first free one from 8080 on.
         open_browser: open a tab, where there is a display.
-        seconds: stop after so many s; None goes on until interrupted.
+        seconds: time until it stops, s; None runs until interrupted.
 
     Raises:
         TunnelError: when the port is taken or MuJoCo Studio is not installed.
@@ -36,7 +36,7 @@ def view_in_browser(run: ShownRun, *, port: int, open_browser: bool, seconds: fl
     try:
         from mujoco.studio import app, launch_web, viewer_protocol
     except ImportError as error:
-        remedy = "install mujoco whole (pip install mujoco), not mujoco-core alone"
+        remedy = "install the full mujoco package (pip install mujoco), not only mujoco-core"
         raise TunnelError("MuJoCo Studio is missing", where="tunnel view --web", remedy=remedy) from error
     from tunnel_lab.show.stepper import puppet_master
 

@@ -1,4 +1,4 @@
-"""The rig live in a window: MuJoCo's viewer."""
+"""The rig in real time in MuJoCo's viewer."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NO_DISPLAY = "use tunnel view --web, or tunnel render for a film"
 
 
 def missing_display() -> str:
-    """Why no window can be opened here; empty where one can, as far as the environment tells."""
+    """Why no window can be opened; empty where the environment shows no reason."""
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
@@ -32,7 +32,7 @@ def missing_display() -> str:
 
 
 class Controls:
-    """What the keys of the window do: space pauses, R releases anew.
+    """The keys of the window: space pauses, R releases again.
 
     Args:
         live: the run.
@@ -44,7 +44,7 @@ class Controls:
         self.released = False
 
     def key(self, code: int) -> None:
-        """A key was pressed; called from the viewer's thread, so it only leaves a note.
+        """Record a key; called from the viewer's thread, so it only sets a flag.
 
         Args:
             code: of the key, a GLFW number (count).
@@ -55,7 +55,7 @@ class Controls:
             self.released = True
 
     def advance(self, seconds: float) -> None:
-        """Go on by what the clock says, as the keys have it.
+        """Advance by the clock, as the keys demand.
 
         Args:
             seconds: since the last call, s.
@@ -83,7 +83,7 @@ def view_in_window(run: ShownRun, *, camera: str, speed: float) -> None:
         raise TunnelError(missing, where="tunnel view", remedy=_NO_DISPLAY)
     import glfw
 
-    # Asked here first: inside the viewer's own thread a failure would leave this process waiting for ever.
+    # Checked first: a failure inside the viewer's thread would leave this process waiting for ever.
     if not glfw.init():
         raise TunnelError("the display cannot be opened", where="tunnel view", remedy=_NO_DISPLAY)
     import mujoco.viewer
@@ -131,13 +131,13 @@ def window_loop(
             history.add(live.data.time, live.angle)
         last = now
         handle.set_figures((_corner(handle.viewport), _figure(history)))
-        handle.set_texts((None, None, "space\nR", "pause\nrelease anew"))
+        handle.set_texts((None, None, "space\nR", "pause\nrelease again"))
         handle.sync()
         sleep(max(0.0, FRAME_S - (clock() - now)))
 
 
 def _corner(viewport: Any) -> Any:
-    """The lower right part of the window, where the trace goes."""
+    """The lower right part of the window, for the trace."""
     import mujoco
 
     width, height = (viewport.width, viewport.height) if viewport is not None else (1200, 900)

@@ -1,6 +1,6 @@
-"""Sweeps: the product of rigs, conditions, sensors, truths and effects, simulated, estimated and kept.
+"""Sweeps: the product of rigs, conditions, sensors, truths and effects, simulated, estimated and stored.
 
-`schema` says what a sweep file holds, `product` which cases it stands for, `shard` does the work of a few cases,
-`store` keeps what is finished, `processes` and `cluster` do shards side by side, `engine` ties these together;
-`summary` and `figures` draw what people look at. Nothing heavy is imported here: workers start by this module.
+`schema` defines the sweep file, `product` lists its cases, `shard` does the work of a few cases, `store` keeps
+finished shards, `processes` and `cluster` do shards in parallel, and `engine` combines these; `summary` and
+`figures` present the results. Nothing heavy is imported here, because workers start with this module.
 """

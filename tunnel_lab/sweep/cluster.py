@@ -1,7 +1,7 @@
-"""Shards side by side on a Dask cluster: on other machines, or on workers that are started here.
+"""Shards in parallel on a Dask cluster: on other machines, or on workers that are started here.
 
-Dask does a lost worker's tasks again elsewhere. A shard is a pure function of sweep and number, and only this
-process writes: a shard that is done twice is kept once. Dask is imported inside the functions, never at import.
+Dask repeats the tasks of a lost worker elsewhere. A shard is a pure function of sweep and number, and only this
+process writes: a shard that is done twice is stored once. Dask is imported inside the functions, never at import.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 LOCAL = "local"
 ATTEMPTS = 3
-"""How often a shard is handed out again after Dask itself gave it up."""
+"""How often a shard is submitted again after Dask has given it up."""
 POLL_S = 5.0
 """How long to wait for a shard before the workers are counted, s."""
 CONNECT_S = 10.0
@@ -40,11 +40,11 @@ def on_cluster(
     Args:
         address: of a scheduler, such as ``tcp://host:8786``, or ``local`` for a cluster that is started here.
         workers: number of workers of a local cluster.
-        say: told what the user should know, a line at a time.
+        say: called with each line for the user.
         poll_s: how long to wait for a shard before the workers are counted, s.
 
     Returns:
-        What does shards: given the sweep as JSON and the shards' numbers, it yields them as they finish.
+        A function that does shards: given the sweep as JSON and the shards' numbers, it yields them as they finish.
     """
     return partial(_work, address, workers, say, poll_s)
 
@@ -69,7 +69,7 @@ def _client(address: str, workers: int) -> Iterator[Client]:
     make_client: Any = distributed.Client  # Dask's own functions carry no types
     make_cluster: Any = distributed.LocalCluster
 
-    for name in ("distributed", "distributed.client"):  # what matters is said in one line of our own
+    for name in ("distributed", "distributed.client"):  # replaced by one line of our own
         logging.getLogger(name).setLevel(logging.CRITICAL)
     if address == LOCAL:
         options: dict[str, Any] = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
@@ -138,7 +138,7 @@ class _Crew:
         )
 
     def _result(self, future: Any, index: int) -> Finished | None:
-        """A finished shard; None where its workers were lost and it is to be handed out again."""
+        """A finished shard; None where its workers were lost and it must be submitted again."""
         from distributed import KilledWorker
 
         try:
@@ -153,7 +153,7 @@ class _Crew:
             if self._attempts[index] > ATTEMPTS:
                 raise TunnelError(
                     f"shard {index} lost every worker it was given to",
-                    remedy="look for lack of memory on the workers; what is finished stays",
+                    remedy="check the memory of the workers; finished shards are kept",
                 ) from None
             return None
         finally:
@@ -161,20 +161,20 @@ class _Crew:
         return found
 
     def _workers(self) -> None:
-        """Say it when there is nobody to do the work, once each time that happens."""
+        """Report when no worker is connected, once each time."""
         if self._client.status != "running":
             raise _gone()
         address = self._client.scheduler.address if self._client.scheduler else ""
         if self._client.nthreads():
             if self._alone:
-                self._say("workers are there again")
+                self._say("workers are connected again")
             self._alone = False
         elif not self._alone:
             self._alone = True
             self._say(f"no worker is connected to {address}: start some with: dask worker {address}; waiting")
 
     def _room(self) -> int:
-        """How many shards may be in flight: two for each thread."""
+        """Number of shards in flight: two for each thread."""
         threads = sum(int(count) for count in self._client.nthreads().values())
         return max(_FEWEST_IN_FLIGHT, 2 * threads)
 
@@ -182,5 +182,5 @@ class _Crew:
 def _gone() -> TunnelError:
     return TunnelError(
         "the scheduler is gone",
-        remedy="what is finished stays: start scheduler and workers again, and then the same command",
+        remedy="finished shards are kept: start scheduler and workers again, and repeat the command",
     )

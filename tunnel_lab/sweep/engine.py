@@ -1,4 +1,4 @@
-"""A sweep from its file to its folder: what is finished stays, and the rest is done."""
+"""Runs a sweep: keeps finished shards and does the rest."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from tunnel_lab.sweep.shard import Finished
 
 Work = Callable[[str, Sequence[int]], Iterator["Finished"]]
-"""Does shards: given the sweep as JSON and the shards' numbers, yields them as they finish, in any order."""
+"""A function that does shards: given the sweep as JSON and their numbers, it yields them in any order."""
 Told = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a sweep went.
+    """The outcome of a sweep.
 
     Args:
         store: its folder.
         found: number of shards that were finished already.
-        crashes: number of estimates that ended in an error of the estimator itself, in the shards done now.
+        crashes: number of estimates that raised an exception, in the shards done now.
     """
 
     store: Store
@@ -35,19 +35,19 @@ class Outcome:
 
 
 def run_sweep(sweep: Sweep, folder: Path, work: Work, progress: Told | None = None) -> Outcome:
-    """Do what is left of a sweep.
+    """Do the rest of a sweep.
 
     Args:
         sweep: what to do.
-        folder: where its results are and go.
+        folder: of its results.
         work: does the shards.
-        progress: told cases finished and their number, once at the start and after each shard.
+        progress: called with the number of finished cases and of all cases, at the start and after each shard.
 
     Returns:
-        How it went; then all results are there.
+        The outcome; all results are then complete.
 
     Raises:
-        TunnelError: when the folder is another sweep's, or the work cannot be done.
+        TunnelError: when the folder belongs to another sweep, or the work cannot be done.
     """
     store = begin(sweep, folder)
     finished = set(store.finished())
@@ -68,7 +68,7 @@ def run_sweep(sweep: Sweep, folder: Path, work: Work, progress: Told | None = No
 
 
 def _started(work: Work, sweep: Sweep, left: Sequence[int]) -> Generator[Finished, None, None]:
-    """The work as a generator, which is closed when it is left, however it is left."""
+    """The work as a generator, which is always closed at the end."""
     if left:
         yield from work(sweep.to_json(), left)
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from identification.scoring.accuracy import Proportion
 
 DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "cn_r": "Cnr"}
-"""Quantities that have a panel; Izz, Cr and the sensor's zero stand in the first table and the CSV."""
+"""Quantities that have a panel; Izz, Cr and the sensor's zero are in the first table and the CSV."""
 NAMES: Mapping[str, str] = {**DRAWN, **SYMBOLS, "sensor_zero": "zero"}
 BRACKETS = "In brackets: the standard error in the last digits, from the number of trials; of shares 95 %."
 _INTERVAL = 1.96
@@ -28,7 +28,7 @@ _WIDE = 10.0  # ratio of the largest to the least value from which an axis is dr
 
 
 def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
-    """Lines by what one figure shows.
+    """Lines grouped by figure.
 
     Args:
         lines: of a summary.
@@ -182,7 +182,7 @@ def axis_table(lines: Sequence[Line]) -> Table:
 
 
 def pace_table(found: Sequence[Pace]) -> Table:
-    """What the steps of the work took.
+    """Times of the steps.
 
     Args:
         found: of a sweep.

@@ -1,7 +1,7 @@
-"""Shards side by side in processes of this machine.
+"""Shards in parallel in processes of this machine.
 
-Every worker is a process of its own with one thread: more of the work is Python than threads could share, and the
-last bit of a sum must not hang on how many threads a linear algebra library takes. Measured in benchmarks/sweep.py.
+Every worker is a process with one thread: most of the work is Python, which threads cannot share, and the last
+bit of a sum must not depend on the number of threads of a linear algebra library. Measured in benchmarks/sweep.py.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tunnel_lab.sweep.shard import Finished
 
 PATIENCE = 3
-"""How often in a row a pool may break without a finished shard in between."""
+"""How often a pool may break in succession without finishing a shard."""
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS")
 
 Said = Callable[[str], None]
@@ -40,10 +40,10 @@ def in_processes(workers: int, say: Said) -> Callable[[str, Sequence[int]], Iter
 
     Args:
         workers: number of processes.
-        say: told what the user should know, a line at a time.
+        say: called with each line for the user.
 
     Returns:
-        What does shards: given the sweep as JSON and the shards' numbers, it yields them as they finish.
+        A function that does shards: given the sweep as JSON and the shards' numbers, it yields them as they finish.
     """
     return partial(_work, workers, say)
 
@@ -62,9 +62,9 @@ def _work(workers: int, say: Said, sweep: str, shards: Sequence[int]) -> Iterato
             if broken >= PATIENCE:
                 raise TunnelError(
                     f"worker processes died {PATIENCE} times without finishing a shard",
-                    remedy="look for lack of memory and give fewer --workers; what is finished stays",
+                    remedy="check the memory and give fewer --workers; finished shards are kept",
                 ) from None
-            say("a worker process was lost; its shards are done again")
+            say("a worker process was lost; its shards are repeated")
 
 
 def _one_pool(workers: int, sweep: str, shards: Sequence[int]) -> Iterator[Finished]:
@@ -82,7 +82,7 @@ def _one_pool(workers: int, sweep: str, shards: Sequence[int]) -> Iterator[Finis
                 yield landed.pop().result()
         pool.shutdown()
     finally:
-        end.close()  # ends the workers, whatever they are at
+        end.close()  # ends the workers at once
         pool.shutdown(wait=False, cancel_futures=True)
         line.close()
 
@@ -94,7 +94,7 @@ def _submit(pool: ProcessPoolExecutor, sweep: str, index: int) -> Future[Finishe
 
 
 def _start_worker(line: Connection) -> None:
-    """Prepare a worker: one thread, Ctrl-C left to the parent, and an end with the parent's."""
+    """Prepare a worker: one thread, Ctrl-C handled by the parent, and an end with the parent."""
     for name in _ONE_THREAD:
         os.environ[name] = "1"
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -102,7 +102,7 @@ def _start_worker(line: Connection) -> None:
 
 
 def _end_with(line: Connection) -> None:
-    """End this process when the other end of the line is closed: by the parent, or because it was killed."""
+    """End this process when the pipe to the parent is closed, by the parent or by its death."""
     try:
         line.recv()
     except (EOFError, OSError):

@@ -1,4 +1,4 @@
-"""Which cases a sweep stands for: every case is a campaign description, whose seed hangs on what it holds."""
+"""The cases of a sweep: every case is a campaign description with a seed computed from its contents."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tunnel_sim.vocabulary.plan import DEFAULT_SAMPLE_RATE, CampaignPlan
 from tunnel_sim.vocabulary.rig import Rig
 
 STEPS_PER_SHARD = 500_000
-"""Integration steps of one shard: about two seconds of one core, and the most a killed sweep loses per worker."""
+"""Integration steps of one shard: about two seconds on one core, the most that a killed sweep loses per worker."""
 NO_EFFECT = "none"
 
 
@@ -38,12 +38,12 @@ class Case:
 
     Args:
         index: in the order of the product, from 0.
-        replicate: which repetition with other noise, from 0.
+        replicate: number of the repetition with other noise, from 0.
         rig_name: as the sweep file names it.
         rig: the rig itself.
         conditions: name of the conditions.
         duration: of every run, s.
-        plan: the campaign, seed and all.
+        plan: the campaign with its seed.
         document: the same as a campaign description, ready to be written as TOML.
     """
 
@@ -59,7 +59,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep file whose rigs have been read: all that its results depend on.
+    """A sweep file with its rigs, which together determine the results.
 
     Args:
         document: the file.
@@ -70,7 +70,7 @@ class Sweep:
     rigs: tuple[Mapping[str, Any], ...]
 
     def to_json(self) -> str:
-        """The sweep as one line of JSON, from which a worker anywhere makes it again."""
+        """The sweep as one line of JSON, from which any worker can rebuild it."""
         return json.dumps(
             {"document": self.document.model_dump(), "rigs": list(self.rigs)}, sort_keys=True, allow_nan=False
         )
@@ -86,11 +86,11 @@ class Sweep:
             The sweep, its rigs parsed.
 
         Raises:
-            TunnelError: when it is no sweep, or one that is too large.
+            TunnelError: when it is not a sweep, or too large.
         """
-        where, remedy = "the sweep as JSON", "begin the sweep anew"
+        where, remedy = "the sweep as JSON", "start the sweep again"
         found = parse_json(text, where, remedy)
-        with as_described("is no sweep", where, remedy):
+        with as_described("is not a sweep", where, remedy):
             sweep = cls(SweepDocument.model_validate(found["document"]), tuple(found["rigs"]))
             check_sweep_size(sweep.document, where)
             if len(sweep._parsed) != len(sweep.document.rig):
@@ -99,7 +99,7 @@ class Sweep:
 
     @cached_property
     def axes(self) -> tuple[Sequence[Any], ...]:
-        """Values of rig, conditions, sensor, truth and effects; the last runs fastest."""
+        """Values of rig, conditions, sensor, truth and effects; the last varies fastest."""
         file = self.document
         return (
             range(len(self.rigs)),
@@ -123,7 +123,7 @@ class Sweep:
 
     @property
     def cases_per_shard(self) -> int:
-        """Cases done and kept together; it hangs on the file alone, never on the workers."""
+        """Number of cases in a shard; it depends on the file only, not on the workers."""
         return _cases_per_shard(self.document)
 
     @property
@@ -151,7 +151,7 @@ class Sweep:
             index: in the order of the product, from 0.
 
         Returns:
-            The case, the same in any sweep whose axes hold it under the same seed.
+            The case, which is the same in any sweep of the same seed that contains it.
         """
         point, replicate = divmod(index, self.document.replicates)
         places = np.unravel_index(point, tuple(map(len, self.axes)))
@@ -185,12 +185,12 @@ class Sweep:
 
 
 def case_seed(seed: int, physics: Mapping[str, Any], replicate: int) -> int:
-    """The seed of a case: it hangs on what the case holds, not on where it stands in the product.
+    """The seed of a case: it depends on the contents of the case, not on its place in the product.
 
     Args:
         seed: of the sweep.
-        physics: all that the case's records depend on besides the noise, plain values.
-        replicate: which repetition, a count from 0.
+        physics: everything that the records of the case depend on besides the noise, as plain values.
+        replicate: number of the repetition, from 0.
 
     Returns:
         A number from 0 to 2⁶³ − 1, as a campaign description's ``seed``.
@@ -236,7 +236,7 @@ def axis_lengths(document: SweepDocument) -> dict[str, int]:
 
 
 def check_sweep_size(document: SweepDocument, where: str) -> None:
-    """Refuse a sweep that is too large, before any of it is expanded.
+    """Refuse a sweep that is too large before it is expanded.
 
     Args:
         document: the sweep file.
@@ -280,10 +280,10 @@ def _samples(table: ConditionsTable, rate: float) -> float:
 
 
 def _points(lists: Mapping[str, Sequence[float]]) -> int:
-    """How many combinations `_spread` makes."""
+    """Number of combinations that `_spread` makes."""
     return prod(map(len, lists.values()))
 
 
 def _numbered(sections: Mapping[str, Any]) -> dict[str, Any]:
-    """A rig's sections with keys as TOML has them."""
+    """A rig's sections with the keys of TOML."""
     return {name: dict(table) if isinstance(table, Mapping) else table for name, table in sections.items()}

@@ -1,4 +1,4 @@
-"""Reading a sweep file: all that can be wrong with it is said before anything is simulated."""
+"""Reading a sweep file: all errors are reported before anything is simulated."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def read_sweep(path: Path) -> Sweep:
     """Read and check a sweep file.
 
     Args:
-        path: a TOML file; rig files in it are taken from its folder.
+        path: a TOML file; paths of rig files are relative to its folder.
 
     Returns:
         The sweep, its rigs read.
 
     Raises:
-        TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
+        TunnelError: for the first error, in one line that names file, key and remedy.
     """
     content = load_toml(path, missing="name a sweep file, see docs/how-to/sweep.md")
     where = shown(path)
@@ -52,7 +52,7 @@ def read_sweep(path: Path) -> Sweep:
 
 
 def _named(document: SweepDocument) -> SweepDocument:
-    """The same, every table of conditions with a name."""
+    """The same, with a name for every table of conditions."""
     many = len(document.conditions) > 1
     conditions = [
         one.model_copy(update={"name": one.name or (f"conditions-{place}" if many else "conditions")})
@@ -62,7 +62,7 @@ def _named(document: SweepDocument) -> SweepDocument:
 
 
 def _without_sources(document: SweepDocument) -> SweepDocument:
-    """The same without the rigs' files and changes: the rigs themselves stand beside it."""
+    """The same without the files and changes of the rigs, which are stored separately."""
     names = [table.model_copy(update={"file": None, "changes": {}}) for table in document.rig]
     return document.model_copy(update={"rig": names})
 
@@ -75,9 +75,9 @@ def _check_names(document: SweepDocument, where: str) -> None:
             )
     if not document.estimators and not document.records:
         raise TunnelError(
-            "neither estimators nor records: nothing would be kept",
+            "neither estimators nor records: there would be no result",
             where=where,
-            remedy="name an estimator, or put records = true",
+            remedy="name an estimator, or set records = true",
         )
     for key, names in (
         ("estimators", document.estimators),
@@ -86,13 +86,13 @@ def _check_names(document: SweepDocument, where: str) -> None:
     ):
         twice = first_twice(names)
         if twice is not None:
-            raise TunnelError(f"{key} has '{twice}' twice", where=where, remedy="give each another name")
+            raise TunnelError(f"{key} has '{twice}' twice", where=where, remedy="give each its own name")
     for entry in document.effects:
         if entry.name == NO_EFFECT and (entry.parameters or entry.together_with):
             raise TunnelError(
-                f"'{NO_EFFECT}' takes nothing beside its name",
+                f"'{NO_EFFECT}' takes no other key",
                 where=f"{where}, effects",
-                remedy="name an effect, or leave name alone",
+                remedy="name an effect, or give the name only",
             )
         for name in (entry.name, *(other.name for other in entry.together_with)):
             if name != NO_EFFECT or entry.together_with:
@@ -101,17 +101,17 @@ def _check_names(document: SweepDocument, where: str) -> None:
 
 
 def _rig(file: str | None, changes: Mapping[str, Mapping[str, Any]], folder: Path) -> dict[str, Any]:
-    """Sections of a rig, changed ones replaced key by key."""
+    """Sections of a rig with the changes, key by key."""
     sections = rig_document(None if file is None else folder / file)
     for name, table in changes.items():
         old = sections.get(name, {})
-        # What is no table stays, for the rig's own check to refuse.
+        # Anything but a table is left for the rig's own check to refuse.
         sections[name] = {**old, **table} if isinstance(old, dict) else old
     return sections
 
 
 def _check_axes(sweep: Sweep, where: str) -> None:
-    """Refuse a value that stands in an axis twice: it would be the same records again."""
+    """Refuse a value that occurs twice in an axis: it would repeat the same records."""
     axes: Iterable[tuple[str, Sequence[Any]]] = zip(_AXES, (sweep.rigs, *sweep.axes[1:]), strict=True)
     for name, values in axes:
         seen: set[str] = set()
@@ -120,15 +120,15 @@ def _check_axes(sweep: Sweep, where: str) -> None:
             text = json.dumps(physics, sort_keys=True)
             if text in seen:
                 raise TunnelError(
-                    f"{name} holds the same twice",
+                    f"{name} holds a value twice",
                     where=where,
-                    remedy="leave one out, and use replicates for more runs",
+                    remedy="remove one, and use replicates for more runs",
                 )
             seen.add(text)
 
 
 def _check_cases(sweep: Sweep, where: str) -> None:
-    """Refuse what the simulator would refuse: every sensor and every effect, with each rig and conditions."""
+    """Refuse what the simulator would refuse: check every sensor and effect with each rig and conditions."""
     from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 
     for case in _cases(sweep, "sensor", where):
@@ -140,7 +140,7 @@ def _check_cases(sweep: Sweep, where: str) -> None:
 
 
 def _cases(sweep: Sweep, axis: str, where: str) -> Iterable[Case]:
-    """Cases that hold every value of an axis together with every rig and conditions."""
+    """Cases that combine every value of an axis with every rig and conditions."""
     lengths = tuple(map(len, sweep.axes))
     wanted = (*_AXES[:2], axis)
     for places in np.ndindex(tuple(lengths[_AXES.index(name)] for name in wanted)):
@@ -155,7 +155,7 @@ def _cases(sweep: Sweep, axis: str, where: str) -> Iterable[Case]:
 
 @contextmanager
 def _in(where: str) -> Iterator[None]:
-    """Errors say the file, too."""
+    """Add the file to errors."""
     try:
         yield
     except TunnelError as error:

@@ -1,4 +1,4 @@
-"""The rows that a sweep keeps: one for every quantity that an estimator was asked for, beside its truth."""
+"""The rows of a sweep's results: one for every quantity of an estimate, with its truth."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ CASE_COLUMNS: Mapping[str, Any] = {
     "mechanical_damping": pl.Float64,
     "sensor_zero": pl.Float64,
 }
-"""What was simulated; coefficients and zero are those injected."""
+"""The simulated case; coefficients and zero are the injected ones."""
 
 RESULT_COLUMNS: Mapping[str, Any] = {
     **CASE_COLUMNS,
@@ -79,7 +79,7 @@ TIMING_COLUMNS: Mapping[str, Any] = {
 
 
 def case_values(case: Case) -> tuple[Any, ...]:
-    """What a case's rows begin with.
+    """The first columns of a case's rows.
 
     Args:
         case: any.
@@ -116,7 +116,7 @@ class Failure:
 
     Args:
         status: `NOT_SIMULATED`, `REFUSED` or `RAISED`.
-        message: what was said.
+        message: the reason.
     """
 
     status: str
@@ -130,8 +130,8 @@ def estimate_rows(
 
     Args:
         case: what was simulated.
-        estimator: its name; None where the case was simulated only.
-        outcome: its estimate, or why there is none; None where the case was simulated only.
+        estimator: its name; None where the case was only simulated.
+        outcome: its estimate, or why there is none; None where the case was only simulated.
 
     Yields:
         Values of `RESULT_COLUMNS`, in their order: of the runs, then of the campaign.
@@ -169,7 +169,7 @@ def _word(setting: EffectSetting) -> str:
 
 
 def _common(conditions: tuple[Condition, ...]) -> tuple[float | None, float | None, float | None]:
-    """Spring, wind-on speed and release angle of a campaign that has one of them only."""
+    """Spring, wind-on speed and release angle of a campaign, each where the campaign has only one."""
     kinds = (
         {one.spring_stiffness for one in conditions},
         {one.wind_speed for one in conditions if one.wind_speed > 0.0} or {0.0},

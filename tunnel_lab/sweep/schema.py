@@ -1,4 +1,4 @@
-"""The tables of a sweep file: those of a campaign description, with lists where values are to be swept."""
+"""The tables of a sweep file: those of a campaign description, with lists of the values to sweep."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ManyNotNegative = Annotated[list[NotNegative], BeforeValidator(_listed), Field(m
 
 
 class RigTable(StrictModel):
-    """``[[rig]]``: a rig description, the packaged one where no file is named, and what is changed in it."""
+    """``[[rig]]``: a rig description with changes; the packaged one where no file is named."""
 
     name: OneLine = Field(default="packaged", description="a short name in quotes")
     file: OneLine | None = Field(default=None, description="the path of a rig description in quotes")

@@ -1,6 +1,6 @@
-"""The work of one shard: its cases simulated together, estimated one by one, and the rows packed as Parquet.
+"""The work of one shard: its cases are simulated together, estimated one by one, and packed as Parquet.
 
-A shard is a pure function of the sweep and the shard's number: it may be done twice, or anywhere.
+A shard is a pure function of the sweep and its number, so it can be done anywhere and more than once.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""Sums of a linear algebra library hang on its number of threads in their last bit; a shard uses one."""
+"""The last bit of sums in a linear algebra library depends on its number of threads; a shard uses one."""
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy", "polars")
 
 
@@ -48,11 +48,11 @@ class Finished:
 
     Args:
         index: of the shard.
-        results: a Parquet file's bytes; the same wherever and whenever the shard is done.
-        records: likewise; None where they are not kept.
-        timings: likewise, but never the same twice.
-        made_with: what the bits of the results hang on besides the sweep.
-        crashes: number of estimates that ended in an error of the estimator itself.
+        results: a Parquet file's bytes; they do not depend on where or when the shard is done.
+        records: likewise; None where they are not stored.
+        timings: likewise, but different every time.
+        made_with: what the bits of the results depend on besides the sweep.
+        crashes: number of estimates that raised an exception.
     """
 
     index: int
@@ -88,7 +88,7 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
             (case, None, one if isinstance(one, Failure) else None)
             for case, one in zip(cases, campaigns, strict=True)
         ]
-    answers.sort(key=lambda answer: answer[0].index)  # of one case the estimators keep their order
+    answers.sort(key=lambda answer: answer[0].index)  # the estimators of one case keep their order
     results = _parquet([row for answer in answers for row in estimate_rows(*answer)], RESULT_COLUMNS)
     records = _parquet(_record_rows(cases, campaigns), RECORD_COLUMNS) if plan.document.records else None
     clock.lap("pack")
@@ -105,14 +105,14 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
 
 
 def simulate_cases(cases: Sequence[Case], *, nthread: int = 1) -> list[Campaign | Failure]:
-    """Simulate cases, those of one rig and sample rate together.
+    """Simulate cases; those of the same rig and sample rate are done together.
 
     Args:
         cases: any.
         nthread: threads; the result is the same to the bit whatever their number.
 
     Returns:
-        A campaign for each case, or why it could not be simulated.
+        For each case a campaign, or why it could not be simulated.
     """
     groups: dict[tuple[str, float], list[int]] = {}
     for place, case in enumerate(cases):
@@ -131,12 +131,12 @@ def _simulate(cases: Sequence[Case], nthread: int) -> Sequence[Campaign | Failur
     except TunnelError as error:
         if len(cases) == 1:
             return [Failure(NOT_SIMULATED, one_line(error))]
-    half = len(cases) // 2  # one bad case must not take the others with it
+    half = len(cases) // 2  # one bad case must not stop the others
     return [*_simulate(cases[:half], nthread), *_simulate(cases[half:], nthread)]
 
 
 def _estimate(campaign: Campaign | Failure, name: str) -> Estimate | Failure:
-    """An estimate, or why there is none: one bad case must not end a night's work."""
+    """An estimate, or why there is none: one bad case must not stop the sweep."""
     if isinstance(campaign, Failure):
         return campaign
     try:
@@ -171,7 +171,7 @@ def _parquet(rows: Sequence[tuple[Any, ...]], columns: Mapping[str, Any]) -> byt
 
 @cache
 def made_with() -> dict[str, str]:
-    """Versions and processor that the bits of a result hang on."""
+    """Versions and processor that the bits of a result depend on."""
     return {**{name: version(name) for name in _PACKAGES}, "machine": platform.machine()}
 
 

@@ -1,9 +1,9 @@
-"""The folder of a sweep: what it is, and which of its shards are finished.
+"""The folder of a sweep, with its finished shards.
 
-``sweep.json`` says what the folder holds. Every shard is a file in ``results``, and one in ``records`` where they
-are kept, written under a temporary name and renamed, the results last: then the shard is finished. ``checksums``
-holds a file for each shard as ``sha256sum --check`` reads it; a part that is not what its checksum says is done
-again. ``timings`` stand apart, because no two runs of a shard take the same time.
+``sweep.json`` describes the sweep. Every shard is a file in ``results``, and one in ``records`` where these are
+stored. Files are written under a temporary name and renamed, results last: the shard is then finished.
+``checksums`` holds a file for each shard in the format of ``sha256sum --check``; a part that does not match its
+checksum is repeated. ``timings`` are separate, because they differ every time.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class Store:
     """The folder of one sweep.
 
     Args:
-        folder: it exists and holds the sweep's ``sweep.json``.
-        sweep: what it holds.
+        folder: an existing folder with the ``sweep.json`` of the sweep.
+        sweep: the sweep.
         made_with: versions that its results are made with.
     """
 
@@ -49,7 +49,7 @@ class Store:
     made_with: Mapping[str, str]
 
     def finished(self) -> list[int]:
-        """Shards whose parts are there and are what their checksums say, in ascending order."""
+        """Shards whose parts exist and match their checksums, in ascending order."""
         return [index for index in range(self.sweep.shards) if self._is_whole(index)]
 
     def keep(self, shard: Finished) -> None:
@@ -65,7 +65,7 @@ class Store:
         odd = next((name for name, value in wanted.items() if shard.made_with.get(name) != value), None)
         if odd is not None:
             raise TunnelError(
-                f"a worker has {odd} {shard.made_with.get(odd)}, but this sweep is made with {wanted[odd]}",
+                f"a worker has {odd} {shard.made_with.get(odd)}, but this sweep uses {wanted[odd]}",
                 where=shown(self.folder),
                 remedy="give every worker the same environment (threads: OMP_NUM_THREADS=1)",
             )
@@ -78,12 +78,12 @@ class Store:
         write_whole(self._part(RESULTS, shard.index), shard.results)
 
     def tidy(self) -> None:
-        """Remove what a killed run left half written."""
+        """Remove partial files that a killed run left."""
         for name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS):
             clear_leftovers(self.folder / name)
 
     def scan(self, dataset: str = RESULTS) -> pl.LazyFrame:
-        """What the finished shards hold, in the order of the cases.
+        """The rows of the finished shards, in the order of the cases.
 
         Args:
             dataset: ``results``, ``records`` or ``timings``.
@@ -101,7 +101,7 @@ class Store:
             raise TunnelError(
                 f"there are no {dataset}",
                 where=shown(self.folder),
-                remedy="run the sweep first" if not parts else "ask for them in the sweep file",
+                remedy="run the sweep first" if not parts else "set records = true in the sweep file",
             )
         return pl.scan_parquet(parts)
 
@@ -116,12 +116,12 @@ class Store:
         return f"part-{index:0{width}d}"
 
     def _line(self, dataset: str, index: int, content: bytes) -> str:
-        """What ``sha256sum`` says of a part."""
+        """The line of ``sha256sum`` for a part."""
         name = self._part(dataset, index).relative_to(self.folder).as_posix()
         return f"{hashlib.sha256(content).hexdigest()}  {name}\n"
 
     def _is_whole(self, index: int) -> bool:
-        """Whether a shard's parts are there, to the bit."""
+        """Whether the parts of a shard exist and match their checksums."""
         kept = (RESULTS, RECORDS) if self.sweep.document.records else (RESULTS,)
         try:
             known = read_regular(self._checksum(index), limits.DOCUMENT_BYTES)
@@ -132,11 +132,11 @@ class Store:
 
 
 def begin(sweep: Sweep, folder: Path) -> Store:
-    """The folder of a sweep, new or begun.
+    """The folder of a sweep, which may be new.
 
     Args:
-        sweep: what it shall hold.
-        folder: made where it is missing.
+        sweep: to store in it.
+        folder: created where it is missing.
 
     Returns:
         The store.
@@ -173,7 +173,7 @@ def begin(sweep: Sweep, folder: Path) -> Store:
 
 
 def open_store(folder: Path) -> Store:
-    """A folder that holds a sweep, finished or not.
+    """Open the folder of a sweep, finished or not.
 
     Args:
         folder: as given to `begin`.
@@ -182,7 +182,7 @@ def open_store(folder: Path) -> Store:
         The store.
 
     Raises:
-        TunnelError: when it holds none, one of another version of the format, or one that is malformed.
+        TunnelError: when it holds no sweep, or one that is malformed or of another version of the format.
     """
     path = folder / MANIFEST
     document = read_json(path, remedy="name the folder of a sweep")
@@ -190,7 +190,7 @@ def open_store(folder: Path) -> Store:
         raise TunnelError(
             f"this program reads version {SCHEMA_VERSION} only", where=shown(path), remedy=_ELSEWHERE
         )
-    with as_described("is no sweep", shown(path), _ELSEWHERE):
+    with as_described("is not a sweep", shown(path), _ELSEWHERE):
         made_with = {str(name): str(value) for name, value in document["made_with"].items()}
         return Store(folder, Sweep.from_json(json.dumps(document["sweep"])), made_with)
 
@@ -203,7 +203,7 @@ def _check_same(store: Store, sweep: Sweep, versions: Mapping[str, str]) -> None
             {**old["document"], "rig": old["rigs"]}, {**new["document"], "rig": new["rigs"]}
         )
         raise TunnelError(
-            f"the folder holds sweep '{store.sweep.document.name}', whose {key} is not that of the file",
+            f"the folder holds sweep '{store.sweep.document.name}', whose {key} differs from the file's",
             where=where,
             remedy=f"{_ELSEWHERE}, or undo the change",
         )

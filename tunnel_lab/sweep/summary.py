@@ -1,7 +1,8 @@
-"""What people look at in a sweep: error against noise, speed, spring and severity, per estimator, with intervals.
+"""Summary of a sweep: error against noise, speed, spring and severity, per estimator, with intervals.
 
-Errors are in % of the truth, or in the quantity's unit where a truth is zero. Along an axis the others are pooled.
-Noise, speed and spring are looked at without effects where the sweep has such cases; they stand at severity 0, too.
+Errors are in % of the truth, or in the quantity's unit where a truth is zero. The values of the other axes are
+pooled. Lines along noise, speed and spring use the cases without effects where the sweep has such cases, which
+are also severity 0.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ AXES = {
     "spring_stiffness": ("spring stiffness", "N m/rad"),
     "duration": ("duration", "s"),
 }
-"""Columns a summary is drawn along, each with its name and unit."""
+"""Columns that a summary uses as axes, each with its name and unit."""
 NOT_ASKED = (
     "ok",
     "model_departs",
@@ -43,16 +44,16 @@ NOT_ASKED = (
     "damping_not_separable",
     "no_reference_size",
 )
-"""Statuses under which a value that is missing is none the runs could give: no failure of the estimator."""
+"""Statuses of values that the runs cannot give; these are not failures of the estimator."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """One figure's worth: an estimator, a quantity and a place on an axis.
+    """The score of an estimator for a quantity at a place on an axis.
 
     Args:
         axis: a key of `AXES`, ``severity`` or ``all``.
-        effect: whose severity it is; the effects pooled otherwise.
+        effect: the effect whose severity it is; otherwise the pooled effects.
         at: the value on the axis, in its unit; None for ``all``.
         at_unit: unit of the axis.
         estimator: its name.
@@ -88,7 +89,7 @@ def _share(name: str, share: Proportion | None) -> dict[str, float | None]:
 
 
 def summarise(store: Store) -> list[Line]:
-    """Score what is finished of a sweep.
+    """Score the finished part of a sweep.
 
     Args:
         store: at least one shard finished.
@@ -104,7 +105,7 @@ def summarise(store: Store) -> list[Line]:
     frame = store.scan()
     if not store.sweep.document.estimators:
         raise TunnelError(
-            "the sweep has no estimators", where=str(store.folder), remedy="there is nothing to summarise"
+            "the sweep has no estimators", where=str(store.folder), remedy="there is no estimate to summarise"
         )
     pairs = frame.select("estimator", "quantity").unique(maintain_order=True).collect()
     columns = ("effect", "severity", *AXES, "truth", "value", "std", "status", "unit")
@@ -166,7 +167,7 @@ def _score(data: pl.DataFrame) -> Score:
 
 @dataclass(frozen=True)
 class Pace:
-    """What a step of the work took.
+    """Time of one step of the work.
 
     Args:
         step: ``simulate``, an estimator's name or ``pack``.
@@ -182,7 +183,7 @@ class Pace:
 
 
 def paces(store: Store) -> Sequence[Pace]:
-    """How long the steps of a sweep took per run; with other load on the machine these are not comparable.
+    """Times of the steps of a sweep per run; they are not comparable under different machine load.
 
     Args:
         store: at least one shard finished.

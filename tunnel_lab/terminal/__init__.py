@@ -1,1 +1,1 @@
-"""What commands print: tables, numbers, progress."""
+"""Output of the commands: tables, numbers, progress."""

@@ -1,4 +1,4 @@
-"""An uncertainty budget as a table: what every source adds, and what dominates."""
+"""An uncertainty budget as a table: the share of every source, and which dominates."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def budget_table(budget: Budget) -> Table:
         budget: of an estimate.
 
     Returns:
-        A row for each source and one for all of them, in the quantities' units; a negative one is what a
-        correlation takes away.
+        A row for each source and one for all of them, in the quantities' units; a negative value is the
+        reduction by a correlation.
     """
     shown = [name for name in budget.names if name in PARAMETERS]
     headings = [f"{SYMBOLS[name]}\n{unit(budget.units[budget.names.index(name)])}" for name in shown]
@@ -49,7 +49,7 @@ def _cell(budget: Budget, component: Component, name: str) -> str:
 
 
 def budget_lines(budget: Budget) -> list[str]:
-    """What dominates each quantity, and the notes of the sources.
+    """The dominant source of each quantity, and the notes of the sources.
 
     Args:
         budget: of an estimate.

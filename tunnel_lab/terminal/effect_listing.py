@@ -18,19 +18,19 @@ ABOUT_DIRECTIONS = (
     "Moments stand on the right-hand side of Izz β̈ + Cr β̇ + Kr β = Ka β + Ca β̇, with Ka = ½ρV²Al Cnβ and "
     "Ca = ½ρVAl² Cnr; y is the reading."
 )
-"""What an equation of the listing refers to."""
+"""The sign convention of the equations."""
 
 _PAGE_HEAD = """# Effects
 
 <!-- Written by `tunnel effects --markdown docs/reference/effects.md`: change the registry, not this page. -->
 
-What the nominal model leaves out, by the names under which `tunnel simulate` injects it and the diagnosis
-answers. `always` acts with the wind off too, `wind_on` only with the wind on.
+Effects that the nominal model leaves out. `tunnel simulate` injects them by these names, and the diagnosis answers
+with them. `always` acts with the wind on or off, `wind_on` only with the wind on.
 
 {directions}
 
-Every effect's first parameter is its severity; at zero the record is that of no effect to the last bit. A
-number in a plan or on the command line is in the unit given here:
+The first parameter of an effect is its severity. At zero the record is identical to one without the effect, to the
+last bit. Numbers in a plan or on the command line are in the units given here:
 
 ```toml
 [[effects]]
@@ -42,8 +42,8 @@ parameters = {{ friction_moment = 0.004 }}   # N m
 tunnel simulate plan.toml --out c --effect coulomb_friction:friction_moment=0.004
 ```
 
-Real effects never have exactly these forms; a name stands for a family. What no free decay can show of them
-is said in [what no free decay can show](../theory/what-no-free-decay-can-show.md).
+Real effects never have exactly these forms; a name stands for a family. Some of their properties cannot be seen in
+any free decay: see [what no free decay can show](../theory/what-no-free-decay-can-show.md).
 
 """
 
@@ -66,7 +66,7 @@ def summary(kind: type[Effect]) -> str:
 
 
 def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
-    """Effects with all that is known of them, in JSON's types.
+    """The full description of effects, in JSON's types.
 
     Args:
         kinds: effects.
@@ -108,7 +108,7 @@ def listing(kinds: Sequence[type[Effect]]) -> Table:
 
     last = "equation, then parameters [unit]"
     result = table("Effects beyond the nominal model", "effect", "channel", "condition", last)
-    for column in result.columns[:3]:  # names are to be copied: never folded
+    for column in result.columns[:3]:  # names are to be copied, so never folded
         column.no_wrap = True
     for kind in kinds:
         parameters = [f"{info.name} {info.symbol} [{pretty_unit(info.unit)}]" for info in kind.parameters()]
@@ -139,7 +139,7 @@ def parameter_table(kind: type[Effect]) -> Table:
 
 
 def lines(kind: type[Effect]) -> list[str]:
-    """All that is known of one effect besides its parameters.
+    """The description of one effect without its parameters.
 
     Args:
         kind: the effect.
@@ -147,7 +147,7 @@ def lines(kind: type[Effect]) -> list[str]:
     Returns:
         Lines for the terminal.
     """
-    drawn = ["drawn:      a random moment, another in every run"] if kind.random == "broad_band" else []
+    drawn = ["drawn:      a random moment, different in every run"] if kind.random == "broad_band" else []
     return [
         f"{kind.name}: {summary(kind)}",
         "",
@@ -162,7 +162,7 @@ def lines(kind: type[Effect]) -> list[str]:
 
 
 def example(kind: type[Effect]) -> str:
-    """How ``tunnel simulate`` is told to inject an effect of typical size.
+    """The option of ``tunnel simulate`` that injects an effect of typical size.
 
     Args:
         kind: the effect.
@@ -175,7 +175,7 @@ def example(kind: type[Effect]) -> str:
 
 
 def _typical(info: ParameterInfo) -> float:
-    """A value that may be given: the default where it is not zero, else the typical size."""
+    """A suitable value: the default where it is not zero, else the typical size."""
     return info.default or info.scale
 
 
@@ -223,5 +223,5 @@ def _section(kind: type[Effect]) -> str:
 
 
 def _cell(text: str) -> str:
-    """Text whose bars do not end a cell of a Markdown table."""
+    """Text with escaped bars for a cell of a Markdown table."""
     return text.replace("|", "\\|")

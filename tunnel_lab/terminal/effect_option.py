@@ -1,4 +1,4 @@
-"""An effect as one word of the command line: ``name:parameter=value,parameter=value``."""
+"""An effect on the command line: ``name:parameter=value,parameter=value``."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def parse_effect(text: str) -> EffectSetting:
         text: such as ``coulomb_friction:friction_moment=0.004``.
 
     Returns:
-        Name and parameters; whether they exist and are in range is the registry's to say.
+        Name and parameters; the registry checks whether they exist and are in range.
 
     Raises:
-        TunnelError: when it has not that form, or a value is no number.
+        TunnelError: when it does not have that form, or a value is not a number.
     """
     from tunnel_sim.vocabulary.plan import EffectSetting
 
@@ -32,13 +32,13 @@ def parse_effect(text: str) -> EffectSetting:
     for part in rest.split(",") if rest else []:
         parameter, equals, value = (piece.strip() for piece in part.partition("="))
         if not (parameter and equals and value):
-            raise TunnelError(f"{part!r} is no PARAMETER=VALUE", where=where, remedy=_FORM)
+            raise TunnelError(f"{part!r} is not PARAMETER=VALUE", where=where, remedy=_FORM)
         if parameter in values:
             raise TunnelError(f"{parameter} is given twice", where=where, remedy="give it once")
         try:
             values[parameter] = float(value)
         except ValueError:
-            raise TunnelError(f"{value!r} is no number", where=where, remedy=_FORM) from None
+            raise TunnelError(f"{value!r} is not a number", where=where, remedy=_FORM) from None
     if not name.strip():
         raise TunnelError("no effect is named", where=where, remedy=_FORM)
     return EffectSetting(name.strip(), values)

@@ -1,4 +1,4 @@
-"""The list of estimators in a command's help, from the registry, so that it is never out of date."""
+"""The list of estimators in a command's help, generated from the registry."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import typer
 from typer.core import TyperCommand
 
 PLACE = "{estimators}"
-"""What stands in a command's docstring where the list belongs."""
+"""Placeholder of the list in a command's docstring."""
 
 _WIDTH = 78
 _INDENT = "  "
 
 
 def command_with_estimators() -> type[TyperCommand]:
-    """The kind of command whose help lists the estimators; the registry is read when the help is asked for."""
+    """A command class whose help lists the estimators; the registry is read when the help is shown."""
     return _CommandWithEstimators
 
 

@@ -13,12 +13,12 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[[int, int, str
     """A progress bar on standard error, where that is a terminal; elsewhere nothing is printed.
 
     Args:
-        what: is going on.
+        what: description of the work.
         total: number of items, where it is known beforehand.
 
     Yields:
-        What to tell the number done, the number in all and the last one's name to. The first call says what was
-        done before, and does not count for the speed.
+        A function to call with the number finished, the total and the name of the last item. The first call gives
+        the number finished before, which does not count for the speed.
     """
     from rich.progress import (
         BarColumn,

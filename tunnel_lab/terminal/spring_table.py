@@ -51,14 +51,14 @@ def read_spring_table(path: Path) -> SpringTable:
         (n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")
     ]
     check_count(len(lines) - 1, limits.SPRINGS, "springs", shown(path), "leave some out")
-    # Line by line: a quoted line feed has no business in such a table.
+    # Line by line: quoted line feeds are not allowed in this table.
     rows = [(number, _values(line, f"{path}, line {number}")) for number, line in lines]
     if not rows:
         raise TunnelError("is empty", where=str(path), remedy=REMEDY)
     columns = _columns([name.strip() for name in rows[0][1]], path)
     table = [_row(row, columns, f"{path}, line {number}") for number, row in rows[1:]]
     if len(table) < 3:
-        raise TunnelError(f"has {len(table)} springs", where=str(path), remedy="a line needs three or more")
+        raise TunnelError(f"has {len(table)} springs", where=str(path), remedy="give three or more")
     names = tuple(name or str(number) for number, (name, _, _) in enumerate(table, 1))
     return SpringTable(names, tuple(row[1] for row in table), tuple(row[2] for row in table))
 
@@ -67,11 +67,11 @@ def _values(line: str, where: str) -> list[str]:
     try:
         return next(csv.reader([line]))
     except csv.Error as error:
-        raise TunnelError(f"is no line of CSV ({error})", where=where, remedy=REMEDY) from None
+        raise TunnelError(f"is not a line of CSV ({error})", where=where, remedy=REMEDY) from None
 
 
 def _columns(header: list[str], path: Path) -> dict[str, int]:
-    """Where each known column stands."""
+    """Index of each known column."""
     known = (NAME, STIFFNESS, FREQUENCY)
     for name in header:
         if name not in known:
@@ -95,7 +95,7 @@ def _row(row: list[str], columns: dict[str, int], where: str) -> tuple[str, floa
 
 
 def _positive(text: str, where: str) -> float:
-    """A number above zero that can be computed with."""
+    """A number above zero and within the limits."""
     try:
         value = float(text)
     except ValueError:

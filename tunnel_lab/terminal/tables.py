@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 
 BRACKETS = "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10."
-"""Said once below tables in the short notation."""
+"""Printed once below tables in the short notation."""
 
 
 class _Console(Console):
-    """A console that leaves it to ``main`` to end when the reader of a pipe goes away."""
+    """A console that leaves a closed pipe to ``main``."""
 
     def on_broken_pipe(self) -> None:
         """Pass the error on; Rich itself would exit with status 1."""
@@ -32,7 +32,7 @@ class _Console(Console):
 
 
 def console(*, stderr: bool = False) -> Console:
-    """A console that colours nothing by guesswork and reads no markup: text is shown as it is.
+    """A console without highlighting and markup: text is printed unchanged.
 
     Args:
         stderr: print to standard error, where progress and status lines go.
@@ -44,7 +44,7 @@ def console(*, stderr: bool = False) -> Console:
 
 
 def say(line: str, *, stderr: bool = False) -> None:
-    """Print one line as it is: no markup, no wrapping, so that paths can be copied.
+    """Print one line unchanged: no markup and no wrapping, so that paths can be copied.
 
     Args:
         line: the text.
@@ -67,7 +67,7 @@ def show_tables(*tables: Table) -> None:
 
 
 def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
-    """An empty table in the house's style.
+    """An empty table in the common style.
 
     Args:
         title: above it.
@@ -81,7 +81,7 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
         title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_edge=False
     )
     for column in columns:
-        # As text, not markup: units stand in brackets. Folded, not cut: a digit must not be lost.
+        # As text, not markup: units stand in brackets. Folded, not cut, so that no digit is lost.
         result.add_column(Text(column), justify="right" if column in right else "left", overflow="fold")
     return result
 
@@ -102,7 +102,7 @@ def rich_table(plain: TextTable) -> Table:
 
 
 def coefficients_table(estimate: Estimate) -> Table:
-    """The campaign's coefficients, those that could be had.
+    """The coefficients that were identified.
 
     Args:
         estimate: of any campaign.
@@ -114,7 +114,7 @@ def coefficients_table(estimate: Estimate) -> Table:
 
 
 def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Table:
-    """What each estimator says, beside what was injected.
+    """Estimates beside the injected values.
 
     Args:
         estimates: of one simulated campaign, one per estimator.
@@ -175,7 +175,7 @@ def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
 
 
 def windows_table(run: RunEstimate) -> Table:
-    """The run seen through consecutive windows, as in the paper's Table III.
+    """Estimates of consecutive windows of a run, as in the paper's Table III.
 
     Args:
         run: an estimate of one run.
@@ -201,7 +201,7 @@ def windows_table(run: RunEstimate) -> Table:
 
 
 def status_lines(estimate: Estimate) -> list[str]:
-    """What the estimate and its runs have to say, each thing once.
+    """The statuses of the estimate and its runs, each once.
 
     Args:
         estimate: of any campaign.
@@ -218,7 +218,7 @@ def _named(symbol: str, unit_name: str) -> Text:
 
 
 def _concise(quantity: Quantity | None) -> str:
-    """A quantity whose unit stands in the heading."""
+    """A quantity without its unit, which is in the heading."""
     return "–" if quantity is None else concise(quantity.value, quantity.std)
 
 

@@ -145,6 +145,25 @@ def test_an_interrupted_run_leaves_no_file(
     assert list((tmp_path / "out").iterdir()) == []
 
 
+def test_a_calm_campaign_without_held_out_runs_claims_neither_wind_nor_prediction(
+    tunnel: Tunnel, tmp_path: Path
+) -> None:
+    calm = PLAN.replace("[0.0, 15.0]", "[0.0]").replace("[20.0, 8.0]", "[20.0]")
+    (tmp_path / "plan.toml").write_text(calm, encoding="utf-8")
+    folder = write_campaign(simulate_campaign(load_plan(tmp_path / "plan.toml")), tmp_path / "calm")
+    answer, page = tmp_path / "answer.json", tmp_path / "report.html"
+    status, out, _ = tunnel("diagnose", folder, "--effects", CAUSE, "--json", answer, "--report", page)
+    assert status == 0
+    document = json.loads(answer.read_text(encoding="utf-8"))
+    assert document["causes"] == [CAUSE]
+    assert not any(run["held_out"] for run in document["gap"]["runs"])
+    assert document["gap"]["closed_on"] in document["verdict"]
+    for text in (out, document["verdict"], page.read_text(encoding="utf-8")):
+        assert "in the fitted runs (none could be held out)" in text
+        assert "on runs held out" not in text
+        assert "with the wind on and off" not in text
+
+
 def test_one_run_says_what_it_cannot_show(tunnel: Tunnel, tmp_path: Path) -> None:
     data = campaign([Setting(16.12, 0.0)], duration=5.0, rate=500.0, noise=5e-4, rng=np.random.default_rng(2))
     status, out, _ = tunnel("diagnose", write_campaign(data, tmp_path / "one"))

@@ -102,10 +102,10 @@ def test_an_effect_is_read_from_one_word() -> None:
 @pytest.mark.parametrize(
     ("text", "part"),
     [
-        ("coulomb_friction:friction_moment", "'friction_moment' is no PARAMETER=VALUE"),
-        ("coulomb_friction:friction_moment=", "is no PARAMETER=VALUE"),
-        ("coulomb_friction:friction_moment=0.1,", "'' is no PARAMETER=VALUE"),
-        ("coulomb_friction:friction_moment=much", "'much' is no number"),
+        ("coulomb_friction:friction_moment", "'friction_moment' is not PARAMETER=VALUE"),
+        ("coulomb_friction:friction_moment=", "is not PARAMETER=VALUE"),
+        ("coulomb_friction:friction_moment=0.1,", "'' is not PARAMETER=VALUE"),
+        ("coulomb_friction:friction_moment=much", "'much' is not a number"),
         ("free_play:half_width=0.1,half_width=0.2", "half_width is given twice"),
         (":friction_moment=0.1", "no effect is named"),
         ("", "no effect is named"),
@@ -143,7 +143,7 @@ def test_effects_are_added_to_the_plans(tunnel: Tunnel, tmp_path: Path) -> None:
         (["coulomb_friction:friction_moment=-1"], "-1.0 is out of range"),
         (["coulomb_friction"], "friction_moment is missing"),
         ([FRICTION, FRICTION], "given twice"),
-        (["coulomb_friction:0.1"], "is no PARAMETER=VALUE"),
+        (["coulomb_friction:0.1"], "is not PARAMETER=VALUE"),
         (["spring_miscalibration:error=0.1,spring_stiffness=1"], "no run has a spring_stiffness of 1"),
     ],
 )

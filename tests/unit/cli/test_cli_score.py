@@ -134,7 +134,7 @@ def test_a_new_estimator_is_said_to_be_unchecked(tunnel: Tunnel, baseline: Path)
         (["--check", "none.parquet"], ["none.parquet", "no such file"]),
         (["missing.toml"], ["missing.toml", "no such file"]),
         (["--write-baseline", "no/such/folder.parquet"], ["folder"]),
-        (["--breakdown", "--check", "packaged"], ["--check", "does not go with --breakdown"]),
+        (["--breakdown", "--check", "packaged"], ["--check", "cannot be combined with --breakdown"]),
         (["--trials", "1"], ["--trials"]),
         (["--jobs", "-1"], ["--jobs"]),
     ],

@@ -35,7 +35,7 @@ def test_interrupted_and_gone_on_with_to_the_same_bits(tmp_path, monkeypatch, ca
     monkeypatch.setattr(module, "advance", interrupted)
     assert main(["train", str(out), *QUICK]) == 130
     assert not out.exists()
-    assert "the same command goes on" in capsys.readouterr().err
+    assert "the same command continues" in capsys.readouterr().err
     assert main(["train", str(out), "--seed", "9", *QUICK]) == 2
     assert "--restart" in capsys.readouterr().err
     assert main(["train", str(out), *QUICK]) == 0
@@ -49,8 +49,8 @@ def test_interrupted_and_gone_on_with_to_the_same_bits(tmp_path, monkeypatch, ca
     [
         (["w.st"], "does not end in .safetensors"),
         (["none/w.safetensors"], "its folder does not exist"),
-        (["w.safetensors", "--zeta", "0.3", "0.1"], "0.3 0.1 is no range"),
-        (["w.safetensors", "--omega", "0", "26"], "0 26 is no range"),
+        (["w.safetensors", "--zeta", "0.3", "0.1"], "0.3 0.1 is not a range"),
+        (["w.safetensors", "--omega", "0", "26"], "0 26 is not a range"),
     ],
 )
 def test_bad_input_is_one_line_and_nothing_written(words, said, tmp_path, monkeypatch, capsys):

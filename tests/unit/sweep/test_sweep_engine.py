@@ -97,7 +97,7 @@ def test_a_lost_process_costs_nothing(sweep: Sweep, here, tmp_path: Path) -> Non
             os.kill(killed[0], signal.SIGKILL)
 
     run_sweep(sweep, tmp_path / "out", in_processes(2, said.append), kill_one)
-    assert said == ["a worker process was lost; its shards are done again"]
+    assert said == ["a worker process was lost; its shards are repeated"]
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")
 
 
@@ -125,8 +125,8 @@ def test_a_changed_file_is_refused_and_a_comment_is_no_change(sweep: Sweep, here
     run_sweep(sweep, tmp_path / "out", here)
     before = contents(tmp_path / "out")
     for text, said in (
-        (SMALL.replace("seed = 1", "seed = 2"), "whose seed is not that of the file"),
-        (SMALL.replace("0.02]", "0.03]"), "whose effects is not that of the file"),
+        (SMALL.replace("seed = 1", "seed = 2"), "whose seed differs from the file's"),
+        (SMALL.replace("0.02]", "0.03]"), "whose effects differs from the file's"),
     ):
         (tmp_path / "changed.toml").write_text(text, encoding="utf-8")
         with pytest.raises(TunnelError, match=said):
@@ -145,7 +145,7 @@ def test_other_versions_are_refused(
     with pytest.raises(TunnelError, match=r"begun with numpy 1\.0"):
         run_sweep(sweep, tmp_path / "old", here)
     monkeypatch.setenv("OMP_NUM_THREADS", "4")
-    with pytest.raises(TunnelError, match="a worker has threads 4, but this sweep is made with 1"):
+    with pytest.raises(TunnelError, match="a worker has threads 4, but this sweep uses 1"):
         run_sweep(sweep, tmp_path / "new", here)
     assert open_store(tmp_path / "new").finished() == []
 

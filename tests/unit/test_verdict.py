@@ -1,0 +1,67 @@
+"""What the answer says of itself: the same words in verdict, JSON, terminal and page."""
+
+from __future__ import annotations
+
+import pytest
+from diagnosis_document import campaign, document
+
+from diagnosis.answer.verdict import verdict
+from diagnosis.result import GapSummary, RunGap
+from tunnel_lab.diagnosis_view import view
+from tunnel_lab.diagnosis_view.page import render_report
+from tunnel_lab.terminal import diagnosis_tables
+
+
+def gap(*held_out: bool) -> GapSummary:
+    runs = tuple(RunGap(f"r{i}", 2.0, 0.1, held_out=held) for i, held in enumerate(held_out))
+    return GapSummary(True, 2.0, 0.1, 0.95, runs, 0.01, 1e-9)
+
+
+def said(*causes: str, closed_on: str = "somewhere", both_winds: bool = True) -> str:
+    return verdict(
+        causes,
+        before=2.0,
+        after=0.1,
+        closed=0.95,
+        probability=0.9,
+        closed_on=closed_on,
+        both_winds=both_winds,
+    )
+
+
+@pytest.mark.parametrize(
+    ("held_out", "closed_on", "after_on"),
+    [
+        ((True, True), "on runs held out of the fit", "on runs held out of the fit"),
+        ((True, False), "on runs held out of the fit", "in all runs, 1 of 2 held out of the fit"),
+        ((False, False), *["in the fitted runs (none could be held out)"] * 2),
+    ],
+)
+def test_the_runs_of_the_closure_are_named(held_out, closed_on, after_on):
+    found = gap(*held_out)
+    assert (found.closed_on, found.after_on) == (closed_on, after_on)
+    assert f"closes {closed_on}," in said("coulomb_friction", closed_on=found.closed_on)
+
+
+def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
+    found = gap(False, False, False)
+    given = document()
+    given["verdict"] = said("quadratic_damping", closed_on=found.closed_on)
+    given["gap"] |= {"closed_on": found.closed_on, "after_on": found.after_on}
+    for run in given["gap"]["runs"]:
+        run["held_out"] = False
+    notes = [fact.note for fact in view.facts(given)]
+    assert notes.count(found.closed_on) == 2
+    assert not any("on runs held out" in note for note in notes)
+    page = render_report(given, campaign())
+    assert "on runs held out" not in page
+    assert "run held out" not in page
+    table = diagnosis_tables.gap_table(given)
+    assert [str(column.header) for column in table.columns] == ["run", "before", "after"]
+
+
+@pytest.mark.parametrize("cause", ["coulomb_friction", "nonlinear_yaw_moment"])
+def test_the_wind_is_mentioned_only_where_runs_have_it_on_and_off(cause):
+    assert "wind" not in said(cause, both_winds=False)
+    assert "with the wind on" in said(cause)
+    assert ("with the wind on and off" in said(cause)) == (cause == "coulomb_friction")

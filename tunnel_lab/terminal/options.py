@@ -1,0 +1,49 @@
+"""Parts of the command line that several commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+PLAN_HELP = "Plan of a campaign (TOML). Default: the rig with its default spring at 10 m/s."
+RUN_HELP = "Run of the plan. Default: its first."
+EFFECT_HELP = "Add an effect to the nominal model. May be repeated; tunnel effects lists them."
+
+SpringOption = Annotated[int | None, typer.Option("--spring", help="Number of the spring in Table II.")]
+WindOption = Annotated[float | None, typer.Option("--wind", help="Wind speed, m/s.")]
+AngleOption = Annotated[float | None, typer.Option("--angle", help="Release angle, degrees.")]
+EffectOption = Annotated[
+    list[str] | None, typer.Option("--effect", metavar="NAME:PARAMETER=VALUE", help=EFFECT_HELP)
+]
+
+
+def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
+    """Names from repeated options, from lists with commas, or from both.
+
+    Args:
+        words: as typed.
+
+    Returns:
+        Names without blanks, in the order given.
+    """
+    return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())
+
+
+def known_estimator(name: str) -> None:
+    """Refuse an unknown estimator.
+
+    Args:
+        name: as typed.
+
+    Raises:
+        TunnelError: when there is no such estimator; it suggests the closest name.
+    """
+    from identification.estimators import ALL_ESTIMATORS
+    from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+
+    if name not in ALL_ESTIMATORS:
+        raise TunnelError(
+            f"there is no estimator {name!r}", where="--estimator", remedy=did_you_mean(name, ALL_ESTIMATORS)
+        )
