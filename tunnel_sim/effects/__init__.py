@@ -1,4 +1,4 @@
-"""The vocabulary of unmodelled effects: each defined once, for injection, fitting and report."""
+"""The unmodelled effects: each is defined once and serves injection, fitting and reports."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from tunnel_sim.effects.wind_speed_drift import WindSpeedDrift
 from tunnel_sim.effects.wind_speed_offset import WindSpeedOffset
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
-#: Every effect, in the order of the vocabulary.
+#: Every effect, in the order in which they are listed and applied.
 ALL_EFFECTS: tuple[type[Effect], ...] = (
     CoulombFriction,
     QuadraticDamping,
@@ -60,16 +60,13 @@ ALL_EFFECTS: tuple[type[Effect], ...] = (
 
 
 def effect_class(name: str) -> type[Effect]:
-    """The effect of a name.
+    """The class of the effect with a given name.
 
     Args:
-        name: as in the vocabulary, such as ``coulomb_friction``.
-
-    Returns:
-        Its class.
+        name: such as ``coulomb_friction``.
 
     Raises:
-        TunnelError: when there is none, with the closest name.
+        TunnelError: when there is none; the message suggests the closest name.
     """
     for kind in ALL_EFFECTS:
         if kind.name == name:
@@ -80,13 +77,10 @@ def effect_class(name: str) -> type[Effect]:
 
 
 def the_effect(**traits: object) -> type[Effect]:
-    """The one effect of the vocabulary with these traits.
+    """The class of the only effect with given traits.
 
     Args:
         **traits: as listed in `Effect`.
-
-    Returns:
-        Its class.
 
     Raises:
         LookupError: when there is none, or more than one.
@@ -101,8 +95,8 @@ def effect_from(name: str, parameters: Mapping[str, float]) -> Effect:
     """An effect by name.
 
     Args:
-        name: as in the vocabulary.
-        parameters: by name, in their units; what is not given takes its default.
+        name: such as ``coulomb_friction``.
+        parameters: by name, in their units; the others take their defaults.
 
     Returns:
         The effect.
