@@ -18,7 +18,7 @@ class SensorClipping(Effect):
     """A reading that saturates.
 
     Args:
-        limit: greatest reading, rad; 0: no limit.
+        limit: greatest possible reading, rad; 0: no limit.
         centre: middle of the possible readings, rad; 0 in the textbook form.
         knee: share of the limit over which the reading saturates gradually, dimensionless; 0 in the textbook form.
     """
@@ -31,7 +31,9 @@ class SensorClipping(Effect):
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     tries = 2
 
-    limit: float = parameter("L", "rad", "greatest reading; 0: no limit", scale=0.3, lower=0.0, upper=10.0)
+    limit: float = parameter(
+        "L", "rad", "greatest possible reading (0: no limit)", scale=0.3, lower=0.0, upper=10.0
+    )
     centre: float = parameter(
         "c", "rad", "middle of the possible readings", scale=0.05, lower=-5.0, upper=5.0, form=True
     )

@@ -16,7 +16,7 @@ class SpringMiscalibration(Effect):
     """One spring that is not as stiff as stated.
 
     Args:
-        error: relative error, true over stated stiffness less one, dimensionless.
+        error: true over stated stiffness, less one, dimensionless.
         spring_stiffness: stated stiffness of the spring concerned, N m/rad.
     """
 
@@ -35,7 +35,7 @@ class SpringMiscalibration(Effect):
     error: float = parameter(
         "x",
         "1",
-        "relative error: true over stated stiffness, less one",
+        "true over stated stiffness, less one",
         scale=0.02,
         lower=-0.9,
         upper=9.0,

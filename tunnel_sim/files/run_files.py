@@ -1,4 +1,4 @@
-"""Run files: one table of times and angles, as CSV or Parquet."""
+"""Run files: tables of times and angles in CSV or Parquet."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ _COLUMNS = "a column yaw_rad or yaw_deg, and time_s unless [sensor] sample_rate 
 def read_table(
     path: Path, where: str, *, timed: bool = False, most: int = limits.RUN_SAMPLES
 ) -> tuple[Array | None, Array, str]:
-    """Read the columns of a run file; others than those of the format are left alone.
+    """Read times and angles from a run file; other columns are ignored.
 
     Args:
         path: a ``.csv`` or ``.parquet`` file.
         where: file and run, for messages.
-        timed: whether times are needed, as no ``sample_rate`` is stated.
-        most: how many samples it may hold.
+        timed: whether times are required because no ``sample_rate`` is stated.
+        most: greatest number of samples.
 
     Returns:
         Times in s (None without a column time_s), the reading as written, and the name of its column:
         ``yaw_rad`` or ``yaw_deg``. All values are finite.
 
     Raises:
-        TunnelError: no such file, not a regular one, too large, not a table, a column missing or twice, a value
-            missing or not a number.
+        TunnelError: no such file, not a regular file, too large, not a table, a missing or repeated column, a
+            value that is missing or not a number.
     """
     readers = {".csv": _read_csv, ".parquet": _read_parquet}
     reader = readers.get(path.suffix.lower())
@@ -61,23 +61,23 @@ def read_table(
 
 
 def table_bytes(record: Record, path: Path) -> bytes:
-    """A record as the content of a run file; reading it gives the same numbers.
+    """The content of a run file with columns time_s and yaw_rad; reading it gives the same numbers.
 
     Args:
-        record: what to write; columns time_s and yaw_rad.
-        path: the ``.csv`` or ``.parquet`` file that it is for.
+        record: what to write.
+        path: the ``.csv`` or ``.parquet`` file, for the format and for messages.
 
     Raises:
         TunnelError: when the table cannot be encoded.
     """
     table = pl.DataFrame({"time_s": record.time_s, "yaw_rad": record.yaw_rad})
-    # CSV gets the shortest digits that read back as the same float.
+    # CSV values have the fewest digits that read back as the same float.
     return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
 
 
 @dataclass(frozen=True)
 class _Table:
-    """What a run file holds: at least the columns that are used, the names of all, and the first row's number."""
+    """A run file: at least the columns that are used, the names of all columns, and the number of the first row."""
 
     frame: pl.DataFrame
     names: Sequence[str]
@@ -85,11 +85,11 @@ class _Table:
 
 
 def _read_csv(content: bytes, where: str, most: int) -> _Table:
-    """The table as text; rows are counted by lines."""
-    if not content.isascii():  # which needs no second copy of a large file
+    """The table as text; rows are numbered as lines of the file."""
+    if not content.isascii():  # ASCII is checked first because it needs no second copy of a large file
         decoded(content, where)
     columns = content.partition(b"\n")[0].count(b",") + 1
-    check_count(columns, limits.COLUMNS, "columns", where, "leave out columns that nobody reads")
+    check_count(columns, limits.COLUMNS, "columns", where, "leave out unused columns")
     check_count(content.count(b"\n") - 1, most, "samples", where, "split the file, or thin it out")
     try:
         rows = pl.read_csv(content, has_header=False, infer_schema=False, quote_char=None)
@@ -109,7 +109,7 @@ def _read_csv(content: bytes, where: str, most: int) -> _Table:
     twice = next((name for name in names if name in _USED and names.count(name) > 1), None)
     if twice is not None:
         raise TunnelError(f"the column {twice} is there twice", where=where, remedy="leave one of them out")
-    # Other columns that have no name, or share one, are kept apart by their position; nobody asks for them.
+    # Unused columns without a name, or with a repeated one, are named by position.
     rows.columns = [
         name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)
     ]
@@ -117,7 +117,7 @@ def _read_csv(content: bytes, where: str, most: int) -> _Table:
 
 
 def _read_parquet(content: bytes, where: str, most: int) -> _Table:
-    """The columns that are used; rows are counted from 1."""
+    """The columns that are used; rows are numbered from 1."""
     remedy = "write the file again, as Parquet or as CSV"
     schema = frame_schema(content, where, remedy, rows=most, counted="samples")
     used = [name for name in schema if name in _USED]
@@ -166,13 +166,13 @@ def _without_blank_end(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def _numbers(series: pl.Series, first_line: int, where: str) -> Array:
-    """The values of a column as finite floats, or a message naming the first that is not."""
+    """The values of a column as finite floats; the message names the first value that is not."""
     if series.dtype == pl.String and first_line == 2:
         numbers = series.str.strip_chars(' \t\r"').cast(pl.Float64, strict=False)
     else:
         numbers = series.cast(pl.Float64)
     values: NDArray[np.float64] = numbers.fill_null(np.nan).to_numpy()
-    bad = np.flatnonzero(~(np.abs(values) <= limits.LARGEST_NUMBER))  # NaN is bad, too
+    bad = np.flatnonzero(~(np.abs(values) <= limits.LARGEST_NUMBER))  # true for NaN as well
     if bad.size:
         at = int(bad[0])
         cell = series[at]

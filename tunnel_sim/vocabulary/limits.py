@@ -1,7 +1,7 @@
-"""How much of anything is read, expanded or simulated, each with its reason; docs/reference/limits.md lists them.
+"""Limits on what is read, expanded or simulated, each with its reason; docs/reference/limits.md lists them.
 
-A limit stands far above what rigs record and far below what fills 2 GiB of memory or takes hours unasked. Whatever
-the simulator writes, the readers read: both keep to the same numbers.
+Each limit is far above what rigs record, and low enough that no input fills 2 GiB of memory or runs for hours
+unexpectedly. The simulator and the readers use the same limits, so whatever is written can be read.
 """
 
 from __future__ import annotations
