@@ -105,8 +105,8 @@ def plausible_run(record: Record, cycles: float, where: str) -> None:
     _check(f"a swing takes {step * per_cycle:.3g} s", step * per_cycle, RANGES["period"], where)
     if per_cycle < LEAST_SAMPLES_PER_CYCLE:
         raise TunnelError(
-            f"{per_cycle:.1f} samples per cycle: the sampling is too slow, and this motion may be the alias of a "
-            f"faster one",
+            f"{per_cycle:.1f} samples per cycle: {_LOOKS} too low a sample rate, and the motion may be the alias "
+            f"of a faster one",
             where=where,
             remedy=f"sample at {LEAST_SAMPLES_PER_CYCLE / (step * per_cycle):.3g} Hz or more; {KEEP}",
         )
