@@ -44,7 +44,7 @@ class UnsteadyAeroLag(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """A phase lag and a phase lead."""
+        """First a phase lag, then a phase lead."""
         del campaign
         scale = cls.parameters()[0].scale
         return [Trial({"lag": scale}, "lag"), Trial({"lag": -scale}, "lag")]
