@@ -1,1 +1,1 @@
-"""The rig's MJCF model and its engine plugin's source: data, no Python."""
+"""The rig's MJCF model and the source of the engine plugin: data only."""

@@ -1,10 +1,10 @@
-"""An independent reference simulator: the truth of blind checks and an oracle for the rest.
+"""An independent reference simulator: the truth of blind checks, and an oracle for tests.
 
-Pure NumPy. It shares no numerics with the MuJoCo model, the estimators or the diagnosis: another integrator
-(all runs of many campaigns advance together), another friction law (a stick-slip event with the state
-corrected inside the step), and for every family of effects further forms than the textbook one.
+It is pure NumPy and shares no numerics with the MuJoCo model, the estimators or the diagnosis. It has its own
+integrator (all runs of many campaigns advance together) and friction law (stick-slip events that correct the state
+within the step). For every family of effects it has further forms besides the textbook form.
 
-``conditions`` says what a campaign is, ``integrator`` moves it, ``moments`` and ``readings`` hold the laws,
-``forms`` and ``outside`` catalogue them, ``severity`` sizes them against the noise, ``draw`` draws campaigns
-and ``make`` writes them: ``python -m tunnel_reference.make OUT --count N --seed S``.
+``conditions`` defines a campaign, ``integrator`` integrates it, ``moments`` and ``readings`` contain the laws,
+``forms`` and ``outside`` list them, ``severity`` scales them relative to the noise, ``draw`` draws campaigns and
+``make`` writes them: ``python -m tunnel_reference.make OUT --count N --seed S``.
 """

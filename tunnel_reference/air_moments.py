@@ -1,6 +1,6 @@
-"""The laws of the air and of forcing: speed, angle and moments on the body.
+"""The laws of aerodynamics and forcing: speed, angle and moments on the body.
 
-Moments are N m on the right-hand side of Izz β̈ = …; ``rows`` are the runs a law applies to, ``p`` its
+Moments are in N m on the right-hand side of Izz β̈ = …; ``rows`` are the runs that a law applies to, ``p`` its
 parameters by run.
 """
 
@@ -25,12 +25,12 @@ def speed_settling(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> No
 
 
 def gust(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """V(t)/V = 1 + g exp(−((t − t0)/w)²): one slow gust, in the runs whose g is not zero."""
+    """V(t)/V = 1 + g exp(−((t − t0)/w)²): one slow gust, in the runs where g is not zero."""
     s.speed_ratio[rows] *= 1.0 + p["size"] * np.exp(-(((s.time - p["when"]) / p["width"]) ** 2))
 
 
 def lag(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
-    """Ka works on (1 − w1 − w2) β + w1 x1 + w2 x2 with τi ẋi = β − xi."""
+    """Ka acts on (1 − w1 − w2) β + w1 x1 + w2 x2 with τi ẋi = β − xi."""
     beta = s.beta[rows]
     deficiency = p["w1"] * (beta - x[0]) + p["w2"] * (beta - x[1])
     s.air_angle[rows] -= deficiency
@@ -39,14 +39,14 @@ def lag(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
 
 
 def lag_one(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
-    """Ka works on β − w (β − x) with τ ẋ = β − x; w = 1 is the lag, w = −1 a lead of the same time."""
+    """Ka acts on β − w (β − x) with τ ẋ = β − x; w = 1 is a lag, w = −1 a lead with the same time constant."""
     gap = s.beta[rows] - x[0]
     s.air_angle[rows] -= p["w1"] * gap
     dx[0] = gap / p["tau1"]
 
 
 def lag_cascade(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
-    """Ka works on x2 with τ/2 ẋ1 = β − x1, τ/2 ẋ2 = x1 − x2: two states in a row."""
+    """Ka acts on x2 with τ/2 ẋ1 = β − x1, τ/2 ẋ2 = x1 − x2: two lags in series."""
     beta = s.beta[rows]
     s.air_angle[rows] += x[1] - beta
     dx[0] = 2.0 * (beta - x[0]) / p["tau1"]
@@ -59,43 +59,43 @@ def _pressure_stiffness(s: Stage, rows: Rows) -> Array:
 
 
 def cubic_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """Ka (κ β³ + q β⁵) more."""
+    """Adds Ka (κ β³ + q β⁵)."""
     a = s.air_angle[rows]
     s.body[rows] += _pressure_stiffness(s, rows) * a**3 * (p["kappa"] + p["quintic"] * a * a)
 
 
 def saturating_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """Ka β/(1 + k|β|) in place of Ka β; k < 0 grows."""
+    """Ka β/(1 + k|β|) instead of Ka β; for k < 0 the moment grows faster than linearly."""
     a = s.air_angle[rows]
     s.body[rows] += _pressure_stiffness(s, rows) * (a / (1.0 + p["k"] * np.abs(a)) - a)
 
 
 def sine_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """Ka sin(kβ)/k in place of Ka β, k = √(6|κ|)."""
+    """Ka sin(kβ)/k instead of Ka β, k = √(6|κ|)."""
     a = s.air_angle[rows]
     k = np.sqrt(6.0 * np.abs(p["kappa"]))
     s.body[rows] += _pressure_stiffness(s, rows) * (np.sin(k * a) / k - a)
 
 
 def tangent_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """Ka arctan(kβ)/k in place of Ka β, k = √(3|κ|); κ > 0 mirrored: 2β − arctan(kβ)/k."""
+    """Ka arctan(kβ)/k instead of Ka β, k = √(3|κ|); for κ > 0 mirrored: 2β − arctan(kβ)/k."""
     a = s.air_angle[rows]
     k = np.sqrt(3.0 * np.abs(p["kappa"]))
     s.body[rows] += np.sign(p["kappa"]) * _pressure_stiffness(s, rows) * (a - np.arctan(k * a) / k)
 
 
 def nonlinear_air_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """Ca μ β² β̇ more."""
+    """Adds Ca μ β² β̇."""
     s.body[rows] += s.speed_ratio[rows] * s.air_damping[rows] * p["mu"] * s.beta[rows] ** 2 * s.rate[rows]
 
 
 def absolute_air_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """Ca m |β| β̇ more."""
+    """Adds Ca m |β| β̇."""
     s.body[rows] += s.speed_ratio[rows] * s.air_damping[rows] * p["mu"] * np.abs(s.beta[rows]) * s.rate[rows]
 
 
 def saturating_air_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """Ca μ β²/(1 + (β/b)²) β̇ more."""
+    """Adds Ca μ β²/(1 + (β/b)²) β̇."""
     square = s.beta[rows] ** 2
     shape = p["mu"] * square / (1.0 + square / p["bend"] ** 2)
     s.body[rows] += s.speed_ratio[rows] * s.air_damping[rows] * shape * s.rate[rows]
@@ -128,6 +128,6 @@ def harmonic_moment(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> N
 
 
 def bump(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """+J/(w√π) exp(−((t − t0)/w)²): a blow of impulse J about one time."""
+    """+J/(w√π) exp(−((t − t0)/w)²): a pulse of impulse J about t0."""
     shape = np.exp(-(((s.time - p["when"]) / p["width"]) ** 2)) / (p["width"] * np.sqrt(np.pi))
     s.body[rows] += p["impulse"] * shape

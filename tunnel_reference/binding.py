@@ -1,4 +1,4 @@
-"""Helpers that bind a law to a campaign's runs."""
+"""Functions that bind a law to the runs of a campaign."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ParamMaker = Callable[[float, Extra, Conditions], dict[str, float | Array]]
 
 
 def _spread_all(values: dict[str, float | Array], c: Conditions) -> dict[str, Array]:
-    """Every parameter with the runs as first axis."""
+    """All parameters, with the runs as first axis."""
     return {k: v if isinstance(v, np.ndarray) and v.ndim == 2 else spread(v, c) for k, v in values.items()}
 
 
@@ -26,9 +26,9 @@ def moving(law: Law, phase: Phase, make: ParamMaker, *, states: int = 0, at_rele
     Args:
         law: the law.
         phase: when it acts.
-        make: parameters by run from severity parameter, secondary parameters and conditions.
-        states: size of its memory per run.
-        at_release: the memory starts at the release angle (else at zero).
+        make: gives the parameters by run from severity parameter, secondary parameters and conditions.
+        states: number of states per run.
+        at_release: whether the states start at the release angle; otherwise at zero.
     """
 
     def bind(p: float, extra: Extra, c: Conditions) -> tuple[Conditions, Bound | None]:
@@ -66,7 +66,7 @@ def one_spring(p: float, extra: Extra, c: Conditions) -> Conditions:
 
 
 def speed_offset(p: float, extra: Extra, c: Conditions) -> Conditions:
-    """True speed V + ΔV (20/V)^n where the wind blows."""
+    """True speed V + ΔV (20/V)^n where the wind is on."""
     ratio = 20.0 / np.where(c.wind_on, c.wind_speed, 20.0)
     return replace(c, speed_offset=p * ratio ** extra["exponent"])
 

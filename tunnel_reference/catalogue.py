@@ -1,4 +1,4 @@
-"""What a form of an effect is: its family, its law and how its parameters are drawn and bound to runs."""
+"""The definition of a form of an effect: family, law, and how its parameters are drawn and bound to runs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Group(StrEnum):
 
     TEXTBOOK = "textbook"
     COMMON = "common"
-    RARE = "rare"  # left out of tuning sets
+    RARE = "rare"  # not in tuning sets
 
 
 def nothing(_rng: np.random.Generator, _conditions: Conditions) -> dict[str, float]:
@@ -37,14 +37,14 @@ class Form:
 
     Args:
         family: public name of the effect, or ``unknown``.
-        name: the form's.
+        name: of the form.
         group: how far it is from the textbook.
         symbol: of its severity parameter, with unit.
         start: a typical magnitude of the severity parameter.
         bind: (severity parameter, secondary parameters, conditions) → changed conditions and term.
-        signs: signs the severity parameter may have.
-        draw: draws secondary parameters (random seeds of forcings among them).
-        limits: least and largest magnitude of the severity parameter.
+        signs: possible signs of the severity parameter.
+        draw: draws secondary parameters, including random seeds.
+        limits: least and greatest magnitude of the severity parameter.
     """
 
     family: str

@@ -1,4 +1,4 @@
-"""What one campaign is: its runs' conditions and the true rig, air and sensor."""
+"""The definition of a campaign: the conditions of its runs, and the true rig, air and sensor."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ RESOLUTION = 2.0 * np.pi / 3.0 / 4096.0
 
 @dataclass(frozen=True)
 class Rod:
-    """A rod that twists between its spring and sensor end (above) and the body (below).
+    """A rod that twists between its upper end, which carries spring and sensor, and the body below.
 
     Args:
         compliance: 1/Krod, rad/(N m).
-        share: share of Izz above the rod.
-        damping_ratio: of the twist against the inertia above the rod.
+        share: share of Izz at the upper end.
+        damping_ratio: of the twist, relative to the inertia of the upper end.
         hardening: h, 1/rad²: the rod's moment is Krod ψ (1 + h ψ²) at twist ψ.
-        held_body: released from the body (the rod twisted by the spring) or from the spring end (untwisted).
+        held_body: whether the body is held until the release (the spring then twists the rod) or the upper end.
     """
 
     compliance: float
@@ -43,7 +43,7 @@ class Conditions:
         spring_stiffness: stated Kr, N m/rad.
         wind_speed: stated V, m/s.
         release_angle: nominal, rad.
-        start_angle: the angle actually released from (at rest), rad.
+        start_angle: true release angle (at rest), rad.
         air_density: ρ, kg/m³.
         duration: of every run, s.
         yaw_inertia: Izz, kg m².
@@ -51,12 +51,12 @@ class Conditions:
         cn_beta: Cnβ, 1/rad.
         cn_r: Cnr, 1/rad.
         noise_std: standard deviation of the reading's white noise, rad.
-        stated_noise: the same as the campaign states it; None where it does not.
+        stated_noise: the standard deviation as stated in the campaign; None where it is not stated.
         zero: the sensor's reading at rest in still air, rad.
         resolution: step of the reading, rad.
         sample_rate: Hz.
         stiffness_scale: true over stated stiffness.
-        speed_offset: true minus stated speed where the wind blows, m/s.
+        speed_offset: true minus stated speed where the wind is on, m/s.
         rod: the flexible rod; None where it is rigid.
     """
 
@@ -96,7 +96,7 @@ class Conditions:
 
     @property
     def wind_on(self) -> NDArray[np.bool_]:
-        """Whether the wind blows, shape (runs,)."""
+        """Whether the wind is on, shape (runs,)."""
         return self.wind_speed > 0.0
 
     @property
@@ -126,7 +126,7 @@ class Conditions:
 
     @property
     def noise_power(self) -> float:
-        """Variance of noise and of rounding to the resolution, rad²."""
+        """Variance of noise and quantisation, rad²."""
         return self.noise_std**2 + self.resolution**2 / 12.0
 
     @property

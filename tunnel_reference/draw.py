@@ -1,4 +1,4 @@
-"""Draws campaigns: conditions as on the rig, and which effects act how strongly."""
+"""Draws campaigns: conditions as on the rig, effects and their severity."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class EffectDraw:
     """One effect of one campaign.
 
     Args:
-        form: which.
+        form: the form of the effect.
         extra: its secondary parameters.
-        sign: of its severity parameter.
-        target: excess it shall have alone after the nominal refit.
-        value: severity parameter; a first guess until it is sized.
+        sign: sign of its severity parameter.
+        target: required excess of this effect alone, after refitting the nominal model.
+        value: magnitude of the severity parameter; a first guess until it is scaled.
     """
 
     form: Form
@@ -59,7 +59,7 @@ class Mixture:
 
     Args:
         textbook: probability of the textbook form.
-        rare: probability that another form is one of the rare ones (kept out of tuning sets at 0).
+        rare: probability that any other form is a rare one (0 for tuning sets).
     """
 
     textbook: float = 0.5
@@ -72,7 +72,7 @@ def draw_campaign(
     """Draw one campaign.
 
     Args:
-        rng: source of everything random.
+        rng: source of all random numbers.
         kind: one of ``KINDS``.
         mixture: of forms.
         families: of the effects, for ``single`` (one) and ``pair`` (two); drawn when empty.
@@ -100,7 +100,7 @@ def draw_families(rng: np.random.Generator, number: int) -> tuple[str, ...]:
 
 
 def _pool(forms: Sequence[Form], rng: np.random.Generator, mixture: Mixture) -> list[Form]:
-    """The common or the rare forms, whichever the mixture draws; never empty if there is any."""
+    """The common or the rare forms, as drawn from the mixture; not empty unless there are none at all."""
     group = Group.RARE if rng.random() < mixture.rare else Group.COMMON
     other = Group.COMMON
     return [f for f in forms if f.group is group] or [f for f in forms if f.group is other]
@@ -117,7 +117,7 @@ def _draw_form(rng: np.random.Generator, family: str, mixture: Mixture) -> Form:
 
 
 def _draw_effect(rng: np.random.Generator, form: Form, conditions: Conditions) -> EffectDraw:
-    """Secondary parameters, sign and target excess: 1 to 10, in a fifth of the cases 10 to 100."""
+    """Draws secondary parameters, sign and target excess: 1 to 10, in a fifth of the cases 10 to 100."""
     top = (10.0, 100.0) if rng.random() < _STRONG_SHARE else (1.0, 10.0)
     target = float(np.exp(rng.uniform(np.log(top[0]), np.log(top[1]))))
     extra = {k: float(v) for k, v in form.draw(rng, conditions).items()}
@@ -126,7 +126,7 @@ def _draw_effect(rng: np.random.Generator, form: Form, conditions: Conditions) -
 
 
 def draw_conditions(rng: np.random.Generator) -> Conditions:
-    """Springs, speeds, releases, truth and sensor: mostly the plan of twelve runs, else another."""
+    """Draws springs, speeds, releases, truth and sensor: mostly the plan of twelve runs, otherwise another plan."""
     design = _twelve_runs(rng) if rng.random() < 0.8 else _other_design(rng)
     stiffness, speed, release = design
     duration = 10.0 if rng.random() < 0.85 else float(rng.choice([8.0, 12.0, 15.0, 20.0]))
@@ -150,7 +150,7 @@ def draw_conditions(rng: np.random.Generator) -> Conditions:
 
 
 def with_defaults(conditions: Conditions) -> Conditions:
-    """The same with arrays for calibration errors of the right length."""
+    """The conditions with calibration errors as arrays of shape (runs,)."""
     n = conditions.runs
     return replace(
         conditions,
@@ -160,7 +160,7 @@ def with_defaults(conditions: Conditions) -> Conditions:
 
 
 def _twelve_runs(rng: np.random.Generator) -> tuple[Array, Array, Array]:
-    """Three springs at three speeds from 20°, two small releases, one between."""
+    """Three springs at three speeds from 20°, two small releases, one medium release."""
     low = float(rng.choice([16.12, 21.02]))
     middle = float(rng.choice([21.02, 35.02] if low < 20.0 else [35.02]))
     high = float(rng.choice([44.84, 51.88, 67.98]))
@@ -170,7 +170,7 @@ def _twelve_runs(rng: np.random.Generator) -> tuple[Array, Array, Array]:
 
 
 def _other_design(rng: np.random.Generator) -> tuple[Array, Array, Array]:
-    """Two to four springs, two to four speeds with still air among them, 6 to 16 runs at mixed releases."""
+    """Two to four springs, two to four speeds including still air, 6 to 16 runs at two release angles."""
     table = [12.0, 16.12, 21.02, 28.0, 35.02, 44.84, 51.88, 60.0, 67.98, 80.0]
     springs = np.sort(rng.choice(np.array(table), size=int(rng.integers(2, 5)), replace=False))
     speeds = np.concatenate(

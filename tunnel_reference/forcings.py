@@ -1,4 +1,4 @@
-"""Random moments as time series: broad-band, Dryden, von Kármán and band spectra, and a wandering vortex."""
+"""Random moments as time series: flat, Dryden, von Kármán and octave-band spectra, and wandering vortices."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ RATE = 1000.0
 
 
 def _length(conditions: Conditions) -> int:
-    """Points of a series that covers a run."""
+    """Number of points in a series that covers a run."""
     return round(conditions.duration * RATE) + 2
 
 
@@ -24,14 +24,14 @@ def _shaped(rng: np.random.Generator, n: int, power: Array) -> Array:
 
 
 def turbulence(kind: str, conditions: Conditions, *, seed: int, scale: float) -> Array:
-    """Unit-variance series for every run (zero wind-off), shape (runs, n).
+    """Series of unit variance for every run (zero with the wind off), shape (runs, n).
 
     Args:
         kind: ``band`` (flat up to ``scale`` Hz), ``dryden`` or ``von_karman`` (integral length ``scale`` m),
             ``octave`` (a band of one octave about ``scale`` Hz).
         conditions: speeds and duration.
         seed: of the series.
-        scale: Hz or m, as the kind says.
+        scale: Hz or m, depending on ``kind``.
     """
     n = 2 ** int(np.ceil(np.log2(_length(conditions))))
     frequency = np.fft.rfftfreq(n, 1.0 / RATE)
@@ -52,7 +52,7 @@ def turbulence(kind: str, conditions: Conditions, *, seed: int, scale: float) ->
 
 
 def wandering_vortex(conditions: Conditions, *, seed: int, strouhal: float, wander: float) -> Array:
-    """The sine of a phase advancing at St V/width and walking by ``wander`` rad per √s, shape (runs, n)."""
+    """The sine of a phase that advances at St V/width, with a random walk of ``wander`` rad/√s; shape (runs, n)."""
     rng = np.random.default_rng(seed)
     n = _length(conditions)
     frequency = strouhal * conditions.true_speed[:, None] / WIDTH

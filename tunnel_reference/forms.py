@@ -1,4 +1,4 @@
-"""The catalogue of forms of the vocabulary's families; ``p`` is the severity parameter, ``e`` the rest."""
+"""All forms of the known effects; ``p`` is the severity parameter, ``e`` are the secondary parameters."""
 
 from __future__ import annotations
 
@@ -21,5 +21,5 @@ FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS}))
 
 
 def forms_of(family: str) -> tuple[Form, ...]:
-    """All forms of one family, the textbook's first."""
+    """All forms of one family, the textbook form first."""
     return tuple(form for form in FORMS if form.family == family)

@@ -1,4 +1,4 @@
-"""Forms of the air's families: nonlinear moment and damping, lag, wind speed, turbulence, vortices."""
+"""Forms of the aerodynamic families: nonlinear moment and damping, lag, wind speed, turbulence, vortices."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ _MOMENT = (
 
 
 def _wagner(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
-    """Two times, p l/V and ``ratio`` times that, each with its share."""
+    """Two time constants, p l/V and ``ratio`` times that, with their weights."""
     return {"w1": e["w1"], "w2": 1.0 - e["w1"], "tau1": lag_time(p, c), "tau2": lag_time(p * e["ratio"], c)}
 
 
 def _speed_power(c: Conditions, exponent: float) -> Array:
-    """(V/20)^n where the wind blows, one elsewhere."""
+    """(V/20)^n where the wind is on, 1 elsewhere."""
     return np.where(c.wind_on, c.true_speed / 20.0, 1.0) ** exponent
 
 
@@ -96,7 +96,7 @@ def _seeded(low: float, high: float) -> Draw:
 
 
 def _vortex(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
-    """A line at St V/width, its phase drawn per run."""
+    """A line at St V/width, with a phase drawn per run."""
     phase = np.random.default_rng(int(e["seed"])).uniform(0.0, 2.0 * np.pi, c.runs)
     return {
         "moment": p * c.reference_moment,
@@ -107,13 +107,13 @@ def _vortex(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
 
 
 def _wander(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
-    """A line whose phase walks."""
+    """A line whose phase is a random walk."""
     wave = wandering_vortex(c, seed=int(e["seed"]), strouhal=e["strouhal"], wander=e["wander"])
     return {"table": p * c.reference_moment[:, None] * wave}
 
 
 def _strouhal(second: bool, wander: bool) -> Draw:
-    """Strouhal number, seed, and what the form adds."""
+    """Strouhal number, seed, and the parameters of the form."""
 
     def draw(g: np.random.Generator, _c: Conditions) -> dict[str, float]:
         return {"seed": float(g.integers(0, 2**31)), "strouhal": float(g.uniform(0.1, 0.22)),

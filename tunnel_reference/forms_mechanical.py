@@ -16,7 +16,7 @@ _ELEMENTS = np.geomspace(1.0 / (2 * np.pi * 200.0), 1.0 / (2 * np.pi * 0.05), 12
 
 
 def _maxwell(p: float, _e: Extra, c: Conditions) -> dict[str, float | Array]:
-    """Moduli (2ηKr/π) Δln τ and the elastic part they have at ωn."""
+    """Moduli (2ηKr/π) Δln τ, and their elastic part at ωn."""
     modulus = 2.0 * p * c.true_stiffness / np.pi * np.log(_ELEMENTS[1] / _ELEMENTS[0])
     square = (c.wind_off_omega[:, None] * _ELEMENTS) ** 2
     return {
@@ -106,7 +106,7 @@ _SPRING = (
 
 
 def _rod_draw(low: float, high: float, hardening: float, held: float, damping: float) -> Draw:
-    """Share above the rod, twist damping, hardening and how it is held."""
+    """Inertia share of the upper end, damping of the twist, hardening, and which end is held until the release."""
 
     def draw(g: np.random.Generator, _c: Conditions) -> dict[str, float]:
         return {"share": float(g.uniform(low, high)), "damping_ratio": float(g.uniform(0.2, 1.0)) * damping,

@@ -1,4 +1,4 @@
-"""Forms of the sensor's families."""
+"""Forms of the sensor families."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ _STEPS = (
 
 
 def _gap(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
-    """Half width, and where in the gap each run starts."""
+    """Half width, and the position in the gap at which each run starts."""
     start = np.random.default_rng(int(e["seed"])).uniform(-1.0, 1.0, c.runs) * e["random"]
     return {"half": p, "start": start}
 
 
 def _start(random: float) -> Draw:
-    """A seed and how far off the middle of the gap a run may start."""
+    """A seed, and the greatest distance of a run's start from the middle of the gap."""
     return lambda g, _c: {"seed": float(g.integers(0, 2**31)), "random": random}
 
 

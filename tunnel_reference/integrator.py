@@ -1,9 +1,10 @@
-"""Moves all runs of many campaigns at once: RK4 at a small step, dry friction by events inside the step.
+"""Integrates all runs of many campaigns at once: RK4 with a small step, dry friction by events within the step.
 
-A campaign's effects are *terms*: a law with its parameters on the rows (runs) it applies to. A law reads and
-changes the moments of one RK4 stage. Friction laws only say their level; its sign is held through a step, and
-where the rate crosses zero within it the state is corrected from the crossing on: to slip the other way, or
-to stick until the other moments leave the level. The correction's local error is of third order in the step.
+The effects of a campaign are *terms*: laws with parameters for the rows (runs) they apply to. A law reads and
+changes the moments of one RK4 stage. A friction law only gives the friction level; the sign of friction is constant
+in a step. Where the rate crosses zero within the step, the state after the crossing is corrected: the body slips the
+other way, or sticks until the other moments exceed the level. The local error of the correction is of third order in
+the step.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from tunnel_reference.terms import Law, Motion, Phase, Rows, Stage, Term
 
 @dataclass(eq=False)
 class _Group:
-    """One law on all rows of the batch that have it, with its block of the state vector."""
+    """One law for all rows of the batch that it applies to, with its block of the state vector."""
 
     law: Law
     phase: Phase
@@ -32,13 +33,13 @@ class _Group:
 
 
 def _as_rows(indices: NDArray[np.intp]) -> Rows:
-    """A slice where the indices are consecutive (a view is cheaper than a gather)."""
+    """A slice where the indices are consecutive, because a view is faster than indexing."""
     first, last = int(indices[0]), int(indices[-1])
     return slice(first, last + 1) if last - first + 1 == indices.size else indices
 
 
 def _stack(arrays: Sequence[Array]) -> Array:
-    """Join parameters along runs; time series of unequal length are held at their last value."""
+    """Join parameters along runs; shorter time series are extended with their last value."""
     if arrays[0].ndim == 1:
         return np.concatenate(arrays)
     longest = max(a.shape[1] for a in arrays)
@@ -48,7 +49,7 @@ def _stack(arrays: Sequence[Array]) -> Array:
 def _group_terms(
     terms: Sequence[Sequence[Term]], offsets: Sequence[int], runs: Sequence[int]
 ) -> list[_Group]:
-    """Merge equal laws of all campaigns into groups, in order of phase then first appearance."""
+    """Merge equal laws of all campaigns into groups, ordered by phase, then by first appearance."""
     found: dict[tuple[int, Any, int], list[tuple[Term, NDArray[np.intp]]]] = {}
     for number, campaign_terms in enumerate(terms):
         rows = np.arange(offsets[number], offsets[number] + runs[number])
@@ -90,7 +91,7 @@ class _Batch:
         self.stage = self._new_stage(0.0, self.state)
 
     def _rod(self, conditions: Sequence[Conditions], runs: Sequence[int]) -> None:
-        """Rod properties by row and which rows have friction."""
+        """Set the rod's properties by row, and the rows with friction."""
         self.top_inertia, self.body_inertia = self.inertia, self.inertia
         if self.flexible:
             rods = [c.rod for c in conditions if c.rod is not None]
@@ -105,7 +106,7 @@ class _Batch:
         self.dry = np.unique(np.concatenate(dry)) if dry else np.zeros(0, dtype=np.intp)
 
     def _initial_state(self) -> Array:
-        """Body angle, body rate, (spring end's angle, rate,) then the laws' memories, in one vector."""
+        """Body angle and rate, (angle and rate of the upper end,) and the states of the laws, in one vector."""
         blocks = [self.release.copy(), np.zeros(self.size)]
         if self.flexible:
             series = self.stiffness / (self.stiffness + self.rod_stiffness)
@@ -122,11 +123,11 @@ class _Batch:
         return np.concatenate(blocks)
 
     def _held_at_top(self) -> Array:
-        """Body angle in balance when the spring end is held at the release angle."""
+        """Equilibrium angle of the body while the upper end is held at the release angle."""
         return np.asarray(self.release * self.rod_stiffness / (self.rod_stiffness - self.air_stiffness))
 
     def _new_stage(self, time: float, state: Array) -> Stage:
-        """The stage before any law has acted."""
+        """A stage to which no law has been applied yet."""
         n = self.size
         beta, rate = state[:n], state[n : 2 * n]
         theta, omega = (state[2 * n : 3 * n], state[3 * n : 4 * n]) if self.flexible else (beta, rate)
@@ -136,7 +137,7 @@ class _Batch:
         )  # fmt: skip
 
     def derivative(self, time: float, state: Array) -> Array:
-        """Time derivative of the state vector at the friction's present sign."""
+        """Time derivative of the state vector with the present sign of friction."""
         n = self.size
         stage = self._new_stage(time, state)
         out = np.zeros_like(state)
@@ -166,7 +167,7 @@ class _Batch:
         return out
 
     def _apply(self, stage: Stage, state: Array, out: Array, phases: tuple[Phase, ...]) -> None:
-        """Let the laws of these phases act."""
+        """Apply the laws of these phases."""
         for group in self.groups:
             if group.phase in phases:
                 shape = group.memory.shape
@@ -176,13 +177,13 @@ class _Batch:
                 )
 
     def start_friction(self) -> None:
-        """Set the friction's sign from rest: against the way the other moments push, or stick."""
+        """Set the sign of friction at rest: opposed to the other moments, or sticking."""
         if self.dry.size:
             self.derivative(0.0, self.state)
             self._leave_rest(self.dry)
 
     def step(self, time: float, h: float) -> None:
-        """Advance by one RK4 step, then correct rows whose rate changed sign under friction."""
+        """Advance by one RK4 step, then correct the rows with friction whose rate changed sign."""
         before = self.state
         k1 = self.derivative(time, before)
         k2 = self.derivative(time + h / 2, before + (h / 2) * k1)
@@ -193,7 +194,7 @@ class _Batch:
             self._friction(before, k1, h)
 
     def _friction(self, before: Array, slope: Array, h: float) -> None:
-        """Correct crossings of the rate within the last step; let rows at rest go or stay."""
+        """Correct zero crossings of the rate within the last step; rows at rest start to slip or remain at rest."""
         rows = self.dry
         at = rows + (3 if self.flexible else 1) * self.size
         crossed = rows[self.state[at] * self.sign[rows] < 0.0]
@@ -204,12 +205,12 @@ class _Batch:
             self._leave_rest(resting)
 
     def _cross(self, rows: NDArray[np.intp], before: Array, slope: Array, h: float) -> None:
-        """From the crossing on, friction acts the other way, or holds."""
+        """After the crossing, friction acts the other way, or sticks."""
         angle_at = rows + (2 if self.flexible else 0) * self.size
         rate_at = angle_at + self.size
         v0, v1, a0 = before[rate_at], self.state[rate_at], slope[rate_at]
         bend = v1 - v0 - a0 * h
-        # v(u) = v0 + a0 h u + bend u²; the root by two Newton steps from the chord's.
+        # v(u) = v0 + a0 h u + bend u²; its root by two Newton steps, starting from the root of the chord.
         u = np.clip(v0 / np.where(v0 == v1, 1.0, v0 - v1), 0.0, 1.0)
         for _ in range(2):
             gradient = a0 * h + 2.0 * bend * u

@@ -1,4 +1,4 @@
-"""Makes sets of campaigns with known truth.
+"""Writes sets of campaigns with known truth.
 
 ``python -m tunnel_reference.make OUT --count N --seed S`` writes OUT/c0001, OUT/c0002, …
 """
@@ -27,7 +27,7 @@ _CHUNK = 400
 
 
 def plan_kinds(count: int, shares: dict[str, float]) -> list[str]:
-    """How many campaigns of each kind, by largest remainder, in order of the shares."""
+    """The kind of every campaign: numbers by largest remainder, in the order of the shares."""
     total = sum(shares.values())
     exact = {kind: count * share / total for kind, share in shares.items()}
     numbers = {kind: int(value) for kind, value in exact.items()}
@@ -38,12 +38,12 @@ def plan_kinds(count: int, shares: dict[str, float]) -> list[str]:
 
 
 def draw_set(count: int, seed: int, shares: dict[str, float], mixture: Mixture) -> list[CampaignDraw]:
-    """Draw a set: families of single effects in turn, pairs so that each family comes about equally often.
+    """Draw a set in which all families occur about equally often.
 
     Args:
         count: number of campaigns.
-        seed: of everything random; the same arguments give the same set.
-        shares: of the kinds.
+        seed: of all random numbers; the same arguments give the same set.
+        shares: relative frequency of each kind.
         mixture: of the forms.
     """
     root = np.random.SeedSequence(seed)
@@ -66,14 +66,14 @@ def draw_set(count: int, seed: int, shares: dict[str, float], mixture: Mixture) 
 
 
 def _in_turn(rng: np.random.Generator, number: int) -> list[str]:
-    """Families, each as often as the others to within one, in random order."""
+    """Families in random order; their frequencies differ by at most one."""
     rounds = -(-number // len(FAMILIES))
     names = [str(name) for _ in range(rounds) for name in rng.permutation(np.array(FAMILIES))]
     return names[:number]
 
 
 def simulate_set(draws: Sequence[CampaignDraw], *, progress: bool = False) -> list[Simulated]:
-    """Size the effects of drawn campaigns and simulate them."""
+    """Scale the effects of drawn campaigns and simulate them."""
     sized = size_effects(draws, progress=progress)
     if progress:
         print(f"simulating {len(sized)} campaigns", file=sys.stderr)
@@ -81,7 +81,7 @@ def simulate_set(draws: Sequence[CampaignDraw], *, progress: bool = False) -> li
 
 
 def as_campaign(simulated: Simulated, name: str) -> Campaign:
-    """The campaign as it is handed out: stated conditions and readings."""
+    """The campaign without its truth: stated conditions and readings."""
     c = simulated.draw.conditions
     time = np.round(c.time, 9)
     runs = tuple(
@@ -104,11 +104,11 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
 
 
 def truth_of(simulated: Simulated) -> dict[str, Any]:
-    """What is true of a campaign, for ``truth.json``.
+    """The truth of a campaign, for ``truth.json``.
 
-    ``effects`` is the sorted list of family names (``["unknown"]`` for an effect outside the vocabulary,
-    ``[]`` for none), ``severity`` the excess after the nominal refit and ``parameters`` each effect's form,
-    severity parameter with its symbol, secondary parameters and the excess it was sized for by itself.
+    ``effects`` is the sorted list of families (``["unknown"]`` for an effect outside the known ones, ``[]`` for
+    none). ``severity`` is the excess after refitting the nominal model. ``parameters`` gives each effect's form,
+    severity parameter with its symbol, secondary parameters, and the excess for which it was scaled alone.
     """
     draw, c = simulated.draw, simulated.draw.conditions
     return {
@@ -160,10 +160,10 @@ def make_set(
 
 
 def parse_shares(text: str) -> dict[str, float]:
-    """Kinds with optional weights, such as ``single:3,none``; the default mixture's weights where not given.
+    """Parse kinds with optional weights, such as ``single:3,none``; the default weights are `DEFAULT_SHARES`.
 
     Raises:
-        TunnelError: for an unknown kind or a weight that is no positive number.
+        TunnelError: for an unknown kind or a weight that is not a positive number.
     """
     shares: dict[str, float] = {}
     for item in text.split(","):
@@ -182,11 +182,11 @@ def parse_shares(text: str) -> dict[str, float]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run from the command line; the exit status."""
+    """Run the command line and return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m tunnel_reference.make", description=__doc__)
-    parser.add_argument("out", type=Path, help="folder to make")
+    parser.add_argument("out", type=Path, help="folder to create")
     parser.add_argument("--count", type=int, default=200, help="number of campaigns")
-    parser.add_argument("--seed", type=int, required=True, help="of everything random")
+    parser.add_argument("--seed", type=int, required=True, help="seed of all random numbers")
     parser.add_argument(
         "--kinds", default=",".join(DEFAULT_SHARES), help="kinds with optional weights, kind:weight"
     )

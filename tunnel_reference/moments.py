@@ -1,7 +1,7 @@
-"""The mechanical laws: what friction, damping, springs and gravity add to the moments of a stage.
+"""The mechanical laws: friction, damping, springs and gravity.
 
-Moments are N m on the right-hand side of Izz β̈ = …; ``rows`` are the runs a law applies to, ``p`` its
-parameters by run. They act on the spring end (θ); gravity acts on the body (β).
+Moments are in N m on the right-hand side of Izz β̈ = …; ``rows`` are the runs that a law applies to, ``p`` its
+parameters by run. They act on the rod's upper end (θ); gravity acts on the body (β).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from tunnel_reference.conditions import Array
 from tunnel_reference.terms import Params, Rows, Stage
 
-# ---- friction: only the level is said; the integrator handles its sign and rest
+# ---- friction: a law only gives the level; the integrator handles its sign and sticking
 
 
 def coulomb_level(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
@@ -25,7 +25,7 @@ def stribeck_level(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> No
 
 
 def reid_level(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """(π/2) η Kr |θ|: Reid's loss, πηKrA² per cycle whatever the frequency."""
+    """(π/2) η Kr |θ|: Reid's loss, πηKrA² per cycle at any frequency."""
     s.level[rows] += (np.pi / 2) * p["loss"] * s.stiffness[rows] * np.abs(s.theta[rows])
 
 
@@ -68,12 +68,12 @@ def mixed_quadratic_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Arr
 
 
 def viscous(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """−c θ̇ with c by run."""
+    """−c θ̇, with c given by run."""
     s.top[rows] -= p["coefficient"] * s.omega[rows]
 
 
 def maxwell_elements(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
-    """−Σ E (θ − zi) with τi żi = θ − zi, less the elastic part this has at ωn."""
+    """−Σ E (θ − zi) with τi żi = θ − zi, without its elastic part at ωn."""
     theta = s.theta[rows]
     dx[:] = (theta - x) / p["times"].T
     s.top[rows] -= p["modulus"] * (theta - x).sum(axis=0) - p["static"] * theta
@@ -89,14 +89,14 @@ def polynomial_spring(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) ->
 
 
 def tanh_spring(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """−sgn(κ) Kr (θ − b tanh(θ/b)) with b = 1/√(3|κ|): κ θ³ at first, then bending over."""
+    """−sgn(κ) Kr (θ − b tanh(θ/b)) with b = 1/√(3|κ|): κ θ³ at small angles, saturating at large ones."""
     t = s.theta[rows]
     bend = 1.0 / np.sqrt(3.0 * np.abs(p["kappa"]))
     s.top[rows] -= np.sign(p["kappa"]) * s.stiffness[rows] * (t - bend * np.tanh(t / bend))
 
 
 def sine_spring(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """Kr (θ − sin(kθ)/k) with k = √(6|κ|): softening, −κ Kr θ³ at first with κ < 0."""
+    """Kr (θ − sin(kθ)/k) with k = √(6|κ|): softening, −κ Kr θ³ with κ < 0 at small angles."""
     t = s.theta[rows]
     k = np.sqrt(6.0 * np.abs(p["kappa"]))
     s.top[rows] += s.stiffness[rows] * (t - np.sin(k * t) / k)
@@ -108,7 +108,7 @@ def bilinear_spring(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> N
 
 
 def dead_zone(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """The spring acts on θ − (1 − r) clip(θ − c, ±δ): a gap at c with a share r of stiffness left in it."""
+    """The spring acts on θ − (1 − r) clip(θ − c, ±δ): a gap at c in which a share r of the stiffness remains."""
     t = s.theta[rows]
     half = p["half"]
     s.spring_angle[rows] -= (1.0 - p["left"]) * np.clip(t - p["centre"], -half, half)
@@ -152,7 +152,7 @@ def breathing(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
 
 
 def moving_mass(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """Inertia Izz (1 + e sin²(πft)): the moments so far shrink by 1/(1+…) and −İ θ̇ is added."""
+    """Inertia Izz (1 + e sin²(πft)): divides the moments so far by 1 + e sin²(πft), and adds −İ θ̇."""
     arg = np.pi * p["frequency"] * s.time
     growth = 1.0 + p["share"] * np.sin(arg) ** 2
     rate = p["share"] * p["inertia"] * np.pi * p["frequency"] * np.sin(2.0 * arg)

@@ -1,6 +1,6 @@
 """A small joint fit of the nominal model, by Gauss–Newton on damped sinusoids in closed form.
 
-It sizes effects (what remains of them after the fit); it is no estimator of the project.
+It scales effects by what remains of them after the fit. It is not one of the project's estimators.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class NominalFit:
 
 
 def _rates(c: Conditions, p: Array) -> tuple[Array, Array, Array, Array]:
-    """Decay rate σ and ωd per run with their gradients over (Izz, Cr, Cnβ, Cnr), shapes (R,) and (R, 4)."""
+    """σ and ωd per run, and their gradients with respect to (Izz, Cr, Cnβ, Cnr), shapes (R,) and (R, 4)."""
     inertia, damping, cn_beta, cn_r = p
     moment = 0.5 * c.air_density * c.wind_speed**2 * FRONTAL_AREA * REFERENCE_LENGTH
     lever = 0.5 * c.air_density * c.wind_speed * FRONTAL_AREA * REFERENCE_LENGTH**2
@@ -69,11 +69,11 @@ def _linear(cosine: Array, sine: Array, readings: Array) -> tuple[Array, Array, 
 
 
 def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
-    """Fit Izz, Cr, Cnβ, Cnr, the zero and every run's start to the readings.
+    """Fit Izz, Cr, Cnβ, Cnr, the zero and the initial state of every run to the readings.
 
     Args:
-        c: conditions; the stated stiffness and speed are used, the true coefficients only to start from.
-        readings: shape (n, runs), rad; n may be less than the campaign's samples (a record cut short).
+        c: conditions; the fit uses the stated stiffness and speed, and starts from the true coefficients.
+        readings: shape (n, runs), rad; n may be less than the number of samples in a run.
 
     Returns:
         The fit; its residuals are noise where the nominal model holds.
@@ -113,15 +113,15 @@ def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
 
 
 def _newton(columns: Array, residual: Array, d_sigma: Array, d_omega: Array) -> Array:
-    """The Gauss–Newton step of the four shared parameters, starts and zero projected out.
+    """The Gauss–Newton step of the four shared parameters, with initial states and zero projected out.
 
-    ``columns`` has shape (R, 4, n): the basis of the start, and the derivatives by σ and ωd.
+    ``columns`` has shape (R, 4, n): the basis of the initial state, and the derivatives with respect to σ and ωd.
     """
     runs, _, n = columns.shape
     gram = columns @ columns.transpose(0, 2, 1)
     sums = columns.sum(axis=2)
     right = np.einsum("rkn,rn->rk", columns, residual)
-    # Unknowns: the four parameters, then the zero; every run's start is eliminated run by run.
+    # Unknowns: the four parameters, then the zero; initial states are eliminated run by run.
     shape = np.zeros((runs, 2, 5))
     shape[:, 0, :4], shape[:, 1, :4] = d_sigma, d_omega
     moment = np.zeros((5, 5))

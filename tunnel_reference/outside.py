@@ -1,4 +1,4 @@
-"""Effects outside the vocabulary: what they leave is a gap that no family explains."""
+"""Effects outside the known families, which leave a gap that no family explains."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _in_windy_run(value: float, e: Extra, c: Conditions) -> Array:
 
 
 def _when(low: float, high: float) -> Draw:
-    """A run, and a time as part of the duration."""
+    """A run, and a time as a share of the duration."""
     return lambda g, _c: {
         "run": float(g.integers(0, 64)),
         "part": g.uniform(low, high),
@@ -43,12 +43,12 @@ def _when(low: float, high: float) -> Draw:
 
 
 def _seeded(g: np.random.Generator, _c: Conditions) -> dict[str, float]:
-    """A seed for phases by run."""
+    """A seed for the phases of the runs, and a frequency."""
     return {"seed": float(g.integers(0, 2**31)), "frequency": float(g.uniform(0.2, 0.6))}
 
 
 def _phases(e: Extra, c: Conditions) -> Array:
-    """A phase per run."""
+    """One phase per run."""
     return np.random.default_rng(int(e["seed"])).uniform(0.0, 2.0 * np.pi, c.runs)
 
 

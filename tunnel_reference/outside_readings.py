@@ -1,4 +1,4 @@
-"""Laws of the sensor outside the vocabulary."""
+"""Laws of the sensor outside the known families."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from tunnel_reference.readings import Params, Reading
 
 
 def gain_change(r: Reading, p: Params) -> Array:
-    """Multiplies by 1 + g from t0 on."""
+    """Multiplies by 1 + g after t0."""
     return r.value * (1.0 + p["gain"] * (r.conditions.time[:, None] > p["when"]))
 
 
 def zero_step(r: Reading, p: Params) -> Array:
-    """Adds d from t0 on, in the runs whose d is not zero."""
+    """Adds d after t0, in the runs where d is not zero."""
     return r.value + p["step"] * (r.conditions.time[:, None] > p["when"])
 
 
@@ -25,7 +25,7 @@ def wandering_zero(r: Reading, p: Params) -> Array:
 
 
 def clock_jitter(r: Reading, p: Params) -> Array:
-    """Samples taken at random times about the stated ones: y + β̇ ε."""
+    """Samples at random times about the stated ones: y + β̇ ε."""
     return r.value + r.motion.rate * p["jitter"] * r.rng.standard_normal(r.value.shape)
 
 
@@ -50,7 +50,7 @@ def amplitude_zero(r: Reading, p: Params) -> Array:
 
 
 def held_samples(r: Reading, p: Params) -> Array:
-    """Now and then the reading hangs for ``length`` seconds."""
+    """At random times the reading is held for ``length`` seconds."""
     n, runs = r.value.shape
     out = r.value.copy()
     length = int(p["length"][0] * r.conditions.sample_rate)
@@ -62,6 +62,6 @@ def held_samples(r: Reading, p: Params) -> Array:
 
 
 def spikes(r: Reading, p: Params) -> Array:
-    """Single samples off by a random amount of standard deviation ``size``, ``rate`` a second."""
+    """Errors of standard deviation ``size`` in single samples, ``rate`` per second."""
     hit = r.rng.random(r.value.shape) < p["rate"] / r.conditions.sample_rate
     return np.asarray(r.value + hit * p["size"] * r.rng.standard_normal(r.value.shape))

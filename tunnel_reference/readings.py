@@ -1,7 +1,7 @@
-"""The laws of the sensor: from the motion of its end to the reading.
+"""The laws of the sensor: from the motion of the rod's upper end to the reading.
 
-A law takes the reading so far (shape (samples, runs), rad) and returns the next; ``Order`` says in which
-order they act. Noise and the common zero come after the laws of the angle, clipping and rounding last.
+A law takes the reading so far (shape (samples, runs), rad) and returns the changed one, in the sequence given by
+``Order``. Noise and the common zero are added after the laws of the angle; clipping and rounding come last.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from tunnel_reference.terms import Motion
 
 
 class Order(IntEnum):
-    """Where in the sensor's chain a law acts."""
+    """The position of a law in the sensor's chain."""
 
     LINKAGE = 0  # between rod and sensor
     CURVE = 1  # the sensor's characteristic
-    ADDED = 2  # what is added to the reading
+    ADDED = 2  # errors added to the reading
     NOISE = 3  # after zero and noise
     LIMIT = 4  # the converter's range
     ROUNDING = 5  # the converter's step; replaces the stated rounding
@@ -30,13 +30,13 @@ class Order(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """A campaign's reading on its way through the sensor.
+    """The readings of a campaign at some point of the sensor's chain.
 
     Args:
         value: shape (samples, runs), rad.
-        motion: of the sensor's end.
-        conditions: the campaign's.
-        rng: for laws that draw.
+        motion: of the rod's upper end.
+        conditions: of the campaign.
+        rng: for laws with random numbers.
     """
 
     value: Array
@@ -71,9 +71,9 @@ def read_motion(
 
     Args:
         conditions: the campaign's noise, zero and resolution.
-        motion: of the sensor's end.
+        motion: of the rod's upper end.
         terms: sensor laws.
-        rng: noise first, then whatever the laws draw, so that one seed gives one noise whatever the effects.
+        rng: the noise is drawn before the laws draw, so that it does not depend on the effects.
 
     Returns:
         The reading, shape (samples, runs), rad.
@@ -99,7 +99,7 @@ _PLAY_STEPS = 8
 
 
 def _fine_path(motion: Motion, interval: float) -> Array:
-    """The angle at eight points per sample by cubic Hermite, shape (8 (n−1) + 1, runs)."""
+    """The angle at eight points per sample by cubic Hermite interpolation, shape (8 (n−1) + 1, runs)."""
     u = (np.arange(_PLAY_STEPS) / _PLAY_STEPS)[None, :, None]
     a, b = motion.angle[:-1, None], motion.angle[1:, None]
     ra, rb = motion.rate[:-1, None] * interval, motion.rate[1:, None] * interval
@@ -137,13 +137,13 @@ def two_plays(r: Reading, p: Params) -> Array:
 
 
 def sliding_linkage(r: Reading, p: Params) -> Array:
-    """The reading lags by z: dz = dβ − |dβ| z/w: a linkage that yields before it slides (Dahl)."""
+    """The reading lags by z with dz = dβ − |dβ| z/w: a linkage that deflects before it slides (Dahl)."""
     path = _fine_path(r.motion, 1.0 / r.conditions.sample_rate)
     z = -p["start"] * p["half"]
     out = np.empty_like(path)
     move = np.diff(path, axis=0, prepend=path[:1])
     for k in range(path.shape[0]):
-        # Exact over one step of constant direction.
+        # Exact for a step in one direction.
         side = np.sign(move[k]) * p["half"]
         z = side + (z - side) * np.exp(-np.abs(move[k]) / p["half"])
         out[k] = z
@@ -203,7 +203,7 @@ def hum(r: Reading, p: Params) -> Array:
 
 
 def hum_bursts(r: Reading, p: Params) -> Array:
-    """Hum whose amplitude swells slowly: a (1 + ½ sin(2π f2 t + φ2)) sin(2πft + φ)."""
+    """Hum with a slowly varying amplitude: a (1 + ½ sin(2π f2 t + φ2)) sin(2πft + φ)."""
     t = r.conditions.time[:, None]
     swell = 1.0 + 0.5 * np.sin(2.0 * np.pi * p["slow"] * t + p["third_phase"])
     return r.value + p["amplitude"] * swell * np.sin(2.0 * np.pi * p["frequency"] * t + p["phase"])
@@ -213,13 +213,13 @@ def hum_bursts(r: Reading, p: Params) -> Array:
 
 
 def clipping(r: Reading, p: Params) -> Array:
-    """−L ≤ y ≤ L; ``lower`` 0 leaves the lower side free."""
+    """−L ≤ y ≤ L; no lower limit where ``lower`` is 0."""
     low = np.where(p["lower"] > 0.0, -p["limit"], -np.inf)
     return np.clip(r.value, low, p["limit"])
 
 
 def soft_clipping(r: Reading, p: Params) -> Array:
-    """|y| bends over towards L within a share k of it: below (1 − k) L straight, then exponential."""
+    """|y| is linear below (1 − k) L and approaches L exponentially above."""
     size = np.abs(r.value)
     knee = (1.0 - p["knee"]) * p["limit"]
     over = np.maximum(size - knee, 0.0)
@@ -231,16 +231,16 @@ def soft_clipping(r: Reading, p: Params) -> Array:
 
 
 def coarse_rounding(r: Reading, p: Params) -> Array:
-    """Rounded to a step."""
+    """Rounds to a multiple of a step."""
     return np.round(r.value / p["step"]) * p["step"]
 
 
 def coarse_truncation(r: Reading, p: Params) -> Array:
-    """Cut down to a step."""
+    """Rounds down to a multiple of a step."""
     return np.floor(r.value / p["step"]) * p["step"]
 
 
 def uneven_rounding(r: Reading, p: Params) -> Array:
-    """Rounded to a step whose every other level is a quarter step off (a converter's uneven codes)."""
+    """Rounds to steps of alternating width: even and odd levels are a quarter step apart from their place."""
     level = np.round(r.value / p["step"])
     return p["step"] * (level + 0.25 * (np.mod(level, 2.0) - 0.5))

@@ -1,7 +1,7 @@
-"""Simulates drawn campaigns and sizes their effects, by secant steps in logarithms.
+"""Simulates drawn campaigns and scales their effects to a target excess, by secant steps in logarithms.
 
-The excess of an effect is mean(residual²)/noise² − 1 over all runs after the nominal model is refitted,
-noise² being the variance of the sensor's noise and of its stated rounding.
+The excess of an effect is mean(residual²)/noise² − 1 over all runs after refitting the nominal model, where noise²
+is the variance of the sensor's noise and stated quantisation.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ _SHORT = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """A campaign simulated.
+    """A simulated campaign.
 
     Args:
-        draw: what was simulated.
+        draw: the campaign as drawn.
         readings: shape (samples, runs), rad.
-        excess: after the nominal refit.
-        run_excess: the same by run, shape (runs,).
+        excess: after refitting the nominal model.
+        run_excess: excess by run, shape (runs,).
     """
 
     draw: CampaignDraw
@@ -46,7 +46,7 @@ class Simulated:
 
 
 def bind_effects(draw: CampaignDraw) -> tuple[Conditions, list[Bound]]:
-    """Conditions and terms of a campaign with all its effects; calibration first, others read it."""
+    """Conditions and terms of a campaign with all effects; calibration comes first because others depend on it."""
     conditions, terms = with_defaults(draw.conditions), []
     for effect in draw.effects:
         conditions, _ = effect.form.bind(effect.sign * effect.value, effect.extra, conditions)
@@ -58,7 +58,7 @@ def bind_effects(draw: CampaignDraw) -> tuple[Conditions, list[Bound]]:
 
 
 def _batches(conditions: Sequence[Conditions]) -> dict[tuple[bool, bool], list[int]]:
-    """Campaign numbers that may be integrated together without much waste: by rod and by short or long."""
+    """Campaigns that can be integrated together efficiently: grouped by rod and by short or long runs."""
     found: dict[tuple[bool, bool], list[int]] = {}
     for number, c in enumerate(conditions):
         found.setdefault((c.rod is not None, c.duration > _SHORT), []).append(number)
@@ -69,8 +69,8 @@ def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> lis
     """Integrate campaigns in as few batches as possible.
 
     Args:
-        draws: what to simulate.
-        fine: 10 steps a sample (20 with a flexible rod); else 1 (10), to size effects.
+        draws: the campaigns to simulate.
+        fine: 10 steps per sample (20 with a flexible rod); otherwise 1 (10), for scaling effects.
     """
     bound = [bind_effects(d) for d in draws]
     motions: list[Motion | None] = [None] * len(draws)
@@ -87,7 +87,7 @@ def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> lis
 
 
 def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
-    """Read a motion through the campaign's sensor and refit the nominal model."""
+    """Convert a motion to readings and refit the nominal model."""
     conditions, terms = bind_effects(draw)
     sensor = [t for t in terms if isinstance(t, ReadingTerm)]
     readings = read_motion(conditions, motion, sensor, np.random.default_rng(draw.seed))
@@ -97,7 +97,7 @@ def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
 
 
 def _is_sensor(effect: EffectDraw, conditions: Conditions) -> bool:
-    """Whether the effect leaves the motion as it is."""
+    """Whether the effect acts on the sensor only, not on the motion."""
     return isinstance(effect.form.bind(effect.value, effect.extra, with_defaults(conditions))[1], ReadingTerm)
 
 
@@ -112,7 +112,7 @@ class _Search:
         self.done = False
 
     def try_out(self) -> None:
-        """Read and fit the motion at the present value and learn from it; only sensor effects keep it."""
+        """Compute the excess at the present value and choose the next; only sensor effects can reuse the motion."""
         assert self.motion is not None
         finite = bool(np.all(np.isfinite(self.motion.angle)))
         self.learn(read_and_fit(self.alone, self.motion).excess if finite else np.inf)
@@ -120,7 +120,7 @@ class _Search:
             self.motion = None
 
     def learn(self, excess: float) -> None:
-        """Take in the excess at the present value and choose the next one."""
+        """Record the excess at the present value and choose the next value."""
         effect = self.alone.effects[0]
         excess = max(excess, 2e-3) if np.isfinite(excess) else 1e6
         self.tried.append((np.log(effect.value), np.log(excess)))
@@ -140,7 +140,7 @@ class _Search:
         self.alone = replace(self.alone, effects=(replace(effect, value=value),))
 
     def settle(self) -> None:
-        """Go back to the value that came closest."""
+        """Select the value whose excess was closest to the target."""
         effect = self.alone.effects[0]
         target = np.log(effect.target)
         nearest = min(self.tried, key=lambda pair: abs(pair[1] - target))
@@ -149,14 +149,14 @@ class _Search:
 
 
 def size_effects(draws: Sequence[CampaignDraw], *, progress: bool = False) -> list[CampaignDraw]:
-    """Size every effect, each by itself in its campaign's conditions.
+    """Scale every effect to its target excess, each alone in the conditions of its campaign.
 
     Args:
         draws: drawn campaigns.
-        progress: say on standard error how the search goes.
+        progress: whether to report progress on standard error.
 
     Returns:
-        The same with severity parameters set.
+        The campaigns with severity parameters set.
     """
     searches = [
         _Search(number, slot, replace(draw, effects=(effect,)))
@@ -172,7 +172,7 @@ def size_effects(draws: Sequence[CampaignDraw], *, progress: bool = False) -> li
             search.try_out()
         if progress:
             left = sum(not s.done for s in searches)
-            print(f"sizing, pass {turn + 1}: {left} of {len(searches)} effects left", file=sys.stderr)
+            print(f"scaling, pass {turn + 1}: {left} of {len(searches)} effects left", file=sys.stderr)
         if all(s.done for s in searches):
             break
     out = list(draws)

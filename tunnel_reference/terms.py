@@ -1,4 +1,4 @@
-"""The vocabulary of the integrator: stages, laws, terms and the motion that comes out."""
+"""The types of the integrator: stages, laws, terms and the resulting motion."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ Rows = NDArray[np.intp] | slice
 
 
 class Phase(IntEnum):
-    """When in a stage a law acts."""
+    """When a law acts within a stage."""
 
     WIND = 0  # changes the speed ratio
-    ANGLE = 1  # changes the angle the air or the spring works on
+    ANGLE = 1  # changes the angle on which air or spring acts
     MOMENT = 2  # adds a moment
     FRICTION = 3  # adds a friction level
 
 
 @dataclass(eq=False)
 class Stage:
-    """One RK4 stage of a batch; arrays have shape (rows,). Laws change what is marked so.
+    """One RK4 stage of a batch; arrays have shape (rows,). Laws may change the marked arrays.
 
     Args:
         time: s.
         beta: body angle, rad.
         rate: body rate, rad/s.
-        theta: angle of the spring and sensor end, rad (the body's where the rod is rigid).
-        omega: its rate, rad/s.
+        theta: angle of the rod's upper end, rad (that of the body where the rod is rigid).
+        omega: rate of the upper end, rad/s.
         stiffness: true Kr, N m/rad.
         air_stiffness: Ka at the run's true speed, N m/rad.
         air_damping: Ca at the run's true speed, N m s/rad.
         speed_ratio: V(t)/V; changed by laws.
-        air_angle: the angle Ka works on, rad; changed by laws.
-        spring_angle: the angle Kr works on, rad; changed by laws.
-        top: moment on the spring end, N m; changed by laws.
+        air_angle: the angle on which Ka acts, rad; changed by laws.
+        spring_angle: the angle on which Kr acts, rad; changed by laws.
+        top: moment on the upper end, N m; changed by laws.
         body: moment on the body, N m; changed by laws.
-        level: friction level on the spring end, N m; changed by laws.
+        level: friction level at the upper end, N m; changed by laws.
     """
 
     time: float
@@ -62,7 +62,7 @@ class Stage:
 
 
 Law = Callable[[Stage, Rows, Params, Array, Array], None]
-"""law(stage, rows, parameters, memory, memory's derivative); memory has shape (states, rows)."""
+"""law(stage, rows, parameters, states, derivative of the states); states have shape (states, rows)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Term:
         law: the law.
         phase: when it acts.
         params: arrays whose first axis is the campaign's runs.
-        memory: initial memory, shape (states, runs); None where the law has none.
+        memory: initial states of the law, shape (states, runs); None where it has none.
     """
 
     law: Law
@@ -84,7 +84,7 @@ class Term:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What the sensor end did in one campaign.
+    """The motion of the rod's upper end in one campaign.
 
     Args:
         angle: shape (samples, runs), rad.

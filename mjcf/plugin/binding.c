@@ -19,7 +19,7 @@ static mjtNum series_at(const mjModel* m, int values, int interval, mjtNum time)
 
 static void read_parameters(const mjModel* m, const mjData* d, const vwt_ids* self, vwt_parameters* p) {
   double* table = (double*)p;  // a structure of doubles only, in the order of the law
-  if (self->span[0].count == VWT_OWN) {  // all in one piece, as build_model writes them: much the fastest
+  if (self->span[0].count == VWT_OWN) {  // contiguous, as build_model writes them: by far the fastest case
     memcpy(p, m->numeric_data + m->numeric_adr[self->span[0].numeric], VWT_OWN * sizeof(double));
   } else {
     memset(p, 0, sizeof(*p));
@@ -34,7 +34,7 @@ static void read_parameters(const mjModel* m, const mjData* d, const vwt_ids* se
 }
 
 static mjtNum wind_speed_at(const mjModel* m, const mjData* d, const vwt_ids* self, mjtNum time) {
-  const mjtNum live = m->nuserdata > 0 ? d->userdata[0] : 0;  // live input: departure from the series
+  const mjtNum live = m->nuserdata > 0 ? d->userdata[0] : 0;  // live input, added to the series
   const mjtNum speed = series_at(m, self->wind_speed, self->wind_interval, time) + live;
   return speed > 0 ? speed : 0;
 }
@@ -57,7 +57,7 @@ static Motion start_motion(const vwt_state* state, const Motion* now) {
   return start;
 }
 
-// The lag's time constant changes with the wind: that of the time halfway from the step's start is taken.
+// The lag's time constant depends on the wind speed, which is taken halfway between the step's start and now.
 static mjtNum lagged_at(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
                         const vwt_state* state, const Motion* now) {
   const mjtNum angle = now->angle + now->twist, rate = now->rate + now->twist_rate;
@@ -82,7 +82,7 @@ static mjtNum air_moment(const mjModel* m, const mjData* d, const vwt_ids* self,
   return vwt_air_moment(p, &air);
 }
 
-// All moments on the spring's end but friction, those of MuJoCo's own spring, damper and rod included.
+// All moments on the rod's upper end except friction, including those of MuJoCo's spring, damper and twisted rod.
 static mjtNum other_moment(const mjModel* m, const vwt_ids* self, const vwt_parameters* p, mjtNum air,
                            const Motion* at) {
   const mjtNum mechanism = vwt_mechanism_moment(p, at->angle, at->rate) - p->spring_stiffness * at->angle -
@@ -93,12 +93,12 @@ static mjtNum other_moment(const mjModel* m, const vwt_ids* self, const vwt_para
   return mechanism + m->jnt_stiffness[self->twist_joint] * at->twist + m->dof_damping[self->twist_dof] * at->twist_rate;
 }
 
-// What turns at the spring's end.
+// The inertia at the rod's upper end.
 static mjtNum end_inertia(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p) {
   return self->twist_dof < 0 ? p->yaw_inertia : p->yaw_inertia - mass_diagonal(m, d, self->twist_dof);
 }
 
-// Dahl's state: zero until the end of the first step where the start is not known.
+// Dahl's state; if the start is not known, it is zero until the end of the first step.
 static mjtNum deflection_at(const vwt_state* state, mjtNum range, const Motion* now) {
   if (state->started == 0) {
     return 0;
@@ -115,7 +115,7 @@ static mjtNum friction(const mjModel* m, const mjData* d, const vwt_ids* self, c
     return -deflection_at(state, range, now) / range * p->friction_moment;
   }
   const Motion start = start_motion(state, now);
-  const mjtNum applied = d->qfrc_applied[self->dof];  // by the user, on the spring's end
+  const mjtNum applied = d->qfrc_applied[self->dof];  // by the user, on the rod's upper end
   const mjtNum other = other_moment(m, self, p, air_moment(m, d, self, p, state, &start), &start) + applied;
   return vwt_friction_moment(p, inertia, start.rate, other, m->opt.timestep);
 }

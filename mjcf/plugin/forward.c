@@ -6,7 +6,7 @@ typedef struct {
   double angle, rate, twist, twist_rate;
 } Motion;
 
-// What stays fixed during one step: the law, the run, and the start of the step for lag and friction.
+// The quantities that are constant during a step: the law, the run, and the step's start for lag and friction.
 typedef struct {
   const vwt_parameters* p;
   const vwt_run* run;
@@ -45,7 +45,7 @@ static double air_at(const Step* s, double time, const Motion* y) {
   return vwt_air_moment(s->p, &air);
 }
 
-// Moments on the spring's end apart from friction; with a rigid rod the air is among them.
+// Moments on the rod's upper end except friction; with a rigid rod they include the aerodynamic moment.
 static double other_moment(const Step* s, double air, const Motion* y) {
   const vwt_parameters* p = s->p;
   const double mechanism =
@@ -61,7 +61,7 @@ static double deflection_at(const Step* s, double time, const Motion* y) {
                                 y->rate);
 }
 
-// Time derivative of the motion while the friction's sign is that of the step.
+// Time derivative of the motion with the step's sign of friction.
 static Motion derivative(const Step* s, double time, const Motion* y) {
   const vwt_parameters* p = s->p;
   const double air = air_at(s, time, y);
@@ -115,13 +115,13 @@ static void move(Step* s, double h, const Motion* to) {
   s->start += h;
 }
 
-// Sign of the slip that starts from rest at the present state: 0 while friction holds.
+// Sign of the slip that starts from rest in the present state; 0 while friction sticks.
 static int slip_from_rest(const Step* s) {
   const double other = other_moment(s, air_at(s, s->start, &s->from), &s->from);
   return fabs(other) <= s->p->friction_moment ? 0 : other > 0 ? 1 : -1;
 }
 
-// Length of the step at which the rate passes zero, by regula falsi (Illinois) on repeated steps.
+// Length of the step after which the rate is zero, by regula falsi (Illinois) on repeated steps.
 static double reversal(const Step* s, double h, double end_rate) {
   double low = 0, high = h, low_rate = s->from.rate, high_rate = end_rate;
   for (int i = 0; i < 30 && high - low > 1e-13; i++) {
@@ -151,7 +151,7 @@ static void step_with_friction(Step* s, double h) {
       move(s, left, &y);
       return;
     }
-    if (s->from.rate * s->slip <= 0) {  // the slip that had begun from rest stops at once: hold
+    if (s->from.rate * s->slip <= 0) {  // a slip that has just started from rest stops at once: stick
       s->slip = 0;
       const Motion held = runge_kutta(s, left);
       move(s, left, &held);
@@ -163,7 +163,7 @@ static void step_with_friction(Step* s, double h) {
     move(s, part, &at);
     left -= part;
   }
-  if (left > 0) {  // chattering: friction holds for what is left
+  if (left > 0) {  // chattering: friction sticks for the rest of the step
     s->slip = 0;
     s->from.rate = 0;
     const Motion held = runge_kutta(s, left);

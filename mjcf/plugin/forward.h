@@ -1,7 +1,7 @@
-// A forward integrator of the moment law without MuJoCo: for fits that need thousands of runs.
+// A forward integrator of the moment law without MuJoCo, for fits that need thousands of runs.
 //
-// It is RK4 with the plugin's own treatment of the lag, and with located reversals under Coulomb friction.
-// Checked against the MuJoCo model for every effect; reported results come from the MuJoCo model.
+// It uses RK4, treats the lag as the plugin does, and locates reversals under Coulomb friction. Tests compare it with
+// the MuJoCo model for every effect; reported results come from the MuJoCo model.
 
 #ifndef VWT_FORWARD_H_
 #define VWT_FORWARD_H_
@@ -14,7 +14,7 @@
 #define VWT_API __attribute__((visibility("default")))
 #endif
 
-// A run apart from its moment law: fields that point at samples, and numbers.
+// A run without its moment law: pointers to samples, and numbers.
 #define VWT_RUN(POINTER, NUMBER)                                                    \
   POINTER(wind)            /* m/s, wind_count samples at wind_interval s */         \
   NUMBER(wind_count)                                                                \
@@ -22,14 +22,14 @@
   POINTER(forcing)         /* 1, forcing_count samples at forcing_interval s */     \
   NUMBER(forcing_count)    /* 0: none */                                            \
   NUMBER(forcing_interval)                                                          \
-  NUMBER(angle)            /* rad, of the spring's end at time 0 */                 \
+  NUMBER(angle)            /* rad, of the rod's upper end at time 0 */              \
   NUMBER(rate)             /* rad/s */                                              \
-  NUMBER(twist)            /* rad, of the body against the spring's end */          \
+  NUMBER(twist)            /* rad, of the body relative to the upper end */         \
   NUMBER(twist_rate)       /* rad/s */                                              \
   NUMBER(lagged)           /* rad, the lag's state */                               \
   NUMBER(twist_stiffness)  /* N m/rad; 0: the rod is rigid */                       \
   NUMBER(twist_damping)    /* N m s/rad */                                          \
-  NUMBER(inertia_share)    /* of Izz at the spring's end */                         \
+  NUMBER(inertia_share)    /* of Izz at the rod's upper end */                      \
   NUMBER(step)             /* s */                                                  \
   NUMBER(steps)            /* between samples */                                    \
   NUMBER(samples)          /* the first at time 0 */
@@ -42,15 +42,15 @@ typedef struct {
 #undef NUMBER
 } vwt_run;
 
-// Fills angle and rate (of the spring's end, `samples` each) for `count` runs.
-// Returns 0, or 1 + the index of the first run that left the finite range.
+// Fills angle and rate of the rod's upper end (`samples` each) for `count` runs.
+// Returns 0, or 1 + the index of the first run whose motion grew without bound.
 VWT_API int vwt_forward(int count, const vwt_parameters* parameters, const vwt_run* runs, double* const* angle,
                         double* const* rate);
 
-// Reading behind a backlash of half width `half`: moves only when pushed. In and out may be the same.
+// Reading behind a backlash of half width `half`: it moves only when pushed. `in` and `out` may be the same array.
 VWT_API void vwt_backlash(int count, const double* in, double half, double start, double* out);
 
-// The law's parameters, the numbers of the plugin's state and the fields of vwt_run, for who fills them by name.
+// Names of the law's parameters, the plugin's state variables and the fields of vwt_run, for callers in Python.
 VWT_API int vwt_parameter_count(void);
 VWT_API const char* vwt_parameter_name(int index);
 VWT_API const char* vwt_parameter_unit(int index);

@@ -5,7 +5,7 @@
 
 #include <mujoco/mjxmacro.h>
 
-// Sizes of a model's mjData in one number (FNV-1a over the lengths of all arrays in its buffer).
+// A hash of the sizes of a model's mjData (FNV-1a over the lengths of all arrays in its buffer).
 static uint64_t layout_of(const mjModel* m) {
   uint64_t hash = 14695981039346656037u;
 #undef XNV
@@ -28,7 +28,7 @@ static int same_sizes(const vwt_sizes* kept, const mjModel* m) {
 #undef X
 }
 
-// Strings of a model that follow one another, with the zero that ends the last.
+// Contiguous strings of a model, including the terminating zero of the last.
 typedef struct {
   const char* text;
   int size;
@@ -42,18 +42,18 @@ static Strings numeric_names(const mjModel* m) {
   return strings(m->names + m->name_numericadr[0], m->names + m->name_numericadr[m->nnumeric - 1]);
 }
 
-// Values of the attributes, of which the plugin has two.
+// Values of the plugin's two attributes.
 static Strings attributes(const mjModel* m, int instance) {
   const char* first = m->plugin_attr + m->plugin_attradr[instance];
   return strings(first, first + strlen(first) + 1);
 }
 
-// Whether `size` bytes at `start` of a model's pool of text are those kept.
+// Whether `size` bytes at `start` of a model's text pool equal those kept.
 static int same_text(const char* pool, mjtSize pool_size, int start, const char* kept, int size) {
   return start >= 0 && start + size <= pool_size && memcmp(pool + start, kept, size) == 0;
 }
 
-// The same without a call, which for a few letters takes longer than to compare them.
+// String comparison without a function call, which for a few characters would take longer than the comparison.
 static int same_word(const char* one, const char* other) {
   while (*one == *other && *one) {
     one++, other++;
@@ -71,7 +71,7 @@ static int same_hinge(const mjModel* m, int joint, int dof, const char* name) {
                        same_word(m->names + m->name_jntadr[joint], name));
 }
 
-// Whether parameters that are read in one piece lie in one piece.
+// Whether the parameters of each span are contiguous in this model.
 static int same_spans(const mjModel* m, const vwt_ids* ids) {
   for (int i = 0; i < ids->span_count; i++) {
     const vwt_span* span = &ids->span[i];
@@ -83,8 +83,8 @@ static int same_spans(const mjModel* m, const vwt_ids* ids) {
   return 1;
 }
 
-// Whether the ids hold for this model. It is asked at every call: models may share an mjData, and a new model may
-// stand where another one was, so an address proves nothing.
+// Whether the ids are valid for this model. This is checked at every call: models may share an mjData, and a new model
+// may have the address of an old one, so addresses cannot be compared instead.
 static int holds(const vwt_instance* self, const mjModel* m, int instance) {
   const vwt_ids* ids = &self->ids;
   const char* joint = self->text + self->names_size;
@@ -97,7 +97,7 @@ static int holds(const vwt_instance* self, const mjModel* m, int instance) {
 
 static vwt_instance* make(const mjModel* m, int instance) {
   vwt_ids found;
-  vwt_find_ids(m, instance, &found);  // first: a refusal must not leak what comes next
+  vwt_find_ids(m, instance, &found);  // before the allocation, because an error does not return
   const Strings names = numeric_names(m), values = attributes(m, instance);
   vwt_instance* self = (vwt_instance*)malloc(sizeof(vwt_instance) + names.size + values.size);
   if (!self) {

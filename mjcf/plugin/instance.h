@@ -1,5 +1,5 @@
-// What one instance of the plugin found in a model: ids of joints and numerics. It follows from the model alone,
-// and is found anew when its mjData meets a model that lists its parts otherwise.
+// The ids of joints and numerics that an instance of the plugin found in a model. They depend on the model only, and
+// are found again when the mjData is used with a model whose names differ.
 
 #ifndef VWT_INSTANCE_H_
 #define VWT_INSTANCE_H_
@@ -10,23 +10,23 @@
 
 #include "moment.h"
 
-// Parameters that follow one another in the law as their numerics do in the model.
+// Parameters that are contiguous in the law and whose numerics are contiguous in the model.
 typedef struct {
   int parameter, numeric, count;
 } vwt_span;
 
 typedef struct {
-  int dof;                                // yaw of the spring's end of the rod
-  int twist_dof;                          // of the body against that end; -1: the rod is rigid
+  int dof;                                // yaw of the rod's upper end
+  int twist_dof;                          // of the body relative to that end; -1: the rod is rigid
   int joint, twist_joint;
   int wind_speed, wind_interval;          // ids of numerics; intervals -1 where constant
   int forcing, forcing_interval;          // ids of numerics, -1 where absent
-  int aero_lag, presliding;               // likewise
+  int aero_lag, presliding;               // ids of numerics, -1 where absent
   int span_count;
-  vwt_span span[VWT_PARAMETER_COUNT];     // the parameters that the model gives
+  vwt_span span[VWT_PARAMETER_COUNT];     // the parameters that are given in the model
 } vwt_ids;
 
-// Sizes that two models share wherever their ids can be the same.
+// Sizes that must agree for two models to have the same ids.
 #define VWT_SIZES(X) \
   X(nq) X(nv) X(njnt) X(nsensor) X(nnumeric) X(nnumericdata) X(nplugin) X(npluginattr) X(npluginstate) \
   X(nsensordata) X(nuserdata) X(nbuffer)
@@ -46,19 +46,19 @@ typedef struct {
   char text[];                            // names of all numerics, then the instance's attributes
 } vwt_instance;
 
-// The law's last parameters belong to joint and body: they are read there, never given again as a numeric.
+// The law's last parameters are attributes of joint and body: they are read there and must not be given as numerics.
 enum { VWT_OWN = VWT_INDEX_spring_stiffness };
 
-// Finds what the instance refers to, or refuses with a message.
+// Finds the ids that the instance refers to, or raises an error.
 void vwt_find_ids(const mjModel* m, int instance, vwt_ids* found);
 
-// The ids that hold for this model; an error where the mjData was made for a model of other sizes.
+// The ids that are valid for this model; an error where the mjData was made for a model of different sizes.
 const vwt_ids* vwt_ids_for(const mjModel* m, mjData* d, int instance);
 
-// Gives new or copied data, whose arrays are those of this model, what belongs to it. 0, or -1 without memory.
+// Sets the ids for new or copied data that was made for this model. Returns 0, or -1 if memory is exhausted.
 int vwt_instance_renew(const mjModel* m, mjData* d, int instance);
 
-// An error where `kept`, of an mjData, was made for a model whose mjData has other sizes.
+// An error where `kept` was made for a model whose mjData has different sizes.
 void vwt_check_layout(const mjModel* m, const vwt_instance* kept);
 
 #endif  // VWT_INSTANCE_H_

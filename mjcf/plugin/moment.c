@@ -18,7 +18,7 @@ double vwt_lag_time(const vwt_parameters* p, double wind_speed) {
   return wind_speed > 0 ? p->aero_lag * p->reference_length / wind_speed : 0;
 }
 
-// x^textbook for x >= 0, or another power of x that agrees with it at the reference; exponent 0: the textbook's.
+// x^textbook for x >= 0, or another power of x that equals it at the reference; exponent 0 selects the textbook power.
 static double power(double x, double textbook, double exponent, double reference) {
   if (exponent == 0 || exponent == textbook) {
     return textbook == 2 ? x * x : x * x * x;
@@ -39,8 +39,8 @@ double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
   const double stiffness = scale * p->cn_beta;                   // Ka (paper, eq. 4)
   const double damping = flow * p->reference_length * p->cn_r;  // Ca (paper, eq. 5)
   const double lag = p->aero_lag;
-  // A lag reads the state x; a lead (lag < 0) mirrors it about the angle, b + (b - x), because the lag's
-  // own equation is unstable with a negative time constant.
+  // A phase lag uses the state x. A phase lead (lag < 0) mirrors x about the angle, b + (b - x), because the
+  // equation of the lag is unstable with a negative time constant.
   const double angle = lag > 0 ? s->lagged : lag < 0 ? 2 * s->angle - s->lagged : s->angle;
   double steepening = 1, thickening = 1;
   if (p->moment_cubic != 0) {
@@ -74,7 +74,7 @@ double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate) 
   if (p->stiffness_quadratic != 0) {
     moment -= spring * p->stiffness_quadratic * power(fabs(angle), 2, p->stiffness_quadratic_exponent, kAngleReference);
   }
-  if (p->free_play > 0) {  // gives back what the linear spring takes inside the dead zone
+  if (p->free_play > 0) {  // cancels the linear spring inside the dead zone
     const double held = angle > p->free_play ? p->free_play : angle < -p->free_play ? -p->free_play : angle;
     moment += spring * held;
   }
@@ -89,7 +89,7 @@ double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate,
   if (!(limit > 0)) {
     return 0;
   }
-  const double onward = other > 0 ? -limit : limit;  // friction once the other moments have turned the slip
+  const double onward = other > 0 ? -limit : limit;  // friction after the other moments have reversed the motion
   if (rate == 0) {
     return fabs(other) <= limit ? -other : onward;
   }
@@ -100,7 +100,7 @@ double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate,
     return slip;
   }
   if (fabs(other) <= limit) {
-    return -other - inertia * rate / duration;  // holds: the rate is zero at the step's end
+    return -other - inertia * rate / duration;  // sticks: the rate is zero at the end of the step
   }
   return (slip * stop + onward * (duration - stop)) / duration;
 }
@@ -109,7 +109,7 @@ double vwt_presliding_range(const vwt_parameters* p, double inertia, double dura
   return fmax(p->presliding, p->friction_moment * duration * duration / (2 * inertia));  // 2 rad in a step
 }
 
-// Deflection after a motion over `distance`, to the side 1 or -1.
+// Deflection after a motion over `distance` in the direction `side`, 1 or -1.
 static double slide(double range, double deflection, int side, double distance) {
   return distance > 0 ? deflection - (side * range - deflection) * expm1(-distance / range) : deflection;
 }
@@ -118,16 +118,16 @@ double vwt_presliding_advance(double range, double deflection, double duration, 
                               double angle1, double rate1) {
   const double change = angle1 - angle0;
   const int side = rate0 > 0 || (rate0 == 0 && change > 0) ? 1 : -1;
-  // The way back is counted from the end, so that the way there remains a smooth function of it: Runge and
-  // Kutta's stages need that, whose angles are not those of one path.
+  // The distance after the reversal is computed from the end of the step, so that the deflection is a smooth function
+  // of the end point. The stages of the Runge-Kutta method, which do not lie on one path, need this.
   const double back = rate0 * rate1 < 0 ? duration * rate1 * rate1 / (2 * fabs(rate1 - rate0)) : 0;
   const double turned = slide(range, deflection, side, side * change + back);
   return slide(range, turned, -side, back);
 }
 
 // Moments of the lag's kernel, w[n] = integral of z exp(-z (1 - u)) u^n over u from 0 to 1, n = 0..3.
-// Integration by parts links neighbours, w[n] = 1 - n w[n-1]/z: used upwards where z is large, downwards from
-// a series where it is small. Either way no digits are lost, however short the step.
+// Integration by parts gives w[n] = 1 - n w[n-1]/z. The recursion runs upwards for large z, and downwards from a
+// series for small z, so that no digits are lost for any step.
 static void kernel_moments(double z, double w[4]) {
   if (z > 1) {
     w[0] = -expm1(-z);
@@ -155,7 +155,7 @@ double vwt_lag_advance(double lag_time, double lagged, double duration, double a
   if (!(duration > 0)) {
     return lagged;
   }
-  // the path in u = time/duration: angle0 + c1 u + c2 u^2 + c3 u^3 (Hermite)
+  // the path as a function of u = time/duration: angle0 + c1 u + c2 u^2 + c3 u^3 (Hermite)
   const double h = duration, change = angle1 - angle0;
   const double c1 = h * rate0;
   const double c2 = 3 * change - h * (2 * rate0 + rate1);

@@ -1,7 +1,7 @@
-// The one moment law of the rig: what air and mechanism add to the linear spring and damper.
+// The moment law of the rig: all moments of air and mechanism except those of the linear spring and damper.
 //
-// Nothing here knows MuJoCo. The engine plugin (binding.c) and the forward integrator (forward.c) both call
-// these functions, so a term exists once. Angles in rad, moments in N m, positive the way yaw is positive.
+// It does not depend on MuJoCo. The engine plugin (binding.c) and the forward integrator (forward.c) both call
+// these functions, so each term is implemented once. Angles in rad; moments in N m, positive in the direction of yaw.
 
 #ifndef VWT_MOMENT_H_
 #define VWT_MOMENT_H_
@@ -10,8 +10,9 @@
 extern "C" {
 #endif
 
-// Every parameter of the law: name, unit, least value allowed. A missing parameter is zero, and at zero its
-// term vanishes exactly; an exponent of zero is the textbook's power. The names are those of the MJCF's <custom><numeric> elements.
+// Every parameter of the law: name, unit, least value allowed. A missing parameter is zero; a term whose coefficient
+// is zero vanishes exactly; an exponent of zero selects the textbook power. The names are those of the
+// <custom><numeric> elements of the MJCF.
 #define VWT_PARAMETERS(X)                        \
   /* the flow and the model's reference sizes */ \
   X(air_density, "kg/m3", 0)                     \
@@ -43,7 +44,7 @@ extern "C" {
   X(free_play, "rad", 0)                         \
   X(gravity_stiffness, "N m/rad", -VWT_ANY)      \
   X(gravity_angle, "rad", -VWT_ANY)              \
-  /* last, what joint and body own in MuJoCo */  \
+  /* attributes of joint and body in MuJoCo */   \
   X(spring_stiffness, "N m/rad", 0)              \
   X(mechanical_damping, "N m s/rad", 0)          \
   X(yaw_inertia, "kg m2", 0)
@@ -67,48 +68,48 @@ extern const char* const vwt_parameter_names[VWT_PARAMETER_COUNT];
 extern const char* const vwt_parameter_units[VWT_PARAMETER_COUNT];
 extern const double vwt_parameter_least[VWT_PARAMETER_COUNT];
 
-// What the air sees.
+// The quantities on which the aerodynamic moment depends.
 typedef struct {
   double time;        // s since the start of the run
-  double wind_speed;  // m/s, now
+  double wind_speed;  // m/s, at this time
   double angle;       // rad, of the body
   double rate;        // rad/s, of the body
   double lagged;      // rad, the lag's state x; ignored where aero_lag or the wind is zero
   double forcing;     // 1, coefficient of an imposed aerodynamic moment (turbulence)
 } vwt_air_state;
 
-// Time constant of the aerodynamic lag, s (a l/V); 0 where there is none. Negative for a lead.
+// Time constant of the aerodynamic lag, s (a l/V); 0 without lag, negative for a phase lead.
 double vwt_lag_time(const vwt_parameters* p, double wind_speed);
 
 // Aerodynamic yaw moment on the body, N m.
 double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s);
 
-// Moment of the mechanism at the spring's end of the rod without friction, N m: what departs from
+// Moment of the mechanism on the rod's upper end, N m, without friction and without the linear terms
 // -spring_stiffness*angle - mechanical_damping*rate.
 double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate);
 
-// Coulomb friction for a step of `duration` s, N m, as the constant moment of the same impulse. It opposes
-// the rate; where the rate would pass zero within the step, friction turns over there or holds, whichever
-// the other moments ask for. `rate` and `other`, the sum of all other moments, are those at the step's start.
+// Coulomb friction in a step of `duration` s, N m, as the constant moment with the same impulse. It opposes the rate.
+// Where the rate would pass zero within the step, friction reverses there or sticks, depending on the other moments.
+// `rate` and `other`, the sum of all other moments, are taken at the start of the step.
 double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double duration);
 
-// Range zs of Dahl's friction, rad, which takes the place of Coulomb's where `presliding` is not zero:
-// -friction_moment z/zs, with the deflection z following dz = dangle - |dangle| z/zs. No less than what keeps the
-// contact's own oscillation, of stiffness 2 friction_moment/zs, stable in steps of `duration` s.
+// Range zs of Dahl's friction, rad, which replaces Coulomb friction where `presliding` is not zero:
+// -friction_moment z/zs, where the deflection z follows dz = dangle - |dangle| z/zs. The range is limited from below so
+// that the oscillation of the contact, of stiffness 2 friction_moment/zs, is stable with steps of `duration` s.
 double vwt_presliding_range(const vwt_parameters* p, double inertia, double duration);
 
 // Deflection after `duration` s, from `deflection`, while the angle moves from (angle0, rate0) to (angle1, rate1).
-// Exact, whatever the speed, for a motion one way; where the rate changes its sign the motion turns, at the angle
-// that a constant acceleration gives.
+// Exact for a motion in one direction at any speed; where the rate changes sign, the reversal is placed at the angle
+// given by a constant acceleration.
 double vwt_presliding_advance(double range, double deflection, double duration, double angle0, double rate0,
                               double angle1, double rate1);
 
-// Lag state after `duration` s, from `lagged`, while the angle follows the cubic through the two given
-// ends (angle0, rate0) and (angle1, rate1). Exact for such a path.
+// Lag state after `duration` s, from `lagged`, while the angle follows the cubic from (angle0, rate0) to
+// (angle1, rate1). Exact for such a path.
 double vwt_lag_advance(double lag_time, double lagged, double duration, double angle0, double rate0,
                        double angle1, double rate1);
 
-// Linear interpolation in `count` samples at `interval` s from time 0; the ends are held.
+// Linear interpolation in `count` samples at `interval` s from time 0; constant beyond the ends.
 double vwt_series(const double* values, int count, double interval, double time);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
-// MuJoCo engine plugin "vwt.yaw_moment": the rig's moment law as passive forces, and the aerodynamic
-// moment as a sensor. Its attributes and numerics are the table in README.md. These are its callbacks.
+// Callbacks of the MuJoCo engine plugin "vwt.yaw_moment": the rig's moment law as passive forces, and the aerodynamic
+// moment as a sensor. Its attributes and numerics are listed in README.md.
 
 #include <stdlib.h>
 #include <string.h>
@@ -24,7 +24,7 @@ static void destroy(mjData* d, int instance) {
   d->plugin_data[instance] = 0;
 }
 
-// The copy has this model's arrays, whatever it had before; the state in them is copied by MuJoCo.
+// The destination now has arrays of this model's sizes; MuJoCo copies the state in them.
 static void copy(mjData* dest, const mjModel* m, const mjData* src, int instance) {
   (void)src;
   if (vwt_instance_renew(m, dest, instance)) {
@@ -73,8 +73,7 @@ mjPLUGIN_LIB_INIT(vwt_yaw_moment) {
   plugin.nattribute = sizeof(attributes) / sizeof(attributes[0]);
   plugin.attributes = attributes;
   plugin.capabilityflags = mjPLUGIN_PASSIVE | mjPLUGIN_SENSOR;
-  // The sensor reads the state alone. Asking for the velocity stage would have MuJoCo compute velocities of
-  // subtrees in every step, which nobody reads.
+  // With the velocity stage MuJoCo would compute velocities of subtrees in every step, which are not needed.
   plugin.needstage = mjSTAGE_POS;
   plugin.nstate = nstate;
   plugin.nsensordata = nsensordata;

@@ -1,17 +1,17 @@
-// The plugin's state: where the present step started. Its stages read it for the lag and for friction.
+// The plugin's state: the motion at the start of the present step, needed in its stages for lag and friction.
 
 #ifndef VWT_STATE_H_
 #define VWT_STATE_H_
 
-// Every number in its order. All zero means: not started.
+// All variables in order. All zero: the run has not started.
 #define VWT_STATE(X)                                          \
   X(lagged)     /* rad, the lag's state x */                  \
-  X(angle)      /* rad, of the spring's end of the rod */     \
+  X(angle)      /* rad, of the rod's upper end */             \
   X(rate)       /* rad/s */                                   \
-  X(twist)      /* rad, of the body against the spring's end */ \
+  X(twist)      /* rad, of the body relative to the upper end */ \
   X(twist_rate) /* rad/s */                                   \
   X(time)       /* s */                                       \
-  X(started)    /* 1 once the numbers above hold */           \
+  X(started)    /* 1 once the variables above are set */      \
   X(deflection) /* rad, Dahl's state z */
 
 typedef struct {

@@ -1,4 +1,4 @@
-// What the compiled code lists, by index: who fills its structures from elsewhere does so by these names.
+// Names and offsets of the compiled structures by index, for callers that fill them by name.
 
 #include <stddef.h>
 

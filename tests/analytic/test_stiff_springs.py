@@ -77,7 +77,7 @@ def test_the_steps_error_is_that_of_runge_and_kutta(turn: float) -> None:
 
 def test_a_rate_for_which_no_step_is_short_enough_is_refused_in_one_line() -> None:
     with pytest.raises(
-        TunnelError, match=r"run 2: the body's motion on its spring of .* Hz is too fast"
+        TunnelError, match=r"run 2: the body's motion on its spring at .* Hz is too fast"
     ) as no:
         simulate_motions(RIG, [PLAIN, replace(PLAIN, spring_stiffness=1e9)], 1000.0)
     assert "\n" not in str(no.value)

@@ -59,7 +59,7 @@ def refused(read: Callable[[Path], object], path: Path) -> TunnelError:
 def test_a_fifo_is_refused_without_waiting(reader: str, tmp_path: Path) -> None:
     name, read = READERS[reader]
     os.mkfifo(tmp_path / name)
-    assert "no regular file" in str(refused(read, tmp_path / name))
+    assert "not a regular file" in str(refused(read, tmp_path / name))
 
 
 @pytest.mark.parametrize("reader", READERS)
@@ -67,7 +67,7 @@ def test_a_device_is_refused(reader: str, tmp_path: Path) -> None:
     """It would be read for ever."""
     name, read = READERS[reader]
     (tmp_path / name).symlink_to("/dev/zero")
-    assert "no regular file" in str(refused(read, tmp_path / name))
+    assert "not a regular file" in str(refused(read, tmp_path / name))
 
 
 @pytest.mark.parametrize("reader", READERS)

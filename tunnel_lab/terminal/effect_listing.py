@@ -24,13 +24,13 @@ _PAGE_HEAD = """# Effects
 
 <!-- Written by `tunnel effects --markdown docs/reference/effects.md`: change the registry, not this page. -->
 
-Effects that the nominal model leaves out. `tunnel simulate` injects them by these names, and the diagnosis answers
-with them. `always` acts with the wind on or off, `wind_on` only with the wind on.
+The effects that the nominal model leaves out. `tunnel simulate` injects them and `tunnel diagnose` reports them
+by these names. The condition `always` means with the wind on or off, `wind_on` only with the wind on.
 
 {directions}
 
-The first parameter of an effect is its severity. At zero the record is identical to one without the effect, to the
-last bit. Numbers in a plan or on the command line are in the units given here:
+The first parameter of an effect is its severity. At zero severity the record is bit-identical to one without the
+effect. Numbers in a plan or on the command line are in the units given here:
 
 ```toml
 [[effects]]
@@ -42,8 +42,8 @@ parameters = {{ friction_moment = 0.004 }}   # N m
 tunnel simulate plan.toml --out c --effect coulomb_friction:friction_moment=0.004
 ```
 
-Real effects never have exactly these forms; a name stands for a family. Some of their properties cannot be seen in
-any free decay: see [what no free decay can show](../theory/what-no-free-decay-can-show.md).
+Real effects never have exactly these forms: each name stands for a family. For what free decays cannot reveal
+about them see [what no free decay can show](../theory/what-no-free-decay-can-show.md).
 
 """
 
@@ -211,7 +211,7 @@ def _section(kind: type[Effect]) -> str:
             "",
             f"- Channel `{kind.channel}`, condition `{kind.condition}`.",
             f"- Equation: {_cell(kind.equation)}",
-            f"- What it leaves in a record: {kind.signature}",
+            f"- Signature in a record: {kind.signature}",
             *(f"- Reference: {reference}" for reference in kind.references),
             "",
             "| parameter | symbol | unit | meaning | typical | from | to | default |",

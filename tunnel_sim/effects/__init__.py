@@ -1,4 +1,4 @@
-"""The vocabulary of unmodelled effects: each defined once, for injection, fitting and report."""
+"""The unmodelled effects: each is defined once and serves injection, fitting and reports."""
 
 from __future__ import annotations
 
@@ -28,16 +28,13 @@ ALL_EFFECTS: tuple[type[Effect], ...] = _found()
 
 
 def effect_class(name: str) -> type[Effect]:
-    """The effect of a name.
+    """The class of the effect with a given name.
 
     Args:
-        name: as in the vocabulary, such as ``coulomb_friction``.
-
-    Returns:
-        Its class.
+        name: such as ``coulomb_friction``.
 
     Raises:
-        TunnelError: when there is none, with the closest name.
+        TunnelError: when there is none; the message suggests the closest name.
     """
     for kind in ALL_EFFECTS:
         if kind.name == name:
@@ -48,13 +45,10 @@ def effect_class(name: str) -> type[Effect]:
 
 
 def the_effect(**traits: object) -> type[Effect]:
-    """The one effect of the vocabulary with these traits.
+    """The class of the only effect with given traits.
 
     Args:
         **traits: as listed in `Effect`.
-
-    Returns:
-        Its class.
 
     Raises:
         LookupError: when there is none, or more than one.
@@ -69,8 +63,8 @@ def effect_from(name: str, parameters: Mapping[str, float]) -> Effect:
     """An effect by name.
 
     Args:
-        name: as in the vocabulary.
-        parameters: by name, in their units; what is not given takes its default.
+        name: such as ``coulomb_friction``.
+        parameters: by name, in their units; the others take their defaults.
 
     Returns:
         The effect.

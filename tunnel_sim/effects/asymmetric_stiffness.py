@@ -1,4 +1,4 @@
-"""A spring stiffer to one side."""
+"""A spring that is stiffer to one side."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True)
 class AsymmetricStiffness(Effect):
-    """A spring stiffer to one side.
+    """A spring that is stiffer to one side.
 
     Args:
-        coefficient: share of the stiffness per angle, 1/rad.
-        exponent: power of the angle in the moment, the same moment at 0.2 rad, dimensionless; 2 is the textbook's.
+        coefficient: relative change of stiffness per angle, 1/rad.
+        exponent: power of the angle in the moment (unchanged at 0.2 rad), dimensionless; 2 in the textbook form.
     """
 
     name = "asymmetric_stiffness"
     place = 5
     channel = "stiffness"
     condition = "always"
-    equation = "−κ Kr β²; bent: |β|^p for β²"
+    equation = "−κ Kr β²; general form: |β|^p for β²"
     signature = (
         "The centre of the oscillation shifts by −κ A²/2 and a second harmonic appears; the "
         "frequency changes only in second order."
@@ -33,21 +33,21 @@ class AsymmetricStiffness(Effect):
     coefficient: float = parameter(
         "κ",
         "1/rad",
-        "share of the stiffness per angle",
+        "relative change of stiffness per angle",
         scale=0.05,
         lower=-2.0,
         upper=2.0,
         per_stiffness=True,
     )
 
-    exponent: float = exponent("p", "power of the angle in the moment, the same moment at 0.2 rad", 2.0)
+    exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 2.0)
 
     @classmethod
     def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
-        """The textbook's term."""
+        """The textbook form."""
         del rate
         return -spring * angle**2
 
     def law(self) -> Mapping[str, float]:
-        """The term of the moment law."""
+        """The effect's terms of the moment law."""
         return {"stiffness_quadratic": self.coefficient, "stiffness_quadratic_exponent": self.exponent}

@@ -1,4 +1,4 @@
-"""What an effect is: parameters with units, hooks where it acts, and traits that say how it is found."""
+"""The base class of all effects: parameters with units, hooks where an effect acts, traits for finding it."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array
 
 REFERENCE_SPEED = 20.0
-"""m/s: where forms that depend on the speed agree with the textbook's."""
+"""Wind speed at which a speed-dependent form equals the textbook form, m/s."""
 
 LEAST_EXPONENT = 0.25
-"""Below it a term is nearly a jump, which the integration's steps do not resolve."""
+"""Smallest exponent: below it a term is nearly a jump, which the integration steps do not resolve."""
 
 SPRING_TOLERANCE = 1e-6
-"""Two stiffnesses closer than this, relative to them, are of one spring."""
+"""Relative difference below which two stiffnesses belong to the same spring."""
 
 Channel = Literal["stiffness", "damping", "forcing", "sensor", "calibration"]
 Condition = Literal["always", "wind_on"]
@@ -33,21 +33,21 @@ Drawn: TypeAlias = float | Array | None
 
 @dataclass(frozen=True)
 class ParameterInfo:
-    """What is known of one parameter of an effect.
+    """One parameter of an effect.
 
     Args:
         name: field name, also in TOML and JSON.
         symbol: as in the effect's equation.
-        unit: SI, rad.
+        unit: SI, angles in rad.
         meaning: one clause.
-        scale: a size typical of this rig, for steps and starting values.
+        scale: a typical value for this rig, for steps and starting values.
         lower: least value allowed, in the unit.
         upper: greatest value allowed, in the unit.
-        default: value where none is given, in the unit; for the severity this is the null.
-        form: whether it changes the effect's textbook form, which its default is.
+        default: value where none is given, in the unit; zero for the severity.
+        form: whether it generalises the effect's form; its default gives the textbook form.
         fit_lower: least value a fit may take, in the unit.
         fit_upper: greatest value a fit may take, in the unit.
-        chosen_spring: whether it names one of the campaign's springs, so that it is chosen and not fitted.
+        chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
         per_stiffness: whether it multiplies the spring's stiffness.
     """
@@ -103,15 +103,12 @@ def parameter(
 
 
 def exponent(symbol: str, meaning: str, textbook: float) -> Any:
-    """A field that is the power of a term, whose textbook value it has by default.
+    """A form parameter that is the exponent of a term; its default is the textbook's.
 
     Args:
         symbol: as in the effect's equation.
         meaning: one clause.
-        textbook: the power of the textbook's form.
-
-    Returns:
-        A form parameter.
+        textbook: exponent of the textbook form, dimensionless.
     """
     return parameter(
         symbol, "1", meaning, scale=1.0, lower=LEAST_EXPONENT, upper=9.0, default=textbook, form=True
@@ -120,7 +117,7 @@ def exponent(symbol: str, meaning: str, textbook: float) -> Any:
 
 @dataclass(frozen=True)
 class Circumstances:
-    """What of a campaign decides where the fit of an effect starts.
+    """What the starting values for the fit of an effect depend on.
 
     Args:
         springs: stated stiffnesses, ascending, N m/rad.
@@ -135,11 +132,11 @@ class Circumstances:
 
 @dataclass(frozen=True)
 class Trial:
-    """Parameter values from which an effect may be fitted.
+    """Starting values for the fit of an effect.
 
     Args:
-        values: by name; the others start at their defaults.
-        scaled: name of the one whose size linear theory sets; None where the values are taken as they are.
+        values: by parameter name; the others start at their defaults.
+        scaled: name of the parameter that linear theory rescales; None where the values are used as they are.
     """
 
     values: Mapping[str, float]
@@ -167,30 +164,31 @@ class WindOnRun:
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect the nominal model leaves out. Its first parameter is the severity, whose null is zero.
+    """An effect that the nominal model leaves out.
 
-    The hooks are identities unless an effect overrides them, and at the null every one of them is. ``stated``
-    is the run as the campaign states it, before any effect; ``drawn`` is what `draw` gave for the run.
+    The first parameter is the severity; at zero severity (the null) the effect does nothing. Every hook does
+    nothing unless an effect overrides it. ``stated`` is the run as the campaign states it, without any effect;
+    ``drawn`` is what `draw` returned for the run.
 
     Every effect states ``place``, its number in the vocabulary (random draws depend on the order, so a new effect
-    takes the next), and ``example``, values of its parameters, in their order, at which it is seen.
+    takes the next number), and ``example``, values of its parameters in their order at which it is visible.
 
-    An effect overrides the traits that do not fit it:
+    Traits, with defaults that an effect overrides:
 
-    - ``random``: what a random moment's spectrum is like; empty where the effect is deterministic. A vortex
-      street is both: its phase may be steady or wander.
-    - ``line``: what sets the frequency of a periodic effect, which has a phase of its own in every run.
-    - ``skips``: whether samples are missing, at an instant of its own in every run (a share of the run's length):
-      the motion is read at other times than stated.
-    - ``fitted``: whether a fit of the deterministic motion can find it. What is not fitted is read off the
-      records (``line``, ``lattice``) or found by its spectrum (``random``).
-    - ``lattice``: whether it is the step of the readings.
-    - ``remembers``: whether a reading depends on the samples before it.
-    - ``ahead_of_sensor``: whether it sits between the rod and the sensor, ahead of what the sensor does.
-    - ``exact``: whether it is a factor on a stated number, so that its form cannot differ from the textbook's.
+    - ``random``: kind of spectrum of a random moment; empty where the effect is deterministic. Vortex shedding
+      has both a line and a spectrum, because its phase may be steady or wander.
+    - ``line``: what sets the frequency of a periodic effect; its phase differs from run to run.
+    - ``skips``: whether samples are missing at an instant that differs from run to run (a share of the run's
+      length), so that the motion is read at other times than stated.
+    - ``fitted``: whether a fit of the deterministic motion can find it. The other effects are read off the
+      records (``line``, ``lattice``) or found from their spectrum (``random``).
+    - ``lattice``: whether it changes the quantisation step.
+    - ``remembers``: whether a reading depends on earlier samples.
+    - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
+    - ``exact``: whether it is a factor on a stated number, so that its form is known exactly.
     - ``tries``: how many starting points of a fit are worth trying.
-    - ``regressed_at``: parameters that a regression of moments must hold, with their values.
-    - ``caveat``: what to bear in mind on reading the coefficients beside it.
+    - ``regressed_at``: parameters held fixed in a regression of moments, with their values.
+    - ``caveat``: how to read the coefficients that are reported with it.
     """
 
     name: ClassVar[str]
@@ -250,30 +248,30 @@ class Effect:
 
     @classmethod
     def chosen_spring(cls) -> str | None:
-        """Name of the parameter that is one of the campaign's springs; None where there is none."""
+        """Name of the parameter that is a spring's stiffness; None where there is none."""
         return next((info.name for info in cls.parameters() if info.chosen_spring), None)
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Values from which a fit may start.
+        """Starting values for a fit.
 
         Args:
             campaign: what the values depend on.
 
         Returns:
-            Trials; none where such a campaign cannot show the effect.
+            Starting values, the most promising first; empty where such a campaign cannot show the effect.
         """
         severity = cls.parameters()[0]
         return (Trial({severity.name: severity.scale * moment_scale(severity, campaign)}, severity.name),)
 
     @classmethod
     def regressor(cls, angle: Array, rate: Array, spring: float) -> Array | None:
-        """The moment per unit of the first parameter, for a regression of the balance of moments.
+        """The moment per unit of the first parameter, for a regression of the moment balance.
 
         Args:
             angle: rad, shape (n,).
             rate: rad/s, shape (n,).
-            spring: stiffness that the moment is proportional to where it is ``per_stiffness``, N m/rad.
+            spring: stiffness of the run's spring, used where the parameter is ``per_stiffness``, N m/rad.
 
         Returns:
             N m per unit, shape (n,); None where the moment is not linear in the first parameter.
@@ -282,42 +280,42 @@ class Effect:
         return None
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """What of the effect's form no free decay shows, and Cnβ and Cnr take up.
+        """Uncertainty of Cnβ and Cnr due to that part of the effect's form which no free decay shows.
 
         Args:
             cn_beta: Cnβ as fitted, 1/rad.
             runs: the campaign's wind-on runs.
 
         Returns:
-            Standard deviations of Cnβ and Cnr from it, 1/rad.
+            Standard deviations of Cnβ and Cnr, 1/rad.
         """
         del cn_beta, runs
         return 0.0, 0.0
 
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
-        """Draw what is random in one run.
+        """Draw the random part of the effect in one run.
 
         Args:
             stated: the run as the campaign states it.
-            rng: of this effect in this run.
+            rng: the generator of this effect in this run.
 
         Returns:
-            What the hooks take as ``drawn``.
+            The value passed to the hooks as ``drawn``.
         """
         del stated
         return float(rng.uniform(0.0, 2.0 * np.pi)) if self.line else None
 
     def law(self) -> Mapping[str, float]:
-        """Parameters of the moment law by name: an effect that is a term of the law has no other hook."""
+        """The effect's parameters in the moment law, by name, for an effect that is a term of the law."""
         return {}
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Change the physics of a run: by default, set the effect's terms of the moment law.
+        """Change the physics of a run; by default, set the effect's terms of the moment law.
 
         Args:
-            run: as left by the effects before.
+            run: as the earlier effects left it.
             stated: the run as the campaign states it.
-            drawn: what the run drew.
+            drawn: what `draw` returned for the run.
 
         Returns:
             The changed physics.
@@ -341,13 +339,13 @@ class Effect:
         return time_s
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """Change what the sensor sees before its zero and noise.
+        """Change the angle that the sensor measures, before zero and noise are added.
 
         Args:
             angle: of the rod's upper end, rad, shape (n,).
             time_s: true times, s, shape (n,).
             stated: the run as the campaign states it.
-            drawn: what the run drew.
+            drawn: what `draw` returned for the run.
 
         Returns:
             The changed angle, rad, shape (n,).
@@ -367,7 +365,7 @@ class Effect:
         return sensor
 
     def on_reading(self, reading: Array) -> Array:
-        """Change the reading after noise and before conversion.
+        """Change the reading after noise and before quantisation.
 
         Args:
             reading: rad, shape (n,).
@@ -378,7 +376,7 @@ class Effect:
         return reading
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Name and parameters as JSON's types."""
+        """Name and parameters as plain JSON values."""
         return {
             "name": self.name,
             "parameters": {info.name: getattr(self, info.name) for info in self.parameters()},
@@ -408,11 +406,11 @@ def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:
 
 
 def moment_scale(info: ParameterInfo, campaign: Circumstances) -> float:
-    """Factor on a typical size where moments are per unit inertia, which is of the order of 0.1 kg m².
+    """Factor on a parameter's typical value: in normalised form moments are divided by about 0.1 kg m².
 
     Args:
         info: the parameter.
-        campaign: whether runs are normalised.
+        campaign: says whether runs are normalised.
 
     Returns:
         10 for a moment in normalised form, else 1.
@@ -421,13 +419,10 @@ def moment_scale(info: ParameterInfo, campaign: Circumstances) -> float:
 
 
 def with_law(run: RunSettings, **values: float) -> RunSettings:
-    """A run with parameters of the moment law added.
+    """A copy of a run with parameters of the moment law added or replaced.
 
     Args:
         run: the run's physics.
         **values: parameters of the law by name.
-
-    Returns:
-        The changed run.
     """
     return dataclasses.replace(run, parameters={**run.parameters, **values})

@@ -30,8 +30,8 @@ class Buffeting(Effect):
     condition = "wind_on"
     equation = "random moment of standard deviation s ½ρV²Al, correlated as exp(−2π fb |t − t'|)"
     signature = (
-        "The response wanders about the decay in wind-on runs, and after the decay goes on as "
-        "narrow-band noise at the rig's own frequency."
+        "In wind-on runs the response wanders about the decay; after the decay it continues as "
+        "narrow-band noise at the rig's natural frequency."
     )
     references = (
         "Dryden & Kuethe, NACA Report 342 (1930)",
@@ -61,7 +61,7 @@ class Buffeting(Effect):
     )
 
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Array:
-        """The kicks of the random moment, those of its steady state first."""
+        """White noise that is filtered into the random moment; the first value sets its initial state."""
         kicks = rng.standard_normal(int(stated.duration / _INTERVAL) + 2)
         kicks[0] = rng.standard_normal()
         return kicks

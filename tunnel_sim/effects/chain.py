@@ -1,4 +1,4 @@
-"""The effects of one run, applied in their order: the one place where their hooks are called."""
+"""The effects of one run, applied in order. Their hooks are called nowhere else."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True, eq=False)
 class EffectChain:
-    """What acts in one run beyond the nominal model.
+    """The effects that act in one run.
 
     Args:
         stated: the run as the campaign states it.
         effects: in the order in which they act.
-        drawn: what the run drew for each of them.
+        drawn: the random part of each effect in this run.
     """
 
     stated: RunSettings
@@ -30,13 +30,13 @@ class EffectChain:
 
     @classmethod
     def draw(cls, stated: RunSettings, effects: Sequence[Effect], rng: np.random.Generator) -> EffectChain:
-        """Draw what is random in the run.
+        """Draw the random parts of the effects in one run.
 
         Args:
             stated: the run as the campaign states it.
             effects: in the order in which they act.
-            rng: every effect draws from generators spawned of it, one for the motion and one for the sensor, so
-                that an effect at its null leaves all that is drawn from ``rng`` itself as it is.
+            rng: parent generator. Each effect draws from generators spawned from it, one for the motion and one
+                for the sensor, so an effect never changes what is later drawn from ``rng`` itself.
 
         Returns:
             The chain.
@@ -93,34 +93,30 @@ class EffectChain:
         return self.angle(np.asarray(path(true), np.float64), true)
 
     def angle(self, angle: Array, time_s: Array) -> Array:
-        """What the sensor sees before its zero and noise.
+        """The angle that the sensor measures, before zero and noise are added.
 
         Args:
             angle: of the rod's upper end, rad, shape (n,).
             time_s: true times since the release, s, shape (n,).
 
         Returns:
-            The angle seen, rad, shape (n,).
+            The measured angle, rad, shape (n,).
         """
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
             angle = effect.on_angle(angle, time_s, self.stated, drawn)
         return angle
 
     def sensor(self, sensor: SensorModel) -> SensorModel:
-        """The true sensor.
-
-        Args:
-            sensor: as stated.
-        """
+        """The true sensor, given the stated one."""
         for effect in self.effects:
             sensor = effect.on_sensor(sensor)
         return sensor
 
     def reading(self, reading: Array) -> Array:
-        """The reading after noise and before conversion.
+        """Change the reading after noise and before quantisation.
 
         Args:
-            reading: zero and noise included, rad, shape (n,).
+            reading: with zero and noise, rad, shape (n,).
 
         Returns:
             The changed reading, rad, shape (n,).
@@ -131,7 +127,7 @@ class EffectChain:
 
     @property
     def reads_plainly(self) -> bool:
-        """Whether no effect touches what the sensor sees or reads."""
+        """Whether no effect changes the measured angle or the reading."""
         return not any(
             _overrides(effect, hook)
             for effect in self.effects

@@ -16,22 +16,24 @@ from tunnel_sim.vocabulary.record import Array
 class CoulombFriction(Effect):
     """Dry friction in the rod's bearing and potentiometer.
 
-    With a presliding range the contact gives way before it slides (Dahl 1968; Canudas de Wit et al. 1995,
-    doi 10.1109/9.376053): z is its deflection, zero at the release, zs where it slides and 2 Tc/zs the stiffness
-    that a reversal of sliding meets.
+    With a presliding range the contact deflects before it slides (Dahl 1968; Canudas de Wit et al. 1995,
+    doi 10.1109/9.376053): z is the deflection, zero at the release; zs is the deflection at which it slides;
+    2 Tc/zs is the stiffness just after the sliding reverses.
 
     Args:
-        friction_moment: moment of friction, N m.
-        presliding: deflection at which the contact slides, rad; 0 is the textbook's.
+        friction_moment: friction moment, N m.
+        presliding: deflection at which the contact slides, rad; 0 in the textbook form.
     """
 
     name = "coulomb_friction"
     place = 1
     channel = "damping"
     condition = "always"
-    equation = "−Tc sgn β̇; rest while the other moments stay within ±Tc; bent: −Tc z/zs, ż = β̇ − |β̇| z/zs"
+    equation = (
+        "−Tc sgn β̇; rest while the other moments stay within ±Tc; general form: −Tc z/zs, ż = β̇ − |β̇| z/zs"
+    )
     signature = (
-        "The envelope falls along a straight line by 4Tc/Kr a cycle, so the damping ratio rises "
+        "The envelope falls linearly, by 4Tc/Kr per cycle, so the damping ratio rises "
         "as the amplitude decays, and the body can come to rest off centre."
     )
     references = (
@@ -40,7 +42,7 @@ class CoulombFriction(Effect):
     )
     example = (0.05,)
 
-    friction_moment: float = parameter("Tc", "N m", "moment of friction", scale=0.004, lower=0.0, upper=1e4)
+    friction_moment: float = parameter("Tc", "N m", "friction moment", scale=0.004, lower=0.0, upper=1e4)
     presliding: float = parameter(
         "zs",
         "rad",
@@ -54,12 +56,12 @@ class CoulombFriction(Effect):
 
     @classmethod
     def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
-        """Friction against the motion."""
+        """Friction opposes the motion."""
         del angle, spring
         return -np.sign(rate)
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Set the moment law's terms, in steps short enough to resolve the contact's give after a reversal."""
+        """Set the terms of the moment law, with steps short enough to resolve the presliding range."""
         del stated, drawn
         if self.is_null or self.presliding == 0.0:
             return with_law(run, friction_moment=self.friction_moment)

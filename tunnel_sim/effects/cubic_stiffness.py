@@ -14,37 +14,37 @@ class CubicStiffness(Effect):
     """A spring that hardens or softens with the angle.
 
     Args:
-        coefficient: share of the stiffness per squared angle, positive: hardening, 1/rad2.
-        exponent: power of the angle in the moment, the same moment at 0.2 rad, dimensionless; 3 is the textbook's.
+        coefficient: relative change of stiffness per squared angle, positive when hardening, 1/rad2.
+        exponent: power of the angle in the moment (unchanged at 0.2 rad), dimensionless; 3 in the textbook form.
     """
 
     name = "cubic_stiffness"
     place = 4
     channel = "stiffness"
     condition = "always"
-    equation = "−κ Kr β³; bent: |β|^p sgn β for β³"
-    signature = "The frequency departs from its small-amplitude value by the share (3/8) κ A²."
+    equation = "−κ Kr β³; general form: |β|^p sgn β for β³"
+    signature = "The relative change of frequency from its small-amplitude value is (3/8) κ A²."
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
     example = (1.0,)
 
     coefficient: float = parameter(
         "κ",
         "1/rad2",
-        "share of the stiffness per squared angle, positive: hardening",
+        "relative change of stiffness per squared angle, positive when hardening",
         scale=0.2,
         lower=-10.0,
         upper=50.0,
         per_stiffness=True,
     )
 
-    exponent: float = exponent("p", "power of the angle in the moment, the same moment at 0.2 rad", 3.0)
+    exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 3.0)
 
     @classmethod
     def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
-        """The textbook's term."""
+        """The textbook form."""
         del rate
         return -spring * angle**3
 
     def law(self) -> Mapping[str, float]:
-        """The term of the moment law."""
+        """The effect's terms of the moment law."""
         return {"stiffness_cubic": self.coefficient, "stiffness_cubic_exponent": self.exponent}

@@ -20,7 +20,7 @@ class FreePlay(Effect):
     place = 6
     channel = "stiffness"
     condition = "always"
-    equation = "−Kr dz(β), dz = 0 within ±δ and β ∓ δ beyond"
+    equation = "−Kr dz(β); dz = 0 within ±δ, β ∓ δ beyond"
     signature = "The frequency falls steeply as the amplitude nears the dead zone."
     references = ("Conner, Tang, Dowell & Virgin, J. Fluids Struct. 11 (1997) 89",)
     example = (0.01,)
@@ -30,5 +30,5 @@ class FreePlay(Effect):
     )
 
     def law(self) -> Mapping[str, float]:
-        """The term of the moment law."""
+        """The effect's terms of the moment law."""
         return {"free_play": self.half_width}

@@ -1,4 +1,4 @@
-"""Gravity on a tilted axis with an offset centre of mass: a restoring moment of its own."""
+"""Gravity acting on an offset centre of mass about a tilted axis."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True)
 class GravityStiffness(Effect):
-    """Gravity on a tilted axis with an offset centre of mass: a restoring moment of its own.
+    """Gravity acting on an offset centre of mass about a tilted axis.
 
     Args:
         stiffness: greatest restoring moment, N m/rad.
-        rest_angle: angle at which gravity is in balance, rad.
+        rest_angle: equilibrium angle under gravity alone, rad.
     """
 
     name = "gravity_stiffness"
@@ -27,26 +27,26 @@ class GravityStiffness(Effect):
     condition = "always"
     equation = "−Kg sin(β − βg)"
     signature = (
-        "The same stiffness is added to every spring, so the gradient of Kr against ωn² keeps its "
-        "slope and leaves the origin; the centre shifts by the spring."
+        "The same stiffness is added to every spring, so the line of Kr against ωn² keeps its gradient "
+        "but misses the origin; the shift of the centre depends on the spring."
     )
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
     example = (0.4, 0.2)
-    regressed_at: ClassVar[Mapping[str, float]] = {"rest_angle": 0.0}  # which is the zero there
+    regressed_at: ClassVar[Mapping[str, float]] = {"rest_angle": 0.0}  # the sensor's zero
 
     stiffness: float = parameter(
         "Kg", "N m/rad", "greatest restoring moment", scale=0.3, lower=-1e5, upper=1e5
     )
     rest_angle: float = parameter(
-        "βg", "rad", "angle at which gravity is in balance", scale=0.1, lower=-3.2, upper=3.2
+        "βg", "rad", "equilibrium angle under gravity alone", scale=0.1, lower=-3.2, upper=3.2
     )
 
     @classmethod
     def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
-        """The pull towards the sensor's zero."""
+        """The moment towards the sensor's zero."""
         del rate, spring
         return -np.sin(angle)
 
     def law(self) -> Mapping[str, float]:
-        """The term of the moment law."""
+        """The effect's terms of the moment law."""
         return {"gravity_stiffness": self.stiffness, "gravity_angle": self.rest_angle}

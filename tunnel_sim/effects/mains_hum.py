@@ -1,4 +1,4 @@
-"""Hum of the mains in the reading."""
+"""Mains hum in the reading."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True)
 class MainsHum(Effect):
-    """Hum of the mains in the reading.
+    """Mains hum in the reading.
 
     Args:
         amplitude: amplitude of the hum, rad.
-        frequency: frequency of the mains, Hz.
+        frequency: mains frequency, Hz.
     """
 
     name = "mains_hum"
@@ -25,7 +25,7 @@ class MainsHum(Effect):
     channel = "sensor"
     condition = "always"
     equation = "y = β + a sin(2π f t + φ), φ drawn for every run"
-    signature = "A spectral line at the mains' frequency in every run, whatever the motion."
+    signature = "A spectral line at the mains frequency in every run, independent of the motion."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.002, 60.0)
     fitted = False
@@ -33,11 +33,11 @@ class MainsHum(Effect):
 
     amplitude: float = parameter("a", "rad", "amplitude of the hum", scale=0.0005, lower=0.0, upper=1.0)
     frequency: float = parameter(
-        "f", "Hz", "frequency of the mains", scale=0.05, lower=45.0, upper=65.0, default=50.0
+        "f", "Hz", "mains frequency", scale=0.05, lower=45.0, upper=65.0, default=50.0
     )
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """Add the hum at a phase of the run's own."""
+        """Add the hum at the phase drawn for the run."""
         del stated
         if self.is_null or not isinstance(drawn, float):
             return angle

@@ -13,25 +13,27 @@ class NonlinearYawDamping(Effect):
     """Aerodynamic damping that depends on the yaw angle.
 
     Args:
-        coefficient: share of Ca per squared angle, 1/rad2.
-        exponent: power of the angle in the factor, the same factor at 0.2 rad, dimensionless; 2 is the textbook's.
+        coefficient: relative change of Ca per squared angle, 1/rad2.
+        exponent: power of the angle in the factor (unchanged at 0.2 rad), dimensionless; 2 in the textbook form.
     """
 
     name = "nonlinear_yaw_damping"
     place = 11
     channel = "damping"
     condition = "wind_on"
-    equation = "Ca (1 + μa β²) β̇ in place of Ca β̇; bent: |β|^p for β²"
-    signature = "The damping ratio of wind-on runs departs by the share μa A²/4 of the aerodynamic part."
+    equation = "Ca (1 + μa β²) β̇ instead of Ca β̇; general form: |β|^p for β²"
+    signature = (
+        "The aerodynamic part of the damping ratio in wind-on runs changes by the relative amount μa A²/4."
+    )
     references = ("van der Pol, Phil. Mag. 2 (1926) 978, doi 10.1080/14786442608564127",)
     example = (20.0,)
 
     coefficient: float = parameter(
-        "μa", "1/rad2", "share of Ca per squared angle", scale=5.0, lower=-500.0, upper=500.0
+        "μa", "1/rad2", "relative change of Ca per squared angle", scale=5.0, lower=-500.0, upper=500.0
     )
 
-    exponent: float = exponent("p", "power of the angle in the factor, the same factor at 0.2 rad", 2.0)
+    exponent: float = exponent("p", "power of the angle in the factor (unchanged at 0.2 rad)", 2.0)
 
     def law(self) -> Mapping[str, float]:
-        """The term of the moment law."""
+        """The effect's terms of the moment law."""
         return {"damping_quadratic": self.coefficient, "damping_quadratic_exponent": self.exponent}

@@ -13,25 +13,25 @@ class NonlinearYawMoment(Effect):
     """An aerodynamic yaw moment that is not linear in the yaw angle.
 
     Args:
-        coefficient: share of Ka per squared angle, 1/rad2.
-        exponent: power of the angle in the factor, the same factor at 0.2 rad, dimensionless; 2 is the textbook's.
+        coefficient: relative change of Ka per squared angle, 1/rad2.
+        exponent: power of the angle in the factor (unchanged at 0.2 rad), dimensionless; 2 in the textbook form.
     """
 
     name = "nonlinear_yaw_moment"
     place = 9
     channel = "stiffness"
     condition = "wind_on"
-    equation = "Ka (1 + κa β²) β in place of Ka β; bent: |β|^p for β²"
-    signature = "As cubic stiffness, but in proportion to V² and absent with the wind off."
+    equation = "Ka (1 + κa β²) β instead of Ka β; general form: |β|^p for β²"
+    signature = "Like cubic stiffness, but proportional to V² and absent with the wind off."
     references = ("Mansor & Passmore, J. Wind Eng. Ind. Aerodyn. 96 (2008) 1218",)
     example = (3.0,)
 
     coefficient: float = parameter(
-        "κa", "1/rad2", "share of Ka per squared angle", scale=1.0, lower=-100.0, upper=100.0
+        "κa", "1/rad2", "relative change of Ka per squared angle", scale=1.0, lower=-100.0, upper=100.0
     )
 
-    exponent: float = exponent("p", "power of the angle in the factor, the same factor at 0.2 rad", 2.0)
+    exponent: float = exponent("p", "power of the angle in the factor (unchanged at 0.2 rad)", 2.0)
 
     def law(self) -> Mapping[str, float]:
-        """The term of the moment law."""
+        """The effect's terms of the moment law."""
         return {"moment_cubic": self.coefficient, "moment_cubic_exponent": self.exponent}

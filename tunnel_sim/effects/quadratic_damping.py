@@ -17,14 +17,14 @@ class QuadraticDamping(Effect):
 
     Args:
         coefficient: coefficient of the squared rate, N m s2/rad2.
-        exponent: power of the rate in the moment, the same moment at 2 rad/s, dimensionless; 2 is the textbook's.
+        exponent: power of the rate in the moment (unchanged at 2 rad/s), dimensionless; 2 in the textbook form.
     """
 
     name = "quadratic_damping"
     place = 2
     channel = "damping"
     condition = "always"
-    equation = "−C2 |β̇| β̇; bent: |β̇|^n sgn β̇"
+    equation = "−C2 |β̇| β̇; general form: |β̇|^n sgn β̇ for |β̇| β̇"
     signature = "The damping ratio falls in proportion to the amplitude."
     references = ("ITTC Recommended Procedure 7.5-02-07-04.5, roll damping of ships: B1 p + B2 |p| p",)
     example = (0.01,)
@@ -33,14 +33,14 @@ class QuadraticDamping(Effect):
         "C2", "N m s2/rad2", "coefficient of the squared rate", scale=0.002, lower=-1e4, upper=1e4
     )
 
-    exponent: float = exponent("n", "power of the rate in the moment, the same moment at 2 rad/s", 2.0)
+    exponent: float = exponent("n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0)
 
     @classmethod
     def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
-        """Drag against the motion."""
+        """Drag opposes the motion."""
         del angle, spring
         return -np.abs(rate) * rate
 
     def law(self) -> Mapping[str, float]:
-        """The term of the moment law."""
+        """The effect's terms of the moment law."""
         return {"quadratic_damping": self.coefficient, "quadratic_damping_exponent": self.exponent}

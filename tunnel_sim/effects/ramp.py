@@ -1,4 +1,4 @@
-"""The course of a drift over a run: a straight ramp, or one that settles."""
+"""How a drift develops over a run: linearly, or exponentially towards a final value."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ EQUATION = "(1 − e^(−k t/T))/(1 − e^(−k))"
 
 
 def settling() -> Any:
-    """The form parameter of a drift: run length over the time constant; 0 is the textbook's straight ramp."""
+    """The form parameter of a drift: run length over the time constant; 0: linear, the textbook form."""
     return parameter(
         "k",
         "1",
@@ -26,11 +26,12 @@ def settling() -> Any:
 
 
 def ramp(part: Array, rate: float) -> Array:
-    """How much of the drift has come.
+    """The share of a drift that has developed.
 
     Args:
-        part: of the run that has passed, t/T, shape (n,).
-        rate: run length over the drift's time constant; below 0 the drift quickens, at 0 it is straight.
+        part: elapsed share of the run, t/T, shape (n,).
+        rate: run length over the drift's time constant, dimensionless ratio; below 0 the drift accelerates, at 0
+            it is linear.
 
     Returns:
         From 0 to 1 over the run, shape (n,).

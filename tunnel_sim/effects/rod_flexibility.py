@@ -1,4 +1,4 @@
-"""A rod that twists between the spring's and sensor's end and the body."""
+"""A rod that twists between its upper end, which carries spring and sensor, and the body."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from tunnel_sim.physics.run_settings import RodTwist, RunSettings
 
 @dataclass(frozen=True)
 class RodFlexibility(Effect):
-    """A rod that twists between the spring's and sensor's end and the body.
+    """A rod that twists between its upper end, which carries spring and sensor, and the body.
 
     Args:
         compliance: twist per moment, rad/(N m).
-        inertia_share: share of Izz that moves with the spring's end, dimensionless.
+        inertia_share: share of Izz at the rod's upper end, dimensionless.
     """
 
     name = "rod_flexibility"
@@ -29,8 +29,8 @@ class RodFlexibility(Effect):
         "the sensor reads θ, Crod is 1 % of critical"
     )
     signature = (
-        "The stiffness of spring and rod in series falls below the spring's, the more the stiffer "
-        "the spring; the air's stiffness acts on the far end; the rod may ring at the release."
+        "Spring and rod in series are softer than the spring alone, and the difference grows with the "
+        "spring's stiffness; the aerodynamic stiffness acts at the lower end; the rod may ring after the release."
     )
     references = ("Meirovitch, Fundamentals of Vibrations, McGraw-Hill 2001",)
     example = (0.001, 0.3)
@@ -42,24 +42,24 @@ class RodFlexibility(Effect):
     inertia_share: float = parameter(
         "s",
         "1",
-        "share of Izz that moves with the spring's end",
+        "share of Izz at the rod's upper end",
         scale=0.1,
         lower=0.001,
         upper=0.999,
-        fit_lower=0.02,  # beyond these the rod moves faster than the integrator steps
+        fit_lower=0.02,  # outside these bounds the rod oscillates too fast for the integrator's steps
         fit_upper=0.9,
         default=0.1,
     )
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Shares of inertia from a light upper end to an even division."""
+        """Shares of inertia from a light upper end to an equal division."""
         del campaign
         scale = cls.parameters()[0].scale
         return [Trial({"compliance": scale, "inertia_share": s}, "compliance") for s in (0.05, 0.2, 0.5)]
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Let the rod twist, in steps short enough for its own oscillation."""
+        """Let the rod twist, with steps short enough for its own oscillation."""
         del stated, drawn
         if self.is_null:
             return run

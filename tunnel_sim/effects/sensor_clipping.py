@@ -10,7 +10,7 @@ import numpy as np
 from tunnel_sim.effects.base import Circumstances, Effect, Trial, parameter
 from tunnel_sim.vocabulary.record import Array
 
-_FAR = 2.0  # rad: where a limit on one side only puts the other
+_FAR = 2.0  # rad: the other limit, where only one side clips
 
 
 @dataclass(frozen=True)
@@ -18,31 +18,31 @@ class SensorClipping(Effect):
     """A reading that saturates.
 
     Args:
-        limit: greatest reading; 0 stands for none, rad.
-        centre: middle of the readings that are possible, rad; 0 is the textbook's.
-        knee: share of the limit over which the reading bends over towards it, dimensionless; 0 is the textbook's.
+        limit: greatest possible reading, rad; 0: no limit.
+        centre: middle of the possible readings, rad; 0 in the textbook form.
+        knee: share of the limit over which the reading saturates gradually, dimensionless; 0 in the textbook form.
     """
 
     name = "sensor_clipping"
     place = 21
     channel = "sensor"
     condition = "always"
-    equation = "|y| ≤ L; bent: |y − c| ≤ L, exponentially within k L of it"
-    signature = "The tops of the largest swings are flat, and nothing else is touched."
+    equation = "|y| ≤ L; general form: |y − c| ≤ L, approached exponentially within k L of the limit"
+    signature = "The peaks of the largest swings are flat; all other readings are unchanged."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.2,)
     tries = 2
 
     limit: float = parameter(
-        "L", "rad", "greatest reading; 0 stands for none", scale=0.3, lower=0.0, upper=10.0
+        "L", "rad", "greatest possible reading (0: no limit)", scale=0.3, lower=0.0, upper=10.0
     )
     centre: float = parameter(
-        "c", "rad", "middle of the readings that are possible", scale=0.05, lower=-5.0, upper=5.0, form=True
+        "c", "rad", "middle of the possible readings", scale=0.05, lower=-5.0, upper=5.0, form=True
     )
     knee: float = parameter(
         "k",
         "1",
-        "share of the limit over which the reading bends",
+        "share of the limit over which the reading saturates gradually",
         scale=0.05,
         lower=0.0,
         upper=0.9,
@@ -51,7 +51,7 @@ class SensorClipping(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Limits somewhat below the greatest reading: on both sides, then on one with the other far away."""
+        """Limits slightly below the greatest reading: first on both sides, then on one side only."""
         limits = [campaign.greatest_reading * share for share in (0.999, 0.99, 0.97, 0.93, 0.87, 0.8)]
         both = [Trial({"limit": limit}, None) for limit in limits]
         one = [
@@ -62,7 +62,7 @@ class SensorClipping(Effect):
         return [*both, *one]
 
     def on_reading(self, reading: Array) -> Array:
-        """Cut off beyond the limit, or bend over towards it."""
+        """Clip at the limit, or saturate gradually."""
         if self.is_null:
             return reading
         if self.knee == 0.0:

@@ -16,15 +16,17 @@ class SensorDrift(Effect):
 
     Args:
         drift: drift over the run, rad.
-        settling: length of the run over the drift's time constant, dimensionless; 0 is the textbook's ramp.
+        settling: length of the run over the drift's time constant, dimensionless; 0: linear (textbook form).
     """
 
     name = "sensor_drift"
     place = 19
     channel = "sensor"
     condition = "always"
-    equation = f"y = β + d t/T over a run of length T; bent: {EQUATION} for t/T"
-    signature = "The centre of the oscillation moves with time and is the same at any wind and spring."
+    equation = f"y = β + d t/T over a run of length T; general form: {EQUATION} for t/T"
+    signature = (
+        "The centre of the oscillation moves with time, in the same way for every wind speed and spring."
+    )
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.01,)
 
@@ -32,7 +34,7 @@ class SensorDrift(Effect):
     settling: float = settling()
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """Add the ramp."""
+        """Add the drift."""
         del drawn
         if self.is_null:
             return angle

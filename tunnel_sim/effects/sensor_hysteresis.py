@@ -18,16 +18,18 @@ class SensorHysteresis(Effect):
 
     Args:
         half_width: half width of the play, rad.
-        roundness: by which share a wider and a narrower play differ from it whose mean is read, dimensionless;
-            0 is the textbook's.
+        roundness: relative difference k of two plays, (1 ± k) times as wide, whose mean is read, dimensionless;
+            0 in the textbook form.
     """
 
     name = "sensor_hysteresis"
     place = 18
     channel = "sensor"
     condition = "always"
-    equation = "y follows β when pushed: play of half width w; bent: mean of plays (1 ± k) w"
-    signature = "The reading rests for a moment at every turn of the motion, and lags by w between turns."
+    equation = "y follows β when pushed: play of half width w; general form: mean of two plays, (1 ± k) w"
+    signature = (
+        "The reading stands still for a moment at each reversal of the motion and lags by w in between."
+    )
     references = (
         "Visintin, Differential Models of Hysteresis, Springer 1994, doi 10.1007/978-3-662-11557-2",
     )
@@ -37,11 +39,17 @@ class SensorHysteresis(Effect):
 
     half_width: float = parameter("w", "rad", "half width of the play", scale=0.001, lower=0.0, upper=0.2)
     roundness: float = parameter(
-        "k", "1", "share by which two plays differ from it", scale=0.3, lower=0.0, upper=1.0, form=True
+        "k",
+        "1",
+        "relative difference of two plays whose mean is read",
+        scale=0.3,
+        lower=0.0,
+        upper=1.0,
+        form=True,
     )
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """Follow when pushed; the release has just pushed it outward."""
+        """Follow when pushed; the release has just pushed the reading outward."""
         del time_s, stated, drawn
         if self.is_null:
             return angle

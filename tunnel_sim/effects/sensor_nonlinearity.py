@@ -11,7 +11,7 @@ from tunnel_sim.effects.base import Circumstances, Drawn, Effect, Trial, exponen
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
-_REFERENCE = 0.2  # rad: where forms of another power give the same error
+_REFERENCE = 0.2  # rad: angle at which every exponent gives the same error
 
 
 @dataclass(frozen=True)
@@ -20,39 +20,45 @@ class SensorNonlinearity(Effect):
 
     Args:
         coefficient: cubic coefficient, 1/rad2.
-        exponent: power of the angle in the error, the same error at 0.2 rad, dimensionless; 3 is the textbook's.
-        quadratic: share of the angle's square in the error beside it, 1/rad; 0 is the textbook's.
+        exponent: power of the angle in the error (unchanged at 0.2 rad), dimensionless; 3 in the textbook form.
+        quadratic: coefficient of an additional quadratic error, 1/rad; 0 in the textbook form.
     """
 
     name = "sensor_nonlinearity"
     place = 16
     channel = "sensor"
     condition = "always"
-    equation = "y = β + s β³; bent: |β|^p sgn β for β³, and q β² beside it"
+    equation = "y = β + s β³; general form: |β|^p sgn β for β³, plus q β²"
     signature = (
-        "A third harmonic of s A³/4; the frequency is untouched, and the decay looks faster by the share "
-        "(3/2) s A², whatever spring and wind."
+        "A third harmonic of s A³/4; the frequency is unchanged, and the decay looks faster by the relative "
+        "amount (3/2) s A² for every spring and wind speed."
     )
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.2,)
 
     coefficient: float = parameter("s", "1/rad2", "cubic coefficient", scale=0.05, lower=-1.0, upper=1.0)
 
-    exponent: float = exponent("p", "power of the angle in the error, the same error at 0.2 rad", 3.0)
+    exponent: float = exponent("p", "power of the angle in the error (unchanged at 0.2 rad)", 3.0)
 
     quadratic: float = parameter(
-        "q", "1/rad", "square of the angle beside it", scale=0.02, lower=-1.0, upper=1.0, form=True
+        "q",
+        "1/rad",
+        "coefficient of an additional quadratic error",
+        scale=0.02,
+        lower=-1.0,
+        upper=1.0,
+        form=True,
     )
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """The cubic error, then one that is mostly quadratic."""
+        """First a cubic error, then one that is mostly quadratic."""
         scale = {info.name: info.scale for info in cls.parameters()}
         mostly_square = {"coefficient": 0.01 * scale["coefficient"], "quadratic": scale["quadratic"]}
         return [*super().trials(campaign), Trial(mostly_square, "quadratic")]
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """Bend the characteristic."""
+        """Apply the nonlinear characteristic."""
         del time_s, stated, drawn
         if self.is_null:
             return angle

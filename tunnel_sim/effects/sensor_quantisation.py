@@ -1,4 +1,4 @@
-"""A resolution coarser than stated."""
+"""A resolution that is coarser than stated."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tunnel_sim.vocabulary.plan import SensorModel
 
 @dataclass(frozen=True)
 class SensorQuantisation(Effect):
-    """A resolution coarser than stated.
+    """A resolution that is coarser than stated.
 
     Args:
         step: true step of the reading, rad.
@@ -22,7 +22,9 @@ class SensorQuantisation(Effect):
     channel = "sensor"
     condition = "always"
     equation = "y = q round(y/q); a step finer than the stated resolution does nothing"
-    signature = "The reading lies on a lattice coarser than stated, and its error is a sawtooth of the angle."
+    signature = (
+        "The readings are multiples of a coarser step than stated; their error is a sawtooth of the angle."
+    )
     references = ("Widrow & Kollár, Quantization Noise, CUP 2008, doi 10.1017/CBO9780511754661",)
     example = (0.004,)
     fitted = False
@@ -31,5 +33,5 @@ class SensorQuantisation(Effect):
     step: float = parameter("q", "rad", "true step of the reading", scale=0.002, lower=0.0, upper=1.0)
 
     def on_sensor(self, sensor: SensorModel) -> SensorModel:
-        """Convert at the true step where it is the coarser one."""
+        """Use the true step where it is coarser than the stated one."""
         return dataclasses.replace(sensor, resolution=max(self.step, sensor.resolution))

@@ -16,19 +16,20 @@ class SpringMiscalibration(Effect):
     """One spring that is not as stiff as stated.
 
     Args:
-        error: share by which the true stiffness exceeds the stated one, dimensionless.
-        spring_stiffness: stated stiffness of the spring in question, N m/rad.
+        error: true over stated stiffness, less one, dimensionless.
+        spring_stiffness: stated stiffness of the spring concerned, N m/rad.
     """
 
     name = "spring_miscalibration"
     place = 22
     channel = "calibration"
     condition = "always"
-    equation = "(1 + x) Kr in place of the stated Kr, in the runs of one spring"
+    equation = "(1 + x) Kr instead of the stated Kr, in the runs of one spring"
     signature = (
-        "All runs of one spring leave the line of stiffness against squared frequency by the same share."
+        "All runs of one spring lie off the line of stiffness against squared frequency by the same relative "
+        "amount."
     )
-    references = ("Paper, Table II: springs 4 and 7 leave the line by −12 % and +10 %",)
+    references = ("Paper, Table II: springs 4 and 7 lie off the line by −12 % and +10 %",)
     example = (0.05, 16.12)
     exact = True
     tries = 2
@@ -36,7 +37,7 @@ class SpringMiscalibration(Effect):
     error: float = parameter(
         "x",
         "1",
-        "share by which the true stiffness exceeds the stated one",
+        "true over stated stiffness, less one",
         scale=0.02,
         lower=-0.9,
         upper=9.0,
@@ -44,7 +45,7 @@ class SpringMiscalibration(Effect):
     spring_stiffness: float = parameter(
         "Kr",
         "N m/rad",
-        "stated stiffness of the spring in question",
+        "stated stiffness of the spring concerned",
         scale=16.12,
         lower=0.0,
         upper=1e6,
@@ -53,7 +54,7 @@ class SpringMiscalibration(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Every spring, where there is another to hold it against."""
+        """Every spring, where there is another to compare it with."""
         springs = campaign.springs if len(campaign.springs) > 1 else ()
         scale = cls.parameters()[0].scale
         return [Trial({"error": scale, "spring_stiffness": spring}, "error") for spring in springs]

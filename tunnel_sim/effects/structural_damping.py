@@ -1,4 +1,4 @@
-"""Hysteretic loss in spring and rod, the same share of energy a cycle at any frequency."""
+"""Hysteretic loss in spring and rod: the same share of the energy per cycle at every frequency."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tunnel_sim.effects.base import Effect, WindOnRun, parameter
 
 @dataclass(frozen=True)
 class StructuralDamping(Effect):
-    """Hysteretic loss in spring and rod, the same share of energy a cycle at any frequency.
+    """Hysteretic loss in spring and rod: the same share of the energy per cycle at every frequency.
 
     Args:
         loss_factor: loss factor, dimensionless.
@@ -21,9 +21,9 @@ class StructuralDamping(Effect):
     place = 3
     channel = "damping"
     condition = "always"
-    equation = "−(η Kr/ωn) β̇, ωn = √(Kr/Izz)"
+    equation = "−(η Kr/ωn) β̇ with ωn = √(Kr/Izz)"
     signature = (
-        "Linear in every run, but the damping moment grows with the square root of the spring's stiffness."
+        "Each run is linear, but the damping moment grows with the square root of the spring's stiffness."
     )
     references = ("Crandall, J. Sound Vib. 11 (1970) 3, doi 10.1016/S0022-460X(70)80105-5",)
     example = (0.02,)
@@ -31,10 +31,10 @@ class StructuralDamping(Effect):
     loss_factor: float = parameter("η", "1", "loss factor", scale=0.005, lower=-1.0, upper=1.0)
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """Whether the loss goes with the motion's frequency or that of the rig in still air, runs do not show.
+        """Runs cannot show which frequency sets the loss: that of the motion, or that of the rig in still air.
 
         Causality may also stiffen the spring by (2η/π) ln(ω/ωn) (Crandall, J. Sound Vib. 11 (1970) 3). The
-        truth may lie anywhere between the two.
+        truth may lie between the two cases; their difference counts as a rectangular half-width.
         """
         del cn_beta
         if not runs:
@@ -53,5 +53,5 @@ class StructuralDamping(Effect):
         return cn_beta_std, cn_r_std
 
     def law(self) -> Mapping[str, float]:
-        """The term of the moment law."""
+        """The effect's terms of the moment law."""
         return {"loss_factor": self.loss_factor}

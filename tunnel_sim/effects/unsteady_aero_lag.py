@@ -1,4 +1,4 @@
-"""An aerodynamic moment that follows the angle late, or leads it."""
+"""An aerodynamic moment that lags or leads the yaw angle."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 from tunnel_sim.effects.base import Circumstances, Effect, Trial, WindOnRun, parameter
 
-#: Share of the first order, a·Cnβ, by which the form leaves Cnr open: chosen on the tuning sets' errors.
+#: Uncertainty of Cnr as a share of the first-order effect a·Cnβ, chosen from the errors in the tuning sets.
 _UNSEEN_SHARE = 0.2
 
 
 @dataclass(frozen=True)
 class UnsteadyAeroLag(Effect):
-    """An aerodynamic moment that follows the angle late, or leads it.
+    """An aerodynamic moment that lags or leads the yaw angle.
 
     Args:
         lag: time constant in units of l/V, l/V.
@@ -24,11 +24,11 @@ class UnsteadyAeroLag(Effect):
     channel = "damping"
     condition = "wind_on"
     equation = (
-        "Ka x in place of Ka β, τ ẋ = β − x, τ = a l/V; for a < 0 the mirrored lead Ka (2β − x) with |τ|"
+        "Ka x instead of Ka β, with τ ẋ = β − x, τ = a l/V; for a < 0 a phase lead: Ka (2β − x) with |τ|"
     )
     signature = (
-        "To first order a change of Cnr, which absorbs it; what is left is of second order in τω "
-        "and shows across springs and speeds."
+        "To first order it is a change of Cnr, which absorbs it; the remainder is of second order in τω "
+        "and shows when springs and speeds are compared."
     )
     references = (
         "Theissen, Unsteady Vehicle Aerodynamics in Gusty Crosswind (dissertation), TU München 2012",
@@ -37,8 +37,8 @@ class UnsteadyAeroLag(Effect):
     example = (1.5,)
     tries = 2
     caveat = (
-        "Cnr after is the derivative of the moment's own damping term; the lag acts besides. Over a slow "
-        "oscillation the two together give the effective Cnr − a Cnβ, which is what the nominal model finds "
+        "The Cnr after adding the lag describes the damping term alone; the lag damps the motion as well. In a "
+        "slow oscillation both together act as an effective Cnr − a Cnβ, which is what the nominal model finds "
         "(before)."
     )
 
@@ -46,20 +46,20 @@ class UnsteadyAeroLag(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """A lag and a lead."""
+        """First a phase lag, then a phase lead."""
         del campaign
         scale = cls.parameters()[0].scale
         return [Trial({"lag": scale}, "lag"), Trial({"lag": -scale}, "lag")]
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """To first order a lag is a change a·Cnβ of Cnr, and only its second order is seen.
+        """To first order a lag only changes Cnr by a·Cnβ; runs show the second-order remainder alone.
 
-        Two time constants, as in Jones's approximation (NACA Report 681, 1940), have a mean up to a third below the
-        one that fits, and a lead mirrors them.
+        With two time constants, as in Jones's approximation (NACA Report 681, 1940), their mean is up to a third
+        below the single constant that fits best; the same holds for a phase lead.
         """
         del runs
         return 0.0, _UNSEEN_SHARE * abs(self.lag * cn_beta)
 
     def law(self) -> Mapping[str, float]:
-        """The term of the moment law."""
+        """The effect's terms of the moment law."""
         return {"aero_lag": self.lag}

@@ -14,7 +14,7 @@ class VortexShedding(Effect):
 
     Args:
         amplitude: coefficient of the moment, dimensionless.
-        strouhal_number: Strouhal number on the body's width, dimensionless.
+        strouhal_number: Strouhal number based on the body's width, dimensionless.
     """
 
     name = "vortex_shedding"
@@ -22,7 +22,7 @@ class VortexShedding(Effect):
     channel = "forcing"
     condition = "wind_on"
     equation = "c ½ρV²Al sin(2π St V t/width + φ), φ drawn for every run"
-    signature = "A spectral line whose frequency grows in proportion to the wind speed."
+    signature = "A spectral line whose frequency is proportional to the wind speed."
     references = ("Bearman, Annu. Rev. Fluid Mech. 16 (1984) 195, doi 10.1146/annurev.fl.16.010184.001211",)
     example = (0.1, 0.02)
     line = "shedding"
@@ -32,11 +32,17 @@ class VortexShedding(Effect):
         "c", "1", "coefficient of the moment", scale=0.01, lower=0.0, upper=5.0, per_pressure=True
     )
     strouhal_number: float = parameter(
-        "St", "1", "Strouhal number on the body's width", scale=0.15, lower=0.001, upper=2.0, default=0.15
+        "St",
+        "1",
+        "Strouhal number based on the body's width",
+        scale=0.15,
+        lower=0.001,
+        upper=2.0,
+        default=0.15,
     )
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Set the moment law's term at a phase of the run's own."""
+        """Set the terms of the moment law, with the phase drawn for the run."""
         del stated
         if self.is_null or not isinstance(drawn, float):
             return run

@@ -12,7 +12,7 @@ from tunnel_sim.effects.base import Circumstances, Drawn, Effect, Trial, paramet
 from tunnel_sim.effects.ramp import EQUATION, ramp, settling
 from tunnel_sim.physics.run_settings import RunSettings, Series
 
-_SAMPLES = 201  # of a bent ramp, linear in between: within 1e-4 of the drift up to k = 5
+_SAMPLES = 201  # of an exponential drift, linear in between: within 1e-4 of the drift up to k = 5
 
 
 @dataclass(frozen=True)
@@ -20,21 +20,21 @@ class WindSpeedDrift(Effect):
     """A wind speed that drifts during the run.
 
     Args:
-        drift: share of the speed gained over the run, dimensionless.
-        settling: length of the run over the drift's time constant, dimensionless; 0 is the textbook's ramp.
+        drift: relative gain of speed over the run, dimensionless.
+        settling: length of the run over the drift's time constant, dimensionless; 0: linear (textbook form).
     """
 
     name = "wind_speed_drift"
     place = 10
     channel = "stiffness"
     condition = "wind_on"
-    equation = "V(t) = V (1 + d t/T) over a run of length T; bent: " + EQUATION + " for t/T"
-    signature = "The frequency of wind-on runs moves with time, whatever the amplitude."
+    equation = "V(t) = V (1 + d t/T) over a run of length T; general form: " + EQUATION + " for t/T"
+    signature = "The frequency of wind-on runs changes with time rather than with amplitude."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
     example = (0.1,)
 
     drift: float = parameter(
-        "d", "1", "share of the speed gained over the run", scale=0.02, lower=-0.9, upper=5.0
+        "d", "1", "relative gain of speed over the run", scale=0.02, lower=-0.9, upper=5.0
     )
     settling: float = settling()
 
@@ -44,7 +44,7 @@ class WindSpeedDrift(Effect):
         return () if campaign.normalised else super().trials(campaign)
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Replace the constant wind by a ramp, sampled where it is bent."""
+        """Replace the constant wind speed by a sampled drift; two samples suffice where it is linear."""
         del drawn
         if stated.wind_speed <= 0.0 or self.is_null:
             return run

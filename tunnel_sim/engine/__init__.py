@@ -1,1 +1,1 @@
-"""The MuJoCo side: model, plugin, simulation, sensor and scenery."""
+"""The simulation with MuJoCo: model, plugin, integration, sensor and scenery."""

@@ -1,4 +1,4 @@
-"""The rig's MuJoCo model: the structure of ``mjcf/rig.xml`` filled with the rig description's numbers."""
+"""The rig's MuJoCo model: the structure comes from ``mjcf/rig.xml``, the numbers from the rig description."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
 _SERIES = ("wind_speed", "forcing")
-_THINNEST = 1e-3  # width over length: MuJoCo refuses the inertias of a body without any
-_NATIVE = frozenset({"spring_stiffness", "mechanical_damping", "yaw_inertia"})  # owned by joint and body
+_THINNEST = 1e-3  # least width over length: MuJoCo refuses the inertias of a body of zero width
+_NATIVE = frozenset({"spring_stiffness", "mechanical_damping", "yaw_inertia"})  # attributes of joint and body
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +33,8 @@ class Model:
 
     Args:
         mj: the compiled model.
-        rig: what it was built from.
-        settings: likewise.
+        rig: the rig it was built from.
+        settings: the run's physics.
         spec: the complete MJCF specification; ``spec.to_xml()`` writes it.
     """
 
@@ -45,17 +45,17 @@ class Model:
 
     @cached_property
     def yaw_address(self) -> int:
-        """Index of the spring end's angle in ``qpos`` and of its rate in ``qvel``."""
+        """Index of the angle of the rod's upper end in ``qpos``, and of its rate in ``qvel``."""
         return int(self.mj.joint("yaw").qposadr[0])
 
     def with_settings(self, settings: RunSettings) -> Model:
-        """The same model with another run's numbers, without compiling again.
+        """The same model with the numbers of another run, without compiling again.
 
         Args:
-            settings: of the same structure: timestep, series lengths and rigid or twisting rod.
+            settings: must have the same layout: timestep, series lengths, and a rigid or twisting rod.
 
         Returns:
-            A model whose physics equals to the bit that of ``build_model(rig, settings)``.
+            A model whose physics is bit-identical to that of ``build_model(rig, settings)``.
 
         Raises:
             TunnelError: when the plugin refuses the numbers, or the steps are too long for them.
@@ -79,15 +79,15 @@ class Model:
         return Model(mj, self.rig, settings, self.spec)
 
     def to_xml(self) -> str:
-        """The complete MJCF, numbers and all."""
+        """The complete MJCF with all numbers."""
         return str(self.spec.to_xml())
 
     def release_state(self) -> mujoco.MjData:
-        """The state at the release: the body held at rest at its angle until now.
+        """The state at the release, where the body has been held at its angle until now.
 
-        With a flexible rod the body holds the release angle and the spring's end is in balance between
-        spring and twisted rod. The plugin's state (lag, angle, rate, twist and its rate, time, started)
-        starts there too, the lag at the body's angle; friction's deflection, its last number, starts at zero.
+        With a flexible rod the body is at the release angle, and the rod's upper end is in equilibrium between
+        spring and twisted rod. The plugin's state starts there too: the lag at the body's angle, the deflection
+        of the friction contact at zero.
         """
         data = mujoco.MjData(self.mj)
         release = self.settings.release_angle
@@ -112,7 +112,7 @@ def build_model(rig: Rig, settings: RunSettings) -> Model:
         The model.
 
     Raises:
-        TunnelError: when MuJoCo or the plugin refuses the configuration, or the steps are too long for it.
+        TunnelError: when MuJoCo or the plugin refuses the settings, or the steps are too long for them.
     """
     check_stable(rig, settings)
     spec = build_spec(rig, settings)
@@ -185,7 +185,7 @@ def _place_rig(spec: mujoco.MjSpec, rig: Rig) -> None:
 
 def _set_dynamics(spec: mujoco.MjSpec, rig: Rig, settings: RunSettings) -> None:
     for geom in spec.geoms:
-        geom.mass = 0.0  # mass and inertia are given below, not by the shapes
+        geom.mass = 0.0  # mass and inertia are set below, not derived from the shapes
     twist = settings.rod_twist
     share = twist.inertia_share if twist is not None else 0.0
     _set_inertia(spec.body("davis"), rig, settings.yaw_inertia * (1.0 - share), rig.body.mass)
@@ -207,7 +207,7 @@ def _set_inertia(body: mujoco.MjsBody, rig: Rig, yaw_inertia: float, mass: float
 
 
 def _inertia(rig: Rig, yaw_inertia: float) -> tuple[float, float, float]:
-    """Principal inertias, kg m²: yaw as given, the others those of a box scaled alike (never in motion)."""
+    """Principal inertias, kg m²: yaw as given, the others (which never matter) as of a box in proportion."""
     length, height = rig.body.length, rig.body.height
     width = max(rig.body.width, _THINNEST * length)
     scale = yaw_inertia / (length**2 + width**2)
@@ -220,14 +220,14 @@ def _set_numerics(spec: mujoco.MjSpec, rig: Rig, settings: RunSettings) -> None:
 
 
 def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
-    """What the MJCF's numerics hold: the moment law's parameters and the sampled inputs.
+    """The ``<numeric>`` elements of the MJCF: the moment law's parameters and the sampled inputs.
 
     Args:
         rig: gives frontal area, reference length and width.
         settings: gives the rest.
 
     Returns:
-        Values by name; what joint and body own is left out.
+        Values by name, without those that are attributes of joint and body.
 
     Raises:
         TunnelError: when a series has an unknown name.
@@ -246,11 +246,11 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
 
 
 def numeric_vector(model: mujoco.MjModel, values: Mapping[str, Sequence[float]]) -> Array:
-    """A model's ``numeric_data`` with some numerics changed.
+    """A model's ``numeric_data`` with some values changed.
 
     Args:
         model: the compiled model.
-        values: new value, or series of the same length, by numeric name.
+        values: by name: a new number, or a series of the same length.
 
     Returns:
         Array of shape (nnumericdata,).

@@ -1,6 +1,6 @@
-"""What is drawn around the rig and has no part in its motion: the working section, its marks, the spring.
+"""Shapes that are drawn but do not affect the motion: the working section, its marks, the spring.
 
-Each piece is one mesh, because MuJoCo computes the pose of every geom in every step.
+Each is a single mesh, because MuJoCo computes the pose of every geom in every step.
 """
 
 from __future__ import annotations
@@ -37,15 +37,12 @@ class Mesh:
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float], turn: float = 0.0) -> Mesh:
-    """A box between two corners, then turned about the vertical axis.
+    """A box between two corners, rotated about the vertical axis.
 
     Args:
         low: least x, y and z, m.
-        high: greatest, m.
-        turn: rad, counter-clockwise seen from above.
-
-    Returns:
-        The box.
+        high: greatest x, y and z, m.
+        turn: rotation, rad, counter-clockwise seen from above.
     """
     vertices = np.asarray(low) + np.array(_CORNERS, dtype=float) * (np.asarray(high) - np.asarray(low))
     rotation = np.array([[cos(turn), -sin(turn), 0.0], [sin(turn), cos(turn), 0.0], [0.0, 0.0, 1.0]])
@@ -53,14 +50,7 @@ def box(low: tuple[float, float, float], high: tuple[float, float, float], turn:
 
 
 def merged(parts: list[Mesh]) -> Mesh:
-    """Several surfaces as one.
-
-    Args:
-        parts: the surfaces.
-
-    Returns:
-        One mesh of them all.
-    """
+    """Several surfaces as one mesh."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
     return Mesh(np.concatenate([part.vertices for part in parts]), np.concatenate(faces))
@@ -72,8 +62,8 @@ def coil(radius: float, wire: float, low: float, high: float, turns: int) -> Mes
     Args:
         radius: of the coil, m.
         wire: radius of the wire, m.
-        low: height of its lower end, m.
-        high: of its upper end, m.
+        low: height of the lower end, m.
+        high: height of the upper end, m.
         turns: number of turns.
 
     Returns:
@@ -97,41 +87,20 @@ def coil(radius: float, wire: float, low: float, high: float, turns: int) -> Mes
 
 
 def floor(section: WorkingSection) -> Mesh:
-    """The floor's slab, its top at height 0.
-
-    Args:
-        section: the tunnel's working section.
-
-    Returns:
-        The slab.
-    """
+    """The floor: a slab with its top at height 0."""
     x, y = section.length / 2, section.width / 2
     return box((-x, -y, -_BEAM), (x, y, 0.0))
 
 
 def glass(section: WorkingSection) -> Mesh:
-    """Walls and ceiling.
-
-    Args:
-        section: the tunnel's working section.
-
-    Returns:
-        Two walls and a ceiling; the section is open along the flow.
-    """
+    """Two walls and the ceiling; the section is open along the flow."""
     x, y, z = section.length / 2, section.width / 2, section.height
     left, right = box((-x, y, 0.0), (x, y + _GLASS, z)), box((-x, -y - _GLASS, 0.0), (x, -y, z))
     return merged([left, right, box((-x, -y, z), (x, y, z + _GLASS))])
 
 
 def frame(rig: Rig) -> Mesh:
-    """The edges of the working section, and the yoke above its ceiling that carries spring and sensor.
-
-    Args:
-        rig: gives the sizes.
-
-    Returns:
-        All beams.
-    """
+    """The beams along the edges of the working section, and the yoke above it that carries spring and sensor."""
     section = rig.working_section
     x, y, z = section.length / 2, section.width / 2, section.height
     b, parts = _BEAM, []
@@ -148,14 +117,7 @@ def frame(rig: Rig) -> Mesh:
 
 
 def marks(rig: Rig) -> Mesh:
-    """Lines on the floor: the wind's direction, and every tenth degree of yaw around the body.
-
-    Args:
-        rig: gives the sizes.
-
-    Returns:
-        Flat boxes.
-    """
+    """Lines on the floor: the wind direction, and a mark every ten degrees of yaw around the body."""
     reach, height = 0.62 * rig.body.length, 0.002
     parts = [
         box((-rig.working_section.length / 2, -0.003, 0.0), (rig.working_section.length / 2, 0.003, height))

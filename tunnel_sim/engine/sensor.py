@@ -13,16 +13,16 @@ from tunnel_sim.vocabulary.record import Array, Record
 def read_motion(
     motion: Motion, sensor: SensorModel, rng: np.random.Generator, chain: EffectChain | None = None
 ) -> Record:
-    """The reading y = quantised(β + zero + noise), with the sensor's effects at their places.
+    """The reading y = quantised(β + zero + noise), with the effects that act on sensor and reading.
 
     Args:
         motion: of the rod's upper end.
-        sensor: noise, zero and resolution; a resolution of 0 leaves the reading continuous.
+        sensor: noise, zero and resolution; with a resolution of 0 the reading is not quantised.
         rng: source of the noise.
-        chain: the run's effects; those that do not concern the sensor do nothing here.
+        chain: the run's effects.
 
     Returns:
-        The record. The ideal converter has no end stop: clipping is an effect.
+        The record. The ideal converter has an unlimited range: clipping is an effect.
     """
     angle, time = motion.angle, motion.time_s
     if chain is not None and chain.skips:

@@ -1,4 +1,4 @@
-"""Runs of the virtual rig: one, many at once, or a whole campaign."""
+"""Simulation of single runs and of many runs at once."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
 
 Progress = Callable[[int, int], None]
-_CHUNK_STEPS = 4_000_000  # steps recorded at once: bounds the memory of a large batch
+_CHUNK_STEPS = 4_000_000  # steps recorded at once, to limit the memory of a large batch
 
 
 def simulate_motion(model: Model, sample_rate: float) -> Motion:
-    """Integrate one run with plain ``mj_step``.
+    """Integrate one run with ``mj_step``.
 
     Args:
         model: the rig in this run.
         sample_rate: Hz.
 
     Returns:
-        The motion from the release on.
+        The motion from the release onwards.
 
     Raises:
-        TunnelError: when the integration leaves the finite range.
+        TunnelError: when the motion grows without bound.
     """
     samples, steps = sampling(model.settings, sample_rate)
     data = model.release_state()
@@ -63,14 +63,14 @@ def simulate(
         rig: geometry, mass and sensor.
         settings: the physics of the run as stated.
         sensor: the potentiometer.
-        rng: source of its noise and of what effects draw.
-        effects: what acts beyond the stated physics.
+        rng: source of the noise and of the random parts of effects.
+        effects: effects to add to the stated physics.
 
     Returns:
         The record.
 
     Raises:
-        TunnelError: when the integration leaves the finite range or the settings are refused.
+        TunnelError: when the motion grows without bound or the settings are refused.
     """
     chain = EffectChain.draw(settings, effects, rng)
     motion = simulate_motion(build_model(rig, follow_fastest(rig, chain.physics())), sensor.sample_rate)
@@ -94,16 +94,16 @@ def simulate_batch(
         settings: the stated physics of every run.
         sensor: the potentiometer, common to the runs.
         rngs: one generator per run.
-        effects: what acts beyond the stated physics, in all runs.
-        nthread: threads; 0 takes all processors. The result is the same to the bit whatever the number,
-            and the same as a loop over `simulate`.
+        effects: effects to add to the stated physics, in all runs.
+        nthread: number of threads; 0 uses all processors. The result does not depend on it, and is bit-identical
+            to that of a loop over `simulate`.
         progress: called with (runs done, runs in all).
 
     Returns:
         One record per run, in order.
 
     Raises:
-        TunnelError: when a run leaves the finite range or its settings are refused.
+        TunnelError: when the motion of a run grows without bound or its settings are refused.
     """
     if len(rngs) != len(settings):
         raise TunnelError(
@@ -126,21 +126,21 @@ def simulate_motions(
     nthread: int = 0,
     progress: Progress | None = None,
 ) -> list[Motion]:
-    """Integrate many runs on a thread pool; arguments and guarantees as in `simulate_batch`.
+    """Integrate many runs on a thread pool, bit-identical to `simulate_motion`.
 
     Args:
         rig: geometry and mass, common to the runs.
         settings: the physics of every run.
         sample_rate: Hz.
-        nthread: threads; 0 takes all processors.
+        nthread: number of threads; 0 uses all processors.
         progress: called with (runs done, runs in all).
 
     Returns:
         One motion per run, in order.
 
     Raises:
-        TunnelError: when a run leaves the finite range, its settings are refused, or its fastest motion asks
-            for too many steps.
+        TunnelError: when the motion of a run grows without bound, its settings are refused, or its fastest motion
+            requires too many steps.
     """
     motions: dict[int, Motion] = {}
     settings = [_followed(rig, run, number) for number, run in enumerate(settings, 1)]
@@ -166,7 +166,7 @@ def _followed(rig: Rig, run: RunSettings, number: int) -> RunSettings:
 
 
 def _groups(settings: Sequence[RunSettings]) -> list[list[int]]:
-    """Indices of runs that one compiled model can serve with expanded fields."""
+    """Indices of the runs that can share one compiled model."""
     groups: dict[tuple[object, ...], list[int]] = {}
     for i, run in enumerate(settings):
         groups.setdefault((run.duration, *run.layout()), []).append(i)
@@ -204,7 +204,7 @@ def _integrate_chunk(rig: Rig, runs: list[RunSettings], sample_rate: float, nthr
 
 @contextmanager
 def _no_log() -> Iterator[None]:
-    """Keep MuJoCo from printing and logging into the working folder what `_check_finite` says."""
+    """Suppress MuJoCo's warnings on the terminal and in a log file; `_check_finite` reports the same."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
@@ -218,5 +218,5 @@ def _check_finite(angle: Array, where: str) -> None:
         raise TunnelError(
             "the motion grows without bound",
             where=where,
-            remedy="check that spring and wind leave a positive stiffness (Kr > Ka) and the damping's sign",
+            remedy="check the sign of the damping, and that the total stiffness is positive (Kr > Ka)",
         )

@@ -1,4 +1,4 @@
-"""A whole campaign on the virtual rig, from its plan."""
+"""Simulation of a whole campaign from its plan."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ from tunnel_sim.vocabulary.rig import Rig
 def simulate_campaign(
     plan: CampaignPlan, rig: Rig | None = None, *, nthread: int = 0, progress: Progress | None = None
 ) -> Campaign:
-    """Make every run of a plan.
+    """Simulate every run of a plan.
 
     Args:
         plan: conditions, truth, sensor, effects and seed.
-        rig: geometry and mass; None takes the packaged rig.
-        nthread: threads; 0 takes all processors. The result is the same to the bit whatever the number.
+        rig: geometry and mass; None uses the packaged rig.
+        nthread: number of threads; 0 uses all processors. The result does not depend on it.
         progress: called with (runs done, runs in all).
 
     Returns:
-        The campaign, as a rig engineer would have measured it: it states the rig's nominal inertia, not
-        the injected one, and knows nothing of the truth.
+        The campaign as a rig engineer would have measured it: it states the rig's nominal inertia, not that of
+        the truth, and contains no other trace of the truth.
 
     Raises:
-        TunnelError: when an effect is unknown or a run leaves the finite range.
+        TunnelError: when an effect is unknown or the motion of a run grows without bound.
     """
     (campaign,) = simulate_campaigns([plan], rig, nthread=nthread, progress=progress)
     return campaign
@@ -54,24 +54,26 @@ def simulate_campaigns(
     nthread: int = 0,
     progress: Progress | None = None,
 ) -> list[Campaign]:
-    """Make every run of several plans, their runs integrated together.
+    """Simulate every run of several plans, integrating the runs together.
 
     Args:
-        plans: of one sample rate.
+        plans: all with the same sample rate.
         rig: as in `simulate_campaign`.
-        nthread: likewise.
+        nthread: as in `simulate_campaign`.
         progress: called with (runs done, runs in all).
 
     Returns:
-        One campaign per plan, to the bit those of `simulate_campaign`.
+        One campaign per plan, bit-identical to those of `simulate_campaign`.
 
     Raises:
-        TunnelError: when sample rates differ, an effect is unknown or a run leaves the finite range.
+        TunnelError: when sample rates differ, an effect is unknown or the motion of a run grows without bound.
     """
     rig = load_rig() if rig is None else rig
     rates = {plan.sensor.sample_rate for plan in plans}
     if len(rates) != 1:
-        raise TunnelError(f"plans of {len(rates)} sample rates", remedy="simulate those of one rate together")
+        raise TunnelError(
+            f"the plans have {len(rates)} different sample rates", remedy="simulate each rate separately"
+        )
     drawn = [_draw(plan) for plan in plans]
     true = [chain.physics() for runs in drawn for _, chain in runs]
     motions = iter(simulate_motions(rig, true, *rates, nthread=nthread, progress=progress))
@@ -85,7 +87,7 @@ _Drawn = list[tuple[np.random.Generator, EffectChain]]  # of every run, in the p
 
 
 def _draw(plan: CampaignPlan) -> _Drawn:
-    """The effects of every run with what they draw, and the generator of its noise."""
+    """The random parts of the effects in every run, and the generator of its noise."""
     effects = plan_effects(plan)
     stated = [run_settings(plan.truth, condition) for condition in plan.conditions]
     rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(plan.seed).spawn(len(stated))]
@@ -144,7 +146,7 @@ def run_settings(truth: Truth, condition: Condition, *, timestep: float = 1e-3) 
         timestep: integration step, s.
 
     Returns:
-        The run without any effect.
+        The run without effects.
     """
     return RunSettings(
         spring_stiffness=condition.spring_stiffness,
@@ -160,18 +162,18 @@ def run_settings(truth: Truth, condition: Condition, *, timestep: float = 1e-3) 
 
 
 def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
-    """The effects a plan names.
+    """The effects of a plan.
 
     Args:
-        plan: its effects, by name and parameters.
+        plan: names effects and parameters.
 
     Returns:
-        The effects in the vocabulary's order, whatever the plan's; what sits between rod and sensor comes
-        ahead of what the sensor itself does.
+        The effects in the order of `ALL_EFFECTS`, which need not be the plan's; those between rod and sensor come
+        before those of the sensor itself.
 
     Raises:
-        TunnelError: when a name is unknown or given twice, a severity missing, a value out of range, or a
-            spring none of the plan's.
+        TunnelError: when a name is unknown or given twice, a severity is missing, a value is out of range, or a
+            spring is not in the plan.
     """
     effects = [_stated_effect(setting) for setting in plan.effects]
     names = [effect.name for effect in effects]
@@ -189,7 +191,7 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
 
 
 def _stated_effect(setting: EffectSetting) -> Effect:
-    """An effect whose severity is given: by its default it would be injected in name only."""
+    """An effect whose severity is given: with the default severity it would do nothing."""
     effect = effect_from(setting.name, setting.parameters)
     severity = effect.parameters()[0]
     if severity.name not in setting.parameters:
@@ -202,7 +204,7 @@ def _stated_effect(setting: EffectSetting) -> Effect:
 
 
 def _check_spring(effect: Effect, plan: CampaignPlan) -> None:
-    """A spring that no run has would be injected in name only."""
+    """Refuse an effect on a spring that no run has: it would do nothing."""
     springs = sorted({condition.spring_stiffness for condition in plan.conditions})
     parameter = effect.chosen_spring()
     if parameter is None or effect.is_null:
@@ -217,13 +219,13 @@ def _check_spring(effect: Effect, plan: CampaignPlan) -> None:
 
 
 def truth_document(plan: CampaignPlan) -> dict[str, Any]:
-    """What was injected, for ``truth.json``; no estimator or diagnosis reads it.
+    """The content of ``truth.json``, which estimators and diagnosis never read.
 
     Args:
         plan: the plan that was simulated.
 
     Returns:
-        Coefficients, sensor, effects that act with their parameters, seed and versions, in JSON's types.
+        Coefficients, sensor, active effects with their parameters, seed and versions, as plain JSON values.
     """
     effects = [effect for effect in plan_effects(plan) if not effect.is_null]
     return {

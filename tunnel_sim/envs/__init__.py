@@ -1,16 +1,16 @@
 """Gymnasium environments of the rig; importing this package registers them.
 
 ``tunnel_sim/FreeDecay-v0``: an episode is one run (docs/reference/envs/free-decay.md).
-``tunnel_sim/Campaign-v0``: an episode is a campaign, a step is a run; it identifies and diagnoses, so it lives in
-``tunnel_lab.envs``, which is named here and not imported.
+``tunnel_sim/Campaign-v0``: an episode is a campaign and a step is a run. It needs identification and diagnosis, so
+its module is in ``tunnel_lab.envs``; it is referred to by name here and not imported.
 """
 
 from __future__ import annotations
 
-# The environments' own modules, and MuJoCo with them, load when one is made.
+# The environments' modules, and MuJoCo with them, are imported when an environment is made.
 from gymnasium.envs.registration import register, registry
 
-#: Entry points by identifier: of one environment, and of the native vector environment where there is one.
+#: Entry points by identifier: of the environment, and of its native vector environment or None.
 ENVIRONMENTS: dict[str, tuple[str, str | None]] = {
     "tunnel_sim/FreeDecay-v0": (
         "tunnel_sim.envs.free_decay:FreeDecayEnv",

@@ -1,4 +1,4 @@
-"""What one episode is: stated by the options of ``reset``, or drawn from a stated distribution."""
+"""The conditions of one episode: given by the options of ``reset``, or drawn from a documented distribution."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tunnel_sim.vocabulary.rig import Rig
 OPTIONS = ("spring", "spring_stiffness", "wind_speed", "air_density", "release_angle", "truth", "effects")
 TRUTH = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping", "sensor_zero")
 
-# What is drawn uniformly where the options do not state it.
+# Ranges of the uniform distributions from which properties are drawn.
 WIND_SPEED = (10.0, 20.0)  # m/s
 RELEASE_ANGLE = (radians(5.0), radians(20.0))  # rad, to either side
 CN_BETA = (0.3, 0.6)  # 1/rad
@@ -32,19 +32,19 @@ CN_R = (-0.2, -0.05)  # 1/rad
 INERTIA_SHARE = (0.95, 1.05)  # of the rig's Izz
 DAMPING_SHARE = (0.5, 1.5)  # of the rig's Cr
 SENSOR_ZERO = (-0.01, 0.01)  # rad
-SEVERITY_SHARE = (0.5, 2.0)  # of an effect's typical size
-STIFFNESS_MARGIN = 1.3  # a drawn spring exceeds the greatest Ka by this factor
+SEVERITY_SHARE = (0.5, 2.0)  # of an effect's typical severity
+STIFFNESS_MARGIN = 1.3  # least ratio of a drawn spring's stiffness to the greatest Ka
 
 
 @dataclass(frozen=True)
 class RunPlan:
-    """One run before it is made: what is stated of it, and what is injected.
+    """One run before it is simulated: its stated conditions and its truth.
 
     Args:
-        condition: spring, wind, release and length, as a campaign states them.
-        truth: coefficients.
+        condition: spring, wind, release and duration, as a campaign states them.
+        truth: true coefficients.
         sensor: the potentiometer with its true zero.
-        effects: what acts beyond the nominal model.
+        effects: effects beyond the nominal model.
     """
 
     condition: Condition
@@ -53,22 +53,22 @@ class RunPlan:
     effects: tuple[Effect, ...] = ()
 
     def stated(self) -> RunSettings:
-        """The run's physics without its effects, as ``tunnel_sim.engine.simulate`` takes it."""
+        """The run's physics without its effects."""
         return run_settings(self.truth, self.condition)
 
     def run(self, record: Record) -> Run:
         """The run as a campaign lists it.
 
         Args:
-            record: what the sensor read.
+            record: the sensor's reading.
 
         Returns:
-            The run; it knows nothing of the truth.
+            The run, without the truth.
         """
         return stated_run(self.condition, record)
 
     def statement(self) -> dict[str, float]:
-        """What the operator is told at the start, SI units."""
+        """The conditions given to the operator at the start, in SI units."""
         condition = self.condition
         return {
             "spring_stiffness": condition.spring_stiffness,
@@ -86,9 +86,9 @@ def plan_run(
     Args:
         options: of ``reset``; see docs/reference/envs/free-decay.md.
         config: of the environment.
-        rig: whose springs, inertia and damping are meant.
-        rng: draws what the options leave open, in the order spring, wind speed, release angle, truth in the
-            order of `TRUTH`, effects. Nothing is drawn for what is stated.
+        rig: defines springs, inertia and damping.
+        rng: draws what the options do not give, in the order spring, wind speed, release angle, truth in the
+            order of `TRUTH`, effects. Nothing is drawn for given options.
 
     Returns:
         The plan.
@@ -124,7 +124,7 @@ def plan_run(
 
 def _checked(options: object, known: Iterable[str], where: str) -> Mapping[str, Any]:
     if not isinstance(options, Mapping):
-        raise EnvError(f"{options!r} is no mapping", where=where, remedy="give names and values")
+        raise EnvError(f"{options!r} is not a mapping", where=where, remedy="give names and values")
     for name in options:
         if name not in known:
             raise EnvError(f"unknown option {name!r}", where=where, remedy=did_you_mean(str(name), known))
@@ -140,7 +140,7 @@ def _number(
     least: float = -1e6,
     most: float = 1e6,
 ) -> float:
-    """A stated number within its range; where it is not stated, drawn, or the first bound without a generator."""
+    """A given number, checked; if none is given, a drawn one, or the first bound without a generator."""
     if given.get(name) is None:
         return float(rng.uniform(*bounds)) if rng is not None else bounds[0]
     value = given[name]
@@ -172,10 +172,10 @@ def _stiffness(given: Mapping[str, Any], rig: Rig, rng: np.random.Generator) -> 
 
 
 def drawn_springs(rig: Rig) -> list[float]:
-    """The stiffnesses an episode draws from: those that outweigh the air at any speed that is drawn.
+    """The stiffnesses from which episodes draw: those that exceed the aerodynamic stiffness at any drawn speed.
 
     Args:
-        rig: its springs, size and air.
+        rig: gives springs, size and air.
 
     Returns:
         N m/rad; all springs where none is stiff enough.
@@ -243,7 +243,7 @@ def _check_time(effect: Effect) -> None:
 
 
 def _drawn_effect(plan: RunPlan, rng: np.random.Generator) -> EffectSetting:
-    """Any effect of the vocabulary, half to twice its typical size."""
+    """An effect of half to twice its typical severity."""
     kinds = [kind for kind in ALL_EFFECTS if not kind.skips]
     kind = kinds[int(rng.integers(len(kinds)))]
     severity = kind.parameters()[0]

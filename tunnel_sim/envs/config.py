@@ -1,4 +1,4 @@
-"""What an environment is made with, apart from how it is drawn."""
+"""The configuration of an environment, apart from rendering."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ from tunnel_sim.vocabulary.rig import Rig
 
 PRESETS = ("plain", "operator")
 LEAST_DEVIATION = 1e-6
-"""Of a reading, rad: below it the information's sums no longer hold what the prior knew."""
+"""Least standard deviation of a reading, rad: below it the prior is lost in the rounding of the information."""
 _MAY_BE_ZERO = frozenset({"noise_std", "resolution", "effect_probability"})
 
 
 @dataclass(frozen=True)
 class FreeDecayConfig:
-    """What every episode of an environment has in common.
+    """What all episodes of an environment have in common.
 
     Args:
-        preset: ``plain``: nothing can be done during a run; ``operator``: wind-speed set-point and applied
-            yaw moment.
+        preset: ``plain``: no control during a run; ``operator``: the action sets the wind-speed set-point and an
+            applied yaw moment.
         duration: of a run, s; a whole number of control periods.
         control_period: s; a whole number of sample intervals.
         sample_rate: of the potentiometer, Hz.
-        noise_std: of its noise, rad.
-        resolution: step of its reading, rad; 0 does not quantise.
+        noise_std: standard deviation of its noise, rad.
+        resolution: step of its reading, rad; 0: no quantisation.
         wind_limit: greatest wind speed, m/s.
-        wind_time_constant: of the tunnel's first-order answer to its set-point, s.
-        moment_limit: greatest moment the operator can apply, N m.
-        effect_probability: probability that an episode whose options name no effects draws one.
+        wind_time_constant: of the tunnel's first-order response to its set-point, s.
+        moment_limit: greatest moment that the operator can apply, N m.
+        effect_probability: probability that an episode draws an effect, if its options do not name effects.
         prior: changes to `Prior` by name, in its units.
-        expose_truth: whether ``info`` carries what was injected.
-        rig_file: a rig description; None takes the packaged one.
+        expose_truth: whether ``info`` contains the truth.
+        rig_file: a rig description; None: the packaged one.
     """
 
     preset: Literal["plain", "operator"] = "plain"
@@ -62,7 +62,7 @@ class FreeDecayConfig:
         """Check every argument.
 
         Raises:
-            EnvError: when one is out of range, or does not divide as it should.
+            EnvError: when one is out of range, or a duration is not a whole number of the shorter interval.
         """
         if self.preset not in PRESETS:
             raise EnvError(f"unknown preset {self.preset!r}", remedy=did_you_mean(str(self.preset), PRESETS))
@@ -74,7 +74,7 @@ class FreeDecayConfig:
         if self.reading_variance < LEAST_DEVIATION**2:
             raise EnvError(
                 f"noise_std and resolution together are below {LEAST_DEVIATION:g} rad",
-                remedy="give more of one: without noise any record holds infinite information",
+                remedy="increase one of them: without noise a record holds infinite information",
             )
         _whole("control_period", self.control_period * self.sample_rate, "sample intervals")
         _whole("duration", self.duration / self.control_period, "control periods")
@@ -94,7 +94,7 @@ class FreeDecayConfig:
 
     @property
     def sample_times(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Times of a whole run's samples, s, as `tunnel_sim.engine.simulate` has them."""
+        """Sample times of a whole run, s, as in `tunnel_sim.engine.simulate`."""
         return np.arange(self.steps * self.samples_per_step) / self.sample_rate
 
     @property
@@ -103,14 +103,7 @@ class FreeDecayConfig:
         return self.noise_std**2 + self.resolution**2 / 12.0
 
     def sensor(self, zero: float) -> SensorModel:
-        """The potentiometer as stated.
-
-        Args:
-            zero: of the sensor, rad.
-
-        Returns:
-            The sensor.
-        """
+        """The potentiometer with a given zero, rad."""
         return SensorModel(self.sample_rate, self.noise_std, self.resolution, zero)
 
     def rig(self) -> Rig:
@@ -119,14 +112,7 @@ class FreeDecayConfig:
 
 
 def angle_limit(rig: Rig) -> float:
-    """The angle at which a run is stopped: the end of the potentiometer's range.
-
-    Args:
-        rig: whose potentiometer it is.
-
-    Returns:
-        rad.
-    """
+    """The angle at which a run is stopped, rad: the end of the potentiometer's range."""
     return radians(rig.potentiometer.half_range_deg)
 
 

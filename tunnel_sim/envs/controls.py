@@ -1,4 +1,4 @@
-"""What the operator does during a run: wind-speed set-point and applied yaw moment."""
+"""The operator's controls during a run: wind-speed set-point and applied yaw moment."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True, eq=False)
 class OperatorLog:
-    """What was done in a run, one entry per control period.
+    """The operator's actions in a run, one entry per control period.
 
     Args:
         time_s: start of the period, shape (n,), s.
@@ -37,7 +37,7 @@ def action_space(config: FreeDecayConfig) -> spaces.Space[Any]:
         config: preset and limits.
 
     Returns:
-        ``Discrete(1)`` where nothing can be done; else a box of two numbers from −1 to 1.
+        ``Discrete(1)`` in the plain preset; else a box of two numbers from −1 to 1.
     """
     if config.preset == "plain":
         return spaces.Discrete(1)
@@ -47,7 +47,7 @@ def action_space(config: FreeDecayConfig) -> spaces.Space[Any]:
 def operator_action(
     config: FreeDecayConfig, *, wind_speed: float, moment: float = 0.0
 ) -> np.ndarray[Any, Any]:
-    """The operator's action in SI units.
+    """The action of the operator preset from values in SI units.
 
     Args:
         config: limits.
@@ -66,7 +66,7 @@ def operator_action(
 
 
 def decode(config: FreeDecayConfig, actions: np.ndarray[Any, Any]) -> tuple[Array, Array]:
-    """Set-points and moments of many operators.
+    """Convert the actions of many runs to SI units.
 
     Args:
         config: limits.
@@ -81,7 +81,9 @@ def decode(config: FreeDecayConfig, actions: np.ndarray[Any, Any]) -> tuple[Arra
     values = np.asarray(actions, dtype=np.float64)
     if values.ndim != 2 or values.shape[1] != 2:
         raise EnvError(
-            f"an action has shape {values.shape[1:]}, not (2,)", where="action", remedy="see the page"
+            f"an action has shape {values.shape[1:]}, not (2,)",
+            where="action",
+            remedy="give set-point and moment",
         )
     bad = ~(np.abs(values) <= 1.0)
     if bad.any():
@@ -95,7 +97,7 @@ def decode(config: FreeDecayConfig, actions: np.ndarray[Any, Any]) -> tuple[Arra
 
 
 def check_plain(actions: np.ndarray[Any, Any], count: int) -> None:
-    """Refuse anything but the plain preset's one action.
+    """Refuse all actions except 0, the only action of the plain preset.
 
     Args:
         actions: as given to ``step``.
@@ -107,7 +109,7 @@ def check_plain(actions: np.ndarray[Any, Any], count: int) -> None:
     values = np.asarray(actions)
     if values.size != count or values.dtype.kind not in "iu" or np.any(values != 0):
         raise EnvError(
-            f"{actions!r} is no action of the plain preset",
+            f"{actions!r} is not an action of the plain preset",
             where="action",
             remedy="give 0, or make the environment with preset='operator'",
         )
@@ -115,11 +117,11 @@ def check_plain(actions: np.ndarray[Any, Any], count: int) -> None:
 
 @dataclass(frozen=True)
 class WindAnswer:
-    """The tunnel's first-order answer to its set-point over one control period.
+    """The tunnel's first-order response to its set-point over one control period.
 
     Args:
         period: s.
-        samples: intervals of the period.
+        samples: number of sample intervals in the period.
         time_constant: s.
     """
 
@@ -131,11 +133,11 @@ class WindAnswer:
         """Exact solution of τ V̇ = Vs − V over the period.
 
         Args:
-            begin: speed at its start, shape (runs,), m/s.
+            begin: speed at the start, shape (runs,), m/s.
             set_point: shape (runs,), m/s.
 
         Returns:
-            Means over the sample intervals, shape (runs, samples), and speed at the end, shape (runs,), m/s.
+            Mean speeds in the sample intervals, shape (runs, samples), and speed at the end, shape (runs,), m/s.
         """
         left = np.exp(-np.arange(self.samples + 1) * (self.period / self.samples / self.time_constant))
         mean = (left[:-1] - left[1:]) * (self.time_constant * self.samples / self.period)

@@ -1,4 +1,4 @@
-"""Moving the runs: one with ``mj_step``, many with ``mujoco.batch``; the bits are the same."""
+"""Integration of the runs: one with ``mj_step``, many with ``mujoco.batch``, with bit-identical results."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-"""What MuJoCo needs to go on to the bit: full physics with plugin state, inputs, and the solver's warm start."""
+"""State for a bit-identical continuation: full physics with plugin state, inputs, and the solver's warm start."""
 
 _CONTROL = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED) | int(mujoco.mjtState.mjSTATE_USERDATA)
 _VARIED = ("jnt_stiffness", "dof_damping", "numeric_data", "body_inertia")
@@ -25,10 +25,10 @@ _VARIED = ("jnt_stiffness", "dof_damping", "numeric_data", "body_inertia")
 
 @dataclass(frozen=True, eq=False)
 class Operation:
-    """What acts on the runs in one control period beside their own physics.
+    """The operator's actions on the runs in one control period.
 
     Args:
-        wind_departure: speed minus the stated one, mean over each sample interval, shape (runs, samples), m/s.
+        wind_departure: mean difference from the stated speed in each sample interval, shape (runs, samples), m/s.
         moment: on the rod's upper end, shape (runs,), N m.
     """
 
@@ -37,10 +37,10 @@ class Operation:
 
 
 class Models:
-    """Compiled models by layout, each compiled once.
+    """Models by layout, each compiled once.
 
     Args:
-        rig: of all of them.
+        rig: the rig of all models.
         sample_rate: Hz.
     """
 
@@ -50,13 +50,13 @@ class Models:
         self._compiled: dict[tuple[object, ...], Model] = {}
 
     def of(self, settings: RunSettings) -> tuple[tuple[object, ...], int, Model]:
-        """The model of a run, its layout, and its steps between two samples.
+        """The model of a run.
 
         Args:
             settings: the run's physics.
 
         Returns:
-            Layout, number of steps, model.
+            Layout, number of steps between two samples, model.
         """
         settings = follow_fastest(self._rig, settings)
         _, steps = sampling(settings, self._sample_rate)
@@ -82,14 +82,14 @@ class OneRun:
         self._steps = 1
 
     def start(self, row: int, settings: RunSettings) -> float:
-        """Begin a run at its release.
+        """Start a run at its release.
 
         Args:
-            row: index of the run; 0 here.
-            settings: its physics.
+            row: index of the run; always 0.
+            settings: the run's physics.
 
         Returns:
-            Angle of the spring's end, rad.
+            Angle of the rod's upper end, rad.
         """
         del row
         _, self._steps, self._model = self._models.of(settings)
@@ -97,13 +97,13 @@ class OneRun:
         return float(self._data.qpos[self._model.yaw_address])
 
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
-        """Move by one control period.
+        """Integrate one control period.
 
         Args:
-            operation: what acts; None: nothing.
+            operation: the operator's actions; None: nothing acts.
 
         Returns:
-            Angle (rad) and rate (rad/s) of the spring's end at the samples and at the period's end, each of
+            Angle (rad) and rate (rad/s) of the rod's upper end at the samples and at the period's end, each of
             shape (1, samples + 1).
         """
         assert self._model is not None
@@ -123,10 +123,10 @@ class OneRun:
         """MuJoCo's state of a run.
 
         Args:
-            row: index of the run; 0 here.
+            row: index of the run; always 0.
 
         Returns:
-            ``mj_getState`` of `STATE`.
+            The result of ``mj_getState`` for `STATE`, shape (n,).
         """
         del row
         assert self._model is not None
@@ -138,18 +138,18 @@ class OneRun:
         """Put a run into a state.
 
         Args:
-            row: index of the run; 0 here.
-            state: from `get_state` of a run of the same layout, shape (n,).
+            row: index of the run; always 0.
+            state: from `get_state`, for a run of the same layout, shape (n,).
         """
         del row
         assert self._model is not None
         mujoco.mj_setState(self._model.mj, self._data, np.asarray(state, dtype=np.float64), STATE)
 
     def pose(self, row: int) -> tuple[float, float]:
-        """Angles of the spring's end and of the body against it, rad.
+        """Angle of the rod's upper end, and of the body relative to it, rad.
 
         Args:
-            row: index of the run; 0 here.
+            row: index of the run; always 0.
 
         Returns:
             The two angles.
@@ -163,13 +163,13 @@ class OneRun:
 
 
 class ManyRuns:
-    """Many runs on ``mujoco.batch``, one batch for each layout that is met.
+    """Many runs on ``mujoco.batch``, one batch per layout.
 
     Args:
         models: compiled models.
-        samples: in one control period.
+        samples: number of samples in one control period.
         count: number of runs.
-        nthread: threads; 0 takes all processors. The result is the same to the bit whatever the number.
+        nthread: number of threads; 0 uses all processors. The result does not depend on it.
     """
 
     def __init__(self, models: Models, samples: int, count: int, nthread: int) -> None:
@@ -180,7 +180,7 @@ class ManyRuns:
         self._last = np.zeros((2, count))  # angle and rate at the last period's end
 
     def start(self, row: int, settings: RunSettings) -> float:
-        """Begin a run at its release; result and arguments as in `OneRun.start`."""
+        """Start a run at its release; result and arguments as in `OneRun.start`."""
         layout, steps, model = self._models.of(settings)
         if layout not in self._groups:
             batch = mujoco_batch.Batch(model.mj, nsim=self._count, nthread=self._nthread)
@@ -199,7 +199,7 @@ class ManyRuns:
         return float(data.qpos[at])
 
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
-        """Move all runs by one control period; result and arguments as in `OneRun.advance`."""
+        """Integrate one control period of all runs; result and arguments as in `OneRun.advance`."""
         if not self._members:
             self._members = self._sorted()
         if len(self._members) == 1:
@@ -228,12 +228,12 @@ class ManyRuns:
         self._last[:, row] = group.states["qpos"][row, at], group.states["qvel"][row, at]
 
     def pose(self, row: int) -> tuple[float, float]:
-        """Angles of the spring's end and of the body; result and arguments as in `OneRun.pose`."""
+        """Angles of the rod's upper end and of the body; result and arguments as in `OneRun.pose`."""
         return _pose(self._groups[self._layout[row]].states["qpos"][row])
 
 
 class _Group:
-    """The batch of one layout; rows of other layouts lie idle in it."""
+    """The batch of one layout; it has idle rows for the runs of other layouts."""
 
     def __init__(self, batch: mujoco_batch.Batch, address: int, steps: int, samples: int) -> None:
         self.batch, self.address, self._steps = batch, address, steps

@@ -1,4 +1,4 @@
-"""Many episodes side by side: reading, information, end. One environment has one, a vector environment many."""
+"""Parallel episodes: readings, information, end. An environment has one episode, a vector environment many."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ from tunnel_sim.vocabulary.rig import Rig
 Flags = NDArray[np.bool_]
 
 READING_BOUND = 2.0 * np.pi
-"""Bound of a reading in the observation, rad; the record is not bounded."""
+"""Bound of a reading in the observation, rad; the record is not clipped."""
 
 
 class Engine(Protocol):
-    """What moves the runs; see `tunnel_sim.envs.engines`."""
+    """The integrator of the runs; see `tunnel_sim.envs.engines`."""
 
     def start(self, row: int, settings: RunSettings) -> float:
-        """Begin a run at its release; result and arguments as in `OneRun.start`."""
+        """Start a run at its release; result and arguments as in `OneRun.start`."""
 
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
-        """Move all runs by one control period; result and arguments as in `OneRun.advance`."""
+        """Integrate one control period of all runs; result and arguments as in `OneRun.advance`."""
 
     def get_state(self, row: int) -> Array:
         """MuJoCo's state of a run; result and arguments as in `OneRun.get_state`."""
@@ -49,14 +49,14 @@ class Engine(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class EpisodeState:
-    """All that an episode in progress is; an environment put back into it goes on with the same bits.
+    """The complete state of an episode in progress; continuing from it gives bit-identical results.
 
     Args:
         plan: of the run.
-        physics: what is integrated: the plan's run with its effects.
-        mujoco: ``mj_getState`` of ``mjSTATE_INTEGRATION``, plugin state included, shape (n,).
+        physics: the plan's run with its effects, as integrated.
+        mujoco: ``mj_getState`` of ``mjSTATE_INTEGRATION``, including the plugin's state, shape (n,).
         arrays: readings so far, sensitivities and information, by name.
-        sensor: what the effects do to the reading.
+        sensor: the run's effects on the reading.
         rng: source of the noise.
     """
 
@@ -83,13 +83,13 @@ def observation_space(config: FreeDecayConfig) -> spaces.Box:
 
 
 class Episodes:
-    """Episodes of one configuration side by side.
+    """Parallel episodes of one configuration.
 
     Args:
         config: of the environment.
         rig: of all runs.
-        engine: what moves them.
-        count: how many there are.
+        engine: integrates the runs.
+        count: number of episodes.
     """
 
     def __init__(self, config: FreeDecayConfig, rig: Rig, engine: Engine, count: int) -> None:
@@ -108,17 +108,17 @@ class Episodes:
         self._stated_speed = np.zeros(count)
         self._speed = np.zeros(count)
         self.step_count = np.zeros(count, dtype=np.int64)
-        self.ended = np.ones(count, dtype=np.bool_)  # nothing is running before the first reset
+        self.ended = np.ones(count, dtype=np.bool_)  # no run is in progress before the first reset
 
     def start(
         self, row: int, options: Mapping[str, Any] | None, rng: np.random.Generator
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode.
+        """Start an episode.
 
         Args:
-            row: index among the many.
+            row: index of the episode.
             options: of ``reset``.
-            rng: of this episode and those after it.
+            rng: generator of this and later episodes.
 
         Returns:
             First observation, and info.
@@ -164,10 +164,10 @@ class Episodes:
         return np.concatenate((shown, (min(time, self._config.duration), self._speed[row])))
 
     def advance(self, actions: Any) -> tuple[Array, Array, Flags, Flags]:
-        """Move every episode by one control period, those that have ended as well.
+        """Advance every episode by one control period, including those that have ended.
 
         Args:
-            actions: shape (runs,) or (runs, 2), as the preset has it.
+            actions: shape (runs,) in the plain preset, (runs, 2) in the operator preset.
 
         Returns:
             Observations of shape (runs, samples + 2), rewards (nats), terminations and truncations of shape
@@ -196,7 +196,7 @@ class Episodes:
         return observations, rewards, wild, truncated
 
     def _operate(self, actions: Any) -> tuple[Array, Array]:
-        """Speeds over the sample intervals and moments; keeps the log."""
+        """Wind speeds in the sample intervals, and moments; also writes the log."""
         if self._config.preset == "plain":
             check_plain(actions, self._count)
             still = np.broadcast_to(self._speed[:, None], (self._count, self._config.samples_per_step))
@@ -210,10 +210,10 @@ class Episodes:
         return speeds, moment
 
     def outcome(self, row: int) -> dict[str, Any]:
-        """What ``info`` holds at the end of an episode.
+        """The content of ``info`` at the end of an episode.
 
         Args:
-            row: index among the many.
+            row: index of the episode.
 
         Returns:
             ``record``; ``run`` in the plain preset, ``operator_log`` in the other; ``truth`` where exposed.
@@ -231,13 +231,13 @@ class Episodes:
         return info
 
     def record(self, row: int) -> Record:
-        """The reading of a run so far.
+        """The record of a run so far.
 
         Args:
-            row: index among the many.
+            row: index of the episode.
 
         Returns:
-            The record, whole where the run has ended.
+            The record, complete where the run has ended.
 
         Raises:
             EnvError: before the first step.
@@ -255,13 +255,13 @@ class Episodes:
         return self._information.matrix(row)
 
     def get_state(self, row: int) -> EpisodeState:
-        """All that an episode in progress is.
+        """The complete state of an episode in progress.
 
         Args:
-            row: index among the many.
+            row: index of the episode.
 
         Returns:
-            The state; it shares nothing with the episode.
+            The state, a copy.
         """
         plan, physics = self._plan(row), self._physics[row]
         assert physics is not None
@@ -277,17 +277,17 @@ class Episodes:
         return EpisodeState(plan, physics, self._engine.get_state(row), arrays, chain, rng)
 
     def set_state(self, row: int, state: EpisodeState) -> np.random.Generator:
-        """Put an episode into a state taken from an environment of the same configuration.
+        """Continue an episode from a state of an environment with the same configuration.
 
         Args:
-            row: index among the many.
+            row: index of the episode.
             state: from `get_state`.
 
         Returns:
-            The episode's generator from now on.
+            The generator that the episode uses from now on.
 
         Raises:
-            EnvError: when the state is of another configuration.
+            EnvError: when the state belongs to a different configuration.
         """
         rng = self._readings.restore(row, state.arrays["readings"], state.sensor, state.rng)
         self._engine.start(row, state.physics)

@@ -17,7 +17,7 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 
 class FreeDecayEnv(gymnasium.Env[Any, Any]):
-    """One run of the oscillating-model rig, from the release on; see docs/reference/envs/free-decay.md.
+    """One run of the oscillating-model rig, from the release onwards; see docs/reference/envs/free-decay.md.
 
     Args:
         render_mode: ``human``: MuJoCo's viewer; ``rgb_array``: pictures; None: nothing is drawn.
@@ -58,14 +58,15 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin a run.
+        """Start a run.
 
         Args:
-            seed: of everything that is drawn, as in Gymnasium.
-            options: what the run is; the rest is drawn. See the environment's page.
+            seed: of all random draws, as in Gymnasium.
+            options: properties of the run; the others are drawn. See the environment's page.
 
         Returns:
-            The readings while the body is still held, time 0 and wind speed; and what is stated of the run.
+            The observation (readings before the release, time 0 and wind speed), and the stated conditions of the
+            run.
 
         Raises:
             EnvError: when an option is unknown or out of range.
@@ -77,14 +78,14 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         return observation, info
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Go on for one control period.
+        """Advance the run by one control period.
 
         Args:
-            action: 0 in the plain preset; set-point and moment, each from −1 to 1, in the operator's.
+            action: 0 in the plain preset; set-point and moment, each from −1 to 1, in the operator preset.
 
         Returns:
             Observation, information gained (nats), whether the angle left the sensor's range, whether the run
-            is over, and info.
+            has ended, and info.
 
         Raises:
             EnvError: when the action is outside the space, or no run is in progress.
@@ -99,7 +100,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         return observation, float(reward), bool(terminated), bool(truncated), info
 
     def operator_action(self, *, wind_speed: float, moment: float = 0.0) -> np.ndarray[Any, Any]:
-        """The operator's action in SI units.
+        """The action of the operator preset from values in SI units.
 
         Args:
             wind_speed: set-point, m/s.
@@ -114,9 +115,9 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         return operator_action(self.config, wind_speed=wind_speed, moment=moment)
 
     def information(self) -> Array:
-        """The Fisher information so far, prior included.
+        """The Fisher information so far, including the prior.
 
-        It is taken at the truth, so it is no observation.
+        It is computed at the true coefficients, so an agent must not observe it.
 
         Returns:
             Shape (7, 7), in the order of ``tunnel_sim.envs.information.UNKNOWNS``.
@@ -124,21 +125,21 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         return self._episodes.matrix(0)
 
     def record(self) -> Record:
-        """The reading so far, of a run cut short by ``TimeLimit`` say.
+        """The record so far, for example of a run ended by ``TimeLimit``.
 
         Returns:
             The record.
 
         Raises:
-            EnvError: when there is none yet.
+            EnvError: before the first step.
         """
         return self._episodes.record(0)
 
     def get_state(self) -> EpisodeState:
-        """All that the episode in progress is, MuJoCo's full state with the plugin's included.
+        """The complete state of the episode in progress, including the states of MuJoCo and the plugin.
 
         Returns:
-            The state; it shares nothing with the environment.
+            The state, a copy.
 
         Raises:
             EnvError: when no episode has begun.
@@ -146,24 +147,24 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         return self._episodes.get_state(0)
 
     def set_state(self, state: EpisodeState) -> None:
-        """Go back to a state, or take over that of another environment made alike.
+        """Continue from a saved state of this environment, or of one with the same configuration.
 
         Args:
             state: from `get_state`.
 
         Raises:
-            EnvError: when the state is of another configuration.
+            EnvError: when the state belongs to a different configuration.
         """
         self.np_random = self._episodes.set_state(0, state)
 
     def render(self) -> Any:
-        """Draw the rig as it stands.
+        """Draw the rig in its present position.
 
         Returns:
             A picture of shape (height, width, 3), uint8, in mode ``rgb_array``; None otherwise.
 
         Raises:
-            EnvError: when nothing can be drawn here, with the remedy.
+            EnvError: when rendering does not work on this machine, with the remedy.
         """
         if self.render_mode is None:
             gymnasium.logger.warn("render() is called without a render_mode; give one to gymnasium.make")
@@ -171,7 +172,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         return self._view.draw(*self._engine.pose(0))
 
     def close(self) -> None:
-        """Close window or context; a second call does nothing."""
+        """Close the window or rendering context; a second call does nothing."""
         self._view.close()
 
 
@@ -182,7 +183,7 @@ def render_fps(control_period: float) -> float | int:
         control_period: s.
 
     Returns:
-        Hz, a whole number where it is one.
+        Hz, as an integer where possible.
     """
     rate = 1.0 / control_period
     return round(rate) if abs(rate - round(rate)) < 1e-9 * rate else rate

@@ -1,4 +1,4 @@
-"""Many runs of ``tunnel_sim/FreeDecay-v0`` at once on ``mujoco.batch``: the native vector environment."""
+"""The native vector environment of ``tunnel_sim/FreeDecay-v0``: many runs at once on ``mujoco.batch``."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from tunnel_sim.vocabulary.record import Array
 
 
 class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
-    """Runs side by side; each with the bits of `FreeDecayEnv` with its own seed.
+    """Parallel runs, each bit-identical to a `FreeDecayEnv` with the same seed.
 
-    A run that has ended begins anew in the next step (``AutoresetMode.NEXT_STEP``), with everything drawn.
+    A run that has ended is restarted in the next step (``AutoresetMode.NEXT_STEP``), with all properties drawn.
 
     Args:
         num_envs: number of runs.
         render_mode: ``rgb_array`` or None.
-        max_episode_steps: runs are truncated after so many steps; None: at their end only.
-        nthread: threads; 0 takes all processors. The result is the same to the bit whatever the number.
+        max_episode_steps: number of steps after which runs are truncated; None: at their end only.
+        nthread: number of threads; 0 uses all processors. The result does not depend on it.
         width: of a picture, pixels.
         height: of a picture, pixels.
         camera: name of a camera of ``mjcf/rig.xml``.
@@ -79,15 +79,15 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin all runs, or those of a mask.
+        """Start all runs, or those selected by a mask.
 
         Args:
-            seed: one for each run, or the first of consecutive ones, or None, as in ``SyncVectorEnv``.
-            options: as in `FreeDecayEnv.reset`, for all runs; ``reset_mask``, a boolean array, begins only
-                some of them; ``runs``, a sequence, gives each run options of its own, over the common ones.
+            seed: one per run, or the first of consecutive seeds, or None, as in ``SyncVectorEnv``.
+            options: as in `FreeDecayEnv.reset`, for all runs. ``reset_mask``, a boolean array, selects the runs to
+                start; ``runs``, a sequence of mappings, overrides the common options run by run.
 
         Returns:
-            Observations of all runs, those not begun anew as zeros with a mask; and infos.
+            Observations of all runs (zeros where the mask excludes a run), and infos.
 
         Raises:
             EnvError: when an option, mask or seed is refused.
@@ -118,7 +118,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         values = np.asarray(mask)
         if values.shape != (self.num_envs,) or values.dtype != np.bool_ or not values.any():
             raise EnvError(
-                f"reset_mask is no boolean array of {self.num_envs} with a True in it",
+                f"reset_mask is not a boolean array of length {self.num_envs} with at least one True",
                 where="option reset_mask",
                 remedy="give one boolean per run",
             )
@@ -129,7 +129,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
             return [{}] * self.num_envs
         if not isinstance(runs, Sequence) or len(runs) != self.num_envs:
             raise EnvError(
-                f"runs is no sequence of {self.num_envs}",
+                f"runs is not a sequence of length {self.num_envs}",
                 where="option runs",
                 remedy="give one mapping per run",
             )
@@ -147,16 +147,16 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return seed
 
     def step(self, actions: Any) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
-        """Go on for one control period; runs that ended in the step before begin anew instead.
+        """Advance all runs by one control period; runs that ended in the previous step are restarted instead.
 
         Args:
-            actions: of ``action_space``; that of a run that begins anew is not used.
+            actions: from ``action_space``; the action of a run that is restarted is ignored.
 
         Returns:
             Observations, information gained (nats), terminations, truncations and infos.
 
         Raises:
-            EnvError: when an action is outside the space, or nothing was reset yet.
+            EnvError: when an action is outside the space, or before the first reset.
         """
         if any(rng is None for rng in self._rngs):
             raise EnvError("no run is in progress", where="step", remedy="call reset() first")
@@ -192,7 +192,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
             state: from an environment of the same configuration.
 
         Raises:
-            EnvError: when the state is of another configuration.
+            EnvError: when the state belongs to a different configuration.
         """
         self._rngs[index] = self._episodes.set_state(index, state)
 
@@ -214,7 +214,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return tuple(self._view.draw(*self._engine.pose(row)) for row in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close the drawing's context.
+        """Close the rendering context.
 
         Args:
             **kwargs: not used.

@@ -1,4 +1,4 @@
-"""From episodes to a campaign that is identified and diagnosed like any other."""
+"""Converting finished episodes to a campaign."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tunnel_sim.vocabulary.rig import Rig
 
 
 class _HasRig(Protocol):
-    """An environment of free decays, alone or many at once; unwrapped."""
+    """A free-decay environment or vector environment, unwrapped."""
 
     config: FreeDecayConfig
     rig: Rig
@@ -29,11 +29,11 @@ def campaign_of(runs: Iterable[Run], env: _HasRig, *, name: str = "episodes") ->
         name: of the campaign.
 
     Returns:
-        The campaign. It states the rig's nominal inertia and the sensor as the environment was told, and
-        nothing of the truth. Runs of equal conditions are numbered.
+        The campaign. It states the rig's nominal inertia and the configured sensor, and contains no trace of the
+        truth. Runs with equal conditions are numbered.
 
     Raises:
-        EnvError: when there is no run.
+        EnvError: when no run is given.
     """
     listed = list(runs)
     if not listed:

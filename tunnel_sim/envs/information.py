@@ -1,18 +1,18 @@
-"""The information a run has given about Cnβ and Cnr, sample by sample.
+"""The information that a run gives about Cnβ and Cnr, sample by sample.
 
 The reading of a run is y = β(t; p) + zero + noise of variance σ². With the sensitivities s = ∂y/∂p of the
 nominal model, the Fisher information of all unknowns is
 
     J = P⁻¹ + Σ s sᵀ/σ²,
 
-P the prior's covariance, summed over the samples so far. The unknowns are Izz, Cr, the angle and rate at the
-release, the sensor's zero, Cnβ and Cnr; the first five are eliminated (Schur complement S of their block), and
-½ log det S, in nats, is what is known of (Cnβ, Cnr). Its increase over a step is the step's reward, and cannot
-be negative. Source: S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory (1993), ch. 3;
-½ log det as the measure of an experiment: D. V. Lindley, Ann. Math. Stat. 27 (1956) 986, doi
+where P is the prior covariance and the sum runs over the samples so far. The unknowns are Izz, Cr, the angle and
+rate at the release, the sensor's zero, Cnβ and Cnr. Eliminating the first five gives the Schur complement S;
+½ log det S, in nats, measures the information about (Cnβ, Cnr). Its increase over a step is the reward of the step
+and cannot be negative. Source: S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory (1993),
+ch. 3; ½ log det as a measure of an experiment: D. V. Lindley, Ann. Math. Stat. 27 (1956) 986, doi
 10.1214/aoms/1177728069.
 
-Everything is done for many runs at once; a run's numbers do not hang on how many there are.
+Many runs are processed at once; the numbers of a run do not depend on how many there are.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from tunnel_sim.vocabulary.record import Array
 UNKNOWNS = (
     "yaw_inertia", "mechanical_damping", "release_angle", "release_rate", "sensor_zero", "cn_beta", "cn_r",
 )  # fmt: skip
-"""The order of rows and columns of the information: what is eliminated first."""
+"""The order of rows and columns of the information matrix; the first five are eliminated."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Prior:
     """What is known before the run, as standard deviations; 0: known exactly.
 
     Args:
-        yaw_inertia: as a share of Izz, dimensionless; what wind-off runs of the spring have told.
-        mechanical_damping: as a share of Cr, dimensionless; likewise.
+        yaw_inertia: as a share of Izz, dimensionless; known from wind-off runs with the spring.
+        mechanical_damping: as a share of Cr, dimensionless; known from the same runs.
         release_angle: rad.
         release_rate: rad/s.
         sensor_zero: rad.
@@ -76,15 +76,17 @@ class Prior:
             least = 0.0 if name not in ("cn_beta", "cn_r") else 1e-300
             if not isinstance(value, int | float) or not isfinite(value) or value < least:
                 raise EnvError(
-                    f"{name} = {value!r} is no standard deviation", where="prior", remedy="give it, SI units"
+                    f"{name} = {value!r} is not a standard deviation",
+                    where="prior",
+                    remedy="give it, SI units",
                 )
         return replace(Prior(), **changes)
 
     def scales(self, run: NominalRun) -> Array:
-        """The standard deviations in the unknowns' own units.
+        """The standard deviations in the units of the unknowns.
 
         Args:
-            run: whose Izz and Cr the shares are of.
+            run: gives Izz and Cr, to which the shares refer.
 
         Returns:
             Shape (7,), in the order of `UNKNOWNS`.
@@ -98,7 +100,7 @@ class Information:
 
     Args:
         count: number of runs.
-        samples: in one step.
+        samples: number of samples in one step.
         interval: between samples, s.
         variance: of a reading, rad².
         prior: what is known before a run.
@@ -109,16 +111,16 @@ class Information:
         self._variance = variance
         size = len(UNKNOWNS)
         self._sensitivities = Sensitivities(count, samples, interval)
-        self._scale = np.ones((count, size))  # the matrices are of the unknowns in units of their prior
+        self._scale = np.ones((count, size))  # the matrices use the prior standard deviations as units
         self.scaled = np.tile(np.eye(size), (count, 1, 1))
         self.known = np.zeros(count)
 
     def start(self, row: int, run: NominalRun) -> None:
-        """Begin a run.
+        """Start a run.
 
         Args:
-            row: index of the run among the many.
-            run: the nominal model of it.
+            row: index of the run.
+            run: its nominal model.
         """
         self._sensitivities.start(row, run)
         self._scale[row] = self._prior.scales(run)
@@ -129,8 +131,8 @@ class Information:
         """Add the samples of one step.
 
         Args:
-            angle: at the samples and at the step's end, shape (runs, samples + 1), rad.
-            rate: likewise, rad/s.
+            angle: at the samples and at the end of the step, shape (runs, samples + 1), rad.
+            rate: at the same times, shape (runs, samples + 1), rad/s.
             wind_speed: mean over the step, shape (runs,), m/s.
             moment: applied by the operator, shape (runs,), N m.
 
@@ -144,20 +146,20 @@ class Information:
         return np.maximum(self.known - before, 0.0)
 
     def matrix(self, row: int) -> Array:
-        """The Fisher information of one run, its prior included.
+        """The Fisher information of one run, including its prior.
 
         Args:
             row: index of the run.
 
         Returns:
-            Shape (7, 7), in the order of `UNKNOWNS` and the inverse products of their units; infinite where
+            Shape (7, 7), in the order of `UNKNOWNS` and in the inverse products of their units; infinite where
             the prior is exact.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.scaled[row] / np.outer(self._scale[row], self._scale[row]))
 
     def snapshot(self, row: int) -> dict[str, Array]:
-        """Copies of all that a run in progress carries.
+        """Copies of the state of a run in progress.
 
         Args:
             row: index of the run.
@@ -169,7 +171,7 @@ class Information:
         return {name: np.array(value) for name, value in own.items()} | self._sensitivities.snapshot(row)
 
     def restore(self, row: int, run: NominalRun, state: Mapping[str, Array]) -> None:
-        """Put a run back to where a snapshot was taken.
+        """Restore a run from a snapshot.
 
         Args:
             row: index of the run.
@@ -185,7 +187,7 @@ class Information:
 
 
 def half_log_det(information: Array) -> Array:
-    """½ log det of the last two unknowns' information with all others eliminated.
+    """½ log det of the information about the last two unknowns, with all others eliminated.
 
     Args:
         information: positive definite, shape (n, m, m).

@@ -1,4 +1,4 @@
-"""The readings of many runs in progress: zero, noise and quantisation at once, effects run by run."""
+"""The readings of many runs in progress; zero, noise and quantisation are vectorised, effects act run by run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 
 class Readings:
-    """What the potentiometers of many runs have read.
+    """The potentiometer readings of many runs.
 
     Args:
         config: of the environment.
@@ -29,16 +29,16 @@ class Readings:
         self._interval = 1.0 / config.sample_rate
         self._chains: list[RunningSensor | None] = [None] * count
         self._rngs: list[np.random.Generator] = [np.random.default_rng(0)] * count
-        self._altered: set[int] = set()  # runs whose reading effects alter
+        self._altered: set[int] = set()  # runs with effects on the reading
         self._sensor = np.zeros((3, count, 1))  # zero, noise, resolution
         self._values = np.zeros((count, config.steps * config.samples_per_step))
 
     def start(self, row: int, chain: RunningSensor, rng: np.random.Generator) -> None:
-        """Begin a run.
+        """Start a run.
 
         Args:
-            row: index among the many.
-            chain: what its effects do to the reading.
+            row: index of the run.
+            chain: the run's effects on the reading.
             rng: source of its noise.
         """
         self._chains[row], self._rngs[row] = chain, rng
@@ -46,10 +46,10 @@ class Readings:
         (self._altered.discard if chain.is_plain else self._altered.add)(row)
 
     def held(self, row: int, angle: float) -> Array:
-        """Readings of the control period before the release; their noise is no part of the run's.
+        """Readings of the control period before the release, with noise that is not drawn from the run's generator.
 
         Args:
-            row: index among the many.
+            row: index of the run.
             angle: at which the rod's upper end is held, rad.
 
         Returns:
@@ -63,12 +63,12 @@ class Readings:
         return quantise(chain.reading(held + sensor.zero + sensor.noise_std * noise), sensor.resolution)
 
     def take(self, angle: Array, step: NDArray[np.int64], running: NDArray[np.bool_]) -> Array:
-        """The next readings of all runs, with the bits of `tunnel_sim.engine.sensor.read_motion`.
+        """The next readings of all runs, bit-identical to `tunnel_sim.engine.sensor.read_motion`.
 
         Args:
             angle: of the rod's upper end at the samples, shape (runs, samples), rad.
             step: number of the control period, shape (runs,).
-            running: which runs are in progress, shape (runs,); the generators of others are left as they are.
+            running: which runs are in progress, shape (runs,); the generators of the others are not used.
 
         Returns:
             Shape (runs, samples), rad.
@@ -99,10 +99,10 @@ class Readings:
             self._values[np.arange(len(first))[:, None], columns] = readings
 
     def record(self, row: int, steps: int) -> Record:
-        """The reading of a run so far.
+        """The record of a run so far.
 
         Args:
-            row: index among the many.
+            row: index of the run.
             steps: number of control periods so far.
 
         Returns:
@@ -117,35 +117,35 @@ class Readings:
         return Record(self._times[:count], self._values[row, :count])
 
     def snapshot(self, row: int) -> tuple[Array, RunningSensor, np.random.Generator]:
-        """Copies of what a run carries.
+        """Copies of the state of a run.
 
         Args:
-            row: index among the many.
+            row: index of the run.
 
         Returns:
-            Readings, effects and source of noise.
+            Readings, effects and generator of the noise.
         """
         return self._values[row].copy(), self._chain(row).copied(), copy.deepcopy(self._rngs[row])
 
     def restore(
         self, row: int, values: Array, chain: RunningSensor, rng: np.random.Generator
     ) -> np.random.Generator:
-        """Put a run back to where a snapshot was taken.
+        """Restore a run from a snapshot.
 
         Args:
-            row: index among the many.
-            values: readings, shape (n,), rad.
-            chain: likewise from `snapshot`.
-            rng: likewise.
+            row: index of the run.
+            values: readings from `snapshot`, shape (n,), rad.
+            chain: effects from `snapshot`.
+            rng: generator from `snapshot`.
 
         Returns:
-            The run's generator from now on, a copy.
+            The generator that the run uses from now on, a copy.
 
         Raises:
-            EnvError: when the readings are of another configuration.
+            EnvError: when the readings belong to a different configuration.
         """
         if np.shape(values) != self._values[row].shape:
-            raise EnvError("the state is of another configuration", remedy="make the environment alike")
+            raise EnvError("the state belongs to a different configuration", remedy="use the same arguments")
         self.start(row, chain.copied(), copy.deepcopy(rng))
         self._values[row] = values
         return self._rngs[row]

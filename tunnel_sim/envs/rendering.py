@@ -1,7 +1,7 @@
 """Pictures of the rig during an episode, off-screen or in MuJoCo's viewer.
 
-What is drawn is a model of its own, posed like the run: so one window outlives all episodes, and many runs
-share one context.
+A separate model is posed like the run and drawn, so that one window lasts for all episodes and many runs share one
+rendering context.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from tunnel_sim.vocabulary.rig import Rig
 
 RENDER_MODES = ("human", "rgb_array")
 _FILM_QUALITY = (2048, 4)
-"""Of shadows and edges: a fifth of the time of a still picture's, which looks the same at this size."""
+"""Quality of shadows and edges: a fifth of the time of a still picture, which looks the same at this size."""
 
 _REMEDY = "install EGL or OSMesa (Debian and Ubuntu: libegl1 or libosmesa6), or set MUJOCO_GL"
 
 
 class RigView:
-    """What draws the rig.
+    """Draws the rig.
 
     Args:
-        rig: what is drawn.
+        rig: the rig to draw.
         mode: ``human``, ``rgb_array`` or None.
         width: of a picture, pixels.
         height: of a picture, pixels.
         camera: name of a camera of ``mjcf/rig.xml``.
-        period: between two pictures of a window, s.
+        period: time between two frames in a window, s.
 
     Raises:
         EnvError: for an unknown mode, camera or size.
@@ -64,13 +64,13 @@ class RigView:
 
         Args:
             end: angle of the rod's upper end, rad.
-            twist: of the body against it, rad.
+            twist: angle of the body relative to it, rad.
 
         Returns:
             A picture of shape (height, width, 3), uint8; None in a window.
 
         Raises:
-            EnvError: when nothing can be drawn here.
+            EnvError: when rendering does not work on this machine.
         """
         if self._model is None:
             self._build()
@@ -83,7 +83,7 @@ class RigView:
         return self._canvas.picture(self._data, self._model.camera(self._camera).id)
 
     def close(self) -> None:
-        """Close window and context; a second call does nothing."""
+        """Close the window and the rendering context; a second call does nothing."""
         if self._window is not None:
             self._window.close()
         if self._canvas is not None:
@@ -97,7 +97,7 @@ class RigView:
             AeroDerivatives(0.0, 0.0),
             dynamics.yaw_inertia,
             dynamics.mechanical_damping,
-            rod_twist=RodTwist(1e-3, 0.5),  # the two joints of any run's pose
+            rod_twist=RodTwist(1e-3, 0.5),  # two joints, so that any run can be shown
         )
         model = build_model(self._rig, settings).mj
         cameras = [model.camera(i).name for i in range(model.ncam)]
@@ -111,7 +111,7 @@ class RigView:
         self._model, self._data = model, mujoco.MjData(model)
 
     def _show(self) -> None:
-        """Bring the window up to date, in real time."""
+        """Update the window, in real time."""
         if self._window is None:
             self._window = _open_window(self._model, self._data)
             self._shown = time.monotonic()
@@ -127,16 +127,16 @@ def _open_window(model: Any, data: Any) -> Any:
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
         raise EnvError("there is no display", where="render_mode human", remedy="use render_mode='rgb_array'")
-    from mujoco import viewer  # here, because it needs a display's libraries
+    from mujoco import viewer  # imported here because it needs the libraries of a display
 
     return viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
 
 
 class _Canvas:
-    """An off-screen picture.
+    """An off-screen rendering context.
 
-    `mujoco.Renderer` chooses its back end once, when MuJoCo is first imported, and then a window's where there
-    is no display. Here it is chosen when the first picture is due.
+    `mujoco.Renderer` chooses its back end when MuJoCo is first imported; without a display it then chooses one that
+    needs a window. Here the back end is chosen when the first picture is drawn.
     """
 
     def __init__(self, model: Any, width: int, height: int) -> None:
@@ -164,7 +164,7 @@ class _Canvas:
 
 
 def _context(width: int, height: int) -> Any:
-    """A current OpenGL context of the first back end that works."""
+    """A current OpenGL context from the first back end that works."""
     chosen = os.environ.get("MUJOCO_GL", "").lower()
     if chosen in ("egl", "osmesa", "glfw", "cgl"):
         names: tuple[str, ...] = (chosen,)
@@ -182,7 +182,7 @@ def _context(width: int, height: int) -> Any:
         except (ImportError, OSError, RuntimeError, AttributeError) as error:
             reasons.append(f"{name}: {' '.join(str(error).split())[:80]}")
             if "MUJOCO_GL" not in os.environ and "OpenGL.platform" not in sys.modules:
-                os.environ.pop("PYOPENGL_PLATFORM", None)  # the failed one claimed PyOpenGL for itself
+                os.environ.pop("PYOPENGL_PLATFORM", None)  # set by the back end that failed
         else:
             return context
     raise EnvError(f"off-screen rendering does not work here ({'; '.join(reasons)})", remedy=_REMEDY)

@@ -1,4 +1,4 @@
-"""The reading of a run in progress, block by block, with the bits of `tunnel_sim.engine.sensor.read_motion`."""
+"""The reading of a run in progress, block by block; bit-identical to `tunnel_sim.engine.sensor.read_motion`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tunnel_sim.vocabulary.record import Array
 
 
 class RunningSensor:
-    """What one run's effects do to the reading.
+    """The effects of one run on its reading.
 
     Args:
         chain: the run's effects.
@@ -28,21 +28,21 @@ class RunningSensor:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the reading is zero, noise and quantisation alone."""
+        """Whether the reading differs from the angle by zero, noise and quantisation only."""
         return self._chain.reads_plainly
 
     def copied(self) -> RunningSensor:
-        """The same sensor at the same point of its run, sharing nothing that changes."""
+        """An independent copy at the same point of the run."""
         other = copy.copy(self)
         vars(other).update(_angles=list(self._angles), _times=list(self._times))
         return other
 
     def angle(self, angle: Array, time_s: Array) -> Array:
-        """What the sensor sees of the run's next samples before its zero and noise.
+        """The angle that the sensor measures in the next samples, before zero and noise are added.
 
         Args:
             angle: of the rod's upper end, shape (n,), rad.
-            time_s: shape (n,), s, following on the call before.
+            time_s: shape (n,), s; continues from the previous call.
 
         Returns:
             Shape (n,), rad.
@@ -55,9 +55,9 @@ class RunningSensor:
         return seen[-len(angle) :]
 
     def held(self, angle: Array, time_s: Array) -> Array:
-        """The same while the body is still held, outside the run's past; arguments as in `angle`."""
+        """The measured angle before the release, which later samples do not depend on; arguments as in `angle`."""
         return self._chain.angle(angle, time_s)
 
     def reading(self, reading: Array) -> Array:
-        """What effects do after the noise; rad, shape (n,) in and out."""
+        """Apply the effects that act after the noise; rad, shape (n,) in and out."""
         return self._chain.reading(reading)

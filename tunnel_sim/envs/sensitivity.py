@@ -1,15 +1,14 @@
-"""Sensitivities of the nominal model, carried along the motion of many runs.
+"""Sensitivities of the nominal model along the motion of many runs.
 
-The nominal model Izz β̈ + (Cr − Ca) β̇ + (Kr − Ka) β = M(t) gives each of its unknowns p a sensitivity x = ∂β/∂p
-that obeys
+In the nominal model Izz β̈ + (Cr − Ca) β̇ + (Kr − Ka) β = M(t) the sensitivity x = ∂β/∂p to an unknown p obeys
 
-    ẍ + 2a ẋ + k x = u(t),   2a = (Cr − Ca)/Izz,   k = (Kr − Ka)/Izz,
+    ẍ + 2a ẋ + k x = u(t),   2a = (Cr − Ca)/Izz,   k = (Kr − Ka)/Izz.
 
-driven by the motion itself: u = ½ρV²Al β/Izz for Cnβ, ½ρVAl² β̇/Izz for Cnr, −β̇/Izz for Cr, −β̈/Izz for Izz, and
-not driven, but starting from (1, 0) and (0, 1), for angle and rate at the release. Over one sample interval the
-homogeneous part is the exact propagator and u is integrated by Simpson's rule, its middle from the cubic
-through both ends; over one control period the wind counts with its mean. Where effects act that the nominal
-model lacks, the motion is the real one and the sensitivities are those of the model that is fitted to it.
+The motion itself drives it: u = ½ρV²Al β/Izz for Cnβ, ½ρVAl² β̇/Izz for Cnr, −β̇/Izz for Cr and −β̈/Izz for Izz.
+For angle and rate at the release u = 0, and the initial values are (1, 0) and (0, 1). In each sample interval the
+homogeneous part is propagated exactly; u is integrated by Simpson's rule, with its middle value from the cubic
+through both ends. The wind speed is replaced by its mean over a control period. Where effects act that the nominal
+model does not include, the motion is the real one, and the sensitivities are those of the nominal model.
 """
 
 from __future__ import annotations
@@ -69,7 +68,7 @@ class Sensitivities:
 
     Args:
         count: number of runs.
-        samples: in one step.
+        samples: number of samples in one step.
         interval: between samples, s.
     """
 
@@ -83,7 +82,7 @@ class Sensitivities:
         self._decay = np.zeros((2, count))
 
     def start(self, row: int, run: NominalRun) -> None:
-        """Begin a run.
+        """Start a run.
 
         Args:
             row: index of the run.
@@ -95,26 +94,26 @@ class Sensitivities:
         self._speed[row] = np.nan
 
     def snapshot(self, row: int) -> dict[str, Array]:
-        """Copies of what a run carries; result and arguments as in `Information.snapshot`."""
+        """Copies of the state of a run; result and arguments as in `Information.snapshot`."""
         return {"sensitivities": self._x[:, row].copy()}
 
     def restore(self, row: int, run: NominalRun, state: Mapping[str, Array]) -> None:
-        """Put a run back; arguments as in `Information.restore`."""
+        """Restore a run from a snapshot; arguments as in `Information.restore`."""
         self.start(row, run)
         self._x[:, row] = state["sensitivities"]
 
     def advance(self, angle: Array, rate: Array, wind_speed: Array, moment: Array) -> Array:
-        """Carry the sensitivities through one step; arguments as in `Information.advance`.
+        """Propagate the sensitivities through one step; arguments as in `Information.advance`.
 
         Returns:
-            Of the readings at the samples, shape (runs, 7, samples), in the order of `UNKNOWNS`.
+            Sensitivities of the readings at the samples, shape (runs, 7, samples), in the order of `UNKNOWNS`.
         """
         if not np.array_equal(wind_speed, self._speed):
             self._set_speed(wind_speed)
         kicks = self._kicks(angle, rate, wind_speed, moment)
         f00, f01, f10, f11 = (row[:, None] for row in self._propagator[:4])
         x, v = self._x
-        out = np.ones((self._samples, len(self._speed), DYNAMIC + 1))  # the zero keeps its one
+        out = np.ones((self._samples, len(self._speed), DYNAMIC + 1))  # the sensitivity to the zero remains 1
         for j in range(self._samples):
             out[j, :, :4], out[j, :, 5:] = x[:, :4], x[:, 4:]
             x, v = f00 * x + f01 * v + kicks[0, j], f10 * x + f11 * v + kicks[1, j]
@@ -131,7 +130,7 @@ class Sensitivities:
         self._propagator = np.stack((*whole, half[1], half[3]))
 
     def _kicks(self, angle: Array, rate: Array, speed: Array, moment: Array) -> Array:
-        """What the driving adds to value and rate in each interval, shape (2, samples, runs, DYNAMIC)."""
+        """What u adds to value and rate in each interval, shape (2, samples, runs, DYNAMIC)."""
         h = self._interval
         a, k = self._decay
         _, f01, _, f11, m01, m11 = self._propagator

@@ -1,1 +1,1 @@
-"""Reading and writing: campaigns, run files and plans, each checked, each written whole or not at all."""
+"""Reading and writing of campaigns, run files, plans and rigs. Input is checked; output is written atomically."""

@@ -1,4 +1,4 @@
-"""Campaigns in and out: a folder with ``campaign.toml`` and one CSV or Parquet file per run.
+"""Reading and writing of a campaign: a folder with ``campaign.toml`` and one CSV or Parquet file per run.
 
 The reader never opens ``truth.json``. The writer writes the whole campaign or nothing.
 """
@@ -52,7 +52,7 @@ def read_campaign(folder: Path | str) -> Campaign:
         The campaign, angles in radians.
 
     Raises:
-        TunnelError: for the first thing that is wrong, in one line that names file, run and remedy.
+        TunnelError: for the first fault, in one line that names file, run and remedy.
     """
     folder = Path(folder)
     if folder.name == CAMPAIGN_FILE and folder.is_file():
@@ -82,20 +82,19 @@ def write_campaign(
 
     Args:
         campaign: what to write; it must pass every check of the reader.
-        folder: the folder to make; its parents are made where they are missing.
+        folder: the folder to create, with its parents where they are missing.
         run_format: ``parquet`` or ``csv``.
-        truth: what a simulator knows, written as ``truth.json``; None writes none.
-        overwrite: whether a folder that is there already may be replaced; only one that is empty or holds a
-            campaign and nothing else is.
+        truth: the simulated truth, written as ``truth.json``; None: no such file.
+        overwrite: whether an existing folder may be replaced; it must be empty or contain only a campaign.
 
     Returns:
         The folder.
 
     Raises:
-        TunnelError: the folder is there, or may not be replaced; the campaign would not be readable; the disk
-            refuses.
-        ValueError: ``truth`` holds NaN or an infinity.
-        TypeError: ``truth`` holds what JSON cannot.
+        TunnelError: the folder exists or may not be replaced; the campaign would not be readable; the disk
+            reports an error.
+        ValueError: ``truth`` contains NaN or an infinity.
+        TypeError: ``truth`` contains a value that JSON cannot represent.
     """
     folder = Path(folder)
     if run_format not in RUN_FORMATS:
@@ -104,7 +103,7 @@ def write_campaign(
             where=shown(folder),
             remedy=did_you_mean(run_format, RUN_FORMATS),
         )
-    clear_leftovers(folder.resolve().parent)  # what a killed command set aside is there again
+    clear_leftovers(folder.resolve().parent)  # restores what a killed command had set aside
     _check_target(folder, overwrite=overwrite)
     files = _run_files(campaign, run_format)
     document = campaign_document(campaign, files)
@@ -121,7 +120,7 @@ def write_campaign(
 
 
 def _read_runs(folder: Path, document: CampaignDocument, sensor: SensorProperties) -> Iterator[Run]:
-    """The runs in turn, as long as there is room for their samples."""
+    """The runs one by one, up to the limit on samples."""
     samples = 0
     for table in document.runs:
         run = _read_run(folder, table, sensor)
@@ -161,7 +160,7 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
 
 
 def _check_inside(folder: Path, path: Path, where: str) -> None:
-    """Refuse a run file that a symbolic link takes outside the folder."""
+    """Refuse a run file outside the folder, also through a symbolic link."""
     try:
         inside = path.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):
@@ -175,7 +174,7 @@ def _check_inside(folder: Path, path: Path, where: str) -> None:
 
 
 def _check_campaign(campaign: Campaign, document: dict[str, Any], folder: Path) -> None:
-    """Everything the reader would refuse, before anything is written."""
+    """Refuse whatever the reader would refuse, before anything is written."""
     parse_document(document, folder / CAMPAIGN_FILE)
     for run in campaign.runs:
         where = run_place(folder, run.id)
@@ -192,7 +191,7 @@ def _check_campaign(campaign: Campaign, document: dict[str, Any], folder: Path) 
 
 
 def _run_files(campaign: Campaign, run_format: str) -> dict[str, str]:
-    """A file for every run: named by id where that is safe on any disk, else by number."""
+    """The file of every run: named by id where all ids are safe file names, else by number."""
     ids = [run.id for run in campaign.runs]
     safe = all(re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,79}", name) for name in ids)
     named = safe and len({name.lower() for name in ids}) == len(ids)
@@ -217,7 +216,7 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
         raise TunnelError(
             "the folder holds no campaign", where=where, remedy="choose another one, or empty it"
         )
-    # What the writer did not make is somebody's work: replacing the folder would delete it.
+    # Files that the writer did not create belong to somebody: replacing the folder would delete them.
     strange = [p for p in entries if p.name not in (CAMPAIGN_FILE, TRUTH_FILE, RUN_FOLDER)]
     runs = folder / RUN_FOLDER
     if runs.is_dir() and not runs.is_symlink():

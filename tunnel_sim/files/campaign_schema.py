@@ -1,4 +1,4 @@
-"""The tables of ``campaign.toml``, and their translation to and from the campaign's vocabulary."""
+"""The tables of ``campaign.toml``, and their conversion to and from `Campaign`."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class SensorTable(StrictModel):
     resolution: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
     noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
     plausible: bool | None = Field(
-        default=None, description="false to keep what looks like a slip of units, or leave it out"
+        default=None, description="false to accept values that look like a wrong unit, or leave it out"
     )
 
 
@@ -90,7 +90,7 @@ def read_document(path: Path) -> CampaignDocument:
         The validated document.
 
     Raises:
-        TunnelError: for the first thing that is wrong, naming file, run and remedy.
+        TunnelError: for the first fault, naming file, run and remedy.
     """
     return parse_document(load_toml(path, missing=NO_CAMPAIGN), path)
 
@@ -100,13 +100,13 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
 
     Args:
         document: the tables.
-        path: the file they come from or go to, for the message.
+        path: the file that is read or written, for the message.
 
     Returns:
         The validated document.
 
     Raises:
-        TunnelError: for the first thing that is wrong, naming file, run and remedy.
+        TunnelError: for the first fault, naming file, run and remedy.
     """
     check_version(document, path)
     parsed = validate(CampaignDocument, document, path)
@@ -131,7 +131,7 @@ def run_place(path: Path, run_id: str) -> str:
 
     Args:
         path: of the run's file, or of the campaign's folder.
-        run_id: the run's.
+        run_id: id of the run.
     """
     return f"{shown(path)}, run '{run_id}'"
 
@@ -170,7 +170,7 @@ def rig_properties(table: RigTable) -> RigProperties:
 
 
 def sensor_properties(table: SensorTable) -> SensorProperties:
-    """The vocabulary's form of ``[sensor]``."""
+    """``[sensor]`` as `SensorProperties`."""
     return SensorProperties(**table.model_dump())
 
 
@@ -182,7 +182,7 @@ def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, An
         files: the file of every run, by id, relative to the campaign's folder.
 
     Returns:
-        The tables, in the order in which they are written; what is None is left out.
+        The tables, in the order in which they are written, without values that are None.
     """
     head = {"name": campaign.name, "description": campaign.description or None}
     document: dict[str, Any] = {"schema_version": 1, "campaign": _stated(head)}
@@ -198,7 +198,7 @@ def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, An
 
 
 def _stated(values: dict[str, Any]) -> dict[str, Any]:
-    # NumPy scalars are turned into the floats that TOML can hold; -0.0 and digits are kept.
+    # NumPy scalars become Python floats, which TOML can hold; -0.0 and all digits are kept.
     return {
         key: float(value) if isinstance(value, np.floating | np.integer) else value
         for key, value in values.items()

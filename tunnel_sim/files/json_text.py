@@ -1,4 +1,4 @@
-"""Documents as JSON text: the one encoder of everything this program writes."""
+"""Documents as JSON text: the only JSON encoder of this project."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ def json_text(document: Mapping[str, object]) -> str:
     """A document as JSON for a file.
 
     Args:
-        document: plain values, and NumPy's scalars and arrays; no NaN and no infinity, which JSON does not have.
+        document: plain values and NumPy scalars and arrays, all finite.
 
     Returns:
-        Indented JSON that ends in a line feed.
+        Indented JSON with a final line feed.
 
     Raises:
-        ValueError: when a number is not finite; the message names its place. That is a fault of the program.
-        TypeError: when a value is of a type that JSON does not have.
+        ValueError: when a number is not finite; the message says where. This is a bug in the program.
+        TypeError: when a value has a type that JSON does not support.
     """
     return _encoded(document, indent=2) + "\n"
 
@@ -31,14 +31,14 @@ def json_line(document: object, *, sort_keys: bool = False) -> str:
 
     Args:
         document: as for `json_text`.
-        sort_keys: whether equal documents must give equal text.
+        sort_keys: whether to sort keys, so that equal documents give equal text.
 
     Returns:
         JSON without line feeds.
 
     Raises:
         ValueError: as for `json_text`.
-        TypeError: likewise.
+        TypeError: as for `json_text`.
     """
     return _encoded(document, sort_keys=sort_keys)
 
@@ -54,14 +54,14 @@ def _encoded(document: object, **layout: Any) -> str:
 
 
 def _plain(value: object) -> object:
-    """What JSON knows of a NumPy value."""
+    """A NumPy value as plain Python."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     raise TypeError(f"internal error: JSON cannot hold a {type(value).__name__}")
 
 
 def _not_finite(value: object, place: str = "the document") -> str | None:
-    """The first number that is not finite, with its place; None where there is none."""
+    """The place of the first number that is not finite; None where there is none."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, float):

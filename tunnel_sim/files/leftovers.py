@@ -1,8 +1,8 @@
-"""What a killed command leaves in a folder: names that say whose it is, and its removal.
+"""Temporary files and folders of killed commands: how they are named, and how they are removed.
 
-While a file or folder is written it has a temporary name beside its own, ``.NAME.MARK.partial``. A folder that is
-about to be replaced is set aside as ``.NAME.MARK.replaced``. The mark names the machine, the process and when the
-process began, so that another command can tell whether the writer still runs.
+While a file or folder is being written, it has the temporary name ``.NAME.MARK.partial`` next to its target. A
+folder that is about to be replaced is renamed ``.NAME.MARK.replaced``. The mark contains the machine, the process
+and its start time, so that another command can tell whether the writer is still running.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ PARTIAL, REPLACED = "partial", "replaced"
 _LEFTOVER = re.compile(
     r"\.(?P<name>.+)\.(?P<machine>[0-9a-f]{8})-(?P<pid>\d+)-(?P<start>\d+)-[0-9a-f]{6}\.(?P<kind>partial|replaced)"
 )
-_NAME_SHOWN = 40  # characters of the target's name in a partial's: names of files are limited to 255 bytes
+_NAME_SHOWN = 40  # characters of the target's name in the temporary name: file names are limited to 255 bytes
 
 
 def temporary_names(target: Path) -> tuple[Path, Path]:
-    """Names beside a target that no other writer has.
+    """Unique temporary names next to a target.
 
     Args:
         target: file or folder to write.
 
     Returns:
-        Where its new content is made, and where the old is set aside.
+        The name for the new content, and the name for the old content while it is being replaced.
     """
     pid = os.getpid()
     mark = f"{_machine()}-{pid}-{_start(pid) or 0}-{secrets.token_hex(3)}"
@@ -41,12 +41,12 @@ def temporary_names(target: Path) -> tuple[Path, Path]:
 
 
 def clear_leftovers(folder: Path) -> None:
-    """Remove what killed commands left in a folder, and put back what they had only set aside.
+    """Remove what killed commands left in a folder, and restore folders that they had set aside.
 
-    Leftovers of processes that run, or that run on another machine, stay. So does whatever cannot be removed.
+    Files of running processes and of other machines are kept. Files that cannot be removed are skipped.
 
     Args:
-        folder: any; need not exist.
+        folder: any folder; it need not exist.
     """
     try:
         names = [entry.name for entry in os.scandir(folder) if entry.name.startswith(".")]
@@ -64,22 +64,18 @@ def clear_leftovers(folder: Path) -> None:
 
 @lru_cache(maxsize=64)
 def clear_leftovers_once(folder: Path) -> None:
-    """The same as `clear_leftovers`, but only the first time that this process writes to the folder.
-
-    Args:
-        folder: any; need not exist.
-    """
+    """As `clear_leftovers`, but only the first time that this process writes to the folder."""
     clear_leftovers(folder)
 
 
 def discard(folder: Path, partial: Path) -> None:
-    """Remove a folder that was set aside and is not needed any more.
+    """Remove a folder that was set aside and is no longer needed.
 
-    It takes the name of a partial first: were its removal interrupted, nobody would put back the rest.
+    It is renamed to a ``.partial`` first, so that after an interrupted removal the rest is not restored.
 
     Args:
-        folder: the folder; need not exist.
-        partial: a free name from `temporary_names`.
+        folder: the folder; it need not exist.
+        partial: an unused name from `temporary_names`.
     """
     if folder.exists():
         folder.rename(partial)
@@ -90,7 +86,7 @@ def _restore(path: Path, target: Path) -> None:
     try:
         path.rename(target)
     except OSError:
-        return  # another command was quicker, or it may not be done: nothing is lost
+        return  # another command was faster, or renaming is not permitted: nothing is lost
 
 
 def _remove(path: Path) -> None:
@@ -105,7 +101,7 @@ def _remove(path: Path) -> None:
 
 @cache
 def _machine() -> str:
-    """A mark of this machine and, in a container, of its numbering of processes."""
+    """A hash that identifies this machine and, in a container, its process namespace."""
     parts = [socket.gethostname()]
     for path, read in (("/etc/machine-id", _text), ("/proc/self/ns/pid", os.readlink)):
         try:
@@ -120,7 +116,7 @@ def _text(path: str) -> str:
 
 
 def _runs(pid: int, start: int) -> bool:
-    """Whether the process that a mark names still runs; True where that cannot be known."""
+    """Whether the process named by a mark is still running; True where that cannot be determined."""
     if os.name != "posix":
         return True
     try:
@@ -128,15 +124,15 @@ def _runs(pid: int, start: int) -> bool:
     except (ProcessLookupError, OverflowError):
         return False
     except OSError:
-        pass  # it runs, and belongs to somebody else
+        pass  # it is running and belongs to another user
     now = _start(pid)
     return now is None or start in (0, now)
 
 
 def _start(pid: int) -> int | None:
-    """Clock ticks from the start of the machine to that of a process; None where that cannot be known."""
+    """Start time of a process in clock ticks since boot; None where it cannot be determined."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_bytes()
     except OSError:
         return None
-    return int(stat.rpartition(b")")[2].split()[19])  # field 22 of proc(5); the second one may hold blanks
+    return int(stat.rpartition(b")")[2].split()[19])  # field 22 of proc(5); field 2 may contain spaces

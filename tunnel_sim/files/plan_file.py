@@ -1,6 +1,6 @@
-"""Reading a campaign described in one small TOML.
+"""Reading the plan of a campaign from a TOML file.
 
-The packaged ``data/paper-campaign.toml`` is the example, with a comment on every key.
+The packaged ``data/paper-campaign.toml`` is an example with a comment on every key.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
 
     Args:
         path: a TOML file like the packaged ``paper-campaign.toml``.
-        rig: whose springs the numbers stand for, and whose inertia, damping and air density are taken where
-            the description states none; None takes the packaged rig.
+        rig: defines the numbered springs, and the inertia, damping and air density that the description does not
+            state; None uses the packaged rig.
 
     Returns:
         The plan: runs in the order springs, stiffnesses, then wind speeds, release angles and repeats.
 
     Raises:
-        TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
+        TunnelError: for the first fault, in one line that names file, key and remedy.
     """
     path = Path(path)
     return plan_from(read_plan(path), load_rig() if rig is None else rig, shown(path))
 
 
 def plan_from(document: PlanDocument, rig: Rig, where: str) -> CampaignPlan:
-    """The plan that a validated campaign description stands for.
+    """The plan defined by a validated campaign description.
 
     Args:
         document: the description.
@@ -64,11 +64,7 @@ def plan_from(document: PlanDocument, rig: Rig, where: str) -> CampaignPlan:
 
 
 def paper_plan() -> CampaignPlan:
-    """The paper's campaign: springs of Table II with the wind off and at three speeds.
-
-    Returns:
-        The plan of the packaged ``data/paper-campaign.toml``.
-    """
+    """The paper's campaign (``data/paper-campaign.toml``): four springs, wind off and at three speeds."""
     with resources.as_file(resources.files("tunnel_sim") / "data" / "paper-campaign.toml") as path:
         return load_plan(path)
 
@@ -92,7 +88,7 @@ def _conditions(document: PlanDocument, rig: Rig, where: str) -> tuple[Condition
 
 
 def _stiffnesses(document: PlanDocument, springs: Mapping[int, float], where: str) -> list[tuple[str, float]]:
-    """A label and a stiffness for every numbered spring and every stiffness stated outright."""
+    """A label and the stiffness of every numbered spring and of every spring stated by its stiffness."""
     for number in document.springs:
         if number not in springs:
             raise TunnelError(
@@ -105,5 +101,5 @@ def _stiffnesses(document: PlanDocument, springs: Mapping[int, float], where: st
 
 
 def _short(value: float) -> str:
-    """The shortest text that tells a number from every other: ``15``, ``16.12``."""
+    """The shortest text that represents a number uniquely: ``15``, ``16.12``."""
     return repr(value + 0.0).removesuffix(".0")  # + 0.0: minus zero is zero

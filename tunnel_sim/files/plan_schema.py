@@ -15,7 +15,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import DEFAULT_SAMPLE_RATE
 
 STEPS_PER_SECOND = 1000.0
-"""Integration steps in a second of a run."""
+"""Integration steps per second of a run."""
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -23,7 +23,7 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 
 def _release_angle(angle: float) -> float:
     if not 0.0 < abs(angle) <= 180.0:
-        raise ValueError("is no release angle in degrees: it is zero or beyond half a turn")
+        raise ValueError("is not a release angle in degrees: it is zero or greater than 180")
     return angle
 
 
@@ -54,7 +54,7 @@ class TruthTable(StrictModel):
 
 
 class SensorModelTable(StrictModel):
-    """``[sensor]``; a key that is left out takes the default of ``SensorModel``."""
+    """``[sensor]``; omitted keys take the defaults of ``SensorModel``."""
 
     sample_rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
     noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
@@ -97,7 +97,7 @@ def read_plan(path: Path) -> PlanDocument:
         The validated document.
 
     Raises:
-        TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
+        TunnelError: for the first fault, in one line that names file, key and remedy.
     """
     document = load_toml(path, missing="name a campaign description such as the packaged paper-campaign.toml")
     plan = validate(PlanDocument, document, path)
@@ -108,7 +108,7 @@ def read_plan(path: Path) -> PlanDocument:
 
 
 class ConditionKeys(Protocol):
-    """The keys whose product are a campaign's runs."""
+    """The keys whose values are combined into a campaign's runs."""
 
     @property
     def springs(self) -> list[int]:
@@ -128,11 +128,11 @@ class ConditionKeys(Protocol):
 
     @property
     def repeats(self) -> int:
-        """Runs of each combination."""
+        """Number of runs of each combination."""
 
 
 def run_count(keys: ConditionKeys) -> int:
-    """How many runs conditions stand for, counted from the lengths of their lists.
+    """The number of runs, calculated from the lengths of the lists.
 
     Args:
         keys: a campaign description, or a table with the same keys.
@@ -142,11 +142,11 @@ def run_count(keys: ConditionKeys) -> int:
 
 
 def check_size(runs: int, duration: float, sample_rate: float, where: str) -> None:
-    """Refuse a campaign that is too large to simulate or to read again, before any of it is expanded.
+    """Refuse a campaign that is too large to simulate or to read again, before it is expanded.
 
     Args:
-        runs: how many.
-        duration: of each, s.
+        runs: number of runs.
+        duration: of each run, s.
         sample_rate: Hz.
         where: file or option, for messages.
 
@@ -154,7 +154,7 @@ def check_size(runs: int, duration: float, sample_rate: float, where: str) -> No
         TunnelError: too many runs, samples or integration steps, with their number and the limit.
     """
     check_count(runs, limits.CAMPAIGN_RUNS, "runs", where, "shorten a list, or make several campaigns")
-    # A run has two samples at least, however short it is.
+    # Even the shortest run has two samples.
     samples = max(2.0, duration * sample_rate)
     lower = "give a shorter duration or a lower sample_rate"
     check_count(samples, limits.RUN_SAMPLES, "samples in a run", where, lower)
@@ -165,14 +165,7 @@ def check_size(runs: int, duration: float, sample_rate: float, where: str) -> No
 
 
 def first_twice(values: Iterable[HashableT]) -> HashableT | None:
-    """The first value that stands twice.
-
-    Args:
-        values: any.
-
-    Returns:
-        None where all differ.
-    """
+    """The first value that occurs a second time; None where all differ."""
     seen: set[HashableT] = set()
     for value in values:
         if value in seen:
@@ -182,14 +175,14 @@ def first_twice(values: Iterable[HashableT]) -> HashableT | None:
 
 
 def check_conditions(plan: ConditionKeys, where: str) -> None:
-    """Refuse conditions that give no run, or the same one twice.
+    """Refuse conditions that give no runs, or the same run twice.
 
     Args:
         plan: a campaign description, or a table with the same keys.
         where: the file, for messages.
 
     Raises:
-        TunnelError: when no spring is given, or a value stands twice.
+        TunnelError: when no spring is given, or a value occurs twice.
     """
     if not plan.springs and not plan.spring_stiffness:
         raise TunnelError(

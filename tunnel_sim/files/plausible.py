@@ -1,9 +1,9 @@
-"""What a rig, its air and its clock may plausibly be: outside, a slip of units is likelier than such a rig.
+"""Plausible ranges for a rig, its air and its clock; outside them a wrong unit is more likely than such a rig.
 
-The ranges are wide enough for towing carriages, pressurised tunnels and models of a few centimetres, so a slip is
-seen where it leaves them, and not otherwise. Speeds in km/h, a factor of 3.6, mostly stay inside: nothing in a
-free decay tells V from a scale of Cnβ and Cnr. Stiffness and inertia have no range at all, for both scale with
-the fifth power of a rig's size.
+The ranges are wide enough for towing carriages, pressurised tunnels and models of a few centimetres, so only a
+wrong unit that leaves them is detected. Speeds in km/h, wrong by a factor of 3.6, mostly remain inside: a free
+decay cannot distinguish an error of V from a factor on Cnβ and Cnr. Stiffness and inertia have no range, because
+both scale with the fifth power of a rig's size.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
 KEEP = "state plausible = false under [sensor] to keep it"
-#: Samples to a cycle: fewer show the swing's peaks to 5 % only, and the true motion may be an alias above half the
-#: sampling rate that nothing in the record betrays.
+#: With fewer samples per cycle the peaks are only resolved to 5 %, and the record may be an undetectable alias of a
+#: motion above half the sample rate.
 LEAST_SAMPLES_PER_CYCLE = 10.0
 _LOOKS = "it looks like"
 
@@ -28,11 +28,11 @@ class Range:
 
     Args:
         low: least plausible value, in the unit.
-        high: largest, in the unit.
-        unit: as the format states it.
-        above: what a value above looks like.
-        below: what a value below looks like.
-        reason: why the ends are where they are.
+        high: greatest plausible value, in the unit.
+        unit: unit in the file format.
+        above: likely unit of a value above the range.
+        below: likely unit of a value below the range.
+        reason: why the range ends where it does.
     """
 
     low: float
@@ -50,7 +50,7 @@ RANGES: Mapping[str, Range] = {
     ),
     "wind_speed": Range(
         0.0, 120.0, "m/s", "km/h or mm/s", "",
-        "beyond a Mach number of 0.35 the air's compressibility changes the coefficients themselves",
+        "above a Mach number of 0.35 compressibility changes the coefficients themselves",
     ),
     "frontal_area": Range(
         1e-5, 100.0, "m2", "cm2 or mm2", "km2",
@@ -58,30 +58,30 @@ RANGES: Mapping[str, Range] = {
     ),
     "reference_length": Range(
         3e-3, 50.0, "m", "cm or mm", "km",
-        "a model of some millimetres up to a lorry with its trailer",
+        "a model of a few millimetres up to a lorry with its trailer",
     ),
-    "width": Range(1e-3, 20.0, "m", "cm or mm", "km", "as the reference length, and a third of it"),
+    "width": Range(1e-3, 20.0, "m", "cm or mm", "km", "a third of the reference length"),
     "step": Range(
         1e-7, 0.5, "s", "milliseconds", "minutes or hours",
-        "10 MHz is beyond any angle sensor, and a rig is sampled more often than twice a second",
+        "no angle sensor reaches 10 MHz, and a rig is sampled more often than twice a second",
     ),
     "period": Range(
         1e-3, 100.0, "s", "milliseconds", "minutes or hours",
-        "a rig that takes minutes for a swing is a ship, one above 1 kHz a tuning fork",
+        "a period of minutes is that of a ship, a frequency above 1 kHz that of a tuning fork",
     ),
 }  # fmt: skip
-"""By the key of ``campaign.toml``; of a run file, the step of ``time_s`` and the period of the swing."""
+"""By key of ``campaign.toml``; ``step`` and ``period`` are the time step and the period of oscillation of a run."""
 
 
 def plausible_values(values: Mapping[str, Any], where: str) -> None:
-    """Refuse stated values that look like a slip of units.
+    """Refuse stated values that appear to be in a wrong unit.
 
     Args:
-        values: by the key of ``campaign.toml``, in its units; keys without a range and None are passed over.
+        values: by key of ``campaign.toml``, in its units; keys without a range and None are skipped.
         where: file and table or run, for messages.
 
     Raises:
-        TunnelError: for the first value out of its range.
+        TunnelError: for the first value outside its range.
     """
     for key, value in values.items():
         allowed = RANGES.get(key)
@@ -90,23 +90,23 @@ def plausible_values(values: Mapping[str, Any], where: str) -> None:
 
 
 def plausible_run(record: Record, cycles: float, where: str) -> None:
-    """Refuse a record whose clock looks like a slip of units, or that is sampled too slowly.
+    """Refuse a record whose times appear to be in a wrong unit, or that is sampled too slowly.
 
     Args:
         record: the run's reading.
-        cycles: how many periods of its oscillation it holds (a count).
+        cycles: number of cycles in the record.
         where: file and run, for messages.
 
     Raises:
-        TunnelError: a step or a period out of its range, or fewer than ten samples to a cycle.
+        TunnelError: a time step or period outside its range, or fewer than ten samples per cycle.
     """
     step, per_cycle = record.sample_interval, record.yaw_rad.size / cycles
     _check(f"time_s steps by {step:.3g} s", step, RANGES["step"], where)
     _check(f"a swing takes {step * per_cycle:.3g} s", step * per_cycle, RANGES["period"], where)
     if per_cycle < LEAST_SAMPLES_PER_CYCLE:
         raise TunnelError(
-            f"{per_cycle:.1f} samples to a cycle: {_LOOKS} a sampling too slow, by which a faster motion may pass "
-            f"for this one",
+            f"{per_cycle:.1f} samples per cycle: {_LOOKS} too low a sample rate, and the motion may be the alias "
+            f"of a faster one",
             where=where,
             remedy=f"sample at {LEAST_SAMPLES_PER_CYCLE / (step * per_cycle):.3g} Hz or more; {KEEP}",
         )

@@ -1,7 +1,7 @@
-"""Reading files: regular ones only, of limited size, and every fault is one `TunnelError`.
+"""Reading of regular files of limited size; every fault is a `TunnelError`.
 
-All readers of all packages go through here. A FIFO or a device is refused without waiting for it, and what is too
-large is refused before it is held in memory.
+All packages read files through this module. A FIFO or a device is refused without waiting for it, and a file that
+is too large is refused before it is loaded into memory.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _CHUNK = 2**22
 _FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
-"""What malformed content makes of code that takes it apart."""
+"""Exceptions that malformed content may cause in a parser."""
 
 
 def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", readable: str = "") -> bytes:
@@ -31,10 +31,10 @@ def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", 
 
     Args:
         path: the file.
-        limit: the most it may hold, bytes.
-        where: what to call it in messages; its path when empty.
+        limit: greatest size, bytes.
+        where: its name in messages; its path when empty.
         missing: the remedy where there is no such file.
-        readable: the remedy where it is no regular file or cannot be read.
+        readable: the remedy where it is not a regular file or cannot be read.
 
     Returns:
         Its content.
@@ -45,7 +45,7 @@ def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", 
     where = where or shown(path)
     readable = readable or "name a file that can be read"
     try:
-        # O_NONBLOCK: to open a FIFO that nobody writes to would wait for ever.
+        # O_NONBLOCK: otherwise opening a FIFO without a writer would wait for ever.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except (FileNotFoundError, NotADirectoryError):
         raise TunnelError("no such file", where=where, remedy=missing or "check the path") from None
@@ -61,12 +61,12 @@ def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", 
 
 
 def read_text(path: Path, limit: int, *, where: str = "", missing: str = "") -> str:
-    """Read a regular file of UTF-8 text; a byte order mark is left out.
+    """Read a regular file of UTF-8 text, without its byte order mark.
 
     Args:
         path: the file.
-        limit: the most it may hold, bytes.
-        where: what to call it in messages; its path when empty.
+        limit: greatest size, bytes.
+        where: its name in messages; its path when empty.
         missing: the remedy where there is no such file.
 
     Returns:
@@ -80,11 +80,11 @@ def read_text(path: Path, limit: int, *, where: str = "", missing: str = "") -> 
 
 
 def decoded(content: bytes, where: str) -> str:
-    """UTF-8 text; a byte order mark is left out.
+    """UTF-8 text, without its byte order mark.
 
     Args:
         content: of the file.
-        where: what to call it in messages.
+        where: its name in messages.
 
     Returns:
         The text.
@@ -107,7 +107,7 @@ def read_json(path: Path, *, remedy: str, limit: int = limits.JSON_BYTES) -> dic
     Args:
         path: the file.
         remedy: what to do where it is missing or malformed.
-        limit: the most it may hold, bytes.
+        limit: greatest size, bytes.
 
     Returns:
         The object.
@@ -123,38 +123,38 @@ def parse_json(content: bytes | str, where: str, remedy: str) -> dict[str, Any]:
 
     Args:
         content: UTF-8.
-        where: what to call it in messages.
+        where: its name in messages.
         remedy: what to do where it is malformed.
 
     Returns:
-        The object; nested no deeper than `limits.NESTING`, no integer longer than `limits.INTEGER_BITS`.
+        The object, nested no deeper than `limits.NESTING` and with integers no longer than `limits.INTEGER_BITS`.
 
     Raises:
-        TunnelError: not UTF-8, not JSON, not an object, NaN or an infinity in it, nested too deep, or an integer
-            too long.
+        TunnelError: not UTF-8, not JSON, not an object, NaN or an infinity, nested too deeply, or an integer that
+            is too long.
     """
     text = content if isinstance(content, str) else decoded(content, where)
     try:
-        # A number such as 1e999 is read as an infinity, by a path of its own.
+        # The parser reads a number such as 1e999 as an infinity; parse_float refuses it.
         found = json.loads(text, parse_constant=_no_constant, parse_float=_finite)
     except (ValueError, RecursionError) as error:
-        raise TunnelError(f"is no JSON ({one_line(error, 80)})", where=where, remedy=remedy) from None
+        raise TunnelError(f"is not JSON ({one_line(error, 80)})", where=where, remedy=remedy) from None
     if not isinstance(found, dict):
-        raise TunnelError("is no JSON object", where=where, remedy=remedy)
+        raise TunnelError("is not a JSON object", where=where, remedy=remedy)
     check_shape(found, where, remedy)
     return found
 
 
 def check_shape(document: Mapping[str, Any], where: str, remedy: str) -> None:
-    """Refuse a document that nests too deep or holds an integer too long for what is done with it.
+    """Refuse a document that is nested too deeply or contains an integer that is too long.
 
     Args:
-        document: of plain values.
-        where: what to call it in messages.
+        document: plain values.
+        where: its name in messages.
         remedy: what to do about it.
 
     Raises:
-        TunnelError: for the first such place.
+        TunnelError: for the first such fault.
     """
     level: list[Any] = [document]
     for _ in range(limits.NESTING + 1):
@@ -179,17 +179,17 @@ def check_shape(document: Mapping[str, Any], where: str, remedy: str) -> None:
 def frame_schema(
     content: bytes, where: str, remedy: str, *, rows: int, counted: str = "rows"
 ) -> dict[str, pl.DataType]:
-    """The columns of a Parquet file, once its metadata says that it is not too large.
+    """The columns of a Parquet file whose metadata says that it is not too large.
 
     Args:
         content: of the file.
-        where: what to call it in messages.
+        where: its name in messages.
         remedy: what to do where it is malformed.
-        rows: the most it may hold.
-        counted: what its rows are, in the plural.
+        rows: greatest number of rows.
+        counted: what a row is, in the plural, for messages.
 
     Returns:
-        Types by name; no row has been read.
+        Types by name. No row is read.
 
     Raises:
         TunnelError: not a readable Parquet file, or too many rows or columns.
@@ -205,13 +205,13 @@ def frame_schema(
 
 
 def read_frame(content: bytes, where: str, remedy: str, columns: Sequence[str]) -> pl.DataFrame:
-    """Columns of a Parquet file that `frame_schema` has looked at.
+    """Columns of a Parquet file that `frame_schema` has accepted.
 
     Args:
         content: of the file.
-        where: what to call it in messages.
+        where: its name in messages.
         remedy: what to do where it is malformed.
-        columns: names of those wanted; the file has them.
+        columns: names of the columns to read; all must exist.
 
     Returns:
         The table.
@@ -227,12 +227,12 @@ def read_frame(content: bytes, where: str, remedy: str, columns: Sequence[str]) 
 
 @contextmanager
 def _parquet_faults(where: str, remedy: str) -> Iterator[None]:
-    """Whatever the Parquet decoder raises, as a `TunnelError`."""
+    """Convert any exception of the Parquet decoder to a `TunnelError`."""
     import polars as pl
 
     try:
         yield
-    # Some broken files make the decoder panic, which is no subclass of Exception.
+    # Some broken files make the decoder panic; PanicException is not a subclass of Exception.
     except (Exception, pl.exceptions.PanicException) as error:
         raise TunnelError(
             f"not a readable Parquet file ({one_line(error, 60)})", where=where, remedy=remedy
@@ -240,12 +240,12 @@ def _parquet_faults(where: str, remedy: str) -> Iterator[None]:
 
 
 def check_count(count: float, limit: int, what: str, where: str, remedy: str) -> None:
-    """Refuse more of something than there may be, with the count and the limit.
+    """Refuse a number above its limit; the message states both.
 
     Args:
         count: the number, known before anything is expanded (a count).
-        limit: how many there may be, see `tunnel_sim.vocabulary.limits`.
-        what: of what, in the plural.
+        limit: see `tunnel_sim.vocabulary.limits`.
+        what: what is counted, in the plural.
         where: file or option, for the message.
         remedy: what to do about it.
 
@@ -259,15 +259,15 @@ def check_count(count: float, limit: int, what: str, where: str, remedy: str) ->
 
 @contextmanager
 def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
-    """Turn what malformed content makes of a parser into one `TunnelError`.
+    """Convert the exceptions that malformed content causes in a parser to a `TunnelError`.
 
     Args:
-        what: what is wrong then, such as ``is no estimate``.
-        where: what to call the content.
+        what: what is wrong, such as ``is not an estimate``.
+        where: name of the content.
         remedy: what to do about it.
 
     Raises:
-        TunnelError: for any fault of the content; a `TunnelError` of the parser itself passes.
+        TunnelError: for any fault of the content; a `TunnelError` of the parser itself is passed on.
     """
     try:
         yield
@@ -281,13 +281,13 @@ def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
 
 def _check_kind(state: os.stat_result, limit: int, where: str, remedy: str) -> None:
     if not stat.S_ISREG(state.st_mode):
-        kind = "it is a folder" if stat.S_ISDIR(state.st_mode) else "it is no regular file"
+        kind = "it is a folder" if stat.S_ISDIR(state.st_mode) else "it is not a regular file"
         raise TunnelError(f"cannot be read ({kind})", where=where, remedy=remedy)
     check_count(state.st_size, limit, "bytes", where, "split the file, or name the right one")
 
 
 def _content(descriptor: int, limit: int, where: str) -> bytes:
-    """What is read, which may be more than the file's stated size."""
+    """The file's content, which may be longer than its stated size."""
     found = bytearray()
     while part := os.read(descriptor, _CHUNK):
         found += part
@@ -301,11 +301,11 @@ def _unreadable(error: Exception, where: str, remedy: str) -> TunnelError:
 
 
 def _no_constant(text: str) -> float:
-    raise ValueError(f"{text} is no number of JSON")
+    raise ValueError(f"{text} is not a JSON number")
 
 
 def _finite(text: str) -> float:
     value = float(text)
     if not abs(value) < float("inf"):
-        raise ValueError(f"{one_line(text, 20)} is beyond all floats")
+        raise ValueError(f"{one_line(text, 20)} is too large for a floating-point number")
     return value

@@ -29,7 +29,7 @@ def load_rig(path: Path | None = None) -> Rig:
     """Read a rig description.
 
     Args:
-        path: a TOML file with the sections of the packaged ``rig.toml``; None reads the packaged one,
+        path: a TOML file with the sections of the packaged ``rig.toml``; None: the packaged file, which describes
             the rig of the paper.
 
     Returns:
@@ -42,7 +42,7 @@ def load_rig(path: Path | None = None) -> Rig:
 
 
 def rig_document(path: Path | None = None) -> dict[str, Any]:
-    """A rig description as it stands in its file, not yet checked.
+    """A rig description as read from its file, not yet checked.
 
     Args:
         path: as in `load_rig`.
@@ -51,16 +51,16 @@ def rig_document(path: Path | None = None) -> dict[str, Any]:
         Its sections by name.
 
     Raises:
-        TunnelError: when the file cannot be read or is no TOML.
+        TunnelError: when the file cannot be read or is not TOML.
     """
     if path is not None:
         return load_toml(path, missing="give the path of a rig description")
     with resources.as_file(resources.files("tunnel_sim") / "data" / "rig.toml") as packaged:
-        return load_toml(packaged, missing="install the program anew")
+        return load_toml(packaged, missing="reinstall the package")
 
 
 def parse_rig(document: Mapping[str, Any], where: str) -> Rig:
-    """A rig from its description.
+    """Build a rig from its description.
 
     Args:
         document: sections by name, as in the packaged ``rig.toml``; SI units.

@@ -1,4 +1,4 @@
-"""What a run must be before anything is estimated from it: uniformly sampled, in radians, of three cycles."""
+"""Checks of a run before anything is estimated from it: uniform sampling, angles in radians, three cycles."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from tunnel_sim.vocabulary.cycles import count_cycles
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
-STEP_TOLERANCE = 0.01  # of the step, as the campaign format states
-# Milliseconds taken for seconds, or kHz for Hz, put a power of a thousand between time_s and sample_rate. Any other
-# rate may be a run's own: sample_rate is for runs without times.
+STEP_TOLERANCE = 0.01  # share of the step, as in docs/reference/campaign-format.md
+# If milliseconds are given as seconds, or kHz as Hz, time_s and sample_rate differ by a power of a thousand. Any
+# other difference is allowed: a run with times may have a rate of its own.
 _TIME_SLIPS = (1e-6, 1e-3, 1e3, 1e6)
 _SLIP_TOLERANCE = 0.1
 MINIMUM_CYCLES = 3.0
-# The count scatters, most where damping is heavy or the sensor drifts; a run of three cycles must pass.
+# The count is uncertain, most where damping is heavy or the sensor drifts; a run of three cycles must pass.
 CYCLE_TOLERANCE = 0.25
-# Degrees taken for radians or the reverse put 57.3 between the swing and the stated release angle.
+# If degrees are given as radians or vice versa, swing and stated release angle differ by a factor of 57.3.
 _SLIP_RATIO = (50.0, 75.0)
 
 
@@ -25,11 +25,11 @@ def uniform_times(time_s: Array, sample_rate: float | None, where: str) -> None:
 
     Args:
         time_s: sample times, shape (n,), s.
-        sample_rate: what the campaign states, Hz; None where it does not.
+        sample_rate: as stated in the campaign, Hz; None where it is not stated.
         where: file and run, for messages.
 
     Raises:
-        TunnelError: a step back, a gap, a step that differs by more than 1 %, or times in another unit than s.
+        TunnelError: a step back, a gap, a step that differs by more than 1 %, or times in a unit other than s.
     """
     if time_s.size < 2:
         raise TunnelError("only one sample", where=where, remedy="record three cycles or more")
@@ -44,7 +44,7 @@ def uniform_times(time_s: Array, sample_rate: float | None, where: str) -> None:
             remedy="sort the samples by time and leave out repeated ones",
         )
     step = float(np.median(steps))
-    # Times far from zero carry their own rounding; it is no fault of the sampling.
+    # Times far from zero have larger rounding errors, which are not a fault of the sampling.
     allowed = STEP_TOLERANCE * step * (1.0 + 1e-6) + 4.0 * float(np.spacing(np.abs(time_s).max()))
     uneven = np.flatnonzero(np.abs(steps - step) > allowed)
     if uneven.size:
@@ -75,13 +75,13 @@ def _uneven(time_s: Array, steps: Array, step: float, at: int, where: str) -> Tu
 
 
 def angle_in_radians(yaw: Array, column: str, release_angle: float | None, where: str) -> Array:
-    """Convert a reading to radians and check that its unit was named rightly.
+    """Convert a reading to radians and check that its unit is plausible.
 
-    The sensor's zero is free, so half the span of the reading is judged, not its value. More than half a turn
-    in ``yaw_rad`` is no oscillation about a rest position; a pendulum let go at 2.4 rad is.
+    The sensor's zero is unknown, so the check uses half the span of the reading. In ``yaw_rad`` more than half a
+    turn to either side cannot be an oscillation about a rest position; a pendulum released at 2.4 rad can.
 
     Args:
-        yaw: the reading, shape (n,), in the unit its column names.
+        yaw: the reading, shape (n,), in the unit named by its column.
         column: ``yaw_rad`` or ``yaw_deg``.
         release_angle: nominal, rad; None where the campaign does not state it.
         where: file and run, for messages.
@@ -90,7 +90,7 @@ def angle_in_radians(yaw: Array, column: str, release_angle: float | None, where
         The reading, shape (n,), rad.
 
     Raises:
-        TunnelError: degrees in ``yaw_rad``, or a factor of 57.3 between reading and release angle.
+        TunnelError: degrees in ``yaw_rad``, or a factor of about 57.3 between reading and release angle.
     """
     angle = np.deg2rad(yaw) if column == "yaw_deg" else yaw
     half_span = 0.5 * (float(angle.max()) - float(angle.min()))
@@ -128,10 +128,10 @@ def enough_cycles(record: Record, where: str) -> float:
         where: file and run, for messages.
 
     Returns:
-        How many cycles the record holds.
+        Number of cycles in the record.
 
     Raises:
-        TunnelError: fewer than three cycles, or nothing that oscillates.
+        TunnelError: fewer than three cycles, or no oscillation.
     """
     cycles = count_cycles(record)
     if cycles >= MINIMUM_CYCLES - CYCLE_TOLERANCE:
@@ -139,6 +139,6 @@ def enough_cycles(record: Record, where: str) -> float:
     what = (
         f"about {cycles:.1f} cycles of oscillation, fewer than three"
         if cycles > 0.0
-        else "no oscillation stands out of the record, so it has fewer than three cycles"
+        else "no oscillation is visible in the record, so it has fewer than three cycles"
     )
     raise TunnelError(what, where=where, remedy="record for longer after the release, or leave the run out")

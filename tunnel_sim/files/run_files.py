@@ -1,4 +1,4 @@
-"""Run files: one table of times and angles, as CSV or Parquet."""
+"""Run files: tables of times and angles in CSV or Parquet."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ _COLUMNS = "a column yaw_rad or yaw_deg, and time_s unless [sensor] sample_rate 
 def read_table(
     path: Path, where: str, *, timed: bool = False, most: int = limits.RUN_SAMPLES
 ) -> tuple[Array | None, Array, str]:
-    """Read the columns of a run file; others than those of the format are left alone.
+    """Read times and angles from a run file; other columns are ignored.
 
     Args:
         path: a file with one of the endings in `READERS`.
         where: file and run, for messages.
-        timed: whether times are needed, as no ``sample_rate`` is stated.
-        most: how many samples it may hold.
+        timed: whether times are required because no ``sample_rate`` is stated.
+        most: greatest number of samples.
 
     Returns:
         Times in s (None without a column time_s), the reading as written, and the name of its column:
         ``yaw_rad`` or ``yaw_deg``. All values are finite.
 
     Raises:
-        TunnelError: no such file, not a regular one, too large, not a table, a column missing or twice, a value
-            missing or not a number.
+        TunnelError: no such file, not a regular file, too large, not a table, a missing or repeated column, a
+            value that is missing or not a number.
     """
     kinds = " or ".join(READERS)
     module = READERS.get(path.suffix.lower())
@@ -73,17 +73,17 @@ def read_table(
 
 
 def table_bytes(record: Record, path: Path) -> bytes:
-    """A record as the content of a run file; reading it gives the same numbers.
+    """The content of a run file with columns time_s and yaw_rad; reading it gives the same numbers.
 
     Args:
-        record: what to write; columns time_s and yaw_rad.
-        path: the ``.csv`` or ``.parquet`` file that it is for.
+        record: what to write.
+        path: the ``.csv`` or ``.parquet`` file, for the format and for messages.
 
     Raises:
         TunnelError: when the table cannot be encoded.
     """
     table = pl.DataFrame({"time_s": record.time_s, "yaw_rad": record.yaw_rad})
-    # CSV gets the shortest digits that read back as the same float.
+    # CSV values have the fewest digits that read back as the same float.
     return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
 
 
@@ -132,7 +132,7 @@ def _numbers(series: pl.Series, text: bool, where: str) -> Array:
     else:
         numbers = series.cast(pl.Float64)
     values: NDArray[np.float64] = numbers.fill_null(np.nan).to_numpy()
-    bad = np.flatnonzero(~(np.abs(values) <= limits.LARGEST_NUMBER))  # NaN is bad, too
+    bad = np.flatnonzero(~(np.abs(values) <= limits.LARGEST_NUMBER))  # true for NaN as well
     if bad.size:
         at = int(bad[0])
         cell = series[at]

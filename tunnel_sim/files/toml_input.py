@@ -1,4 +1,4 @@
-"""Reading a TOML file strictly: every slip becomes one line that names file, place and remedy."""
+"""Strict reading of TOML files: every error is one line that names file, place and remedy."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ SCHEMA_VERSION = 1
 
 
 class StrictModel(BaseModel):
-    """A table of a TOML file: unknown keys, wrong types, NaN and infinities are refused.
+    """A table of a TOML file; unknown keys, wrong types, NaN and infinities are refused.
 
-    The description of each field is the remedy shown to the user: ``give <key> as <description>``.
+    The description of a field becomes the remedy shown to the user: ``give <key> as <description>``.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
@@ -39,9 +39,9 @@ def _printable(text: str) -> str:
 
 
 OneLine = Annotated[str, AfterValidator(_printable)]
-"""A text that can stand in a message of one line."""
+"""A text without line breaks or control characters."""
 SampleRate = Annotated[float, Field(ge=limits.SLOWEST_RATE, le=limits.FASTEST_RATE)]
-"""Hz."""
+"""A sample rate within its limits, Hz."""
 
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{limits.KEY_PARTS},}}", re.ASCII)
@@ -58,8 +58,8 @@ def load_toml(path: Path, *, missing: str) -> dict[str, Any]:
         The document, not yet validated.
 
     Raises:
-        TunnelError: no file, not a regular one, not readable, too large, not UTF-8, not TOML, nested too deep, or
-            a number beyond what can be computed with.
+        TunnelError: no such file, not a regular file, not readable, too large, not UTF-8, not TOML, nested too
+            deeply, or a number outside `limits.SMALLEST_NUMBER` to `limits.LARGEST_NUMBER`.
     """
     where = shown(path)
     text = read_text(path, limits.DOCUMENT_BYTES, missing=missing)
@@ -79,7 +79,7 @@ def _parsed(text: str, where: str) -> dict[str, Any]:
             remedy="correct the file at that place",
         )
     try:
-        # tomllib raises ValueError itself for numbers and dates Python cannot hold.
+        # tomllib raises ValueError for numbers and dates that Python cannot represent.
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise TunnelError(
@@ -88,7 +88,7 @@ def _parsed(text: str, where: str) -> dict[str, Any]:
 
 
 def _check_magnitudes(value: object, where: str, key: str = "") -> None:
-    """Refuse numbers whose powers no float can hold; NaN and infinities are the schema's to refuse."""
+    """Refuse numbers whose powers would overflow or underflow; the schema refuses NaN and infinities."""
     if isinstance(value, Mapping):
         for name, one in value.items():
             _check_magnitudes(one, where, name)
@@ -109,14 +109,14 @@ def _is_computable(value: float) -> bool:
 
 
 def check_version(document: Mapping[str, Any], path: Path) -> None:
-    """Refuse a document whose ``schema_version`` is not the one this program reads.
+    """Refuse a document whose ``schema_version`` this program does not read.
 
     Args:
         document: the document of :func:`load_toml`.
         path: its file, for the message.
 
     Raises:
-        TunnelError: the version is absent or another one.
+        TunnelError: the version is missing or different.
     """
     remedy = f"put schema_version = {SCHEMA_VERSION} at the top of the file"
     if "schema_version" not in document:
@@ -158,12 +158,12 @@ def validate(model: type[ModelT], document: Mapping[str, Any], path: Path) -> Mo
         The validated document.
 
     Raises:
-        TunnelError: for the first thing that is wrong.
+        TunnelError: for the first fault.
     """
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        # An unknown key comes first: it is the usual cause of the missing one beside it.
+        # An unknown key is reported first: it is often the cause of a missing key in the same table.
         problems = error.errors(include_url=False)
         first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
         raise _as_tunnel_error(model, document, first, path) from None
@@ -206,7 +206,7 @@ def _wrong_value(key: str, problem: Any) -> str:
 
 
 def _place(document: Mapping[str, Any], loc: Sequence[str | int]) -> str:
-    """Where in the document a location is: ``run 'r01'``, ``[rig]`` or nothing for the top level."""
+    """A location as text: ``run 'r01'``, ``[rig]``, or nothing for the top level."""
     if len(loc) >= 2 and loc[0] == "runs" and isinstance(loc[1], int):
         entry = document["runs"][loc[1]]
         name = entry.get("id") if isinstance(entry, Mapping) else None
@@ -219,7 +219,7 @@ def _place(document: Mapping[str, Any], loc: Sequence[str | int]) -> str:
 
 
 def _table_model(model: type[StrictModel], loc: Sequence[str | int]) -> type[StrictModel] | None:
-    """The model of the table that a location lies in."""
+    """The model of the table that contains a location."""
     current: type[StrictModel] | None = model
     for part in loc:
         if isinstance(part, int) or current is None:

@@ -1,4 +1,4 @@
-"""The one place where files are written: whole or not at all, and every refusal in one line."""
+"""Atomic writing of files and folders. No other module writes files; every error is one line."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _PASSED_ON = (TunnelError, BrokenPipeError, KeyboardInterrupt, SystemExit, Gener
 
 
 def output_folder(folder: Path) -> Path:
-    """Make a folder to write to, with its parents.
+    """Create a folder for output, with its parents.
 
     Args:
-        folder: where the output goes; may exist.
+        folder: where the output goes; it may exist.
 
     Returns:
         The same folder.
 
     Raises:
-        TunnelError: when it is a file, or cannot be made or written to.
+        TunnelError: when it is a file, or cannot be created or written to.
     """
     with refusals(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -41,13 +41,13 @@ def output_folder(folder: Path) -> Path:
 
 
 def refuse_unwritable(path: Path) -> None:
-    """Refuse, before the work is done, a file that could not be written after it.
+    """Refuse a file that cannot be written, before the work whose result it is for.
 
     Args:
-        path: the file; a symbolic link stands for what it names.
+        path: the file; symbolic links are followed.
 
     Raises:
-        TunnelError: when it is a folder or a disk, or its folder does not exist.
+        TunnelError: when it is a folder or a block device, or its folder does not exist.
     """
     target = _target(path)
     if not target.parent.is_dir():
@@ -56,20 +56,20 @@ def refuse_unwritable(path: Path) -> None:
 
 
 def write_whole(path: Path, content: bytes) -> Path:
-    """Write a file whole or not at all: to a temporary neighbour, then renamed over the target.
+    """Write a file completely or not at all: to a temporary file next to it, which is then renamed.
 
-    A symbolic link stays, and what it names is replaced. A device, a pipe, or the file that is this process's own
-    standard output is written to as it is.
+    A symbolic link is kept and its target is replaced. Devices, pipes and this process's standard output are
+    written to directly.
 
     Args:
         path: the file; replaced when it exists.
-        content: what it will hold.
+        content: what to write.
 
     Returns:
         The same path.
 
     Raises:
-        TunnelError: when it is a folder or a disk, or cannot be written.
+        TunnelError: when it is a folder or a block device, or cannot be written.
     """
     target = _target(path)
     with refusals(path):
@@ -84,33 +84,33 @@ def write_whole(path: Path, content: bytes) -> Path:
 
 
 def write_encoded(path: Path, encode: Callable[[BinaryIO], object]) -> Path:
-    """Write what a library's own writer makes, whole or not at all.
+    """Write the output of a library's writer, completely or not at all.
 
     Args:
         path: the file; replaced when it exists.
-        encode: writes the content to the stream that it is given.
+        encode: writes the content to a stream.
 
     Returns:
         The same path.
 
     Raises:
-        TunnelError: whatever the writer raises, and as `write_whole`.
+        TunnelError: when the writer fails, or as `write_whole`.
     """
     return write_whole(path, encoded(path, encode))
 
 
 def encoded(path: Path, encode: Callable[[BinaryIO], object]) -> bytes:
-    """What a library's own writer makes, kept in memory: the disk takes no part in it.
+    """The output of a library's writer, in memory.
 
     Args:
-        path: the file that it is for, named where the writer fails.
-        encode: writes the content to the stream that it is given.
+        path: the file it is meant for, named in messages.
+        encode: writes the content to a stream.
 
     Returns:
         The content.
 
     Raises:
-        TunnelError: whatever the writer raises.
+        TunnelError: when the writer fails.
     """
     stream = io.BytesIO()
     with refusals(path):
@@ -119,7 +119,7 @@ def encoded(path: Path, encode: Callable[[BinaryIO], object]) -> bytes:
 
 
 def write_json(path: Path, document: Mapping[str, object]) -> Path:
-    """Write a JSON document whole or not at all.
+    """Write a JSON document completely or not at all.
 
     Args:
         path: the file; replaced when it exists.
@@ -130,23 +130,23 @@ def write_json(path: Path, document: Mapping[str, object]) -> Path:
 
     Raises:
         TunnelError: when the file cannot be written.
-        ValueError: when the document holds NaN or infinity.
+        ValueError: when the document contains NaN or infinity.
     """
     return write_whole(path, json_text(document).encode())
 
 
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[Path]:
-    """A folder that is there whole or not at all; one that is there already is replaced.
+    """Write a folder completely or not at all; an existing one is replaced.
 
     Args:
-        folder: its parents are made where they are missing; a symbolic link stands for what it names.
+        folder: missing parents are created; symbolic links are followed.
 
     Yields:
-        A new, empty folder beside it to write in, which takes its name at the end.
+        A new, empty folder to write in, which is renamed at the end.
 
     Raises:
-        TunnelError: when the disk refuses.
+        TunnelError: when the disk reports an error.
     """
     target = Path(os.path.realpath(folder))
     with refusals(folder, (OSError,)):
@@ -164,16 +164,16 @@ def whole_folder(folder: Path) -> Iterator[Path]:
 
 @contextmanager
 def refusals(path: Path, kinds: tuple[type[BaseException], ...] = (BaseException,)) -> Iterator[None]:
-    """Turn whatever a writer raises into one line.
+    """Convert the exceptions of a writer to a `TunnelError`.
 
-    Interruptions pass, and so does a reader's end of a pipe that was closed.
+    Interruptions and broken pipes are passed on.
 
     Args:
-        path: what is written.
-        kinds: of errors that are turned; libraries written in Rust raise some that are no `Exception`.
+        path: the file or folder that is written.
+        kinds: exceptions to convert; libraries written in Rust raise some that are not subclasses of `Exception`.
 
     Raises:
-        TunnelError: in place of those.
+        TunnelError: instead of those.
     """
     try:
         yield
@@ -184,7 +184,7 @@ def refusals(path: Path, kinds: tuple[type[BaseException], ...] = (BaseException
 
 
 def _target(path: Path) -> Path:
-    """The file that a path stands for, refused where it is nothing to write a file to."""
+    """The file that a path refers to; refused where no file can be written."""
     where = shown(path)
     with refusals(path):
         if path.is_dir():
@@ -198,7 +198,7 @@ def _target(path: Path) -> Path:
 
 
 def _standard_stream(path: Path) -> int | None:
-    """Number of this process's own standard stream that a path stands for, such as ``/dev/stdout``."""
+    """Descriptor of this process's standard stream that a path such as ``/dev/stdout`` refers to."""
     for stream in (sys.__stdout__, sys.__stderr__):
         try:
             if stream is not None and os.path.samestat(path.stat(), os.fstat(stream.fileno())):
@@ -230,14 +230,14 @@ def _put_in_place(partial: Path, target: Path, replaced: Path) -> None:
         target.rename(replaced)
     try:
         partial.rename(target)
-    except BaseException:  # an interruption too: the old folder must not stay set aside
+    except BaseException:  # also for an interruption: the old folder must be restored
         if replaced.exists():
             replaced.rename(target)
         raise
 
 
 def _unwritable(path: Path, error: BaseException) -> TunnelError:
-    """The one line for what cannot be written."""
+    """The error for a file or folder that cannot be written."""
     reason = error.strerror if isinstance(error, OSError) else None
     said = reason.lower() if reason else f"{type(error).__name__}: {error}".rstrip(": ")
     return TunnelError(

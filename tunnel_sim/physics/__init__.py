@@ -1,1 +1,1 @@
-"""The physics of one run: the moment law, the motion it gives, and the steps it is integrated in."""
+"""The physics of one run: moment law, settings, integration steps and motion."""

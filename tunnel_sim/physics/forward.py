@@ -1,7 +1,7 @@
-"""The compiled forward integrator: the moment law of the plugin without MuJoCo, for fits of many runs.
+"""The compiled forward integrator: the plugin's moment law without MuJoCo, for fits of many runs.
 
-Its steps are RK4 with the plugin's own treatment of the aerodynamic lag; reversals under Coulomb friction are
-located. Tests hold it against the MuJoCo model for every term. Calls release the interpreter's lock.
+It uses RK4 steps, treats the aerodynamic lag as the plugin does, and locates reversals under Coulomb friction.
+Tests compare it with the MuJoCo model for every term. Calls release the global interpreter lock.
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, 
 
     Args:
         law: the moment law's parameters, shape (n, number of parameters), in the law's order.
-        runs: shape (n,), of `run_dtype`; what ``wind`` and ``forcing`` point at must stay alive.
+        runs: shape (n,), of `run_dtype`; the arrays that ``wind`` and ``forcing`` point to must stay alive.
         samples: samples per run, the first at time 0.
 
     Returns:
-        Angle (rad) and rate (rad/s) of the spring's end, each of shape (n, samples), and a status: 0, or
-        one more than the index of the first run that left the finite range (it and those after are unset).
+        Angle (rad) and rate (rad/s) of the rod's upper end, each of shape (n, samples), and a status: 0, or
+        one more than the index of the first run whose motion grew without bound (that run and the later ones are
+        unset).
     """
     count = len(runs)
     law = np.ascontiguousarray(law, dtype=np.float64)
@@ -50,15 +51,15 @@ def _row_pointers(array: Array) -> NDArray[np.uintp]:
 
 
 def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motion:
-    """Integrate one run; arguments and result as in ``tunnel_sim.engine.simulate.simulate_motion``.
+    """Integrate one run.
 
     Args:
         rig: gives frontal area, reference length and width.
-        settings: the run's physics; its timestep is the integrator's.
+        settings: the run's physics, with the timestep to use.
         sample_rate: Hz.
 
     Returns:
-        The motion from the release on.
+        The motion from the release onwards.
 
     Raises:
         ValueError: when the motion grows without bound.
@@ -74,14 +75,14 @@ def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motio
 
 
 def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array]]:
-    """A run's conditions as the compiled code takes them.
+    """A run's conditions in the form that the compiled code takes.
 
     Args:
         settings: the run's physics.
 
     Returns:
         Array of shape (1,) and `run_dtype`, at the release (see ``Model.release_state``), and the arrays it
-        points at, which the caller keeps alive.
+        points to, which the caller must keep alive.
     """
     run = np.zeros(1, dtype=run_dtype())
     wind = settings.series.get("wind_speed")

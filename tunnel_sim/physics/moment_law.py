@@ -1,6 +1,6 @@
-"""What the compiled library lists: the moment law's parameters, the plugin's state, the fields of a run.
+"""Names that the compiled library lists: parameters of the moment law, the plugin's state, fields of a run.
 
-They are looked up by name, so that Python and C cannot disagree on an order (``mjcf/plugin/tables.c``).
+Python looks them up by name, so that it cannot disagree with C about their order (``mjcf/plugin/tables.c``).
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ def parameter_units() -> Mapping[str, str]:
 
 
 def parameter_vector(values: Mapping[str, float]) -> Array:
-    """The law's parameters as the compiled code takes them.
+    """The law's parameters in the form that the compiled code takes.
 
     Args:
-        values: by name, in the law's units; what is not given is zero.
+        values: by name, in the law's units; the others are zero.
 
     Returns:
         Array of shape (number of parameters,).
@@ -63,19 +63,19 @@ def parameter_vector(values: Mapping[str, float]) -> Array:
 
 @functools.cache
 def state_names() -> tuple[str, ...]:
-    """The names of the numbers of the plugin's state, in their order (``mjcf/plugin/state.h``)."""
+    """The names of the plugin's state variables, in their order (``mjcf/plugin/state.h``)."""
     library = forward_library()
     return tuple(library.vwt_state_name(i).decode() for i in range(library.vwt_state_count()))
 
 
 def state_vector(values: Mapping[str, float]) -> Array:
-    """The plugin's state as ``mjData.plugin_state`` holds it.
+    """The plugin's state in the form of ``mjData.plugin_state``.
 
     Args:
-        values: by name, in rad, rad/s and s; what is not given is zero.
+        values: by name, in rad, rad/s and s; the others are zero.
 
     Returns:
-        Array of shape (numbers of the state,).
+        Array of shape (number of state variables,).
 
     Raises:
         ValueError: when a name is unknown.
@@ -87,7 +87,7 @@ def state_vector(values: Mapping[str, float]) -> Array:
 
 @functools.cache
 def run_dtype() -> np.dtype[np.void]:
-    """One run apart from its moment law, field for field the C structure ``vwt_run``."""
+    """One run without its moment law: the C structure ``vwt_run``, field by field."""
     library = forward_library()
     fields = range(library.vwt_run_count())
     return np.dtype(

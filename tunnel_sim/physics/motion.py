@@ -1,4 +1,4 @@
-"""The true motion of a run, and the samples at which the sensor reads it."""
+"""The true motion of a run, and how it is sampled."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Motion:
 
     Args:
         time_s: shape (n,), s from the release.
-        angle: of the spring's and sensor's end of the rod, shape (n,), rad.
-        rate: likewise, rad/s.
+        angle: of the rod's upper end, which carries spring and sensor, shape (n,), rad.
+        rate: of the same end, shape (n,), rad/s.
     """
 
     time_s: Array
@@ -31,7 +31,7 @@ class Motion:
 
 
 def sampling(settings: RunSettings, sample_rate: float) -> tuple[int, int]:
-    """How many samples a run has and how many integration steps lie between two of them.
+    """The number of samples in a run, and of integration steps between two samples.
 
     Args:
         settings: duration and timestep, s.
@@ -41,18 +41,19 @@ def sampling(settings: RunSettings, sample_rate: float) -> tuple[int, int]:
         (samples, steps between samples).
 
     Raises:
-        TunnelError: when the sample rate is beyond all use, or the sample interval is not a whole number of
+        TunnelError: when the sample rate is outside its limits, or the sample interval is not a whole number of
             timesteps.
     """
     if not limits.SLOWEST_RATE <= sample_rate <= limits.FASTEST_RATE:
         raise TunnelError(
-            f"a sample rate of {sample_rate:g} Hz is beyond {limits.SLOWEST_RATE:g} to {limits.FASTEST_RATE:g} Hz",
+            f"the sample rate of {sample_rate:g} Hz is not between {limits.SLOWEST_RATE:g} and "
+            f"{limits.FASTEST_RATE:g} Hz",
             remedy="give it in Hz",
         )
     steps = 1.0 / (sample_rate * settings.timestep)
     if abs(steps - round(steps)) > 1e-9 * steps or round(steps) < 1:
         raise TunnelError(
-            f"a sample rate of {sample_rate:g} Hz is no whole number of {settings.timestep:g} s steps",
+            f"the sample interval at {sample_rate:g} Hz is not a whole number of {settings.timestep:g} s steps",
             remedy="choose a timestep that divides the sample interval",
         )
     return max(2, round(settings.duration * sample_rate)), round(steps)

@@ -1,4 +1,4 @@
-"""Where the package's compiled libraries are."""
+"""The location of the package's compiled libraries."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ def native_library(stem: str) -> Path:
     """The path of a compiled library of this package.
 
     Args:
-        stem: its name without ``lib`` and ending, such as ``vwt_plugin``.
+        stem: its name without ``lib`` and suffix, such as ``vwt_plugin``.
 
     Returns:
-        The file: of the installed package, also where the Python sources run from a checkout.
+        The file in the installed package, even when the Python sources run from a checkout.
 
     Raises:
         TunnelError: when the package was not built.

@@ -1,4 +1,4 @@
-"""The physics of one run as numbers: what the MuJoCo model and the forward integrator are both built from."""
+"""The physics of one run as numbers, from which the MuJoCo model and the forward integrator are both built."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def _check(name: str, value: float, *, above: float = -inf, least: float = -inf)
 
 @dataclass(frozen=True)
 class Series:
-    """A sampled input, linear between samples and held beyond its ends.
+    """A sampled input: linear between samples, constant before the first and after the last.
 
     Args:
-        values: samples from the run's start on.
-        interval: s between samples, positive.
+        values: samples, the first at the run's start.
+        interval: time between samples, s, positive.
     """
 
     values: tuple[float, ...]
@@ -47,17 +47,20 @@ class Series:
             TunnelError: when there are none, one is not finite, or the interval is not positive.
         """
         if not self.values or not all(map(isfinite, self.values)):
-            raise TunnelError("a series needs samples, all finite", remedy="correct the sampled input")
+            raise TunnelError(
+                "a series needs at least one sample, and all samples must be finite",
+                remedy="correct the sampled input",
+            )
         _check("interval of a series", self.interval, above=0.0)
 
 
 @dataclass(frozen=True)
 class RodTwist:
-    """A rod that twists between the spring's and sensor's end and the body.
+    """A rod that twists between its upper end, which carries spring and sensor, and the body.
 
     Args:
         compliance: 1/Krod, rad/(N m), positive.
-        inertia_share: share of Izz that moves with the spring's end, 0 < share < 1.
+        inertia_share: share of Izz at the rod's upper end, 0 < share < 1.
         damping_ratio: of the twist, as a fraction of critical.
     """
 
@@ -77,7 +80,7 @@ class RodTwist:
         _check("damping_ratio of the rod", self.damping_ratio, least=0.0)
 
     def damping(self, yaw_inertia: float) -> float:
-        """Damping of the rod's twist, N m s/rad, for the whole Izz in kg m²."""
+        """Damping of the rod's twist, N m s/rad, given the total Izz in kg m²."""
         share = self.inertia_share
         return 2.0 * self.damping_ratio * sqrt(yaw_inertia * share * (1.0 - share) / self.compliance)
 
@@ -94,10 +97,10 @@ class RodTwist:
         return sqrt(1.0 / (self.compliance * yaw_inertia * share * (1.0 - share)))
 
     def frequency(self, yaw_inertia: float, spring_stiffness: float) -> float:
-        """A bound from above on the rod's own frequency.
+        """An upper bound on the natural frequency of the rod's twist.
 
         Args:
-            yaw_inertia: the whole Izz, kg m².
+            yaw_inertia: the total Izz, kg m².
             spring_stiffness: Kr, N m/rad.
 
         Returns:
@@ -122,8 +125,8 @@ class RunSettings:
         release_rate: rad/s; the rig itself releases from rest.
         duration: s.
         timestep: integration step, s.
-        parameters: further parameters of the moment law by name (see ``mjcf/plugin/README.md``), zero where
-            not given.
+        parameters: further parameters of the moment law by name (see ``mjcf/plugin/README.md``); the others are
+            zero.
         series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient.
         rod_twist: None for a rigid rod.
     """
@@ -143,7 +146,7 @@ class RunSettings:
     rod_twist: RodTwist | None = None
 
     def __post_init__(self) -> None:
-        """Check names and numbers; bounds of the law's parameters are the plugin's to check.
+        """Check names and numbers. The plugin checks the bounds of the law's parameters.
 
         Raises:
             TunnelError: when a name is unknown or belongs to another field, or a number is out of range.
@@ -165,7 +168,7 @@ class RunSettings:
                 )
 
     def layout(self) -> tuple[object, ...]:
-        """What runs must have in common for one compiled model to serve them all.
+        """What runs must have in common to share one compiled model.
 
         Returns:
             Timestep, names and lengths of the series, and whether the rod is rigid.

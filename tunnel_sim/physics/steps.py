@@ -1,18 +1,19 @@
-"""How long an integration step may be: the one place that decides it.
+"""How long an integration step may be. No other module decides it.
 
-Runge and Kutta's method of order 4, in steps h, takes an undamped oscillation of ω as one whose amplitude falls
-by (ωh)⁶/144 and whose phase lags by (ωh)⁵/120 in each step. That is a damping ratio of (ωh)⁵/144 that is not
-there, and a frequency too low by (ωh)⁴/120 of itself. From these come the turns (ωh, rad) that a step may cover:
+With the classical Runge–Kutta method of order 4 and steps h, the amplitude of an undamped oscillation of angular
+frequency ω falls by (ωh)⁶/144 per step, and its phase lags by (ωh)⁵/120. This amounts to a spurious damping ratio
+of (ωh)⁵/144 and a relative frequency error of −(ωh)⁴/120. The phase angle per step, ωh in rad, is limited
 
-- of the body on its spring, with and without the wind: `FREQUENCY_ERROR` of the frequency;
-- of a flexible rod's own mode: half a radian, 5e-4 of its frequency and 2.2e-4 of damping ratio beside its 1 %;
-- for any mode: `_UNSTABLE`, beyond which the method diverges.
+- for the body on its spring, with and without the wind, so that the frequency error is `FREQUENCY_ERROR`;
+- for a flexible rod's own mode to half a radian, which gives a relative frequency error of 5e-4 and a spurious
+  damping ratio of 2.2e-4 compared with its 1 %;
+- for any mode to `_UNSTABLE`, because the method diverges beyond it.
 
 Fits predict thousands of runs and may err up to the noise of a block mean: their steps are longer
 (`fit_substeps`). What is reported is predicted once more in steps of `REPORT_STEP` at most (`report_substeps`):
 half those of a fit of a body below 14 rad/s, in which the method errs a sixteenth as much.
 
-A step is only ever divided by a whole number, so that a sample interval remains a whole number of steps.
+Steps are only divided by whole numbers, so that a sample interval remains a whole number of steps.
 """
 
 from __future__ import annotations
@@ -25,15 +26,15 @@ from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffnes
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.rig import Rig
 
-#: Largest relative error of the body's frequency that the integration may make; of the damping ratio, 9e-8.
+#: Greatest relative error of the body's frequency due to integration; the damping ratio is then wrong by 9e-8.
 FREQUENCY_ERROR = 1e-6
-#: Turn of the body's oscillation in one step that makes that error, rad.
+#: Phase angle of the body's oscillation per step that causes this error, rad.
 BODY_TURN = (120.0 * FREQUENCY_ERROR) ** 0.25
-#: Turn of the rod's own mode in one step, rad.
+#: Greatest phase angle of the rod's own mode per step, rad.
 ROD_TURN = 0.5
-#: Steps in place of one at the most: a run then takes hundreds of times as long as usual, and as much memory.
+#: Greatest number by which a step is divided: a run then takes hundreds of times the usual time and memory.
 MOST_SUBSTEPS = 320
-USUAL_RATE = 1000.0  # steps in a second where nothing asks for more
+USUAL_RATE = 1000.0  # steps per second where no faster motion asks for more
 #: Shortest step, s; by a rounding less than `MOST_SUBSTEPS` of the usual one.
 LEAST_STEP = 0.999 / (USUAL_RATE * MOST_SUBSTEPS)
 
@@ -45,20 +46,20 @@ _FIT_BODY_TURN = 0.055  # rad: some 1e-6 rad over 10 s
 _FIT_SHORTEST = 2e-4  # s, however stiff the rod
 _REPORT_ROD_TURN = 0.25  # rad
 _REPORT_SHORTEST = 1e-4  # s
-_UNSTABLE = 2.5  # rad in one step; the method diverges beyond 2.8
-_LARGEST = 700.0  # logarithm near that of the largest number
+_UNSTABLE = 2.5  # rad per step; the method diverges beyond 2.8
+_LARGEST = 700.0  # logarithm of nearly the largest float
 _MOST_CONTACT_SUBSTEPS = 40
-_LEAST_RANGE = 1e-6  # rad: for a shorter presliding range steps are not shortened further
+_LEAST_RANGE = 1e-6  # rad: a shorter presliding range does not shorten the steps further
 
 
 def whole_steps(sample_rate: float) -> float:
-    """The longest usual step that divides the sample interval.
+    """The longest step, at most 1/`USUAL_RATE`, that divides the sample interval.
 
     Args:
         sample_rate: Hz.
 
     Returns:
-        At most one in `USUAL_RATE`, s.
+        s.
     """
     return 1.0 / (sample_rate * max(1, ceil(USUAL_RATE / sample_rate)))
 
@@ -99,22 +100,22 @@ def report_substeps(run: RunSettings, interval: float) -> int:
 
 
 def for_rod(run: RunSettings) -> RunSettings:
-    """The run in steps short enough for its rod's own oscillation; for a rigid rod as it is.
+    """The run with steps short enough for its rod's own oscillation; unchanged if the rod is rigid.
 
     Args:
-        run: with its rod.
+        run: the run's physics, with its rod.
 
     Returns:
-        The run with its timestep divided by a whole number, `MOST_SUBSTEPS` at the most.
+        The run with its timestep divided by a whole number, at most `MOST_SUBSTEPS`.
     """
     return _divided(run, min(MOST_SUBSTEPS, _substeps(_rod_rate(run) * run.timestep, ROD_TURN)))
 
 
 def for_contact(run: RunSettings) -> RunSettings:
-    """The run in steps in which, from a reversal on, the motion covers half the contact's presliding range.
+    """The run with steps in which the motion after a reversal covers at most half the presliding range.
 
     Args:
-        run: with its friction.
+        run: the run's physics, with its friction.
 
     Returns:
         The run with its timestep divided by a whole number.
@@ -132,7 +133,7 @@ def for_contact(run: RunSettings) -> RunSettings:
 
 
 def follow_fastest(rig: Rig, run: RunSettings) -> RunSettings:
-    """The run in steps short enough for the fastest motion present, as it is where they are.
+    """The run with steps short enough for its fastest motion; unchanged where they already are.
 
     Args:
         rig: gives the reference sizes.
@@ -152,7 +153,7 @@ def follow_fastest(rig: Rig, run: RunSettings) -> RunSettings:
 
 
 def check_stable(rig: Rig, run: RunSettings) -> None:
-    """Refuse steps in which the integration would diverge or damp a motion away.
+    """Refuse steps with which the integration would diverge.
 
     Args:
         rig: gives the reference sizes.
@@ -167,9 +168,9 @@ def check_stable(rig: Rig, run: RunSettings) -> None:
 
 
 def body_rate(rig: Rig, run: RunSettings) -> float:
-    """The fastest rate of the body on its spring: the larger of both roots' sizes, with or without the wind.
+    """The fastest rate of the body on its spring: the larger magnitude of the two roots, with or without wind.
 
-    Terms that stiffen or dampen with the angle count with their slope at the release.
+    Terms that are nonlinear in the angle count with their slope at the release.
 
     Args:
         rig: gives the reference sizes.
@@ -213,11 +214,11 @@ def _spring(run: RunSettings) -> float:
 
 
 def _slope(run: RunSettings, name: str, textbook: float, x: float, reference: float) -> float:
-    """Size of the slope at x of a term's coefficient times x to the term's power."""
+    """Magnitude of the slope at x of a power term."""
     coefficient = abs(run.parameters.get(name, 0.0))
     if coefficient == 0.0 or x == 0.0:
         return 0.0
-    # the air's factor is a power of the angle beside the angle itself: one more
+    # the aerodynamic factor multiplies the angle itself, which adds one to the exponent
     beside = 1.0 if name == "moment_cubic" else 0.0
     given = run.parameters.get(f"{name}_exponent", 0.0)
     exponent = (given or textbook - beside) + beside
@@ -225,21 +226,21 @@ def _slope(run: RunSettings, name: str, textbook: float, x: float, reference: fl
 
 
 def _power(x: float, textbook: float, exponent: float, reference: float) -> float:
-    """X to a power that agrees with the textbook's at the reference; 0 is the textbook's."""
+    """X to a power, scaled to agree with the textbook power at the reference; exponent 0: textbook power."""
     if x == 0.0:
         return 0.0
     return exp(min(_LARGEST, textbook * log(reference) + (exponent or textbook) * log(x / reference)))
 
 
 def _largest_root(stiffness: float, damping: float, inertia: float) -> float:
-    """Size of the larger root of I s² + C s + K, rad/s."""
+    """Magnitude of the larger root of I s² + C s + K, rad/s."""
     half, square = abs(damping) / (2.0 * inertia), stiffness / inertia
     inside = half * half - square
     return half + sqrt(inside) if inside > 0.0 else sqrt(square)
 
 
 def _rod_rate(run: RunSettings) -> float:
-    """A bound from above on the rod's own frequency, rad/s; 0 for a rigid rod."""
+    """An upper bound on the frequency of the rod's own mode, rad/s; 0 for a rigid rod."""
     twist = run.rod_twist
     return 0.0 if twist is None else twist.frequency(run.yaw_inertia, run.spring_stiffness)
 
@@ -259,5 +260,5 @@ def _too_fast(run: RunSettings, body: float, rod: float) -> TunnelError:
     if not by_rod:
         remedy = "check spring_stiffness (N m/rad), yaw_inertia (kg m2) and damping"
     return TunnelError(
-        f"{what} of {rate / (2.0 * pi):.4g} Hz is too fast for steps of {run.timestep:g} s", remedy=remedy
+        f"{what} at {rate / (2.0 * pi):.4g} Hz is too fast for steps of {run.timestep:g} s", remedy=remedy
     )

@@ -1,1 +1,1 @@
-"""The values everything speaks in: records, campaigns, plans, the rig, the air, and the one error."""
+"""The types that all packages share: record, campaign, plan, rig, aerodynamic derivatives, error and limits."""

@@ -1,8 +1,8 @@
-"""Aerodynamic derivatives and the moments they stand for.
+"""Aerodynamic derivatives, and the stiffness and damping that follow from them.
 
-Sign convention: yaw angle β and yaw rate r = β̇ are positive the same way about the rod's axis; the air's
-moment is N = Ka β + Ca r on the right-hand side of Izz β̈ + Cr β̇ + Kr β = N. A positive Cnβ lowers the
-frequency, a negative Cnr adds damping. A is the frontal area and l the model's length.
+Sign convention: yaw angle β and yaw rate r = β̇ have the same positive direction about the rod's axis; the
+aerodynamic moment is N = Ka β + Ca r on the right-hand side of Izz β̈ + Cr β̇ + Kr β = N. A positive Cnβ lowers
+the frequency; a negative Cnr adds damping. A is the frontal area and l the model's length.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from tunnel_sim.vocabulary.record import Record
 
 @dataclass(frozen=True)
 class RigProperties:
-    """What a campaign states of its rig; None where it does not say.
+    """What a campaign states about its rig; None where nothing is stated.
 
     Args:
         yaw_inertia: nominal Izz of model and support, kg m².
@@ -26,13 +26,13 @@ class RigProperties:
 
 @dataclass(frozen=True)
 class SensorProperties:
-    """What a campaign states of its angle sensor; None where it does not say.
+    """What a campaign states about its angle sensor; None where nothing is stated.
 
     Args:
         sample_rate: Hz.
         resolution: step of the reading, rad.
         noise_std: standard deviation of the reading's noise, rad.
-        plausible: False keeps what looks like a slip of units or a sampling too slow.
+        plausible: False accepts values that look like a wrong unit, and a low sample rate.
     """
 
     sample_rate: float | None = None
@@ -43,14 +43,14 @@ class SensorProperties:
 
 @dataclass(frozen=True)
 class Run:
-    """One run: its record and the conditions it was made in.
+    """One run: its record and its conditions.
 
     Args:
         id: unique in the campaign.
         record: the sensor's reading.
         wind_speed: V, m/s; 0 is wind-off.
         spring_stiffness: Kr, N m/rad; None: the run is identified in normalised form.
-        air_density: ρ, kg/m³; present where wind_speed > 0.
+        air_density: ρ, kg/m³; required where wind_speed > 0.
         release_angle: nominal, rad.
     """
 
@@ -63,18 +63,18 @@ class Run:
 
     @property
     def wind_on(self) -> bool:
-        """Whether the wind blows."""
+        """Whether the wind is on."""
         return self.wind_speed > 0.0
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """The runs of one rig with one sensor, whose zero is unknown and common to all of them.
+    """The runs of one rig with one sensor; the sensor's zero is unknown and the same in all runs.
 
     Args:
-        name: short name, also the folder's.
-        rig: what is stated of the rig.
-        sensor: what is stated of the sensor.
+        name: short name, also of the folder.
+        rig: what is stated about the rig.
+        sensor: what is stated about the sensor.
         runs: at least one run, with unique ids.
         description: free text.
     """

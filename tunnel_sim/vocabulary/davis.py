@@ -9,7 +9,7 @@ import numpy as np
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Body
 
-_SLANT_DROP = 0.4  # share of the height the slant takes: the paper gives its angle, not its length
+_SLANT_DROP = 0.4  # height of the slant over that of the body: the paper gives its angle, not its length
 _NOSE_RADIUS = 0.30  # share of the height, drawn only
 _EDGE_RADIUS = 0.14  # of the long edges, share of the height, drawn only
 _STEPS = 8  # facets of a quarter round
@@ -28,12 +28,12 @@ def davis_vertices(body: Body) -> Array:
     radius = _EDGE_RADIUS * body.height
     layers = []
     for angle in np.linspace(0.0, pi / 2, _STEPS + 1):
-        # the side profile, drawn in evenly as the quarter round of the long edges reaches the flank
+        # the side profile, shrunk evenly along the quarter round of the long edges
         inward = radius * (1.0 - cos(angle))
         shrunk = profile * (1.0 - 2.0 * inward / np.array([body.length, body.height]))
         offset = body.width / 2 - radius * (1.0 - sin(angle))
         layers += [np.insert(shrunk, 1, side * offset, axis=1) for side in (-1.0, 1.0)]
-    # angle 0 is the roof's edge: full profile, drawn-in width; pi/2 the flank
+    # angle 0: full profile at reduced width; angle pi/2: shrunk profile at full width
     return np.concatenate(layers)
 
 

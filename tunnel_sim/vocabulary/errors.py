@@ -1,4 +1,4 @@
-"""The one error a user is meant to read: what is wrong, where, and the remedy."""
+"""The error shown to users: what is wrong, where, and the remedy."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import difflib
 from collections.abc import Iterable
 from pathlib import Path
 
-_LONGEST = 4096  # of a part of a message, characters: a path may have that many
+_LONGEST = 4096  # characters in one part of a message: the longest path
 
 
 class TunnelError(Exception):
-    """Bad input, said in one line.
+    """Bad input, described in one line.
 
     Args:
         what: what is wrong, as a short clause.
-        where: the file, run or option it concerns; empty when there is none.
+        where: the file, run or option concerned; empty when there is none.
         remedy: what to do about it.
 
-    The text reads ``where: what; remedy`` and is one line, whatever the parts hold. The command line prints it and
-    exits with status 2.
+    The text reads ``where: what; remedy`` and is always a single line. The command line prints it and exits with
+    status 2.
     """
 
     def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:
@@ -34,7 +34,7 @@ def one_line(value: object, limit: int = 120) -> str:
 
     Args:
         value: anything.
-        limit: longest text, characters; what is longer is shortened.
+        limit: greatest length, characters; longer text is cut.
     """
     try:
         whole = str(value)
@@ -45,12 +45,12 @@ def one_line(value: object, limit: int = 120) -> str:
 
 
 def shown(path: Path) -> str:
-    """A path for an error message: whole, but on one line."""
+    """A path for an error message: complete, on one line."""
     return one_line(path, limit=_LONGEST)
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """The remedy for an unknown name: the closest known one, or the list of all.
+    """The remedy for an unknown name: the closest known name, or the list of all.
 
     Args:
         name: the name that was not found.

@@ -1,7 +1,7 @@
-"""How much of anything is read, expanded or simulated, each with its reason; docs/reference/limits.md lists them.
+"""Limits on what is read, expanded or simulated, each with its reason; docs/reference/limits.md lists them.
 
-A limit stands far above what rigs record and far below what fills 2 GiB of memory or takes hours unasked. Whatever
-the simulator writes, the readers read: both keep to the same numbers.
+Each limit is far above what rigs record, and low enough that no input fills 2 GiB of memory or runs for hours
+unexpectedly. The simulator and the readers use the same limits, so whatever is written can be read.
 """
 
 from __future__ import annotations
@@ -9,53 +9,53 @@ from __future__ import annotations
 DOCUMENT_BYTES = 2 * 2**20
 """Largest TOML file or spring table, bytes: ten thousand runs take 1.4 MB, and TOML is parsed at 1 MB/s."""
 JSON_BYTES = 32 * 2**20
-"""Largest JSON document, bytes: nested lists take thirty times their text in memory."""
+"""Largest JSON document, bytes: nested lists take thirty times as much memory as text."""
 DATA_BYTES = 512 * 2**20
 """Largest Parquet file, bytes: twenty million samples of two columns take 320 MB."""
 CSV_BYTES = 384 * 2**20
-"""Largest run file as CSV, bytes: ten million samples take 300 MB, and five times that in memory."""
+"""Largest run file as CSV, bytes: ten million samples take 300 MB, and five times as much memory."""
 WEIGHTS_BYTES = 64 * 2**20
-"""Largest file of weights or checkpoint of a training, bytes: the paper's networks take 0.2 MB."""
+"""Largest file of network weights or training checkpoint, bytes: the paper's networks take 0.2 MB."""
 
 NESTING = 32
-"""Deepest nesting of tables and lists: the formats need six levels, and Python's recursion ends near a thousand."""
+"""Deepest nesting of tables and lists: the formats need six levels, and Python's recursion limit is a thousand."""
 KEY_PARTS = 32
-"""Most parts of a dotted TOML key: the time to parse one grows with the square of their number."""
+"""Most parts of a dotted TOML key: the parsing time grows with the square of their number."""
 INTEGER_BITS = 128
-"""Longest integer, bits: a seed of NumPy has 128; a float holds no more than 1024."""
+"""Longest integer, bits: a NumPy seed has 128; a float cannot exceed 1024."""
 NAME_CHARACTERS = 200
 """Longest name of a spring, characters: two lines of a table."""
 SMALLEST_NUMBER = 1e-100
-"""Smallest magnitude above zero in a TOML file or table, SI: squares and cubes of it are still numbers."""
+"""Smallest magnitude above zero in a TOML file or table, SI: its square and cube do not underflow."""
 LARGEST_NUMBER = 1e100
-"""Largest magnitude in a TOML file, table or record, SI: squares and cubes of it are still finite."""
+"""Largest magnitude in a TOML file, table or record, SI: its square and cube do not overflow."""
 SLOWEST_RATE = 1e-6
-"""Lowest sample rate, Hz: a sample in twelve days."""
+"""Lowest sample rate, Hz: one sample in twelve days."""
 FASTEST_RATE = 1e9
-"""Highest sample rate, Hz: beyond it sample times of a long record can no longer be told apart."""
+"""Highest sample rate, Hz: above it the sample times of a long record cannot be distinguished."""
 
 RUN_SAMPLES = 20_000_000
 """Most samples of one run: five and a half hours at 1 kHz, 320 MB in memory."""
 CAMPAIGN_SAMPLES = 40_000_000
 """Most samples of a campaign, and of the cases a sweep simulates together: 640 MB in memory."""
 CAMPAIGN_RUNS = 10_000
-"""Most runs of a campaign: a year's work at a rig."""
+"""Most runs of a campaign: a year's work on a rig."""
 COLUMNS = 1_000
-"""Most columns of a run file: a logger of many channels has some hundred."""
+"""Most columns of a run file: a logger with many channels has a few hundred."""
 CAMPAIGN_STEPS = 1_000_000_000
-"""Most integration steps of a campaign: one and a half hours of a core."""
+"""Most integration steps of a campaign: one and a half hours on one core."""
 SPRINGS = 1_000
-"""Most springs of a spring table: each is a line on the screen."""
+"""Most springs of a spring table: each is printed as one line."""
 
 SWEEP_CASES = 100_000_000
-"""Most cases of a sweep: years of a core."""
+"""Most cases of a sweep: years on one core."""
 SWEEP_SHARDS = 1_000_000
-"""Most shards of a sweep: each is three files in a folder, looked at when the sweep goes on."""
+"""Most shards of a sweep: each is three files in a folder, checked when the sweep continues."""
 SWEEP_AXIS = 100_000
-"""Most values of one axis of a sweep, lists multiplied out: the axes are held in memory, 1 kB a value."""
+"""Most values of one axis of a sweep, with its lists expanded: the axes are held in memory, 1 kB per value."""
 SWEEP_CHECKS = 10_000
-"""Most combinations of rig and conditions with a sensor or an effect: all are checked first, 2000 in a second."""
+"""Most combinations of rig and conditions with a sensor or an effect: all are checked first, 2000 per second."""
 SCORE_CELLS = 10_000
-"""Most cells of a score grid: each is a row of a table."""
+"""Most cells of a score grid: each is one row of a table."""
 SCORE_ROWS = 1_000_000
 """Most rows of a table of trials (trials × estimators × quantities): 1 GB in memory."""

@@ -1,4 +1,4 @@
-"""What to simulate: the plan of a campaign, and the conditions it stands for."""
+"""What to simulate: the plan of a campaign and its runs."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from math import pi
 
 DEFAULT_SAMPLE_RATE = 1000.0
-"""Of the potentiometer, Hz."""
+"""Default sample rate of the potentiometer, Hz."""
 
 POTENTIOMETER_RESOLUTION = 2.0 * pi / 3.0 / 4096.0
-"""12 bit over ±60°, rad."""
+"""Step of a 12-bit converter over ±60°, rad."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """The coefficients that are injected.
+    """The coefficients that the simulation uses, which the estimators are to recover.
 
     Args:
         cn_beta: Cnβ, 1/rad.
@@ -32,10 +32,10 @@ class Truth:
 
 @dataclass(frozen=True)
 class Condition:
-    """One run to make.
+    """One run to simulate.
 
     Args:
-        id: unique in the campaign; tells spring, speed, angle and repeat.
+        id: unique in the campaign; made of spring, speed, angle and repeat.
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s; 0 is wind-off.
         air_density: ρ, kg/m³.
@@ -53,13 +53,13 @@ class Condition:
 
 @dataclass(frozen=True)
 class SensorModel:
-    """The potentiometer: zero, then noise, then quantisation.
+    """The potentiometer: it adds its zero and noise to the angle, then quantises.
 
     Args:
         sample_rate: Hz.
         noise_std: standard deviation of the noise, rad.
-        resolution: step of the reading, rad; 0 does not quantise.
-        zero: added to the angle, rad; common to the campaign and unknown to the estimators.
+        resolution: step of the reading, rad; 0: no quantisation.
+        zero: added to the angle, rad; the same in all runs and unknown to the estimators.
     """
 
     sample_rate: float = DEFAULT_SAMPLE_RATE
@@ -70,7 +70,7 @@ class SensorModel:
 
 @dataclass(frozen=True)
 class EffectSetting:
-    """One effect beyond the nominal model, by name; the registry of effects validates it.
+    """One effect to inject, by name; ``tunnel_sim.effects`` validates it.
 
     Args:
         name: name of the effect.
@@ -83,15 +83,15 @@ class EffectSetting:
 
 @dataclass(frozen=True)
 class CampaignPlan:
-    """All that a simulated campaign depends on, besides the rig.
+    """Everything a simulated campaign depends on, apart from the rig.
 
     Args:
         name: short name of the campaign.
         seed: of the random numbers.
-        truth: coefficients to inject.
+        truth: coefficients of the simulation.
         conditions: the runs, at least one, with unique ids.
         sensor: the potentiometer.
-        effects: what is added to the nominal model.
+        effects: effects added to the nominal model.
         description: free text.
     """
 

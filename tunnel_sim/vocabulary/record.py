@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def read_only(values: ArrayLike) -> Array:
-    """A float64 copy that cannot be written to."""
+    """A read-only float64 copy."""
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array
@@ -22,7 +22,7 @@ class Record:
     """A uniformly sampled reading of the yaw angle, from the release or later.
 
     Args:
-        time_s: sample times, shape (n,), s, increasing by one constant step.
+        time_s: sample times, shape (n,), s, with a constant step.
         yaw_rad: sensor reading, shape (n,), rad, nose-right positive; the sensor's zero is unknown.
 
     The arrays are copied and made read-only.

@@ -1,4 +1,4 @@
-"""The rig: the one owner of its numbers."""
+"""The rig's dimensions and properties."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Dynamics:
     Args:
         yaw_inertia: Izz of model and support, kg m².
         mechanical_damping: Cr, N m s/rad.
-        default_spring: number of the spring fitted where none is named.
+        default_spring: number of the spring used where none is named.
     """
 
     yaw_inertia: float
@@ -94,9 +94,9 @@ class Potentiometer:
 
     Args:
         sample_rate: Hz.
-        half_range_deg: the converter covers ± this angle, degrees.
+        half_range_deg: half of the converter's range, degrees.
         bits: resolution of the converter, bits.
-        noise_std: standard deviation of the noise before conversion, rad.
+        noise_std: standard deviation of the noise before quantisation, rad.
     """
 
     sample_rate: float

@@ -213,5 +213,5 @@ def test_the_state_holds_mujocos_with_that_of_the_plugin() -> None:
 def test_a_state_of_another_configuration_is_refused() -> None:
     env = make(duration=0.3).unwrapped
     env.reset(seed=1)
-    with pytest.raises(ValueError, match="another configuration"):
+    with pytest.raises(ValueError, match="different configuration"):
         make(duration=0.2).unwrapped.set_state(env.get_state())

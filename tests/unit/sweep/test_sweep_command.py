@@ -44,7 +44,7 @@ EFFECT = 'name = "coulomb_friction"\nparameters = { friction_moment = [0.002, 0.
         ("springs = [8]", "springs = [11]", "there is no spring 11"),
         ("springs = [8]", "", "no spring"),
         ("wind_speeds = [0.0, 15.0]", "wind_speeds = []", "'wind_speeds' is empty"),
-        ("sample_rate = 500.0", "sample_rate = 300.0", "no whole number of"),
+        ("sample_rate = 500.0", "sample_rate = 300.0", "not a whole number of"),
         ("replicates = 2", "replicates = 0", "'replicates' = 0"),
         ("[conditions]", '[[rig]]\nfile = "no.toml"\n[conditions]', "no.toml"),
         ("[conditions]", "[[rig]]\nchanges = { dynamic = { x = 1 } }\n[conditions]", "did you mean 'dynamics'?"),
