@@ -135,6 +135,11 @@ CLEAR_MOMENT = 5.0
 DRIFT_RATIO = 1.5
 #: Highest frequency of a moment, Hz: the rig's inertia keeps the response to faster ones below any noise. Physics.
 FASTEST_MOMENT = 30.0
+#: Bands with a smaller share of the excess are not listed. Judgement.
+LISTED_BAND_SHARE = 0.05
+#: Mean squared residual of a run, in noise variances, beyond which the intervals of its backbone allow for
+#: coloured residuals. Judgement.
+COLOURED_RUN = 1.5
 #: A line is this many times the median around it. Judgement: the skirt of a resonance is not.
 LINE_CONTRAST = 8.0
 

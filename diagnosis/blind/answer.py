@@ -23,7 +23,7 @@ from tunnel_sim.files.writing import output_folder
 from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError
 
-Told = Callable[[int, int, str], None]
+Progress = Callable[[int, int, str], None]
 
 
 def answers_folder(folder: Path, excluded: Sequence[str] = ()) -> Path:
@@ -40,7 +40,7 @@ def answers_folder(folder: Path, excluded: Sequence[str] = ()) -> Path:
 
 
 def answer_set(
-    folder: Path, *, excluded: Sequence[str] = (), jobs: int = 1, progress: Told | None = None
+    folder: Path, *, excluded: Sequence[str] = (), jobs: int = 1, progress: Progress | None = None
 ) -> str:
     """Diagnose every campaign of a set that has no answer yet.
 

@@ -18,7 +18,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 CHUNK = 100
 """Campaigns simulated together: their runs advance in one array, so that few at a time would cost as much."""
 
-Told = Callable[[int, int], None]
+Progress = Callable[[int, int], None]
 
 
 def make_blind(
@@ -29,7 +29,7 @@ def make_blind(
     shares: Mapping[str, float] = DEFAULT_SHARES,
     mixture: Mixture | None = None,
     key: Path | None = None,
-    progress: Told | None = None,
+    progress: Progress | None = None,
     tell_steps: bool = False,
 ) -> Path:
     """Draw, simulate and write campaigns whose truth is only in the key.
@@ -91,7 +91,7 @@ def _write_campaigns(
     seed: int,
     shares: Mapping[str, float],
     mixture: Mixture,
-    progress: Told | None,
+    progress: Progress | None,
     tell_steps: bool,
 ) -> dict[str, Any]:
     """Write the campaigns; their truths by name."""

@@ -13,6 +13,7 @@ import numpy as np
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import RunData
 from diagnosis.fitting.spectra import linear_coefficients
+from diagnosis.policy import COLOURED_RUN
 from identification.decay.damped_oscillation import Decay
 from identification.decay.decay_fit import Reading, fit_run
 from identification.decay.windows import fit_windows
@@ -73,7 +74,7 @@ def _backbone(fit: Fit, index: int, run: RunData, start: float) -> Backbone:
     decay = Decay(0.5 * damping / inertia, max(stiffness, 1e-12) / inertia)
     std = float(np.sqrt(run.noise_variance))
     reading = Reading(run.interval * np.arange(run.reading.size, dtype=np.float64), run.reading)
-    departs = float(np.mean(fit.residuals[index] ** 2)) > 1.5
+    departs = float(np.mean(fit.residuals[index] ** 2)) > COLOURED_RUN
     noise = NoiseLevel(std, "residual", std, 1.0, departs, disagrees=False)
     windows = fit_windows(reading, decay, fit.value("zero"), noise)
     alone = fit_run(reading, decay)

@@ -75,7 +75,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     count = "the wind-off run" if len(off) == 1 else f"the {len(off)} wind-off runs"
     if min(tests) * len(tests) < PLACE_FALSE_ALARM_RATE:
         return Finding("always", f"{count}, fitted alone, show{'s' * (len(off) == 1)} it too")
-    return Finding("wind_on", f"{count}, fitted alone, leave{'s' * (len(off) == 1)} nothing beyond noise")
+    return Finding("wind_on", f"{count}, fitted alone, show{'s' * (len(off) == 1)} no gap")
 
 
 def _lone_run(found: Survey) -> str | None:

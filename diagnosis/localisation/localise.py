@@ -15,7 +15,7 @@ from diagnosis.localisation.mapping import Survey, survey
 from diagnosis.localisation.maps import Maps
 from diagnosis.localisation.words import describe, nowhere
 from diagnosis.names import plain
-from diagnosis.policy import NAMED_RUN_SHARE, PLACE_FALSE_ALARM_RATE
+from diagnosis.policy import INTERVAL_SHARE, NAMED_RUN_SHARE, PLACE_FALSE_ALARM_RATE
 from diagnosis.result import Where
 from diagnosis.study import COARSE_STEP, Study
 from tunnel_sim.effects import effect_class
@@ -43,7 +43,7 @@ def localise(study: Study) -> tuple[Where, Maps]:
         channel=channel.value,
         condition=condition.value,
         runs=runs,
-        time_s=blow_interval(found, 0.8) or found.maps.time.interval(),
+        time_s=blow_interval(found, INTERVAL_SHARE) or found.maps.time.interval(),
         amplitude_rad=found.maps.amplitude.interval(),
         frequency_hz=found.frequency_interval,
     )

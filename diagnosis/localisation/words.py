@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from diagnosis.localisation.inference import Finding
 from diagnosis.localisation.mapping import Survey
-from diagnosis.policy import LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
+from diagnosis.policy import LISTED_BAND_SHARE, LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
 from diagnosis.result import Where
 
 _LISTED = 12  # ids listed in a sentence at most
@@ -107,7 +107,7 @@ def _extent(where: Where, found: Survey) -> str:
 
 def _bands(found: Survey, bands: tuple[str, ...]) -> str:
     whole = sum(max(band.excess, 0.0) for band in found.maps.bands)
-    shown = [b for b in found.maps.bands if b.band in bands and b.excess > 0.05 * whole]
+    shown = [b for b in found.maps.bands if b.band in bands and b.excess > LISTED_BAND_SHARE * whole]
     if not shown or whole <= 0.0:
         return ""
     shown.sort(key=lambda band: -band.excess)
