@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from identification.policy import DIFFERENCE_RATE
 from identification.scoring.accuracy import Trials
-from identification.scoring.comparison import FALSE_ALARM_RATE, Change, changes, holm
+from identification.scoring.comparison import Change, changes, holm
 from tunnel_lab.scoring.results import Key, Results, groups_of
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -58,8 +59,8 @@ class Verdict:
         return not self.worse
 
 
-def check(baseline: Results, now: Results, *, rate: float = FALSE_ALARM_RATE) -> Verdict:
-    """Compare a score with its baseline, by cell and over all cells of a kind.
+def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> Verdict:
+    """Compare a score with its baseline, cell by cell and over all cells of a kind together.
 
     Args:
         baseline: trials of the baseline.
