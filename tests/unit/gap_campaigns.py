@@ -40,7 +40,9 @@ def campaign(effect: Effect | None = None, *, added: Array | None = None, seed: 
         else [getattr(effect, info.name) for info in effect.parameters() if not info.form]
     )
     common = np.array([INERTIA, DAMPING, CN_BETA, CN_R, 0.001, *values])
-    own = [np.linspace(0.2, 0.8, len(runs))] * len(problem.phased)  # phases (rad) or instants (shares of the run)
+    own = [np.linspace(0.2, 0.8, len(runs))] * len(
+        problem.phased
+    )  # phases (rad) or instants (shares of the run)
     release = np.column_stack([np.array([[0.35, 0.0]] * len(runs)), *own])
     rng = np.random.default_rng(seed)
     time = INTERVAL * np.arange(count)
