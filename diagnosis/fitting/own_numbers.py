@@ -64,7 +64,7 @@ def _beside_the_motion(reading: Array, interval: float, grid: Array) -> np.ndarr
     size = _PADDING * reading.size
     power = np.abs(np.fft.rfft((reading - reading.mean()) * np.hanning(reading.size), size))
     own = float(np.argmax(power)) / (size * interval)
-    return np.all([np.abs(grid - k * own) > _OWN_BAND * own for k in _MULTIPLES], axis=0)
+    return np.asarray(np.all([np.abs(grid - k * own) > _OWN_BAND * own for k in _MULTIPLES], axis=0))
 
 
 def _amplitudes(fit: Fit, grid: Array, rate: float) -> tuple[np.ndarray, Array]:

@@ -190,7 +190,7 @@ class _Job:
     def reading(self, angle: Array, rate: Array) -> Array:
         """Block means of the reading from angle and rate at the blocks' ends."""
         if self.chain.skips:
-            ends = np.arange(angle.size) * self.run.interval
+            ends = np.arange(angle.size, dtype=np.float64) * self.run.interval
             return sample_means(self.chain, Motion(ends, angle, rate), self.run, self.zero)
         weights = hermite_means(self.run.block)
         h = self.run.interval

@@ -59,4 +59,4 @@ class DroppedSamples(Effect):
             return time_s
         interval = time_s[1] - time_s[0]
         after = np.clip((time_s - drawn * stated.duration) / interval + 0.5, 0.0, 1.0)
-        return time_s + self.lost_time * after
+        return np.asarray(time_s + self.lost_time * after, np.float64)

@@ -10,7 +10,7 @@ from tunnel_sim.effects.base import Drawn, Effect, parameter
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
-_REFERENCE_RELEASE = 0.3  # rad: where all exponents give the same amplitude
+_REFERENCE_RELEASE = 0.35  # rad: where all exponents give the same amplitude
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class SecondMode(Effect):
     channel = "sensor"
     condition = "always"
     equation = (
-        "y = β + a exp(−ζ2 ω2 t) cos(ω2 t + φ), φ drawn for every run; other form: a (|β0|/0.3 rad)^n for a, "
+        "y = β + a exp(−ζ2 ω2 t) cos(ω2 t + φ), φ drawn for every run; other form: a (|β0|/0.35 rad)^n for a, "
         "β0 the release angle"
     )
     signature = "A decaying line from the release on, at one frequency whatever the spring and the wind."
@@ -58,4 +58,5 @@ class SecondMode(Effect):
         size = self.amplitude * (abs(stated.release_angle) / _REFERENCE_RELEASE) ** self.exponent
         since = np.maximum(time_s, 0.0)  # the body is held before the release
         turn = self.frequency * since
-        return angle + size * np.exp(-self.damping_ratio * turn) * np.cos(turn + drawn)
+        wave = size * np.exp(-self.damping_ratio * turn) * np.cos(turn + drawn)
+        return np.asarray(angle + wave, np.float64)
