@@ -364,7 +364,7 @@ def test_an_open_set_is_scored_and_said_to_be_open(blind, quick, capsys):
     assert main(["blind", "diagnose", str(blind)]) == 0
     assert main(["blind", "score", str(blind)]) == 0
     assert len(quick) == 3
-    assert "no blind check" in capsys.readouterr().out
+    assert "not a blind test" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
