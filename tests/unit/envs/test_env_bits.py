@@ -13,6 +13,7 @@ from env_episodes import NAME, episode, make, same
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.spring_miscalibration import SpringMiscalibration
 from tunnel_sim.engine.simulate import simulate
+from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.moment_law import state_names
 
@@ -215,3 +216,9 @@ def test_a_state_of_another_configuration_is_refused() -> None:
     env.reset(seed=1)
     with pytest.raises(ValueError, match="different configuration"):
         make(duration=0.2).unwrapped.set_state(env.get_state())
+
+
+def test_an_episode_cannot_pass_over_samples() -> None:
+    env = make(duration=0.3)
+    with pytest.raises(EnvError, match="cannot pass over samples"):
+        env.reset(seed=1, options=STATED | {"effects": {"dropped_samples": {"lost_time": 0.01}}})
