@@ -63,7 +63,7 @@ def _frequency(run: RunData) -> float:
     values = run.reading - run.reading.mean()
     size = _PADDING * values.size
     place, _ = highest_peak(values * np.hanning(values.size), size)
-    return place / (size * run.interval)
+    return float(place / (size * run.interval))
 
 
 @dataclass(frozen=True)
