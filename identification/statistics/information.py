@@ -111,4 +111,4 @@ def embed(link: Array, *, with_zero: bool) -> Array:
     """
     if not with_zero:
         return link
-    return np.asarray(block_diag(link, 1.0))
+    return np.asarray(block_diag(link, np.ones((1, 1))))
