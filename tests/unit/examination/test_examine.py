@@ -87,7 +87,7 @@ def test_of_two_springs_none_is_blamed():
     data = campaign([run("a", 16.0, 0.0, actual=17.6), run("b", 35.0, 0.0)])
     (remark,) = examine(data).remarks
     assert remark.runs == ("a", "b")
-    assert "cannot be told" in remark.what
+    assert "cannot be determined" in remark.what
 
 
 def test_time_that_runs_backwards():
