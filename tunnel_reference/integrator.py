@@ -2,9 +2,9 @@
 
 The effects of a campaign are *terms*: laws with parameters for the rows (runs) they apply to. A law reads and
 changes the moments of one RK4 stage. A friction law only gives the friction level; the sign of friction is constant
-in a step. Where the rate crosses zero within the step, the state after the crossing is corrected: the body slips the
-other way, or sticks until the other moments exceed the level. The local error of the correction is of third order in
-the step.
+in a step. Where the rate crosses zero within the step, the state after the crossing is corrected: the body slips
+the other way, or sticks until the other moments exceed the level. The local error of the correction is of third
+order in the step.
 """
 
 from __future__ import annotations
