@@ -67,7 +67,7 @@ class Models:
 
 
 class OneRun:
-    """One run on a model of its own.
+    """A single run with its own model.
 
     Args:
         models: compiled models.

@@ -14,7 +14,7 @@ class RigProperties:
     Args:
         yaw_inertia: nominal Izz of model and support, kg m².
         frontal_area: A, m²; needed for non-dimensional coefficients.
-        reference_length: l, m; likewise.
+        reference_length: l, m; needed for non-dimensional coefficients.
         width: body width, m (Strouhal numbers).
     """
 
