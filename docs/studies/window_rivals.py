@@ -249,7 +249,7 @@ class _Task:
         return _residuals(columns, self.measured, self.std)
 
     def scan(self, kind: type[Effect]) -> Array | None:
-        """Where a fit starts: the severity whose columns are the likest once the base is adjusted."""
+        """Where a fit starts: the severity whose columns fit best once the base is adjusted."""
         info = kind.parameters()[0]
         best, least = None, np.inf
         for unit in (sign * size for size in _SCAN for sign in (1.0, -1.0)):

@@ -1,4 +1,4 @@
-"""Which cases a sweep file stands for, and that their seeds hang on what they hold. Truth: counts by hand."""
+"""Which cases a sweep file stands for, and that their seeds depend on what they hold. Truth: counts by hand."""
 
 from __future__ import annotations
 
