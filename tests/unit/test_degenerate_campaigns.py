@@ -60,7 +60,7 @@ def test_a_degenerate_campaign_gives_finite_numbers_or_a_refusal(seed, estimator
 def test_runs_that_are_one_file_are_no_traceback(estimator):
     springs = (16.12, 44.84, 16.12)
     runs = tuple(Run(f"r{k}", _swing(16.12, 0), 0.0, spring) for k, spring in enumerate(springs))
-    with pytest.raises(TunnelError, match="the same samples under another spring"):
+    with pytest.raises(TunnelError, match="the same samples with different springs"):
         identify(_campaign(*runs), estimator, throw=False)
     found = make_estimator(estimator).estimate(_campaign(*runs))
     json.dumps(found.to_json_dict(), allow_nan=False)

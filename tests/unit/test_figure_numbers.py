@@ -13,7 +13,8 @@ import pytest
 
 from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.unit.shown_numbers import assert_shows, numbers
-from tunnel_lab.diagnosis_view import answer, where
+from tunnel_lab.diagnosis_view import figures_answer as answer
+from tunnel_lab.diagnosis_view import figures_where as where
 from tunnel_lab.diagnosis_view.figures_common import run_label
 
 Document = dict[str, Any]

@@ -181,7 +181,7 @@ def test_weights_with_another_record_are_refused():
     text = (resources.files("identification") / "neural" / "weights" / "paper.json").read_text()
     with pytest.raises(TunnelError, match="do not belong together"):
         networks_of(content + b" ", text, "here")
-    with pytest.raises(TunnelError, match="not weights"):
+    with pytest.raises(TunnelError, match="not the weights"):
         networks_of(content, "{}", "here")
 
 

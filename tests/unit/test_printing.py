@@ -49,7 +49,7 @@ on     12.340 ± 0.056  0.01230 ± 0.00045  ok
 <off>  –               –                  no oscillation
 
 Note: run on: it starts late; cut it
-Note: no wind-on runs, so no cn_beta and cn_r: add runs with the wind on
+Note: no wind-on runs, so cn_beta and cn_r are not given: add runs with the wind on
 Note: no decaying motion above the noise: check the sensor, or let the record start at
 the release (<off>)"""
 
@@ -144,9 +144,9 @@ def test_a_diagnosis_prints_verdict_tables_and_caveats(diagnosis: Diagnosis) -> 
     assert any(line.strip() == "0.003990 ± 0.000060 N m" for line in lines)
     assert any(line.strip() == "2.000 (at its upper bound)" for line in lines)
     assert "Cnr [1/rad]  -0.313 ± 0.022  -0.257 ± 0.012   +18 %" in lines
-    assert "Caution: few runs" in lines
+    assert lines[lines.index("Caveats:") + 1] == "- few runs"
     assert lines[-2:] == ["These runs cannot show:", "- a drift"]
-    assert "<p>Caution: few runs</p>" in diagnosis._repr_html_()
+    assert "<p>- few runs</p>" in diagnosis._repr_html_()
 
 
 def test_a_diagnosis_as_frames(diagnosis: Diagnosis) -> None:

@@ -4,6 +4,7 @@ import json
 import os
 import struct
 from collections.abc import Callable
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -270,7 +271,7 @@ def test_a_training_record_that_is_not_numbers_is_refused(tmp_path: Path) -> Non
     assert read_networks(tmp_path / "w.safetensors").spec.grid
 
 
-RIG = (Path(load_rig.__code__.co_filename).parent / "data" / "rig.toml").read_text(encoding="utf-8")
+RIG = (resources.files("tunnel_sim") / "data" / "rig.toml").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def test_answer_is_repeatable():
     ("stiffness", "frequency", "what"),
     [
         ([1.0, 2.0], [0.5, 0.7], "fewer than three"),
-        ([1.0, 2.0, 3.0], [0.5, 0.7], "as many"),
+        ([1.0, 2.0, 3.0], [0.5, 0.7], "differ; pair them"),
         ([1.0, -2.0, 3.0], [0.5, 0.7, 0.9], "positive"),
         ([1.0, 2.0, float("nan")], [0.5, 0.7, 0.9], "positive"),
         ([1.0, 2.0, 3.0], [0.5, 0.5, 0.5], "the same"),

@@ -177,7 +177,7 @@ def test_runs_without_a_stiffness_are_said_to_share_a_spring(
 ) -> None:
     status, out, _ = tunnel("diagnose", normalised_campaign, "--effects", "sensor_drift")
     assert status == 0
-    assert "all runs are taken to have the same spring" in out
+    assert "all runs are assumed to have the same spring" in out
     assert "ωn [rad/s]" in out
 
 
@@ -198,4 +198,4 @@ def test_records_without_noise_are_said_to_test_the_numerics(
     folder = write_campaign(data, tmp_path / "pure")
     status, out, _ = tunnel("diagnose", folder, "--effects", "sensor_drift")
     assert status == 0
-    assert "next to no noise" in out
+    assert "almost no noise" in out
