@@ -65,16 +65,17 @@ def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
 def test_points_of_the_closure(given: Document) -> None:
     fig = answer.closure_figure(given)
     axes, runs = fig.axes[0], given["gap"]["runs"]
-    before, after = axes.lines[:2]
+    before, held_out, fitted, zero = axes.lines
     assert curve(before) == [(run["before"], row) for row, run in enumerate(runs)]
-    assert curve(after) == [(run["after"], row) for row, run in enumerate(runs)]
+    for line, whether in ((held_out, True), (fitted, False)):
+        assert curve(line) == [(r["after"], row) for row, r in enumerate(runs) if r["held_out"] == whether]
     assert [label.get_text() for label in axes.get_yticklabels()] == list(IDS)
     ends = [sorted(segment[:, 0]) for segment in axes.collections[0].get_segments()]
     assert ends == [sorted((run["before"], run["after"])) for run in runs]
     noise = axes.patches[0].get_extents().transformed(axes.transData.inverted())
     assert (noise.x0, noise.x1) == pytest.approx((-0.063, 0.063))
     assert axes.get_xscale() == "symlog"
-    assert list(axes.lines[2].get_xdata()) == [0.0, 0.0]
+    assert list(zero.get_xdata()) == [0.0, 0.0]
 
 
 def test_closure_without_maps_and_without_causes(given: Document) -> None:
