@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.decay.posterior import Posterior
+from identification.statistics.information import determined
 from tunnel_sim.vocabulary.record import Array
 
 _PAIRS = 3000
@@ -45,6 +46,8 @@ def shared_moments(
     draws = np.concatenate((half, -half))
     proposal = -0.5 * (_TAILS + size) * np.log1p(np.sum(draws**2, axis=1) / _TAILS)
     for _ in range(_ROUNDS):
+        if not determined(covariance):  # all the weight is on a few draws: the caller finds it not determined
+            break
         unit = np.sqrt(np.diag(covariance))
         factor = unit[:, None] * np.linalg.cholesky(covariance / np.outer(unit, unit))
         points = centre + draws @ factor.T

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from identification import Estimate, identify
+from identification.decay.importance import shared_moments
 from identification.estimate import Quantity
+from identification.statistics.information import determined
 from tests.reference.free_decays import TWELVE, Setting, campaign, damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
@@ -76,3 +78,16 @@ def test_intervals_go_through_json_and_are_absent_where_there_are_none():
     assert len(document["runs"][0]["zeta"]["interval"]) == 2
     assert Estimate.from_json_dict(document) == estimate
     assert "interval" not in Quantity(1.0, 0.1, "1").to_json_dict()
+
+
+class Spike:
+    """A likelihood far narrower than its proposal, and away from it."""
+
+    def log_likelihood_at(self, points):
+        return -1e12 * np.sum((points - 2.0) ** 2, axis=1)
+
+
+def test_draws_of_which_one_counts_determine_nothing_and_raise_nothing():
+    rng = np.random.default_rng(1)
+    _, covariance = shared_moments([Spike()], [np.eye(2)], np.zeros(2), np.eye(2), rng)
+    assert not determined(covariance)
