@@ -20,6 +20,7 @@ from diagnosis.detection.sensor_noise import campaign_noise, noise_trend, readin
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.run_data import Data, prepare, without_start
+from diagnosis.fitting.similarity import Similarity, similar_campaign
 from diagnosis.fitting.starting_points import is_gross, nominal_start
 from diagnosis.policy import COARSE_STEP_POWER, COARSER_STEP, HUM_LEFT, NOISE_EXPLAINS_UP_TO, UNKNOWN_SHARE
 from diagnosis.study import COARSE_STEP, HUM, Study
@@ -41,13 +42,13 @@ def investigate(
         progress: called with the name of each step.
 
     Returns:
-        What was found.
+        What was found, in the units of the similar campaign.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
     clock = _Clock(progress)
-    found = _test(campaign, {kind.name for kind in kinds}, clock)
+    found = _test(*similar_campaign(campaign), {kind.name for kind in kinds}, clock)
     if found.test.detected:
         found = _weigh_effects(found, kinds, clock)
     return replace(found, seconds=clock.seconds)
@@ -76,26 +77,26 @@ def fit_nominal(data: Data) -> Fit:
     return found
 
 
-def _test(campaign: Campaign, allowed: set[str], clock: _Clock) -> Study:
+def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: _Clock) -> Study:
     """The study up to the test of the gap: noise, hum and nominal fit."""
     with clock.step("noise"):
         noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
         coarse = COARSE_STEP.name in allowed and stated is not None and step > COARSER_STEP * stated
     with clock.step("nominal fit"):
-        nominal = fit_nominal(prepare(campaign, noise.variance))
+        nominal = fit_nominal(prepare(campaign, noise.variance, similarity))
         cleaned, hum = campaign, None
         line = find_hum(nominal) if HUM.name in allowed else None
         if line is not None:
             frequency = refine_frequency(campaign, line)
             cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
             noise = campaign_noise(cleaned)
-            nominal = fit_nominal(prepare(cleaned, noise.variance))
+            nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
         started_late = is_gross(nominal)
         if started_late:
             nominal = fit_nominal(without_start(nominal.problem.data))
         test = test_gap(nominal, noise, trend, coarse_step=coarse)
-    return Study(campaign, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
+    return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
 
 
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
