@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.outsiders import Outsider
 from diagnosis.attribution.random_moments import RandomAnswer
-from diagnosis.attribution.rank import Hypothesis
 from diagnosis.detection.gap import GapTest
 from diagnosis.detection.mains import Hum
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend

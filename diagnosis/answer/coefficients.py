@@ -10,7 +10,7 @@ import numpy as np
 
 from diagnosis.answer.held_out import HeldOut
 from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.rank import Hypothesis
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import linear_coefficients
 from diagnosis.policy import COLOURED_EXCESS, EVEN_SHARE, FORM_CHANGE_STD

@@ -11,6 +11,7 @@ from diagnosis.fitting.similarity import frequency
 from diagnosis.policy import SAME_SPRING
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 
+
 def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     """Leave out the runs that cannot be fitted together with the others.
 

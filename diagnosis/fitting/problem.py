@@ -12,6 +12,7 @@ import numpy as np
 
 from diagnosis.fitting.run_data import Data, RunData, hermite_means
 from tunnel_sim.effects import Effect, EffectChain
+from tunnel_sim.effects.base import ParameterInfo
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
@@ -73,10 +74,14 @@ class Problem:
             f"{kind.name}.{info.name}"
             for kind in self.effects
             for info in kind.parameters()
-            if not info.form or kind.name in self.free_forms
+            if self._is_free(kind, info)
         ]
         held = dict(self.fixed)
         return tuple(name for name in names if name not in held)
+
+    def _is_free(self, kind: type[Effect], info: ParameterInfo) -> bool:
+        freed = not info.form or kind.name in self.free_forms
+        return freed and not (info.beside_spring and self.data.normalised)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -91,7 +96,7 @@ class Problem:
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Least and greatest values of the common parameters."""
-        low = {"yaw_inertia": 1e-9, "stiffness": 1e-9}
+        low = {"yaw_inertia": 1e-9, "stiffness": 0.0, "mechanical_damping": 0.0}
         infos = {f"{kind.name}.{info.name}": info for kind in self.effects for info in kind.parameters()}
         lower = [infos[name].fit_lower if name in infos else low.get(name, -np.inf) for name in self.names]
         upper = [infos[name].fit_upper if name in infos else np.inf for name in self.names]

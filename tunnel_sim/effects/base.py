@@ -47,6 +47,7 @@ class ParameterInfo:
         form: whether it generalises the effect's form; its default gives the textbook form.
         fit_lower: least value a fit may take, in the unit.
         fit_upper: greatest value a fit may take, in the unit.
+        beside_spring: whether only a spring of stated stiffness beside the effect makes it known; else it is held.
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
         per_stiffness: whether it multiplies the spring's stiffness.
@@ -63,6 +64,7 @@ class ParameterInfo:
     form: bool
     fit_lower: float
     fit_upper: float
+    beside_spring: bool
     chosen_spring: bool
     per_pressure: bool
     per_stiffness: bool
@@ -80,6 +82,7 @@ def parameter(
     form: bool = False,
     fit_lower: float | None = None,
     fit_upper: float | None = None,
+    beside_spring: bool = False,
     chosen_spring: bool = False,
     per_pressure: bool = False,
     per_stiffness: bool = False,
@@ -95,6 +98,7 @@ def parameter(
         "form": form,
         "fit_lower": lower if fit_lower is None else fit_lower,
         "fit_upper": upper if fit_upper is None else fit_upper,
+        "beside_spring": beside_spring,
         "chosen_spring": chosen_spring,
         "per_pressure": per_pressure,
         "per_stiffness": per_stiffness,
@@ -180,6 +184,8 @@ class Effect:
     - ``line``: what sets the frequency of a periodic effect; its phase differs from run to run.
     - ``skips``: whether samples are missing at an instant that differs from run to run (a share of the run's
       length), so that the motion is read at other times than stated.
+    - ``autonomous``: whether its moment and its reading depend on angle and rate alone, so that a stretch of a run
+      shows it as a whole run does.
     - ``fitted``: whether a fit of the deterministic motion can find it. The other effects are read off the
       records (``line``, ``lattice``) or found from their spectrum (``random``).
     - ``lattice``: whether it changes the quantisation step.
@@ -203,6 +209,7 @@ class Effect:
     random: ClassVar[Literal["", "broad_band", "narrow_band"]] = ""
     line: ClassVar[Literal["", "mains", "shedding", "ringing"]] = ""
     skips: ClassVar[bool] = False
+    autonomous: ClassVar[bool] = True
     fitted: ClassVar[bool] = True
     lattice: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
