@@ -17,6 +17,7 @@ from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_
 from diagnosis.fitting.stretches import Stretches, fit_whole, in_stretches
 from diagnosis.policy import (
     ALWAYS_FITTED,
+    BEAM_WIDTH,
     FREED_HYPOTHESES,
     GROWN_BY,
     GROWN_FROM,
@@ -47,19 +48,19 @@ def grow(
         seeds: sets fitted to the same runs; the growth goes on from the best of them.
 
     Returns:
-        Fitted hypotheses of all sizes, best first. The growth ends where the evidence for a larger set falls, and
-        at `MOST_CAUSES`.
+        Fitted hypotheses of all sizes, best first. The growth ends where the evidence for a larger set falls or
+        could not rise, and at `MOST_CAUSES`.
     """
     found = {seed.names: seed for seed in seeds}
     level = _by_evidence(seeds, nominal)[:1] or [Hypothesis((), nominal)]
-    while len(level[0].effects) < MOST_CAUSES:
+    while _may_gain(level[0], nominal):
         count = FREED_HYPOTHESES if not level[0].effects else 1
         children = with_forms(_children(level, kinds, progress), level[0].fit, count)
         found |= {child.names: child for child in children}
         ranked = _by_evidence(children, nominal)
         if not ranked or not _goes_on(ranked[0], level[0], nominal):
             break
-        level = ranked[:GROWN_FROM]
+        level = [h for h in ranked[:GROWN_FROM] if _left(h) <= BEAM_WIDTH * _left(ranked[0])]
     return sorted(found.values(), key=lambda h: h.fit.total)
 
 
@@ -92,7 +93,7 @@ def grow_in_stretches(
     first = Hypothesis((), fit_nominal(stretches.data))
     level, found = [_Grown(first, Hypothesis((), nominal))], []
     able = [kind for kind in kinds if kind.autonomous]
-    while len(level[0].part.effects) < MOST_CAUSES:
+    while _may_gain(level[0].whole, nominal):
         parts = sorted(_children([g.part for g in level], able, progress), key=lambda h: h.fit.total)
         grown = [g for part in parts[:LENGTHENED] if (g := _lengthened(part, stretches, nominal)) is not None]
         found += [g.whole for g in grown]
@@ -109,13 +110,26 @@ def _lengthened(part: Hypothesis, stretches: Stretches, nominal: Fit) -> _Grown 
     return None
 
 
+def _left(hypothesis: Hypothesis) -> float:
+    return max(hypothesis.fit.excess, 0.0)
+
+
 def _evidence(hypothesis: Hypothesis, nominal: Fit) -> float:
-    share = max(hypothesis.fit.excess, 0.0) / max(nominal.excess, 1e-9)
+    share = _left(hypothesis) / max(nominal.excess, 1e-9)
     return evidence(hypothesis.effects, share, hypothesis.forms, nominal.excess, nominal.chance)
 
 
 def _by_evidence(found: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
     return sorted(found, key=lambda h: -_evidence(h, nominal))
+
+
+def _may_gain(hypothesis: Hypothesis, nominal: Fit) -> bool:
+    """Whether the evidence could rise if one more effect closed all that is left."""
+    if not hypothesis.effects:
+        return True
+    larger = (*hypothesis.effects, "")
+    best = evidence(larger, 0.0, hypothesis.forms, nominal.excess, nominal.chance)
+    return len(hypothesis.effects) < MOST_CAUSES and best > _evidence(hypothesis, nominal)
 
 
 def _goes_on(child: Hypothesis, parent: Hypothesis, nominal: Fit) -> bool:

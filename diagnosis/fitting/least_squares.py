@@ -10,6 +10,7 @@ from diagnosis.fitting.problem import Point, Problem
 from tunnel_sim.vocabulary.record import Array
 
 _MAX_ITERATIONS = 25
+_HOPELESS = 5  # steps after which a fit must be better than the one it adds an effect to
 _AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
 _TRIES = 9  # dampings tried in a step, each ten times the last
 
@@ -121,6 +122,8 @@ def fit(
             borrowed = False  # once more with its own sensitivities
         elif poor:
             converged = True
+        if base is not None and iterations >= _HOPELESS and state.cost > base.total:
+            break  # more parameters, and still worse than without them
     return state.result(iterations, converged)
 
 

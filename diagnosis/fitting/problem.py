@@ -143,20 +143,24 @@ class Problem:
             duration=run.duration,
         )
 
-    def chain(self, common: Array, own: Array, run: RunData) -> EffectChain:
+    def chain(
+        self, common: Array, own: Array, run: RunData, effects: tuple[Effect, ...] | None = None
+    ) -> EffectChain:
         """The effects of one run.
 
         Args:
             common: as in `Point`, shape (common,).
             own: the run's own parameters, a row of ``Point.release``, shape (own,).
             run: conditions.
+            effects: from `effects_at`, where they are known already.
 
         Returns:
             The effects with the phases and instants that the run has.
         """
         phases = dict(zip(self.phased, own[2:].tolist(), strict=True))
         drawn = tuple(phases.get(kind.name) for kind in self.effects)
-        return EffectChain(self.stated(common, own, run), self.effects_at(common), drawn)
+        known = self.effects_at(common) if effects is None else effects
+        return EffectChain(self.stated(common, own, run), known, drawn)
 
     def predict(self, points: Sequence[Point]) -> list[list[Array]]:
         """Predicted block means.
@@ -168,8 +172,11 @@ class Problem:
             For every point, for every run, the reading's block means, rad; infinite where the motion grows
             without bound.
         """
-        cases = [(p, r) for p in range(len(points)) for r in range(len(self.data.runs))]
-        jobs = [_Job(self, points[p], r) for p, r in cases]
+        jobs = [
+            _Job(self, point, r, effects)
+            for point, effects in zip(points, map(self.effects_at, (p.common for p in points)), strict=True)
+            for r in range(len(self.data.runs))
+        ]
         half = (len(jobs) + _THREADS - 1) // _THREADS
         results = list(_POOL.map(_run_jobs, [jobs[i : i + half] for i in range(0, len(jobs), half)]))
         flat = [values for part in results for values in part]
@@ -180,11 +187,13 @@ class Problem:
 class _Job:
     """One run at one point."""
 
-    def __init__(self, problem: Problem, point: Point, run_index: int) -> None:
+    def __init__(
+        self, problem: Problem, point: Point, run_index: int, effects: tuple[Effect, ...]
+    ) -> None:
         run = problem.data.runs[run_index]
         self.run = run
         self.zero = float(point.common[problem.nominal_names.index("zero")])
-        self.chain = problem.chain(point.common, point.release[run_index], run)
+        self.chain = problem.chain(point.common, point.release[run_index], run, effects)
         physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         self.row, self.keep_alive = forward_run(physics)
         self.law = parameter_vector(physics.law(campaign_rig(problem.data)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -238,10 +239,7 @@ class Effect:
     @classmethod
     def parameters(cls) -> tuple[ParameterInfo, ...]:
         """The effect's parameters, the severity first."""
-        return tuple(
-            ParameterInfo(name=own.name, default=cast(float, own.default), **own.metadata)
-            for own in dataclasses.fields(cls)
-        )
+        return _parameters(cls)
 
     @property
     def severity(self) -> float:
@@ -388,6 +386,14 @@ class Effect:
             "name": self.name,
             "parameters": {info.name: getattr(self, info.name) for info in self.parameters()},
         }
+
+
+@functools.cache
+def _parameters(kind: type[Effect]) -> tuple[ParameterInfo, ...]:
+    return tuple(
+        ParameterInfo(name=own.name, default=cast(float, own.default), **own.metadata)
+        for own in dataclasses.fields(kind)
+    )
 
 
 def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:
