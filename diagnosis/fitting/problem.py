@@ -187,9 +187,7 @@ class Problem:
 class _Job:
     """One run at one point."""
 
-    def __init__(
-        self, problem: Problem, point: Point, run_index: int, effects: tuple[Effect, ...]
-    ) -> None:
+    def __init__(self, problem: Problem, point: Point, run_index: int, effects: tuple[Effect, ...]) -> None:
         run = problem.data.runs[run_index]
         self.run = run
         self.zero = float(point.common[problem.nominal_names.index("zero")])
