@@ -76,7 +76,7 @@ def compare(problem: Problem, common: Array, release: Array) -> Comparison:
         failure = error.what
     return Comparison(
         ids=tuple(run.id for run in runs),
-        residuals=[(run.reading - p) / s for run, p, s in zip(runs, predicted, noise, strict=True)],
+        residuals=[run.scaled(run.reading - p) for run, p in zip(runs, predicted, strict=True)],
         differences=[p - f for p, f in zip(predicted, before, strict=True)],
         noise=noise,
         failure=failure,

@@ -74,6 +74,8 @@ def planned_run(
         wind_speed=wind_speed,
         air_density=air_density if wind_speed > 0.0 else 0.0,
         duration=duration,
+        start=0.0,
+        samples=None,
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from diagnosis.policy import SAME_SPRING
 from identification.decay.spectrum import highest_peak
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.record import Record, evenly_spaced
 
 _PADDING = 8  # times the record, which places the peak of a few cycles to within a few per cent
 
@@ -97,6 +97,7 @@ def frequency(record: Record) -> float:
     Returns:
         The peak of its spectrum, Hz.
     """
+    record = evenly_spaced(record)
     swing = record.yaw_rad - np.mean(record.yaw_rad)
     size = _PADDING * swing.size
     place, _ = highest_peak(swing * np.hanning(swing.size), size)

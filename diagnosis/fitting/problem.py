@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from diagnosis.fitting.run_data import Data, RunData, hermite_means
+from diagnosis.fitting.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
@@ -192,17 +192,14 @@ class _Job:
         if self.chain.skips:
             ends = np.arange(angle.size, dtype=np.float64) * self.run.interval
             return sample_means(self.chain, Motion(ends, angle, rate), self.run, self.zero)
-        weights = hermite_means(self.run.block)
+        weights = self.run.weights
         h = self.run.interval
         mean: Array = (
             weights[0] * angle[:-1]
             + weights[1] * angle[1:]
             + h * (weights[2] * rate[:-1] + weights[3] * rate[1:])
         )
-        time = np.asarray(
-            (np.arange(mean.size) + 0.5 * (self.run.block - 1) / self.run.block) * h, np.float64
-        )
-        return self.chain.reading(self.chain.angle(mean, time) + self.zero)
+        return self.chain.reading(self.chain.angle(mean, self.run.times) + self.zero)
 
 
 def blocks_beyond(physics: RunSettings, run: RunData) -> int:
@@ -230,11 +227,8 @@ def sample_means(chain: EffectChain, motion: Motion, run: RunData, zero: float) 
     Returns:
         rad, of the shape of the run's ``reading``.
     """
-    samples = run.reading.size * run.block
-    time: Array = np.asarray(np.arange(samples) * (run.interval / run.block), np.float64)
-    reading = chain.reading(chain.seen(motion, time) + zero)
-    means: Array = reading.reshape(run.reading.size, run.block).mean(axis=1)
-    return means
+    reading = chain.reading(chain.seen(motion, run.sample_times, run.derivative) + zero)
+    return run.means(reading)
 
 
 def condensed(physics: RunSettings, data: Data) -> RunSettings:

@@ -103,22 +103,50 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
     )
 
 
-def white_noise(reading: Array, sensor: SensorProperties) -> float:
+def white_noise(reading: Array, sensor: SensorProperties, time: Array | None = None) -> float:
     """The white part of a reading's noise, from its sixth differences, which hold almost none of the motion.
 
     Args:
         reading: of many samples per cycle, shape (n,), rad.
         sensor: what the campaign states; used where the reading agrees with it.
+        time: of the samples where they are not evenly spaced, shape (n,), s.
 
     Returns:
         Standard deviation of one sample, rad, quantisation included.
     """
     peak = 0.5 * float(np.ptp(reading))
     floor = max(LEAST_NOISE * peak, 1e-300)
-    fast, degrees = _fast_part([Residual(reading, 1, 0, peak)], floor)
+    if time is not None and reading.size > 4 * _ORDER:
+        variance, relative = _scattered_variance(time, reading)
+        fast, degrees = sqrt(variance), 2.0 / relative**2
+    else:
+        fast, degrees = _fast_part([Residual(reading, 1, 0, peak)], floor)
     fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
     stated = stated_noise(sensor)
     return max(stated, floor) if stated is not None and _agree(fast, max(stated, floor), degrees) else fast
+
+
+def _scattered_variance(time: Array, values: Array) -> tuple[float, float]:
+    """The variance of white noise on a smooth motion that is sampled at any times.
+
+    Args:
+        time: increasing, shape (n,), s.
+        values: at least seven, shape (n,), rad.
+
+    Returns:
+        Variance of one sample, rad², and its relative standard deviation. A sixth divided difference is zero for
+        the cubic or quintic that a swing resembles over seven samples, whatever their times.
+    """
+    count = time.size - _ORDER
+    nodes = np.stack([time[i : i + count] for i in range(_ORDER + 1)])
+    weights = np.empty_like(nodes)
+    for i, node in enumerate(nodes):
+        away = (node - nodes) / (nodes[-1] - nodes[0])
+        away[i] = 1.0
+        weights[i] = 1.0 / np.prod(away, axis=0)
+    difference = sum(w * values[i : i + count] for i, w in enumerate(weights))
+    squares = difference**2 / np.sum(weights**2, axis=0)
+    return float(np.mean(squares)), sqrt(2.0 * _SAMPLES_PER_DEGREE / count)
 
 
 def _fast_part(residuals: Sequence[Residual], fallback: float) -> tuple[float, float]:

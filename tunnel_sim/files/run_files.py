@@ -13,8 +13,8 @@ import polars as pl
 from numpy.typing import NDArray
 
 from tunnel_sim.files.reading import read_regular
-from tunnel_sim.files.toml_input import one_line
 from tunnel_sim.files.run_table import COLUMNS
+from tunnel_sim.files.toml_input import one_line
 from tunnel_sim.files.writing import encoded
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
@@ -74,7 +74,11 @@ def read_table(
         readable=f"name a readable {kinds} file",
     )
     if not content.strip():
-        raise TunnelError("the file is empty", where=where, remedy=f"give it {_named(quantity)}, and time_s unless [sensor] sample_rate is given")
+        raise TunnelError(
+            "the file is empty",
+            where=where,
+            remedy=f"give it {_named(quantity)}, and time_s unless [sensor] sample_rate is given",
+        )
     return _columns(reader.read(content, where, most), where, timed=timed, quantity=quantity)
 
 

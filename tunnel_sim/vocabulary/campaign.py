@@ -7,7 +7,6 @@ from typing import Literal
 
 from tunnel_sim.vocabulary.record import Record
 
-
 Quantity = Literal["angle", "rate", "acceleration"]
 """What a sensor measures: the yaw angle, or its first or second derivative."""
 
