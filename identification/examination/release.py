@@ -14,7 +14,7 @@ from identification.decay.decay_fit import Reading, RunFit, fit_run
 from identification.decay.first_guess import starting_decay, starting_frequency
 from identification.decay.residual_noise import white_noise
 from tunnel_sim.vocabulary.campaign import SensorProperties
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
 _NEAR_LARGEST = 0.9  # of the largest swing: the last swing of this size comes after the release
 _LEAST_SAMPLES = 16
@@ -43,6 +43,9 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
     Returns:
         Index of the first sample of the free motion; 0 if the record starts in it, or if no oscillation is found.
     """
+    if not record.uniform:
+        even = evenly_spaced(record)
+        return int(np.searchsorted(record.time_s, even.time_s[find_release(even, sensor)]))
     free = _surely_free(record)
     if record.yaw_rad.size - free < _LEAST_SAMPLES:
         return 0
