@@ -97,7 +97,7 @@ def frequency(record: Record) -> float:
     Returns:
         The peak of its spectrum, Hz.
     """
-    record = evenly_spaced(record)
+    record = evenly_spaced(record, bridged=False)
     swing = record.yaw_rad - np.mean(record.yaw_rad)
     size = _PADDING * swing.size
     place, _ = highest_peak(swing * np.hanning(swing.size), size)

@@ -22,10 +22,12 @@ BLOCK_INTERVAL = 4e-3
 class Samples:
     """Samples that are not evenly spaced, on the uniform raster of the blocks.
 
+    A block without any has a place for one in its middle, so that every block has a mean; it does not count.
+
     Args:
         time: since the start of the first block, increasing, shape (m,), s.
         block: the block that each sample lies in, shape (m,).
-        count: samples in each block, shape (n,); blocks may be empty.
+        count: samples in each block, shape (n,).
     """
 
     time: Array
@@ -39,14 +41,17 @@ class Samples:
         The raster starts half a mean interval before the first sample, so that jitter moves few samples into the
         next block.
         """
+        blocks, interval = record.time_s.size // block, block * record.sample_interval
         time = record.time_s - record.time_s[0] + 0.5 * record.sample_interval
-        place = np.floor(time / (block * record.sample_interval)).astype(np.int64)
-        whole = place < record.time_s.size // block
-        count = np.bincount(place[whole], minlength=record.time_s.size // block)
-        return cls(time[whole], place[whole], count)
+        place = np.floor(time / interval).astype(np.int64)
+        count = np.bincount(place, minlength=blocks)[:blocks]
+        empty = np.flatnonzero(count == 0)
+        order = np.argsort(np.concatenate([time[place < blocks], (empty + 0.5) * interval]))
+        time = np.concatenate([time[place < blocks], (empty + 0.5) * interval])[order]
+        return cls(time, np.concatenate([place[place < blocks], empty])[order], count)
 
     def means(self, values: Array) -> Array:
-        """Mean over each block of one value per sample, shape (m,) or (k, m); 0 where the block is empty."""
+        """Mean over each block of one value per sample, shape (m,) or (k, m)."""
         rows = np.atleast_2d(values)
         sums = np.stack([np.bincount(self.block, row, self.count.size) for row in rows])
         return np.asarray((sums / np.maximum(self.count, 1)).reshape(*values.shape[:-1], -1), np.float64)
@@ -115,8 +120,7 @@ class RunData:
             return np.asarray(
                 (np.arange(self.reading.size) + 0.5 * (self.block - 1) / self.block) * self.interval
             )
-        middle = (np.arange(self.reading.size) + 0.5) * self.interval
-        return np.where(self.samples.count > 0, self.samples.means(self.samples.time), middle)
+        return self.samples.means(self.samples.time)
 
     @property
     def sample_times(self) -> Array:
@@ -284,7 +288,8 @@ def _prepare_run(run: Run, noise_variance: float, derivative: int) -> RunData:
     if samples is None:
         reading = record.yaw_rad[: count * block].reshape(count, block).mean(axis=1)
     else:
-        reading = _bridged(samples.means(record.yaw_rad[: samples.time.size]), samples.count > 0)
+        since = record.time_s - record.time_s[0] + 0.5 * record.sample_interval
+        reading = samples.means(np.interp(samples.time, since, record.yaw_rad))
     return RunData(
         id=run.id,
         reading=reading,
@@ -298,12 +303,6 @@ def _prepare_run(run: Run, noise_variance: float, derivative: int) -> RunData:
         derivative=derivative,
         samples=samples,
     )
-
-
-def _bridged(reading: Array, seen: NDArray[np.bool_]) -> Array:
-    """Block means with those of empty blocks interpolated, for what looks at the shape of a run."""
-    places = np.arange(reading.size)
-    return reading if seen.all() else np.asarray(np.interp(places, places[seen], reading[seen]))
 
 
 def hermite_basis(u: Array, derivative: int = 0, interval: float = 1.0) -> Array:

@@ -45,7 +45,7 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
     """
     if not holds_motion(record):
         return SpectralPeak(0.0, 0.0)
-    record = evenly_spaced(record)
+    record = evenly_spaced(record, bridged=False)
     centred = record.yaw_rad - record.yaw_rad.mean()
     size = 1 << int(np.ceil(np.log2(padding * centred.size)))
     # Below one cycle per record the spectrum holds the offset's remainder, not the oscillation.

@@ -14,6 +14,7 @@ from tunnel_sim.vocabulary.record import CLOCK_TOLERANCE, Array, Record
 _FINEST = 9  # decimals: no logger rounds to less than a nanosecond
 _ON_LATTICE = 1e-3  # of the lattice's step: rounding errors of the decimals themselves
 _SWEEPS = 8
+_NO_GAP = 1.75  # usual steps: a longer one may be a gap
 _MOST_MISSING = 1e3  # ticks per sample: beyond it the stamps are not those of one clock
 
 
@@ -74,20 +75,30 @@ def find_clock(time_s: Array) -> Clock | None:
         The clock whose ticks, rounded to the last decimal of the stamps, are the stamps; samples may be missing.
         None if there is none.
     """
-    interval = float(np.median(np.diff(time_s)))
+    steps = np.diff(time_s)
+    usual = steps[steps < _NO_GAP * np.median(steps)]
+    allowed = _rounding(time_s)
+    for interval in (float(np.mean(steps)), float(np.mean(usual))):
+        found = _counted(time_s, interval)
+        if found is not None and found.away <= max(allowed, CLOCK_TOLERANCE * found.interval):
+            return found
+    return None
+
+
+def _counted(time_s: Array, interval: float) -> Clock | None:
+    """The clock of about an interval, s, that fits the stamps best; None if gaps are most of them."""
     for _ in range(_SWEEPS):
-        place = np.concatenate([[0], np.cumsum(np.maximum(np.round(np.diff(time_s) / interval), 1.0))])
+        ticks = np.maximum(np.round(np.diff(time_s) / interval), 1.0)
+        place = np.concatenate([[0.0], np.cumsum(ticks)])
+        if place[-1] > _MOST_MISSING * time_s.size:
+            return None
         slope, start = np.polyfit(place - place.mean(), time_s, 1)
-        if abs(slope / interval - 1.0) * place[-1] < CLOCK_TOLERANCE:
-            break
+        settled = abs(slope / interval - 1.0) * place[-1] < CLOCK_TOLERANCE
         interval = float(slope)
-    if place[-1] > _MOST_MISSING * time_s.size:
-        return None
-    clock = start + slope * (place - place.mean())
-    away = float(np.abs(time_s - clock).max())
-    if away > max(_rounding(time_s), CLOCK_TOLERANCE * slope):
-        return None
-    return Clock(float(slope), place.astype(np.int64), clock, away)
+        if settled:
+            break
+    clock = start + interval * (place - place.mean())
+    return Clock(interval, place.astype(np.int64), clock, float(np.abs(time_s - clock).max()))
 
 
 def _rounding(time_s: Array) -> float:

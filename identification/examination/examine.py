@@ -12,6 +12,7 @@ from identification.examination.release import find_release
 from identification.examination.repeated import without_repeats
 from identification.examination.spring_line import springs_off_the_line
 from identification.examination.swings import swing_of
+from identification.examination.turns import wide_swings
 from identification.remark import Examined, Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
@@ -38,11 +39,12 @@ def examine(campaign: Campaign) -> Examined:
     kept, repeats = without_repeats(campaign)
     if any(remark.outcome is Outcome.REFUSED for remark in repeats):
         return Examined(campaign, repeats)
+    noted = wide_swings(kept)
     kept, clocks = with_clocks(kept)
     kept, releases = from_releases(kept)
     swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
     faults = growing_runs(swings) or exchanged_labels(swings) or springs_off_the_line(swings)
-    return Examined(kept, (*repeats, *clocks, *releases, *faults))
+    return Examined(kept, (*repeats, *noted, *clocks, *releases, *faults))
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

@@ -68,7 +68,7 @@ RANGES: Mapping[str, Range] = {
         -_TWO_TURNS, _TWO_TURNS, "rad", "degrees", "degrees", "as for the swing",
     ),
     "swing": Range(
-        0.0, _TWO_TURNS, "rad", "degrees", "",
+        0.0, _TWO_TURNS, "rad, or name the column yaw_deg", "degrees", "",
         "a pendulum stays below half a turn and a disc between springs below two; 13 degrees are a small swing",
     ),
     "step": Range(

@@ -31,7 +31,7 @@ def count_cycles(record: Record) -> float:
     Returns:
         The number of cycles; 0 when nothing oscillates.
     """
-    record = evenly_spaced(record)
+    record = evenly_spaced(record, bridged=False)
     reading = _without_hum(record)
     level = _without_trend(reading)
     # Only rounding errors remain of a constant, a linear drift or pure hum.

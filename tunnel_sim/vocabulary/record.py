@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 #: Deviation of the times from a uniform clock, in steps, up to which they are uniform. At ten samples per cycle it
 #: moves a reading by 0.6 % of the swing.
 CLOCK_TOLERANCE = 0.01
+_GAP = 4.0  # mean intervals: a longer step is a gap
 
 
 def read_only(values: ArrayLike) -> Array:
@@ -74,11 +75,12 @@ class Record:
         return bool(np.abs(away).max() <= allowed)
 
 
-def evenly_spaced(record: Record) -> Record:
+def evenly_spaced(record: Record, *, bridged: bool = True) -> Record:
     """A record on a uniform raster, for methods that need one.
 
     Args:
         record: any.
+        bridged: whether gaps are bridged by a curve; False: by the record's mean, which adds nothing to a spectrum.
 
     Returns:
         The record itself where it is uniform; else a smooth curve through it at as many times, evenly spaced from
@@ -87,15 +89,20 @@ def evenly_spaced(record: Record) -> Record:
     if record.uniform:
         return record
     given, reading = record.time_s, record.yaw_rad
-    # Cubic pieces whose slopes are those of parabolas through three neighbours: local, so that a gap stays one.
+    # Cubic pieces whose slopes are those of parabolas through three neighbours.
     slope = np.gradient(reading, given)
     time = np.linspace(given[0], given[-1], given.size)
     at = np.clip(np.searchsorted(given, time, side="right") - 1, 0, given.size - 2)
     step = np.diff(given)[at]
     u = (time - given[at]) / step
+    first, last = slope[at], slope[at + 1]
+    # Across a gap slopes may lead far off: up to three times the mean slope, a cubic stays between its ends.
+    steepest = 3.0 * np.abs(np.diff(reading)[at]) / step
+    gap = step > _GAP * record.sample_interval
+    first, last = (np.where(gap, np.clip(end, -steepest, steepest), end) for end in (first, last))
     values = (
         (1.0 + 2.0 * u) * (1.0 - u) ** 2 * reading[at]
         + u**2 * (3.0 - 2.0 * u) * reading[at + 1]
-        + step * u * (1.0 - u) * ((1.0 - u) * slope[at] - u * slope[at + 1])
+        + step * u * (1.0 - u) * ((1.0 - u) * first - u * last)
     )
-    return Record(time, values)
+    return Record(time, values if bridged else np.where(gap, reading.mean(), values))
