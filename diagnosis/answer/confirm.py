@@ -144,7 +144,7 @@ class _Case:
     def __init__(self, problem: Problem, common: Array, own: Array, run: RunData) -> None:
         self.run = run
         self.chain = problem.chain(common, own, run)
-        self.zero = float(common[problem.nominal_names.index("zero")])
+        self.zero = problem.zero(common, own)
         physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         steps = report_substeps(physics, run.interval)
         blocks = run.reading.size + blocks_beyond(physics, run)

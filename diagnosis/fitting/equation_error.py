@@ -33,11 +33,14 @@ def equation_error_start(problem: Problem) -> Point | None:
     if any(kind.regressor(nothing, nothing, 1.0) is None for kind in problem.effects):
         return None
     data = problem.data
-    zero = float(np.median([np.median(run.reading[-run.reading.size // 4 :]) for run in data.runs]))
+    own = [float(np.median(run.reading[-run.reading.size // 4 :])) for run in data.runs]
+    common_zero = float(np.median(own))
     rows, targets, releases = [], [], []
-    for run in data.runs:
+    for run, own_zero in zip(data.runs, own, strict=True):
+        zero = own_zero if data.own_zeros else common_zero
         angle, rate, acceleration = _smoothed(run, zero)
-        releases.append((float(run.reading[0] - zero), float(rate[: max(1, rate.size // 200)].mean())))
+        start = (float(run.reading[0] - zero), float(rate[: max(1, rate.size // 200)].mean()))
+        releases.append((*start, zero) if data.own_zeros else start)
         edge = max(3, angle.size // 100)
         inside = slice(edge, -edge)
         design, target = _balance(problem, run, angle[inside], rate[inside], acceleration[inside])
@@ -49,7 +52,7 @@ def equation_error_start(problem: Problem) -> Point | None:
     solution = lsq_linear(matrix / scale, target, bounds=(lower * scale, upper * scale)).x / scale
     if not np.all(np.isfinite(solution)):
         return None
-    return Point(_common(problem, solution, zero), np.array(releases))
+    return Point(_common(problem, solution, common_zero), np.array(releases))
 
 
 def _solution_bounds(problem: Problem) -> tuple[Array, Array]:
@@ -100,10 +103,9 @@ def _balance(
 
 def _common(problem: Problem, solution: Array, zero: float) -> Array:
     """The solution in the order of the problem's common parameters."""
-    count = len(problem.nominal_names) - 1
-    values = dict(
-        zip([name for name in problem.nominal_names if name != "zero"], solution[:count], strict=True)
-    )
+    nominal = [name for name in problem.nominal_names if name != "zero"]
+    count = len(nominal)
+    values = dict(zip(nominal, solution[:count], strict=True))
     values["zero"] = zero
     for kind, value in zip(problem.effects, solution[count:], strict=True):
         severity, *rest = kind.parameters()

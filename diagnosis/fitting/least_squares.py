@@ -63,6 +63,10 @@ class Fit:
         """A common parameter by name."""
         return float(self.point.common[self.problem.names.index(name)])
 
+    def zero(self, index: int) -> float:
+        """The sensor's zero in the run of an index."""
+        return self.problem.zero(self.point.common, self.point.release[index])
+
     def std(self, name: str) -> float:
         """Its standard deviation, if the model is right."""
         i = self.problem.names.index(name)

@@ -35,8 +35,9 @@ class Point:
     Args:
         common: parameters common to the runs, in the order of `Problem.names`, shape (common,).
         release: of every run its own parameters, shape (runs, own): angle (rad) and rate (rad/s) of the sensor's
-            end at the record's start, then in the effects' order the phase (rad) of each periodic one and the
-            instant (share of the run's length) of each that skips samples.
+            end at the record's start, the sensor's zero (rad) where each run has its own, then in the effects'
+            order the phase (rad) of each periodic one and the instant (share of the run's length) of each that
+            skips samples.
     """
 
     common: Array
@@ -64,7 +65,24 @@ class Problem:
         """Names of the nominal model's common parameters."""
         first = "stiffness" if self.data.normalised else "yaw_inertia"
         air = ("cn_beta", "cn_r") if self.data.wind_on else ()
-        return (first, "mechanical_damping", *air, "zero")
+        return (first, "mechanical_damping", *air, *(() if self.data.own_zeros else ("zero",)))
+
+    @property
+    def first_phase(self) -> int:
+        """Place of the first phase or instant among a run's own parameters."""
+        return 3 if self.data.own_zeros else 2
+
+    def zero(self, common: Array, own: Array) -> float:
+        """The sensor's zero in one run.
+
+        Args:
+            common: as in `Point`, shape (common,).
+            own: of the run, a row of ``Point.release``, shape (own,).
+
+        Returns:
+            In the unit of the reading.
+        """
+        return float(own[2] if self.data.own_zeros else common[self.nominal_names.index("zero")])
 
     @cached_property
     def effect_names(self) -> tuple[str, ...]:
@@ -149,7 +167,7 @@ class Problem:
         Returns:
             The effects with the phases and instants that the run has.
         """
-        phases = dict(zip(self.phased, own[2:].tolist(), strict=True))
+        phases = dict(zip(self.phased, own[self.first_phase :].tolist(), strict=True))
         drawn = tuple(phases.get(kind.name) for kind in self.effects)
         return EffectChain(self.stated(common, own, run), self.effects_at(common), drawn)
 
@@ -178,7 +196,7 @@ class _Job:
     def __init__(self, problem: Problem, point: Point, run_index: int) -> None:
         run = problem.data.runs[run_index]
         self.run = run
-        self.zero = float(point.common[problem.nominal_names.index("zero")])
+        self.zero = problem.zero(point.common, point.release[run_index])
         self.chain = problem.chain(point.common, point.release[run_index], run)
         physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         self.row, self.keep_alive = forward_run(physics)

@@ -195,6 +195,7 @@ class Data:
         width: m; likewise.
         normalised: whether the runs are fitted per unit inertia with a common stiffness.
         yaw_inertia: nominal Izz, kg m²; None where the campaign does not state it.
+        own_zeros: whether every run has a zero of its own.
         windy: whether the runs are part of a campaign with the wind on, though none of these may be: the model
             then keeps its aerodynamic parameters.
     """
@@ -205,6 +206,7 @@ class Data:
     width: float
     normalised: bool
     yaw_inertia: float | None
+    own_zeros: bool = False
     windy: bool = False
 
     @property
@@ -277,6 +279,7 @@ def prepare(campaign: Campaign, noise_variance: dict[str, float]) -> Data:
         width=rig.width or 0.0,
         normalised=any(run.spring_stiffness is None for run in campaign.runs),
         yaw_inertia=rig.yaw_inertia,
+        own_zeros=campaign.sensor.zero == "per_run",
     )
 
 
