@@ -54,11 +54,12 @@ def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     if freedom == 0 or sum(map(_scatter, groups)) <= float(chi2.isf(MISFIT_RATE, freedom)):
         return campaign, ()
     largest = max(max(c.zero for c in group) - min(c.zero for c in group) for group in groups)
+    compared = {centre.run.id for group in groups for centre in group}
     remark = Remark(
         Outcome.NOTED,
-        tuple(centre.run.id for group in groups for centre in group),
-        f"they oscillate about zeros that differ by up to {largest:.2g} under equal conditions; every run of the "
-        f"campaign is fitted with a zero of its own",
+        tuple(run.id for run in campaign.runs if run.id in compared),
+        f"they oscillate about zeros that differ by up to {largest:.2g} {campaign.sensor.unit} under equal "
+        f"conditions; every run of the campaign is fitted with a zero of its own",
         "state zero = 'common' under [sensor] if the zero cannot have moved between them",
     )
     return replace(campaign, sensor=replace(campaign.sensor, zero="per_run")), (remark,)

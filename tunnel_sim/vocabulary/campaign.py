@@ -52,6 +52,11 @@ class SensorProperties:
     zero: Zero | None = None
 
     @property
+    def unit(self) -> str:
+        """Unit of the readings."""
+        return ("rad", "rad/s", "rad/s²")[self.derivative]
+
+    @property
     def derivative(self) -> int:
         """Which derivative of the angle the readings are: 0, 1 or 2."""
         return 0 if self.quantity is None else ("angle", "rate", "acceleration").index(self.quantity)
