@@ -55,9 +55,9 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
     frequency = starting_frequency(later)
     if frequency is None:
         return 0
-    crossings, largest, turn = _crossings(record, sensor, float(np.median(later.yaw_rad)), frequency)
+    crossings, largest, out = _crossings(record, sensor, float(np.median(later.yaw_rad)), frequency)
     held = _last_long_stretch(crossings, largest)
-    if held is None and largest == 1 and turn > _SLOWER * (crossings[1] - turn) + 1.0:
+    if held is None and largest == 1 and out[0] > _SLOWER * (crossings[1] - out[1]) + 0.5:
         held = 0
     return 0 if held is None else _standstill(record, crossings, held)
 
@@ -71,11 +71,11 @@ def _surely_free(record: Record) -> int:
 
 def _crossings(
     record: Record, sensor: SensorProperties, centre: float, frequency: float
-) -> tuple[Array, int, float]:
+) -> tuple[Array, int, tuple[float, float]]:
     """Where the smoothed reading crosses its centre, in samples; the start of the record counts as the first.
 
-    The second value is the place of the first crossing after the largest excursion, and the third its turning point
-    in samples.
+    The second value is the place of the first crossing after the largest excursion; the third are the samples that
+    the smoothed reading takes to get there, and its place in samples.
     """
     yaw = record.yaw_rad
     width = max(1, min(round(_SMOOTHED * record.sample_rate / frequency), yaw.size // 4))
@@ -88,8 +88,9 @@ def _crossings(
     change = np.flatnonzero(np.diff(np.sign(smooth[outside])) != 0.0)
     middles = 0.5 * (outside[change] + outside[change + 1]) + 0.5 * width
     crossings = np.concatenate([[0.0], middles])
-    turn = float(np.argmax(away) + 0.5 * width)
-    return crossings, int(np.searchsorted(crossings, turn)), turn
+    steps = float(np.argmax(away))
+    turn = steps + 0.5 * width
+    return crossings, int(np.searchsorted(crossings, turn)), (steps, turn)
 
 
 def _last_long_stretch(crossings: Array, largest: int) -> int | None:
