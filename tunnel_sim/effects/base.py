@@ -26,7 +26,7 @@ SPRING_TOLERANCE = 1e-6
 """Relative difference below which two stiffnesses belong to the same spring."""
 
 NEAR_MOTION = 0.3
-"""Difference from the motion's frequency or its multiples within which a line is the motion's own, as a share of it."""
+"""Distance from the motion's frequency or a multiple within which a line is the motion's own, as a share of it."""
 
 MULTIPLES = (1.0, 2.0, 3.0)
 """Multiples of the motion's frequency at which its harmonics lie."""
