@@ -101,23 +101,17 @@ def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: 
 
 
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
-    """The study with effects, pairs, random moments and outsiders fitted and weighed."""
-    nominal = found.nominal
-    hypotheses = _fit_effects(nominal, kinds, clock)
+    """The study with sets of effects, random moments and outsiders fitted and weighed."""
+    fitted = [kind for kind in kinds if kind.fitted]
+    if is_gross(found.nominal):
+        return _weigh_in_stretches(found, fitted, clock)
+    with clock.step("effects"):
+        found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress)))
     with clock.step("random moments"):
-        random = weigh_random_moments(nominal, hypotheses, {kind.name for kind in kinds})
-    found = replace(
-        found,
-        hypotheses=tuple(hypotheses),
-        random=tuple(random),
-        outsider=weigh_outsiders(nominal),
-    )
-    weighed = _weighed(found)
-    best = found.hypothesis(weighed[0].effects)
-    if best is not None and len(best.effects) > 1:
-        with clock.step("pruning"):
-            found = replace(found, hypotheses=(*found.hypotheses, *prune(best, found.hypotheses)))
-        weighed = _weighed(found)
+        random = weigh_random_moments(found.nominal, found.hypotheses, {kind.name for kind in kinds})
+    found = replace(found, random=tuple(random), outsider=weigh_outsiders(found.nominal))
+    found = _pruned(found, found.nominal, clock)
+    weighed = _weighed(found, found.nominal)
     if weighed[0].effects == ("unknown",) and _read_off_explains(found):
         weighed = []  # what is left belongs to the cause read off the records
     elif weighed[0].effects != ("unknown",):
@@ -129,26 +123,42 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     return replace(found, weighed=tuple(weighed))
 
 
-def _fit_effects(nominal: Fit, kinds: Sequence[type[Effect]], clock: _Clock) -> list[Hypothesis]:
-    """Sets of effects, best first."""
-    fitted = [kind for kind in kinds if kind.fitted]
-    seeds: list[Hypothesis] = []
-    if is_gross(nominal):
-        with clock.step("effects on stretches"):
-            seeds = grow_in_stretches(nominal, fit_nominal, fitted, clock.progress)
+def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+    """The study where the nominal model misses the motion itself: sets are weighed by their fits to stretches.
+
+    The answer's own fit is one of the whole runs.
+    """
+    data = found.nominal.problem.data
     with clock.step("effects"):
-        return grow(nominal, fitted, clock.progress, seeds)
+        grown = grow_in_stretches(data, fit_nominal, kinds, clock.progress)
+    found = replace(found, hypotheses=grown.hypotheses, outsider=weigh_outsiders(grown.nominal))
+    found = _pruned(found, grown.nominal, clock)
+    weighed = _weighed(found, grown.nominal)
+    if weighed[0].effects != ("unknown",):
+        with clock.step("polishing"):
+            polished = _polished(found.hypotheses, weighed[0], ())
+            whole = [grown.whole(h, data) if h.names == weighed[0].effects else h for h in polished]
+            found = replace(found, hypotheses=tuple(whole))
+    return replace(found, weighed=tuple(weighed))
 
 
-def _weighed(found: Study) -> list[Weighed]:
-    """The answers with their probabilities, most probable first."""
-    nominal = found.nominal
-    shares = [(h.effects, _share(h.fit, nominal)) for h in found.hypotheses]
+def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
+    """The study with every set that has one effect less than the answer."""
+    best = found.hypothesis(_weighed(found, base)[0].effects)
+    if best is None or len(best.effects) == 1:
+        return found
+    with clock.step("pruning"):
+        return replace(found, hypotheses=(*found.hypotheses, *prune(best, found.hypotheses)))
+
+
+def _weighed(found: Study, base: Fit) -> list[Weighed]:
+    """The answers with their probabilities, most probable first; shares of the gap that ``base`` leaves."""
+    shares = [(h.effects, _share(h.fit, base)) for h in found.hypotheses]
     shares += [(answer.effects, answer.share) for answer in found.random]
     return weigh(
         shares,
-        chance=nominal.chance,
-        excess=nominal.excess,
+        chance=base.chance,
+        excess=base.excess,
         outside=UNKNOWN_SHARE if found.outsider is None else found.outsider.share,
         forms={h.names: h.forms for h in found.hypotheses},
     )

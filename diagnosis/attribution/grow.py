@@ -14,7 +14,7 @@ from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
-from diagnosis.fitting.stretches import Stretches, fit_whole, in_stretches
+from diagnosis.fitting.stretches import Stretches, fit_longer, in_stretches, long_stretch
 from diagnosis.policy import (
     ALWAYS_FITTED,
     BEAM_WIDTH,
@@ -33,26 +33,20 @@ _ITERATIONS = 12  # of a fit on the way; the answer's own is polished
 Progress = Callable[[str], None]
 
 
-def grow(
-    nominal: Fit,
-    kinds: Sequence[type[Effect]],
-    progress: Progress | None = None,
-    seeds: Sequence[Hypothesis] = (),
-) -> list[Hypothesis]:
+def grow(nominal: Fit, kinds: Sequence[type[Effect]], progress: Progress | None = None) -> list[Hypothesis]:
     """Add effects one after another, to the best few sets of each size.
 
     Args:
         nominal: the fit without any effect.
         kinds: effects to try.
         progress: called with the names of each set.
-        seeds: sets fitted to the same runs; the growth goes on from the best of them.
 
     Returns:
         Fitted hypotheses of all sizes, best first. The growth ends where the evidence for a larger set falls or
         could not rise, and at `MOST_CAUSES`.
     """
-    found = {seed.names: seed for seed in seeds}
-    level = _by_evidence(seeds, nominal)[:1] or [Hypothesis((), nominal)]
+    found: dict[tuple[str, ...], Hypothesis] = {}
+    level = [Hypothesis((), nominal)]
     while _may_gain(level[0], nominal):
         count = FREED_HYPOTHESES if not level[0].effects else 1
         children = with_forms(_children(level, kinds, progress), level[0].fit, count)
@@ -65,48 +59,72 @@ def grow(
 
 
 @dataclass(frozen=True, eq=False)
-class _Grown:
-    """A set of causes fitted to stretches of the runs, and to the whole runs."""
+class InStretches:
+    """Sets of causes grown on stretches of the runs.
 
-    part: Hypothesis
-    whole: Hypothesis
+    Args:
+        nominal: fit of the nominal model to long stretches.
+        stretches: these.
+        hypotheses: sets of causes fitted to them.
+    """
+
+    nominal: Fit
+    stretches: Stretches
+    hypotheses: tuple[Hypothesis, ...]
+
+    def whole(self, hypothesis: Hypothesis, data: Data) -> Hypothesis:
+        """The hypothesis fitted to whole runs, from its fit to stretches; as it is where that fails."""
+        with suppress(FitError, np.linalg.LinAlgError):
+            return replace(hypothesis, fit=fit_longer(hypothesis.fit, self.stretches, data)[0])
+        return hypothesis
+
+
+@dataclass(frozen=True, eq=False)
+class _Grown:
+    """A set of causes fitted to short and to long stretches of the runs."""
+
+    short: Hypothesis
+    long: Hypothesis
 
 
 def grow_in_stretches(
-    nominal: Fit,
+    data: Data,
     fit_nominal: Callable[[Data], Fit],
     kinds: Sequence[type[Effect]],
     progress: Progress | None = None,
-) -> list[Hypothesis]:
+) -> InStretches:
     """Grow sets of causes on stretches of the runs, where the nominal model misses the motion itself.
 
     Args:
-        nominal: its fit to the whole runs.
-        fit_nominal: fits it to any runs.
+        data: the runs.
+        fit_nominal: fits the nominal model to any runs.
         kinds: effects to try; those that are autonomous are.
         progress: called with the names of each set.
 
     Returns:
-        The best sets of each size, with textbook forms, fitted to the whole runs from their fits to stretches.
+        The best sets of each size, with textbook forms. Effects are added in short stretches, in which the phase
+        cannot be lost, and compared in long ones.
     """
-    stretches = in_stretches(nominal.problem.data)
-    first = Hypothesis((), fit_nominal(stretches.data))
-    level, found = [_Grown(first, Hypothesis((), nominal))], []
+    short = in_stretches(data)
+    first = fit_nominal(short.data)
+    nominal, long = fit_longer(first, short, data, long_stretch(short))
+    level, found = [_Grown(Hypothesis((), first), Hypothesis((), nominal))], []
     able = [kind for kind in kinds if kind.autonomous]
-    while _may_gain(level[0].whole, nominal):
-        parts = sorted(_children([g.part for g in level], able, progress), key=lambda h: h.fit.total)
-        grown = [g for part in parts[:LENGTHENED] if (g := _lengthened(part, stretches, nominal)) is not None]
-        found += [g.whole for g in grown]
-        grown.sort(key=lambda g: -_evidence(g.whole, nominal))
-        if not grown or not _goes_on(grown[0].whole, level[0].whole, nominal):
+    while _may_gain(level[0].long, nominal):
+        tried = sorted(_children([g.short for g in level], able, progress), key=lambda h: h.fit.total)
+        grown = [g for h in tried[:LENGTHENED] if (g := _lengthened(h, short, data)) is not None]
+        found += [g.long for g in grown]
+        grown.sort(key=lambda g: -_evidence(g.long, nominal))
+        if not grown or not _goes_on(grown[0].long, level[0].long, nominal):
             break
         level = grown[:GROWN_FROM]
-    return found
+    return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
 
 
-def _lengthened(part: Hypothesis, stretches: Stretches, nominal: Fit) -> _Grown | None:
+def _lengthened(hypothesis: Hypothesis, short: Stretches, data: Data) -> _Grown | None:
     with suppress(FitError, np.linalg.LinAlgError):
-        return _Grown(part, replace(part, fit=fit_whole(part.fit, stretches, nominal.problem.data)))
+        found, _ = fit_longer(hypothesis.fit, short, data, long_stretch(short))
+        return _Grown(hypothesis, replace(hypothesis, fit=found))
     return None
 
 
