@@ -8,7 +8,9 @@ from decimal import Decimal
 
 import numpy as np
 
+from diagnosis.answer.determined import meant_coefficient
 from diagnosis.answer.held_out import HeldOut
+from diagnosis.answer.pulls import coefficient_move
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.rank import Hypothesis
 from diagnosis.fitting.least_squares import Fit
@@ -41,9 +43,11 @@ def coefficients(
     Returns:
         ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` in normalised form. The variance is that of the
         fit scaled by its excess, or where the residuals are coloured the greatest of that, the delete-a-group
-        jackknife (Kott, J. Off. Stat. 17 (2001) 521) and the scatter of the runs; plus the rounding of the air
-        density, plus the part of a cause's form that no free decay shows, plus half the change made by freeing
-        the forms (another family of forms may change as much), plus the spread over rivals.
+        jackknife (Kott, J. Off. Stat. 17 (2001) 521), the scatter of the runs and half the difference between two
+        halves of the data (`diagnosis.answer.pulls`); plus the rounding of the air density, plus the part of a
+        cause's form that no free decay shows, plus half the change made by freeing the forms (another family of
+        forms may change as much), plus the spread over rivals. No standard deviation is given at a bound and where
+        the runs do not determine the coefficient.
     """
     names = ("omega_n", "zeta") if fit.problem.data.normalised else ("cn_beta", "cn_r")
     result = {}
@@ -59,8 +63,15 @@ def coefficients(
         unfreed = None if textbook is None else _value_only(textbook, name)
         moved = 0.0 if unfreed is None else FORM_CHANGE_STD * (value - unfreed)
         variance = std**2 + rounding**2 + unseen**2 + moved**2 + spread
-        result[name] = ParameterEstimate(value, math.sqrt(variance), _UNITS[name])
+        result[name] = _estimate(fit, name, value, math.sqrt(variance))
     return result
+
+
+def _estimate(fit: Fit, name: str, value: float, std: float) -> ParameterEstimate:
+    """A coefficient, marked where the fit stopped at a bound or the runs do not determine it."""
+    bound = fit.bound("stiffness" if name == "omega_n" else name) if name != "zeta" else None
+    found = ParameterEstimate(value, None if bound else std, _UNITS[name], bound)
+    return meant_coefficient(found, fit, name)
 
 
 def _unseen_form(fit: Fit, name: str) -> float:
@@ -122,6 +133,8 @@ def _value(fit: Fit, held_out: HeldOut, name: str) -> tuple[float | None, float]
         count = len(values)
         jackknife = math.sqrt((count - 1.0) / count * sum((v - value) ** 2 for v in values if v is not None))
         std = max(std, jackknife)
+    if fit.excess > COLOURED_EXCESS:
+        std = max(std, coefficient_move(fit, name))
     if fit.excess > COLOURED_EXCESS and name in fit.problem.names:
         std = max(std, _scatter_of_runs(fit, name))
     return value, std

@@ -32,14 +32,14 @@ class Subsets:
             names: some of the causes.
 
         Returns:
-            The better of the study's own fit, one started from the fit of all causes, and the known fits of fewer
-            of them: a cause that gains nothing leaves the fit as it was.
+            The study's own fit, or else one started from the fit of all causes; a fit of fewer of them where that
+            is better: a cause that gains nothing leaves the fit as it was.
         """
         key = frozenset(names)
         if key not in self._fits:
             own = self._study.hypothesis(sorted(key))
             fewer = [known for subset, known in self._fits.items() if subset < key]
-            tried = [*fewer, *([own.fit] if own else []), *self._refitted(key)]
+            tried = [*fewer, *(self._refitted(key) if own is None else [own.fit])]
             self._fits[key] = min(tried, key=lambda found: found.total)
         return self._fits[key]
 
