@@ -13,7 +13,7 @@ from diagnosis.detection.gap import test_gap
 from diagnosis.policy import GAP_FALSE_ALARM_RATE, MATERIAL_SHARE
 from diagnosis.result import ParameterEstimate
 from diagnosis.study import Study
-from identification.printing.numbers import COEFFICIENTS, unit_mark
+from identification.printing.numbers import COEFFICIENTS, significant, unit_mark
 
 Estimates = Mapping[str, ParameterEstimate]
 
@@ -96,7 +96,7 @@ def _each(names: list[str], size: Callable[[str], str]) -> str:
 
 
 def _noise_powers(excess: float) -> str:
-    return "less than 0.001 noise powers" if excess < 1e-3 else f"{excess:.3g} noise powers"
+    return "less than 0.001 noise powers" if excess < 1e-3 else f"{significant(excess, 2)} noise powers"
 
 
 def _sized(size: float, given: ParameterEstimate) -> str:

@@ -50,11 +50,14 @@ def verdict(
             f"There is a gap ({before:.2f} times the noise power), and no effect of the vocabulary explains it. "
             f"{rest}"
         )
-    sources = "; ".join(_source(name, both_winds=both_winds) for name in causes)
+    several = len(causes) > 1
+    sources = "; ".join(
+        _source(name, both_winds=both_winds) + (f" ({plain([name])})" if several else "") for name in causes
+    )
     return (
         f"The gap ({before:.2f} times the noise power) comes from {plain(causes)} "
         f"(probability {probability:.2f}): "
-        f"{sources}. With {'it' if len(causes) == 1 else 'them'} added, {100.0 * closed:.1f} % of the gap "
+        f"{sources}. With {'them' if several else 'it'} added, {100.0 * closed:.1f} % of the gap "
         f"closes {closed_on}. {rest}"
     )
 
