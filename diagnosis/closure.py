@@ -31,7 +31,7 @@ class Waterfall:
         held_out: what was held out, in words.
     """
 
-    steps: tuple[Step, ...]
+    steps: tuple[Step, ...] = ()
     without: Mapping[str, float] = field(default_factory=dict)
     held_out: str = ""
 

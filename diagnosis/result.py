@@ -254,7 +254,7 @@ class Diagnosis:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[Remark, ...] = ()
     inclusion: Mapping[str, float] = field(default_factory=dict)
-    waterfall: Waterfall = Waterfall(())
+    waterfall: Waterfall = field(default_factory=Waterfall)
     rest: Rest | None = None
 
     def to_json_dict(self) -> dict[str, Any]:

@@ -151,10 +151,11 @@ def fit_seen(whole: Fit, seen: Sequence[NDArray[np.bool_]]) -> tuple[Point, list
         seen: by run the blocks to fit, shape (n,).
 
     Returns:
-        The point found, and the scaled residuals of all blocks there. The own parameters of a run that is not seen
-        stay as they were.
+        The point found, and the scaled residuals of all blocks there. Parameters at a bound, and the own parameters
+        of a run that is not seen, stay as they were.
     """
-    slopes = [(c[s], r[s]) for (c, r), s in zip(whole.jacobian, seen, strict=True)]
+    free = np.array([whole.bound(name) is None for name in whole.problem.names], np.float64)
+    slopes = [(c[s] * free, r[s]) for (c, r), s in zip(whole.jacobian, seen, strict=True)]
 
     def look(point: Point) -> tuple[Point, list[Array], list[Array], float]:
         residuals = scaled_residuals(whole.problem, point)
@@ -167,9 +168,7 @@ def fit_seen(whole: Fit, seen: Sequence[NDArray[np.bool_]]) -> tuple[Point, list
     for _ in range(_STEPS):
         before = cost
         for _ in range(_TRIES):
-            there = look(
-                clip(whole.problem, damped_step(whole.problem, point, visible, slopes, damping))
-            )
+            there = look(clip(whole.problem, damped_step(whole.problem, point, visible, slopes, damping)))
             if there[-1] < cost:
                 point, residuals, visible, cost = there
                 damping *= 0.2

@@ -17,8 +17,8 @@ def inclusion(candidates: Sequence[Candidate], read_off: Sequence[str]) -> dict[
         read_off: causes read off the records before any fit.
 
     Returns:
-        The sum of the probabilities of the answers that name the effect; of a cause read off the records 1 minus the
-        false-alarm rate of its test.
+        The sum of the probabilities of the answers that name the effect; of a cause read off the records 1 minus
+        the rate at which a campaign without a gap is said to have one.
     """
     names = [frozenset(candidate.effect.split(" + ")) for candidate in candidates]
     found = {}

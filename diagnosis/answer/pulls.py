@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.fitting.least_squares import Fit, normal_equations
 from diagnosis.fitting.spectra import resonance
@@ -70,7 +71,9 @@ def _half_difference(pieces: _Pieces, order: Array) -> float:
 def _pieces(fit: Fit, gradient: Array) -> _Pieces:
     matrix, slope, solutions = normal_equations(fit.jacobian, fit.residuals)
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    inverse = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-12, hermitian=True) / np.outer(size, size)
+    inverse = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-12, hermitian=True) / np.outer(
+        size, size
+    )
     direction, step = inverse @ gradient, inverse @ slope  # the step is what the fit had still to go
     rows: list[tuple[float, ...]] = []
     for index, (run, (common, release), residual, solution) in enumerate(
@@ -92,11 +95,10 @@ def _pieces(fit: Fit, gradient: Array) -> _Pieces:
     return _Pieces(pull, weight, tuple(orders))
 
 
-def _starts(count: int, cycles: float) -> Array:
+def _starts(count: int, cycles: float) -> NDArray[np.int64]:
     """First block of every whole cycle of a run of ``count`` blocks with ``cycles`` cycles to a block."""
-    pieces = max(int(count * cycles), 1)
-    starts: Array = np.arange(min(pieces, count)) * count // min(pieces, count)
-    return starts
+    pieces = min(max(int(count * cycles), 1), count)
+    return np.arange(pieces, dtype=np.int64) * count // pieces
 
 
 def _gradient(fit: Fit, name: str) -> Array:

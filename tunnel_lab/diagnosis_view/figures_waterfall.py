@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,8 +36,8 @@ def waterfall_figure(document: Document) -> Figure | None:
         document: a diagnosis.
 
     Returns:
-        A bar for the nominal gap; for each cause one from what was left before it to what it leaves; and one for the
-        rest, on a logarithmic scale. None where no cause is named.
+        A bar for the nominal gap; for each cause one from what was left before it to what it leaves; and one for
+        the rest, on a logarithmic scale. None where no cause is named.
     """
     steps = document.get("waterfall", [])
     if len(steps) < 2:
@@ -65,7 +66,7 @@ def _bars(axes: Axes, left: Array, floor: float) -> None:
     shown = np.maximum(left, floor)
     starts = np.array([floor, *np.minimum(shown[:-1], shown[1:]), floor])
     ends = np.array([shown[0], *np.maximum(shown[:-1], shown[1:]), shown[-1]])
-    steps = [AFTER if after <= before else BEFORE for before, after in zip(left[:-1], left[1:], strict=True)]
+    steps = [AFTER if after <= before else BEFORE for before, after in pairwise(left)]
     rows = np.arange(left.size + 1)
     axes.barh(rows, ends - starts, left=starts, color=[BEFORE, *steps, ACCENT], height=0.6)
     axes.vlines(shown, rows[:-1], rows[1:], color=QUIET, linewidth=0.8)

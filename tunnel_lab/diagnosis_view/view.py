@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from diagnosis.policy import LISTED_PROBABILITY
 from diagnosis.names import plain as words
+from diagnosis.policy import LISTED_PROBABILITY
 from diagnosis.printing import held_out_excess, probability
 from identification.printing.numbers import (
     COEFFICIENTS,
