@@ -7,6 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from diagnosis.printing import inclusion_line
 from identification.printing.numbers import p_text, significant
 from tunnel_lab.diagnosis_view import view
 from tunnel_lab.diagnosis_view.figures import diagnosis_figures
@@ -90,7 +91,7 @@ def _context(document: Document, campaign: Campaign) -> dict[str, Any]:
         "candidates": candidates,
         "more": more,
         "causes": view.cause_paragraphs(document),
-        "inclusion": view.inclusion_rows(document),
+        "inclusion": view.plain(inclusion_line(document)),
         "steps": view.step_rows(document),
         "rivals": [view.plain(name) for name in document["ambiguous_with"]],
         "next_run": view.next_run_rows(document),

@@ -8,7 +8,7 @@ from typing import Any
 
 from diagnosis.names import plain as words
 from diagnosis.policy import LISTED_PROBABILITY
-from diagnosis.printing import held_out_excess, probability
+from diagnosis.printing import held_out_excess
 from identification.printing.numbers import (
     COEFFICIENTS,
     UNDETERMINED,
@@ -181,19 +181,6 @@ def candidate_rows(document: Document) -> tuple[list[dict[str, Any]], int]:
         for c in candidates[:count]
     ]
     return rows, max(len(candidates) - count, 0)
-
-
-def inclusion_rows(document: Document) -> list[tuple[str, str]]:
-    """The effects that may be among the causes.
-
-    Args:
-        document: the diagnosis.
-
-    Returns:
-        Names and probabilities, most probable first; those of 0.01 and more.
-    """
-    found = sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1])
-    return [(plain(name), probability(value)) for name, value in found if value >= LISTED_PROBABILITY]
 
 
 def step_rows(document: Document) -> list[dict[str, str]]:
