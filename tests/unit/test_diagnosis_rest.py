@@ -121,12 +121,16 @@ def test_a_small_rest_of_a_named_cause_is_said_to_be_small(data, base):
     study = studied(data, base, (CAUSE,), base)
     found = judged(replace(study, test=replace(study.test, p_value=0.0)), 0.0, 0.0001)
     assert found.words == "Explained; what remains (0.40 noise powers) moves Cnβ by less than 0.02 %."
-    assert judged(study, 0.0, None).words.startswith("Explained; what remains (0.40 noise powers) concerns no")
+    assert judged(study, 0.0, None).words.startswith(
+        "Explained; what remains (0.40 noise powers) concerns no"
+    )
 
 
 def test_no_gap_leaves_nothing(data, base):
     study = studied(data, base)
-    assert judged(replace(study, test=replace(study.test, p_value=0.7)), 0.0, 0.001).words.startswith("No gap")
+    assert judged(replace(study, test=replace(study.test, p_value=0.7)), 0.0, 0.001).words.startswith(
+        "No gap"
+    )
 
 
 @pytest.mark.parametrize(("std", "determined"), [(0.05, True), (1.0, True), (1000.0, False)])

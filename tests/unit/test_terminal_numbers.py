@@ -73,7 +73,11 @@ def test_parameters_of_the_answer(given: Document) -> None:
     }
     found = rows(printing.parameters_table(given))
     assert [row[:2] for row in found] == [["a", "x"], ["", "y"], ["b", "x"]]
-    assert [row[2] for row in found] == ["0.250 ± 0.010", "2.500 (at its upper bound)", "not determined by these runs"]
+    assert [row[2] for row in found] == [
+        "0.250 ± 0.010",
+        "2.500 (at its upper bound)",
+        "not determined by these runs",
+    ]
     given["candidates"] = given["candidates"][-2:]
     given["candidates"][0]["parameters"] = {}
     assert rows(printing.parameters_table(given)) == []

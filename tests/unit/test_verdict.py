@@ -40,7 +40,9 @@ def said(*causes: str, closed_on: str = "somewhere", both_winds: bool = True) ->
 def test_the_runs_of_the_closure_are_named(held_out, closed_on, after_on):
     found = gap(*held_out)
     assert (found.closed_on, found.after_on) == (closed_on, after_on)
-    assert f"closes {closed_on}. What remains is small." in said("coulomb_friction", closed_on=found.closed_on)
+    assert f"closes {closed_on}. What remains is small." in said(
+        "coulomb_friction", closed_on=found.closed_on
+    )
 
 
 def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
