@@ -10,6 +10,7 @@ from diagnosis.answer.held_out import HeldOut, predict_held_out
 from diagnosis.answer.reported import Base
 from diagnosis.answer.stretches import Turns, predict_stretches, turns_of
 from diagnosis.answer.subsets import Names, Subsets
+from diagnosis.attribution.random_moments import RandomAnswer
 from diagnosis.closure import Step, Waterfall
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.study import COARSE_STEP, HUM, Study
@@ -37,12 +38,14 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
         names |= {best}
         left.remove(best)
         steps.append(Step(best, models.excess(names)))
-    without = {name: models.excess(models.causes - {name}) for name in sorted(models.causes)}
     random = study.random_answer(study.fitted)
-    if random is not None:
-        steady = models.causes & models.read_off
-        without = {name: without[name] for name in sorted(steady)} | {random.kind.name: steps[-1].excess}
-        steps.append(Step(random.kind.name, models.random_excess()))
+    if random is None:
+        without = {name: models.excess(models.causes - {name}) for name in sorted(models.causes)}
+    else:
+        last = models.random_excess(random)
+        without = {name: last + size for name, size in models.read_off.items()}
+        without[random.kind.name] = steps[-1].excess
+        steps.append(Step(random.kind.name, last))
     return Waterfall(tuple(steps), without, models.words)
 
 
@@ -52,13 +55,12 @@ class _Models:
     def __init__(self, study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> None:
         self._study, self._base, self._known = study, base, dict(known)
         named = study.causes != ("unknown",)
-        read_off = {HUM.name: base.hum, COARSE_STEP.name: base.extra}
-        self._constant = {name: read_off[name] for name in study.read_off if named}
+        powers = {HUM.name: base.hum, COARSE_STEP.name: base.extra}
+        self.read_off = {name: powers[name] for name in study.read_off if named}  # and what each adds
         self._ratio = 1.0 + base.extra  # of the estimated noise to the base
-        self._always = base.hum + base.extra - sum(self._constant.values())
+        self._always = base.hum + base.extra - sum(self.read_off.values())
         self._fit = Subsets(study)
-        self.read_off = frozenset(self._constant)
-        self.causes: Names = self._fit.causes | self.read_off
+        self.causes: Names = self._fit.causes | self.read_off.keys()
         out = self._held_out(study.nominal)
         self._ids = [run.id for run in study.nominal.problem.data.runs]
         self._turns: Turns = turns_of(study.nominal, {run for run in self._ids if run not in out.residuals})
@@ -76,20 +78,18 @@ class _Models:
 
     def fitted_excess(self, names: Names) -> float:
         """What the causes leave in the readings they are fitted to, in noise variances of a sample."""
-        fitted = self._fit(names - self.read_off)
+        fitted = self._fit(names - self.read_off.keys())
         return self._in_samples(dict(zip(self._ids, fitted.residuals, strict=True))) + self._left(names)
 
     def excess(self, names: Names) -> float:
         """What the causes leave in readings held out of the fit, in noise variances of a sample."""
-        fitted = self._fit(names - self.read_off)
+        fitted = self._fit(names - self.read_off.keys())
         if fitted not in self._excess:
             self._excess[fitted] = self._in_samples(self._predicted(fitted))
         return self._excess[fitted] + self._left(names)
 
-    def random_excess(self) -> float:
-        """What all causes leave, one of them a random moment: its innovations where the wind is on."""
-        random = self._study.random_answer(self._study.fitted)
-        assert random is not None
+    def random_excess(self, random: RandomAnswer) -> float:
+        """What all causes and a random moment leave: the moment's innovations where the wind is on."""
         runs = self._study.nominal.problem.data.runs
         still = self._predicted(self._study.chosen)
         by_run = {
@@ -100,7 +100,7 @@ class _Models:
 
     def _left(self, names: Names) -> float:
         """What the causes read off the records, as far as not among the names, add to the excess."""
-        return self._always + sum(size for name, size in self._constant.items() if name not in names)
+        return self._always + sum(size for name, size in self.read_off.items() if name not in names)
 
     def _predicted(self, fitted: Fit) -> dict[str, Array]:
         seen = dict(zip(self._ids, fitted.residuals, strict=True))

@@ -213,9 +213,9 @@ def p_text(value: float) -> str:
         value: a probability.
 
     Returns:
-        Two significant digits, such as ``3.7e-08``, or ``< 1e-300``.
+        Two significant digits, such as ``= 3.7e-08``, or ``< 1e-300``.
     """
-    return f"{value:.2g}" if value >= _LEAST_P else f"< {_LEAST_P:.0e}"
+    return f"= {value:.2g}" if value >= _LEAST_P else f"< {_LEAST_P:.0e}"
 
 
 _LEAST_P = 1e-300  # close to the smallest number that a computer represents

@@ -97,7 +97,9 @@ def _context(document: Document, campaign: Campaign) -> dict[str, Any]:
         "next_run": view.next_run_rows(document),
         "runs": view.run_rows(document, campaign),
         "coefficients": view.coefficient_rows(document),
-        "tests": [(name, p_text(value)) for name, value in document["gap"]["tests"].items()],
+        "tests": [
+            (name, p_text(value).removeprefix("= ")) for name, value in document["gap"]["tests"].items()
+        ],
         "seconds": [(name, f"{value:.1f} s") for name, value in document["seconds"].items()],
         "noise": _noise_rows(document) + _confirmation_rows(document),
         "provenance": _flat(document.get("provenance") or {}),
