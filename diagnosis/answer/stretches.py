@@ -46,7 +46,7 @@ def predict_stretches(whole: Fit, turns: Turns) -> dict[str, Array]:
 
     Returns:
         By id of the runs that are divided: reading minus prediction in noise standard deviations, every block
-        predicted by the fit that has not seen it.
+        predicted by the fit that has not seen it, unless that fit failed.
     """
     runs = whole.problem.data.runs
     found = {
@@ -54,7 +54,10 @@ def predict_stretches(whole: Fit, turns: Turns) -> dict[str, Array]:
     }
     for number in range(FOLDS if found else 0):
         out = [turn == number for turn in turns]
-        _, residuals = fit_seen(whole, [~left for left in out])
+        try:
+            _, residuals = fit_seen(whole, [~left for left in out])
+        except np.linalg.LinAlgError:
+            continue
         for run, residual, left in zip(runs, residuals, out, strict=True):
             if left.any():
                 found[run.id][left] = residual[left]

@@ -104,7 +104,10 @@ class _Models:
 
     def _predicted(self, fitted: Fit) -> dict[str, Array]:
         seen = dict(zip(self._ids, fitted.residuals, strict=True))
-        return seen | self._held_out(fitted).residuals | predict_stretches(fitted, self._turns)
+        found = seen | self._held_out(fitted).residuals | predict_stretches(fitted, self._turns)
+        still = {run.id: run.reading / np.sqrt(run.noise_variance) for run in fitted.problem.data.runs}
+        # a prediction that grows without bound is as good as none
+        return {run: r if np.all(np.isfinite(r)) else still[run] for run, r in found.items()}
 
     def _held_out(self, fitted: Fit) -> HeldOut:
         if fitted not in self._known:
