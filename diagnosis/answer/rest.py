@@ -50,11 +50,13 @@ def _is_material(move: Move) -> bool:
 
 
 def _p_value(study: Study) -> float:
-    """The test of the gap, of the residuals of the answer's fit; with a random moment, of its innovations."""
+    """The test of the gap, of the residuals of the answer's fit; in its wind a random moment leaves innovations."""
     random = study.random_answer(study.fitted)
     if random is not None:
-        squares = np.concatenate([i**2 for i in random.process.innovations])
-        return float(chi2.sf(squares.sum(), squares.size))
+        runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
+        still = [residual for run, residual in runs if not run.wind_on]
+        left = np.concatenate([*random.process.innovations, *still])
+        return float(chi2.sf(left @ left, left.size))
     if study.chosen is study.nominal:
         return study.test.p_value
     # no cause changes the tests of the noise itself: those of the residuals count

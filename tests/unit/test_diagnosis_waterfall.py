@@ -15,6 +15,9 @@ from diagnosis.answer.stretches import predict_stretches, turns_of
 from diagnosis.answer.subsets import Subsets
 from diagnosis.answer.waterfall import waterfall
 from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.process_noise import ProcessNoise, Spectrum
+from diagnosis.attribution.random_moments import RandomAnswer
+from diagnosis.attribution.rank import Hypothesis
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.starting_points import starting_points
@@ -148,3 +151,23 @@ def test_the_probability_of_an_effect_is_that_of_the_answers_that_name_it():
     assert found["sensor_drift"] == pytest.approx(0.625)
     assert found[HUM] == 1.0 - 1e-3
     assert found[CAUSE] == 0.0
+
+
+def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
+    """Where the wind is off the runs' own residuals are left, and nothing beside the moment is taken out."""
+    kind = effect_class("buffeting")
+    best = added(base, IDLE)
+    windy = tuple(run.id for run in data.runs if run.wind_on)
+    process = ProcessNoise(Spectrum(0.01, 5.0), 10.0, 5.0, 3.0, 0.25, [np.ones(9)] * 4, windy, 0.012)
+    random = RandomAnswer(kind, process, Hypothesis((IDLE,), best), 0.01)
+    study = studied(data, base, (kind.name, IDLE, HUM))
+    study = replace(study, random=(random,), weighed=(Weighed((kind.name, IDLE), 0.01, 0.9),))
+    found = waterfall(study, replace(NO_BASE, hum=2.0), {})
+    still = predict_held_out(best).excess
+    off = [still[run.id] for run in data.runs if not run.wind_on]
+    assert {step.effect for step in found.steps[1:-1]} == {IDLE, HUM}
+    assert found.steps[-1].effect == kind.name
+    assert found.steps[-1].excess == pytest.approx((4 * 0.25 + sum(off)) / 6)
+    assert set(found.without) == {HUM, kind.name}
+    assert found.without[HUM] == pytest.approx(found.steps[-1].excess + 2.0)
+    assert found.without[kind.name] == found.steps[-2].excess
