@@ -48,7 +48,7 @@ def meant_coefficient(found: ParameterEstimate, fit: Fit, name: str) -> Paramete
 
 
 def _limited(found: ParameterEstimate, greatest: float) -> ParameterEstimate:
-    if found.std is None or found.std <= greatest:
+    if found.std is None or 0.0 < found.std <= greatest:  # 0: the readings do not depend on it
         return found
     return replace(found, std=None, determined=False)
 

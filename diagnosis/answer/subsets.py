@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from contextlib import suppress
+from functools import partial
 
 import numpy as np
 
-from diagnosis.fitting.least_squares import Fit, FitError, fit
+from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_growing
 from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
 from diagnosis.study import Study
+from tunnel_sim.effects import Effect
 
 _ITERATIONS = 6  # the fit of all causes is close for the parameters that are left
+_NO_GAIN = 0.999  # of the χ² of a fit of fewer causes: another start may do better
 
 Names = frozenset[str]
 
@@ -32,24 +36,56 @@ class Subsets:
             names: some of the causes.
 
         Returns:
-            The study's own fit, or else one started from the fit of all causes; a fit of fewer of them where that
-            is better: a cause that gains nothing leaves the fit as it was.
+            The study's own fit, or else one started from the fit of all causes. Where a fit of fewer of them is
+            better, the missing cause is added to that; a cause that gains nothing leaves the fit as it was.
         """
         key = frozenset(names)
         if key not in self._fits:
+            fewer = min((known for known in self._fits if known < key), key=lambda k: self._fits[k].total)
             own = self._study.hypothesis(sorted(key))
-            fewer = [known for subset, known in self._fits.items() if subset < key]
-            tried = [*fewer, *(self._refitted(key) if own is None else [own.fit])]
-            self._fits[key] = min(tried, key=lambda found: found.total)
+            found = self._from_all(key) if own is None else own.fit
+            if found is None or found.total > _NO_GAIN * self._fits[fewer].total:
+                found = self._from_fewer(fewer, key) or found
+            known = self._fits[fewer]
+            self._fits[key] = known if found is None or found.total > known.total else found
         return self._fits[key]
 
-    def _refitted(self, names: Names) -> list[Fit]:
+    def _from_all(self, names: Names) -> Fit | None:
+        """A fit started from that of all causes, with its sensitivities."""
         start = restricted(self._study.chosen, names)
-        with suppress(FitError, np.linalg.LinAlgError):
-            found = fit(start.problem, start.point, base=start, tolerance=1e-3, max_iterations=_ITERATIONS)
-            if np.isfinite(found.total):
-                return [found]
-        return []
+        return _fitted(
+            lambda: fit(start.problem, start.point, base=start, tolerance=1e-3, max_iterations=_ITERATIONS)
+        )
+
+    def _from_fewer(self, fewer: Names, names: Names) -> Fit | None:
+        """A fit in which the missing causes are added to a fit of fewer, one after another."""
+        kinds = [kind for kind in self._study.chosen.problem.effects if kind.name in names - fewer]
+        found: Fit | None = self._fits[fewer]
+        for kind in kinds:
+            found = None if found is None else _one_more(found, kind)
+        return found
+
+
+def _one_more(base: Fit, kind: type[Effect]) -> Fit | None:
+    """The better of the fits from the first two starting points of an effect; None where none succeeds."""
+    gross = is_gross(base)
+    starts = sorted(starting_points(base, kind), key=lambda start: not (gross and start.balanced))[:2]
+    tried = [_fitted(partial(_added, base, start, growing=gross)) for start in starts]
+    return min((found for found in tried if found), key=lambda found: found.total, default=None)
+
+
+def _added(base: Fit, start: StartingPoint, *, growing: bool) -> Fit:
+    if growing:
+        return fit_growing(start.problem, start.point)
+    return fit(start.problem, start.point, base=base)
+
+
+def _fitted(attempt: Callable[[], Fit]) -> Fit | None:
+    """The result of a fit; None where it fails."""
+    with suppress(FitError, np.linalg.LinAlgError):
+        found = attempt()
+        return found if np.isfinite(found.total) else None
+    return None
 
 
 def restricted(whole: Fit, names: Names) -> Fit:

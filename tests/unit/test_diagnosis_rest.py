@@ -133,7 +133,7 @@ def test_no_gap_leaves_nothing(data, base):
     )
 
 
-@pytest.mark.parametrize(("std", "determined"), [(0.05, True), (1.0, True), (1000.0, False)])
+@pytest.mark.parametrize(("std", "determined"), [(0.05, True), (1.0, True), (1000.0, False), (0.0, False)])
 def test_a_parameter_without_an_order_of_magnitude_is_not_determined(std, determined):
     (info,) = effect_class("cubic_stiffness").parameters()[:1]
     given = ParameterEstimate(0.2, std, "1/rad2")
