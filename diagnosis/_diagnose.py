@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from diagnosis.answer.assemble import assemble
+from diagnosis.answer.own_units import in_own_units
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.refusal import refuse_hopeless
 from diagnosis.investigate import Progress, investigate
@@ -41,7 +42,8 @@ def diagnose(
     if progress is not None:
         progress("where, and how far it closes")
     where, maps = localise(study)
-    return replace(assemble(study, where, maps, left_out), remarks=examined.remarks)
+    answer = replace(assemble(study, where, maps, left_out), remarks=examined.remarks)
+    return in_own_units(answer, study.similarity)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

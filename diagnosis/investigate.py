@@ -9,10 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.attribution.decide import Weighed, form_floor, weigh
+from diagnosis.attribution.decide import Weighed, weigh
+from diagnosis.attribution.grow import grow, grow_in_stretches, prune
+from diagnosis.attribution.hypothesis import Hypothesis, polish
 from diagnosis.attribution.outsiders import weigh_outsiders
 from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
-from diagnosis.attribution.rank import Hypothesis, polish, rank_pairs, rank_singles
 from diagnosis.detection.gap import test_gap
 from diagnosis.detection.mains import find_hum, refine_frequency, remove_hum
 from diagnosis.detection.refusal import refuse_indefinite
@@ -20,6 +21,7 @@ from diagnosis.detection.sensor_noise import campaign_noise, noise_trend, readin
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.run_data import Data, prepare, without_start
+from diagnosis.fitting.similarity import Similarity, similar_campaign
 from diagnosis.fitting.starting_points import is_gross, nominal_start
 from diagnosis.policy import COARSE_STEP_POWER, COARSER_STEP, HUM_LEFT, NOISE_EXPLAINS_UP_TO, UNKNOWN_SHARE
 from diagnosis.study import COARSE_STEP, HUM, Study
@@ -41,13 +43,13 @@ def investigate(
         progress: called with the name of each step.
 
     Returns:
-        What was found.
+        What was found, in the units of the similar campaign.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
     clock = _Clock(progress)
-    found = _test(campaign, {kind.name for kind in kinds}, clock)
+    found = _test(*similar_campaign(campaign), {kind.name for kind in kinds}, clock)
     if found.test.detected:
         found = _weigh_effects(found, kinds, clock)
     return replace(found, seconds=clock.seconds)
@@ -76,41 +78,46 @@ def fit_nominal(data: Data) -> Fit:
     return found
 
 
-def _test(campaign: Campaign, allowed: set[str], clock: _Clock) -> Study:
+def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: _Clock) -> Study:
     """The study up to the test of the gap: noise, hum and nominal fit."""
     with clock.step("noise"):
         noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
         coarse = COARSE_STEP.name in allowed and stated is not None and step > COARSER_STEP * stated
     with clock.step("nominal fit"):
-        nominal = fit_nominal(prepare(campaign, noise.variance))
+        nominal = fit_nominal(prepare(campaign, noise.variance, similarity))
         cleaned, hum = campaign, None
         line = find_hum(nominal) if HUM.name in allowed else None
         if line is not None:
             frequency = refine_frequency(campaign, line)
             cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
             noise = campaign_noise(cleaned)
-            nominal = fit_nominal(prepare(cleaned, noise.variance))
+            nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
         started_late = is_gross(nominal)
         if started_late:
             nominal = fit_nominal(without_start(nominal.problem.data))
         test = test_gap(nominal, noise, trend, coarse_step=coarse)
-    return Study(campaign, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
+    return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
 
 
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
     """The study with effects, pairs, random moments and outsiders fitted and weighed."""
     nominal = found.nominal
-    singles, pairs = _fit_effects(nominal, kinds, clock)
+    hypotheses = _fit_effects(nominal, kinds, clock)
     with clock.step("random moments"):
-        random = weigh_random_moments(nominal, singles, pairs, {kind.name for kind in kinds})
+        random = weigh_random_moments(nominal, hypotheses, {kind.name for kind in kinds})
     found = replace(
         found,
-        hypotheses=(*singles, *pairs),
+        hypotheses=tuple(hypotheses),
         random=tuple(random),
         outsider=weigh_outsiders(nominal),
     )
     weighed = _weighed(found)
+    best = found.hypothesis(weighed[0].effects)
+    if best is not None and len(best.effects) > 1:
+        with clock.step("pruning"):
+            found = replace(found, hypotheses=(*found.hypotheses, *prune(best, found.hypotheses)))
+        weighed = _weighed(found)
     if weighed[0].effects == ("unknown",) and _read_off_explains(found):
         weighed = []  # what is left belongs to the cause read off the records
     elif weighed[0].effects != ("unknown",):
@@ -122,17 +129,15 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     return replace(found, weighed=tuple(weighed))
 
 
-def _fit_effects(
-    nominal: Fit, kinds: Sequence[type[Effect]], clock: _Clock
-) -> tuple[list[Hypothesis], list[Hypothesis]]:
-    """Single effects, and pairs where no single effect closes the gap; each best first."""
+def _fit_effects(nominal: Fit, kinds: Sequence[type[Effect]], clock: _Clock) -> list[Hypothesis]:
+    """Sets of effects, best first."""
     fitted = [kind for kind in kinds if kind.fitted]
-    with clock.step("single effects"):
-        singles = rank_singles(nominal, fitted, clock.progress)
-    if not singles or _share(singles[0].fit, nominal) <= form_floor(nominal.excess, singles[0].effects):
-        return singles, []
-    with clock.step("pairs"):
-        return singles, rank_pairs(singles, fitted, clock.progress)
+    seeds: list[Hypothesis] = []
+    if is_gross(nominal):
+        with clock.step("effects on stretches"):
+            seeds = grow_in_stretches(nominal, fit_nominal, fitted, clock.progress)
+    with clock.step("effects"):
+        return grow(nominal, fitted, clock.progress, seeds)
 
 
 def _weighed(found: Study) -> list[Weighed]:
@@ -142,7 +147,7 @@ def _weighed(found: Study) -> list[Weighed]:
     shares += [(answer.effects, answer.share) for answer in found.random]
     return weigh(
         shares,
-        chance=float(np.sqrt(2.0 / nominal.count)) / max(nominal.excess, 1e-3),
+        chance=nominal.chance,
         excess=nominal.excess,
         outside=UNKNOWN_SHARE if found.outsider is None else found.outsider.share,
         forms={h.names: h.forms for h in found.hypotheses},

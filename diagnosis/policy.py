@@ -57,8 +57,17 @@ GROSS_MISFIT = 0.01
 ALWAYS_FITTED = 7
 #: Predicted drop, as a share of χ², beyond which others are fitted too. Judgement.
 PREDICTED_SHARE = 0.01
-#: Single effects to which a second is added, and second effects fitted to each. Judgement: time against coverage.
-PAIR_BASES, PAIR_SECONDS = 3, 4
+#: Sets of each size to which another effect is added, and effects fitted to each. Judgement: time against coverage.
+GROWN_FROM, GROWN_BY = 3, 4
+#: Excess, in that of the best set of its size, up to which another set is grown. Judgement: time against coverage.
+BEAM_WIDTH = 3.0
+#: Factor by which the evidence for a set may fall when an effect is added, for the growth to go on. Judgement: where
+#: three equal causes are missing, the first closes a third of what is left, which lowers the evidence to 0.2.
+GROWTH_EVIDENCE = 0.1
+#: Sets of each size, found on stretches, that are fitted to whole runs. Judgement: time against coverage.
+LENGTHENED = 4
+#: Causes named at most. Convention: the vocabulary's one to four, and a small one beside them.
+MOST_CAUSES = 5
 #: Hypotheses whose forms are freed, and the share they must leave open with the textbook form (0008).
 FREED_HYPOTHESES, FREED_FROM = 3, 0.02
 

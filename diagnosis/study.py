@@ -6,13 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.outsiders import Outsider
 from diagnosis.attribution.random_moments import RandomAnswer
-from diagnosis.attribution.rank import Hypothesis
 from diagnosis.detection.gap import GapTest
 from diagnosis.detection.mains import Hum
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.similarity import Similarity
 from tunnel_sim.effects import the_effect
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -25,7 +26,8 @@ class Study:
     """Everything found in a campaign, as `diagnosis.investigate.investigate` returns it.
 
     Args:
-        campaign: as given.
+        campaign: the similar campaign (`diagnosis.fitting.similarity`), whose units all values below have.
+        similarity: how it was made from the measured one.
         cleaned: the campaign without the hum, where one was found.
         noise: of the cleaned records.
         trend: of the noise with the motion.
@@ -44,6 +46,7 @@ class Study:
     """
 
     campaign: Campaign
+    similarity: Similarity
     cleaned: Campaign
     noise: Noise
     trend: NoiseTrend

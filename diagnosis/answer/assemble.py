@@ -15,6 +15,7 @@ from diagnosis.answer.coefficients import coefficients, rival_fits
 from diagnosis.answer.held_out import HeldOut, predict_held_out
 from diagnosis.answer.inclusion import inclusion
 from diagnosis.answer.next_run import separating_run
+from diagnosis.answer.own_units import own_estimate
 from diagnosis.answer.pulls import coefficient_move
 from diagnosis.answer.reference_sizes import size_note, sized_coefficients
 from diagnosis.answer.reported import excess_base, gap_summary, report_fits
@@ -67,7 +68,7 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
     steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
     seconds["waterfall"] = time.perf_counter() - begun
     found = _coefficients(study, chosen, nominal_out, chosen_out)
-    left = rest(study, found.after, _moves(chosen, found.after), steps.steps[-1].excess)
+    left = rest(study, *_in_own_units(study, found.after, chosen), steps.steps[-1].excess)
     return Diagnosis(
         campaign=study.campaign.name,
         causes=study.causes,
@@ -116,11 +117,14 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
     )
 
 
-def _moves(chosen: Fit, stated: Mapping[str, ParameterEstimate]) -> dict[str, float]:
-    """How far what remains moves each coefficient, by the name under which it is stated."""
-    own = ("omega_n", "zeta") if chosen.problem.data.normalised else ("cn_beta", "cn_r")
-    return {
-        name: coefficient_move(chosen, coefficient) for name, coefficient in zip(stated, own, strict=False)
+def _in_own_units(
+    study: Study, stated: Mapping[str, ParameterEstimate], chosen: Fit
+) -> tuple[dict[str, ParameterEstimate], dict[str, float]]:
+    """The coefficients stated, and how far what remains moves each, in the measured campaign's units."""
+    names = ("omega_n", "zeta") if chosen.problem.data.normalised else ("cn_beta", "cn_r")
+    return {name: own_estimate(given, study.similarity) for name, given in stated.items()}, {
+        name: study.similarity.own(coefficient_move(chosen, coefficient), given.unit)
+        for (name, given), coefficient in zip(stated.items(), names, strict=False)
     }
 
 

@@ -12,7 +12,7 @@ from diagnosis.answer.determined import meant_coefficient
 from diagnosis.answer.held_out import HeldOut
 from diagnosis.answer.pulls import coefficient_move
 from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.rank import Hypothesis
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import linear_coefficients
 from diagnosis.policy import COLOURED_EXCESS, EVEN_SHARE, FORM_CHANGE_STD

@@ -9,9 +9,9 @@ from functools import partial
 
 import numpy as np
 
-from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_growing
+from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
+from diagnosis.fitting.starting_points import starting_points
 from diagnosis.study import Study
 from tunnel_sim.effects import Effect
 
@@ -68,16 +68,9 @@ class Subsets:
 
 def _one_more(base: Fit, kind: type[Effect]) -> Fit | None:
     """The better of the fits from the first two starting points of an effect; None where none succeeds."""
-    gross = is_gross(base)
-    starts = sorted(starting_points(base, kind), key=lambda start: not (gross and start.balanced))[:2]
-    tried = [_fitted(partial(_added, base, start, growing=gross)) for start in starts]
+    starts = starting_points(base, kind)[:2]
+    tried = [_fitted(partial(fit, start.problem, start.point)) for start in starts]
     return min((found for found in tried if found), key=lambda found: found.total, default=None)
-
-
-def _added(base: Fit, start: StartingPoint, *, growing: bool) -> Fit:
-    if growing:
-        return fit_growing(start.problem, start.point)
-    return fit(start.problem, start.point, base=base)
 
 
 def _fitted(attempt: Callable[[], Fit]) -> Fit | None:

@@ -81,21 +81,16 @@ def weigh(
     Returns:
         All answers, ``unknown`` among them, most probable first.
     """
-
-    def floor(names: Sequence[str]) -> float:
-        return form_floor(excess, names) + CHANCE_STDS * chance
-
     answers: dict[tuple[str, ...], float] = {}
     for names, share in shares:
         key = tuple(sorted(names))
         answers[key] = min(max(share, 0.0), answers.get(key, np.inf))
     freed = forms or {}
     weights = {
-        names: _evidence(share, floor(names)) * _prior(len(names), freed.get(names, 0))
-        for names, share in answers.items()
+        names: evidence(names, share, freed.get(names, 0), excess, chance) for names, share in answers.items()
     }
     answers[("unknown",)] = min(UNKNOWN_SHARE, max(outside, 0.0))
-    weights[("unknown",)] = _evidence(answers[("unknown",)], floor(()))
+    weights[("unknown",)] = evidence((), answers[("unknown",)], 0, excess, chance)
     total, even = sum(weights.values()), EVEN_SHARE / len(weights)
     found = [
         Weighed(names, answers[names], (1.0 - EVEN_SHARE) * weight / total + even)
@@ -104,7 +99,24 @@ def weigh(
     return sorted(found, key=lambda w: -w.probability)
 
 
-def _evidence(share: float, floor: float) -> float:
+def evidence(effects: Sequence[str], share: float, forms: int, excess: float, chance: float) -> float:
+    """Weight of a set of effects among all answers.
+
+    Args:
+        effects: names.
+        share: of the gap that they leave open.
+        forms: how many of their forms were freed.
+        excess: of the nominal model's block means.
+        chance: standard deviation of a share by chance alone.
+
+    Returns:
+        The weight, not normalised.
+    """
+    floor = form_floor(excess, effects) + CHANCE_STDS * chance
+    return _density(share, floor) * _prior(len(effects), forms)
+
+
+def _density(share: float, floor: float) -> float:
     """Weight of an answer that leaves a share of the gap: the density of such a share under a true cause.
 
     Beyond `UNKNOWN_SHARE` it falls three times as steeply, so that many effects that close little do not together

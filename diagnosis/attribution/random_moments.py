@@ -8,13 +8,13 @@ from functools import partial
 
 import numpy as np
 
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.process_noise import (
     ProcessNoise,
     fit_turbulence,
     fit_wandering_shedding,
     whiteness,
 )
-from diagnosis.attribution.rank import Hypothesis
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.policy import (
     BESIDE_EVIDENCE,
@@ -52,24 +52,22 @@ class RandomAnswer:
 
 
 def weigh_random_moments(
-    nominal: Fit, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], allowed: Collection[str]
+    nominal: Fit, hypotheses: Sequence[Hypothesis], allowed: Collection[str]
 ) -> list[RandomAnswer]:
     """Try turbulence, and vortices with a wandering phase, alone and beside the best single effects.
 
     Args:
         nominal: the nominal fit.
-        singles: fitted single effects, best first.
-        pairs: fitted pairs.
+        hypotheses: fitted sets of effects, best first.
         allowed: names of the vocabulary to answer in.
 
     Returns:
         The most likely answer of each kind that passes, alone unless the evidence for an effect beside it is
         strong. To pass, the innovations must be white by band and steady in time, and the wind-off runs free of a
-        gap. Empty where none passes, or where one or two deterministic effects close the gap.
+        gap. Empty where none passes, or where deterministic effects close the gap.
     """
     if any(
-        max(hypothesis.fit.excess, 0.0) < CLOSED_WITHOUT_RANDOM * nominal.excess
-        for hypothesis in (*singles, *pairs)
+        max(hypothesis.fit.excess, 0.0) < CLOSED_WITHOUT_RANDOM * nominal.excess for hypothesis in hypotheses
     ):
         return []
     kinds: tuple[tuple[str, tuple[_Kind, ...]], ...] = (
@@ -77,7 +75,7 @@ def weigh_random_moments(
         ("narrow_band", (fit_wandering_shedding,)),
     )
     known = [(the_effect(random=random), fits) for random, fits in kinds]
-    tried = [_likeliest(kind, fits, nominal, singles) for kind, fits in known if kind.name in allowed]
+    tried = [_likeliest(kind, fits, nominal, hypotheses) for kind, fits in known if kind.name in allowed]
     answers = [answer for answer in tried if answer is not None]
     least = min((answer.process.cost for answer in answers), default=0.0)
     return [answer for answer in answers if answer.process.cost < least + RIVAL_EVIDENCE]
@@ -87,11 +85,11 @@ _Kind = Callable[[Fit], ProcessNoise | None]
 
 
 def _likeliest(
-    kind: type[Effect], fits: Sequence[_Kind], nominal: Fit, singles: Sequence[Hypothesis]
+    kind: type[Effect], fits: Sequence[_Kind], nominal: Fit, hypotheses: Sequence[Hypothesis]
 ) -> RandomAnswer | None:
     for explain in fits:  # a spectrum with more freedom only where the simpler one does not pass
         alone = _try(kind, explain, nominal, None, nominal)
-        partners = [s for s in singles if s.effects != (kind.name,)][:RANDOM_PARTNERS]
+        partners = _partners(kind, hypotheses)
         beside = [a for s in partners if (a := _try(kind, explain, s.fit, s, nominal)) is not None]
         best = min(beside, key=lambda a: a.process.cost, default=None)
         if alone is None or (best is not None and best.process.cost < alone.process.cost - BESIDE_EVIDENCE):
@@ -99,6 +97,14 @@ def _likeliest(
         if alone is not None:
             return alone
     return None
+
+
+def _partners(kind: type[Effect], hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The best single effects, and the best set of every larger size."""
+    able = [h for h in hypotheses if kind.name not in h.effects]
+    sizes = sorted({len(h.effects) for h in able} - {1})
+    larger = [next(h for h in able if len(h.effects) == size) for size in sizes]
+    return [*[h for h in able if len(h.effects) == 1][:RANDOM_PARTNERS], *larger]
 
 
 def _try(

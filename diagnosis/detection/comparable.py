@@ -7,14 +7,9 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
+from diagnosis.fitting.similarity import frequency
 from diagnosis.policy import SAME_SPRING
-from identification.decay.spectrum import highest_peak
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.record import Record
-
-_PADDING = 8  # times the record, which places the peak of a few cycles to within a few per cent
 
 
 def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
@@ -86,18 +81,3 @@ def _by_frequency(runs: Sequence[Run]) -> list[list[Run]]:
             groups.append([])
         groups[-1].append(run)
     return groups
-
-
-def frequency(record: Record) -> float:
-    """The frequency of a decay.
-
-    Args:
-        record: a run's reading.
-
-    Returns:
-        The peak of its spectrum, Hz.
-    """
-    swing = record.yaw_rad - np.mean(record.yaw_rad)
-    size = _PADDING * swing.size
-    place, _ = highest_peak(swing * np.hanning(swing.size), size)
-    return place * record.sample_rate / size

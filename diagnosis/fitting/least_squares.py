@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,6 +10,7 @@ from diagnosis.fitting.problem import Point, Problem
 from tunnel_sim.vocabulary.record import Array
 
 _MAX_ITERATIONS = 25
+_HOPELESS = 5  # steps after which a fit must be better than the one it adds an effect to
 _AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
 _TRIES = 9  # dampings tried in a step, each ten times the last
 
@@ -58,6 +58,11 @@ class Fit:
     def excess(self) -> float:
         """Mean squared scaled residual minus one."""
         return self.total / self.count - 1.0
+
+    @property
+    def chance(self) -> float:
+        """Standard deviation, by chance, of a share of the excess."""
+        return float(np.sqrt(2.0 / self.count)) / max(self.excess, 1e-3)
 
     def value(self, name: str) -> float:
         """A common parameter by name."""
@@ -117,36 +122,9 @@ def fit(
             borrowed = False  # once more with its own sensitivities
         elif poor:
             converged = True
+        if base is not None and iterations >= _HOPELESS and state.cost > base.total:
+            break  # more parameters, and still worse than without them
     return state.result(iterations, converged)
-
-
-_HORIZONS = (0.25, 0.4, 0.6, 0.8)
-
-
-def fit_growing(problem: Problem, start: Point) -> Fit:
-    """Minimise χ² over the records' beginnings first, then over ever longer parts.
-
-    Args:
-        problem: runs and effects.
-        start: parameter values to start from; their motion may be out of phase before the records end.
-
-    Returns:
-        The fit of the whole records.
-
-    Raises:
-        FitError: when the model cannot be integrated.
-    """
-    point = start
-    for share in _HORIZONS:
-        runs = tuple(
-            dataclasses.replace(run, reading=run.reading[: max(20, int(share * run.reading.size))])
-            for run in problem.data.runs
-        )
-        shorter = Problem(
-            dataclasses.replace(problem.data, runs=runs), problem.effects, problem.fixed, problem.free_forms
-        )
-        point = fit(shorter, point, tolerance=1e-3, max_iterations=15).point
-    return fit(problem, point)
 
 
 class _State:
@@ -361,13 +339,37 @@ def damped_step(
     """
     matrix, gradient, solutions = normal_equations(jacobian, residuals, damping)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix / np.outer(scale, scale)
-    step = np.linalg.lstsq(scaled + damping * np.eye(len(scale)), gradient / scale, rcond=1e-13)[0] / scale
+    scaled = matrix / np.outer(scale, scale) + damping * np.eye(len(scale))
     lower, upper = problem.bounds
-    moved = np.clip(point.common + step, lower, upper)
-    step = moved - point.common
-    release = np.stack([s[:, -1] - s[:, :-1] @ step for s in solutions])
-    return Point(moved, point.release + release)
+    step = bounded_step(
+        scaled, gradient / scale, (lower - point.common) * scale, (upper - point.common) * scale
+    )
+    release = np.stack([s[:, -1] - s[:, :-1] @ (step / scale) for s in solutions])
+    return Point(np.clip(point.common + step / scale, lower, upper), point.release + release)
+
+
+def bounded_step(matrix: Array, gradient: Array, lower: Array, upper: Array) -> Array:
+    """The solution of the normal equations, those parameters held at a bound that would leave their range.
+
+    Args:
+        matrix: symmetric, shape (n, n).
+        gradient: shape (n,).
+        lower: least steps, at most 0, shape (n,).
+        upper: greatest steps, at least 0, shape (n,).
+
+    Returns:
+        Steps within their bounds, shape (n,).
+    """
+    step, free = np.zeros(gradient.size), np.ones(gradient.size, dtype=bool)
+    while free.any():
+        held = gradient[free] - matrix[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], held, rcond=1e-13)[0]
+        outside = free & ((step < lower) | (step > upper))
+        if not outside.any():
+            break
+        step[outside] = np.clip(step, lower, upper)[outside]
+        free &= ~outside
+    return step
 
 
 def _covariance(jacobian: list[tuple[Array, Array]]) -> Array:

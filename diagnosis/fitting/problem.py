@@ -12,6 +12,7 @@ import numpy as np
 
 from diagnosis.fitting.run_data import Data, RunData, hermite_means
 from tunnel_sim.effects import Effect, EffectChain
+from tunnel_sim.effects.base import ParameterInfo
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
@@ -73,10 +74,14 @@ class Problem:
             f"{kind.name}.{info.name}"
             for kind in self.effects
             for info in kind.parameters()
-            if not info.form or kind.name in self.free_forms
+            if self._is_free(kind, info)
         ]
         held = dict(self.fixed)
         return tuple(name for name in names if name not in held)
+
+    def _is_free(self, kind: type[Effect], info: ParameterInfo) -> bool:
+        freed = not info.form or kind.name in self.free_forms
+        return freed and not (info.beside_spring and self.data.normalised)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -91,7 +96,7 @@ class Problem:
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Least and greatest values of the common parameters."""
-        low = {"yaw_inertia": 1e-9, "stiffness": 1e-9}
+        low = {"yaw_inertia": 1e-9, "stiffness": 0.0, "mechanical_damping": 0.0}
         infos = {f"{kind.name}.{info.name}": info for kind in self.effects for info in kind.parameters()}
         lower = [infos[name].fit_lower if name in infos else low.get(name, -np.inf) for name in self.names]
         upper = [infos[name].fit_upper if name in infos else np.inf for name in self.names]
@@ -138,20 +143,24 @@ class Problem:
             duration=run.duration,
         )
 
-    def chain(self, common: Array, own: Array, run: RunData) -> EffectChain:
+    def chain(
+        self, common: Array, own: Array, run: RunData, effects: tuple[Effect, ...] | None = None
+    ) -> EffectChain:
         """The effects of one run.
 
         Args:
             common: as in `Point`, shape (common,).
             own: the run's own parameters, a row of ``Point.release``, shape (own,).
             run: conditions.
+            effects: from `effects_at`, where they are known already.
 
         Returns:
             The effects with the phases and instants that the run has.
         """
         phases = dict(zip(self.phased, own[2:].tolist(), strict=True))
         drawn = tuple(phases.get(kind.name) for kind in self.effects)
-        return EffectChain(self.stated(common, own, run), self.effects_at(common), drawn)
+        known = self.effects_at(common) if effects is None else effects
+        return EffectChain(self.stated(common, own, run), known, drawn)
 
     def predict(self, points: Sequence[Point]) -> list[list[Array]]:
         """Predicted block means.
@@ -163,8 +172,11 @@ class Problem:
             For every point, for every run, the reading's block means, rad; infinite where the motion grows
             without bound.
         """
-        cases = [(p, r) for p in range(len(points)) for r in range(len(self.data.runs))]
-        jobs = [_Job(self, points[p], r) for p, r in cases]
+        jobs = [
+            _Job(self, point, r, effects)
+            for point, effects in zip(points, map(self.effects_at, (p.common for p in points)), strict=True)
+            for r in range(len(self.data.runs))
+        ]
         half = (len(jobs) + _THREADS - 1) // _THREADS
         results = list(_POOL.map(_run_jobs, [jobs[i : i + half] for i in range(0, len(jobs), half)]))
         flat = [values for part in results for values in part]
@@ -175,11 +187,11 @@ class Problem:
 class _Job:
     """One run at one point."""
 
-    def __init__(self, problem: Problem, point: Point, run_index: int) -> None:
+    def __init__(self, problem: Problem, point: Point, run_index: int, effects: tuple[Effect, ...]) -> None:
         run = problem.data.runs[run_index]
         self.run = run
         self.zero = float(point.common[problem.nominal_names.index("zero")])
-        self.chain = problem.chain(point.common, point.release[run_index], run)
+        self.chain = problem.chain(point.common, point.release[run_index], run, effects)
         physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         self.row, self.keep_alive = forward_run(physics)
         self.law = parameter_vector(physics.law(campaign_rig(problem.data)))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.fitting.similarity import Similarity
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.aero import aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import Campaign, Run
@@ -54,13 +55,14 @@ class Data:
 
     Args:
         runs: prepared runs.
-        frontal_area: A, m²; 1 where the campaign does not state it.
+        frontal_area: A, m²; 1 in the measured campaign's units where it does not state it.
         reference_length: l, m; likewise.
         width: m; likewise.
         normalised: whether the runs are fitted per unit inertia with a common stiffness.
         yaw_inertia: nominal Izz, kg m²; None where the campaign does not state it.
         windy: whether the runs are part of a campaign with the wind on, though none of these may be: the model
             then keeps its aerodynamic parameters.
+        similarity: how the campaign was made from the measured one.
     """
 
     runs: tuple[RunData, ...]
@@ -70,6 +72,7 @@ class Data:
     normalised: bool
     yaw_inertia: float | None
     windy: bool = False
+    similarity: Similarity = Similarity()
 
     @property
     def springs(self) -> tuple[float, ...]:
@@ -121,12 +124,15 @@ class Data:
         return self.with_runs(tuple(run for run in self.runs if run.id in keep))
 
 
-def prepare(campaign: Campaign, noise_variance: dict[str, float]) -> Data:
+def prepare(
+    campaign: Campaign, noise_variance: dict[str, float], similarity: Similarity = Similarity()
+) -> Data:
     """Average a campaign's records in blocks.
 
     Args:
         campaign: the runs.
         noise_variance: of one sample, rad², by run id.
+        similarity: how the campaign was made from the measured one.
 
     Returns:
         The prepared data. Where any run states no stiffness, all are taken in normalised form.
@@ -134,11 +140,12 @@ def prepare(campaign: Campaign, noise_variance: dict[str, float]) -> Data:
     rig = campaign.rig
     return Data(
         runs=tuple(_prepare_run(run, noise_variance[run.id]) for run in campaign.runs),
-        frontal_area=rig.frontal_area or 1.0,
-        reference_length=rig.reference_length or 1.0,
+        frontal_area=rig.frontal_area or similarity.area,
+        reference_length=rig.reference_length or similarity.time,
         width=rig.width or 0.0,
         normalised=any(run.spring_stiffness is None for run in campaign.runs),
         yaw_inertia=rig.yaw_inertia,
+        similarity=similarity,
     )
 
 

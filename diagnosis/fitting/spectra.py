@@ -8,9 +8,13 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import Data
+from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
 from tunnel_sim.vocabulary.record import Array
 
 _PADDING = 8  # zero padding: lines are found to a small part of a bin
+_MAINS, _MAINS_WANDER = 50.0, 0.5  # Hz, of the rig as measured
+_NYQUIST = 2.6  # blocks per period of the mains: two, and room for the skirt
+_BEYOND_MOTION = 4.0  # times the motion's frequency: beyond its third harmonic
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,13 +98,15 @@ def mains_line(fit: Fit) -> Line | None:
         fit: gives the residuals.
 
     Returns:
-        The line; None where the sampling is too slow to see it.
+        The line; None where the sampling is too slow to see it, or the motion too fast to tell it apart.
     """
     data = fit.problem.data
-    if any(1.0 / run.interval < 130.0 for run in data.runs):
+    mains, around = (data.similarity.similar(value, "Hz") for value in (_MAINS, _MAINS_WANDER))
+    fast_enough = all(_NYQUIST * mains < 1.0 / run.interval for run in data.runs)
+    if not fast_enough or mains < _BEYOND_MOTION * REFERENCE_FREQUENCY:
         return None
     spectra = smooth_spectra(fit)
-    grid = np.arange(49.5, 50.5, 0.005)
+    grid = np.arange(mains - around, mains + around, 0.005)
     total = np.sum([s.power(grid) for s in spectra], axis=0)
     best = float(grid[np.argmax(total)])
     beside = np.concatenate(

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.fitting.equation_error import equation_error_start
-from diagnosis.fitting.least_squares import Fit, clip, normal_equations, scaled_residuals
+from diagnosis.fitting.least_squares import Fit, normal_equations
 from diagnosis.fitting.own_numbers import OwnNumbers, ringing, skip
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData
@@ -16,7 +15,7 @@ from diagnosis.fitting.spectra import Line, mains_line, shedding_line
 from diagnosis.policy import GROSS_MISFIT
 from identification.decay.spectrum import highest_peak
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.base import Circumstances, Trial
+from tunnel_sim.effects.base import Circumstances, ParameterInfo, Trial
 from tunnel_sim.vocabulary.record import Array
 
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
@@ -75,13 +74,11 @@ class StartingPoint:
         problem: the fit with the effect added.
         point: where to start.
         predicted_drop: of χ² by linear theory, dimensionless.
-        balanced: whether the point comes from the balance of moments.
     """
 
     problem: Problem
     point: Point
     predicted_drop: float
-    balanced: bool = False
 
 
 def _of_line(line: Line | None) -> OwnNumbers | None:
@@ -114,8 +111,6 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
         found_own = _FINDERS[kind.line or "skips"](base)
         return [] if found_own is None else [_own_start(base, kind, found_own)]
     found = [_scaled_start(base, kind, trial) for trial in kind.trials(_circumstances(data))]
-    if is_gross(base):
-        found.append(_balanced_start(base, kind))
     return sorted((start for start in found if start is not None), key=lambda start: -start.predicted_drop)
 
 
@@ -134,28 +129,19 @@ def is_gross(fit: Fit) -> bool:
     return fit.total > GROSS_MISFIT * readings
 
 
-def _balanced_start(base: Fit, kind: type[Effect]) -> StartingPoint | None:
-    held = {f"{kind.name}.{name}": value for name, value in kind.regressed_at.items()}
-    fixed = dict(base.problem.fixed) | held
-    problem = Problem(
-        base.problem.data, (*base.problem.effects, kind), tuple(fixed.items()), base.problem.free_forms
-    )
-    point = equation_error_start(problem)
-    if point is None:
-        return None
-    point = clip(problem, point)
-    total = sum(float(r @ r) for r in scaled_residuals(problem, point))
-    return StartingPoint(problem, point, base.total - total, balanced=True) if np.isfinite(total) else None
-
-
 def _own_start(base: Fit, kind: type[Effect], found: OwnNumbers) -> StartingPoint:
     problem = Problem(
         base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.free_forms
     )
-    infos = [info for info in kind.parameters() if not info.form]
+    infos = _own_parameters(problem, kind)
     values = [np.clip(value, info.lower, info.upper) for value, info in zip(found.values, infos, strict=True)]
     release = np.column_stack([base.point.release, found.numbers])
     return StartingPoint(problem, Point(np.concatenate([base.point.common, values]), release), found.drop)
+
+
+def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]:
+    """Those parameters of an effect that are free in a problem."""
+    return [info for info in kind.parameters() if f"{kind.name}.{info.name}" in problem.names]
 
 
 def _circumstances(data: Data) -> Circumstances:
@@ -170,7 +156,7 @@ def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint 
     freed = any(info.form and info.name in trial.values for info in kind.parameters())
     with_free_form = (*base.problem.free_forms, kind.name) if freed else base.problem.free_forms
     problem = Problem(base.problem.data, (*base.problem.effects, kind), fixed, with_free_form)
-    infos = [info for info in kind.parameters() if info.name not in held and (freed or not info.form)]
+    infos = _own_parameters(problem, kind)
     scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)
     values = np.array([trial.values.get(info.name, info.default) for info in infos])
     change = _moderate_change(base, problem, values, scaled)

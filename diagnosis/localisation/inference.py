@@ -120,16 +120,17 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
         return Finding(
             "forcing", f"most of the missing moment acts between {blow[0]:.1f} and {blow[1]:.1f} s"
         )
-    return _by_band(found, condition) or _between_runs(nominal, found) or _by_drift(found)
+    return _by_band(nominal, found, condition) or _between_runs(nominal, found) or _by_drift(found)
 
 
-def _by_band(found: Survey, condition: str | None) -> Finding | None:
+def _by_band(nominal: Fit, found: Survey, condition: str | None) -> Finding | None:
     excess = {band.band: max(band.excess, 0.0) for band in found.maps.bands}
     whole = max(sum(excess.values()), 1e-300)
     lines = [line for line in found.maps.lines if line.share > 0.5 * DOMINANT_SHARE]
     if lines and len(lines) >= max(1, len(found.maps.runs) // 3):
         frequency = float(np.median([line.frequency for line in lines]))
-        channel = "forcing" if frequency < FASTEST_MOMENT else "sensor"
+        similar = nominal.problem.data.similarity.similar(frequency, "Hz")
+        channel = "forcing" if similar < FASTEST_MOMENT else "sensor"
         return Finding(channel, f"it is a spectral line near {frequency:.3g} Hz")
     if excess.get("above", 0.0) > DOMINANT_SHARE * whole:
         return Finding("sensor", "most of it is faster than the rig can move")

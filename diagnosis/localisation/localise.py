@@ -87,7 +87,7 @@ def _with_hum(study: Study) -> list[Array]:
     data, residuals = study.nominal.problem.data, study.nominal.residuals
     if study.hum is None:
         return residuals
-    given = prepare(study.campaign, {run.id: run.noise_variance for run in data.runs})
+    given = prepare(study.campaign, {run.id: run.noise_variance for run in data.runs}, data.similarity)
     readings = {run.id: run.reading for run in given.runs}
     # the fit may leave a record's start out; both end together
     return [

@@ -8,6 +8,7 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import RunData
+from diagnosis.fitting.similarity import Similarity
 from diagnosis.localisation.backbone import backbones
 from diagnosis.localisation.excess import (
     Profile,
@@ -20,6 +21,7 @@ from diagnosis.localisation.excess import (
 )
 from diagnosis.localisation.lines import residual_lines
 from diagnosis.localisation.maps import GroupExcess, Maps, RunMap, Trace
+from diagnosis.localisation.own_units import maps_in_own_units
 from diagnosis.localisation.phase_plane import apparent_moment, motion, phase_plane
 from diagnosis.study import Study
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -79,7 +81,7 @@ def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     noise = [float(np.sqrt(run.noise_variance)) for run in nominal.problem.data.runs]
     maps = Maps(
         runs=_run_maps(scaled, excesses),
-        groups=_groups(scaled, excesses),
+        groups=_groups(scaled, excesses, study.similarity),
         time=time,
         time_by_run=_time_by_run(scaled, times, time.edges),
         moment_time=np.maximum(energy, 0.0) / max(float(np.maximum(energy, 0.0).sum()), 1e-300),
@@ -93,7 +95,11 @@ def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         phase_plane=phase_plane(nominal, chosen),
         traces=_traces(nominal, best, excesses, times),
     )
-    return Survey(maps, excesses, _frequency_interval(excesses), energy, z)
+    interval = _frequency_interval(excesses)
+    similarity = study.similarity
+    if interval is not None:
+        interval = similarity.own(interval[0], "Hz"), similarity.own(interval[1], "Hz")
+    return Survey(maps_in_own_units(maps, similarity), excesses, interval, energy, z)
 
 
 def _shares(excesses: list[RunExcess]) -> list[float]:
@@ -135,7 +141,7 @@ def _run_maps(fit: Fit, excesses: list[RunExcess]) -> tuple[RunMap, ...]:
     )
 
 
-def _groups(fit: Fit, excesses: list[RunExcess]) -> tuple[GroupExcess, ...]:
+def _groups(fit: Fit, excesses: list[RunExcess], similarity: Similarity) -> tuple[GroupExcess, ...]:
     """Mean excess of the runs that share a condition; conditions that do not vary are left out."""
     runs = fit.problem.data.runs
     levels = [(e.excess / run.block, e.std / run.block) for e, run in zip(excesses, runs, strict=True)]
@@ -143,7 +149,10 @@ def _groups(fit: Fit, excesses: list[RunExcess]) -> tuple[GroupExcess, ...]:
     keys = {
         "wind": ["on" if run.wind_on else "off" for run in runs],
         "spring": [
-            "" if run.spring_stiffness is None else f"{run.spring_stiffness:g} N m/rad" for run in runs
+            ""
+            if run.spring_stiffness is None
+            else f"{similarity.own(run.spring_stiffness, 'N m/rad'):g} N m/rad"
+            for run in runs
         ],
         "speed": [f"{run.wind_speed:g} m/s" for run in runs],
         "amplitude": [f"{0.05 * round(value / 0.05):.2f} rad" for value in start],

@@ -14,7 +14,7 @@ from diagnosis.answer.assemble import assemble
 from diagnosis.answer.candidates import candidates
 from diagnosis.answer.reported import excess_base
 from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.rank import Hypothesis
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.investigate import investigate
 from diagnosis.localisation.localise import localise
 from tests.unit import gap_campaigns

@@ -15,9 +15,9 @@ from diagnosis.answer.stretches import predict_stretches, turns_of
 from diagnosis.answer.subsets import Subsets
 from diagnosis.answer.waterfall import waterfall
 from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.process_noise import ProcessNoise, Spectrum
 from diagnosis.attribution.random_moments import RandomAnswer
-from diagnosis.attribution.rank import Hypothesis
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.starting_points import starting_points

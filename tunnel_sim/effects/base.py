@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -47,6 +48,7 @@ class ParameterInfo:
         form: whether it generalises the effect's form; its default gives the textbook form.
         fit_lower: least value a fit may take, in the unit.
         fit_upper: greatest value a fit may take, in the unit.
+        beside_spring: whether only a spring of stated stiffness beside the effect makes it known; else it is held.
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
         per_stiffness: whether it multiplies the spring's stiffness.
@@ -63,6 +65,7 @@ class ParameterInfo:
     form: bool
     fit_lower: float
     fit_upper: float
+    beside_spring: bool
     chosen_spring: bool
     per_pressure: bool
     per_stiffness: bool
@@ -80,6 +83,7 @@ def parameter(
     form: bool = False,
     fit_lower: float | None = None,
     fit_upper: float | None = None,
+    beside_spring: bool = False,
     chosen_spring: bool = False,
     per_pressure: bool = False,
     per_stiffness: bool = False,
@@ -95,6 +99,7 @@ def parameter(
         "form": form,
         "fit_lower": lower if fit_lower is None else fit_lower,
         "fit_upper": upper if fit_upper is None else fit_upper,
+        "beside_spring": beside_spring,
         "chosen_spring": chosen_spring,
         "per_pressure": per_pressure,
         "per_stiffness": per_stiffness,
@@ -180,6 +185,8 @@ class Effect:
     - ``line``: what sets the frequency of a periodic effect; its phase differs from run to run.
     - ``skips``: whether samples are missing at an instant that differs from run to run (a share of the run's
       length), so that the motion is read at other times than stated.
+    - ``autonomous``: whether its moment and its reading depend on angle and rate alone, so that a stretch of a run
+      shows it as a whole run does.
     - ``fitted``: whether a fit of the deterministic motion can find it. The other effects are read off the
       records (``line``, ``lattice``) or found from their spectrum (``random``).
     - ``lattice``: whether it changes the quantisation step.
@@ -203,6 +210,7 @@ class Effect:
     random: ClassVar[Literal["", "broad_band", "narrow_band"]] = ""
     line: ClassVar[Literal["", "mains", "shedding", "ringing"]] = ""
     skips: ClassVar[bool] = False
+    autonomous: ClassVar[bool] = True
     fitted: ClassVar[bool] = True
     lattice: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
@@ -231,10 +239,7 @@ class Effect:
     @classmethod
     def parameters(cls) -> tuple[ParameterInfo, ...]:
         """The effect's parameters, the severity first."""
-        return tuple(
-            ParameterInfo(name=own.name, default=cast(float, own.default), **own.metadata)
-            for own in dataclasses.fields(cls)
-        )
+        return _parameters(cls)
 
     @property
     def severity(self) -> float:
@@ -381,6 +386,14 @@ class Effect:
             "name": self.name,
             "parameters": {info.name: getattr(self, info.name) for info in self.parameters()},
         }
+
+
+@functools.cache
+def _parameters(kind: type[Effect]) -> tuple[ParameterInfo, ...]:
+    return tuple(
+        ParameterInfo(name=own.name, default=cast(float, own.default), **own.metadata)
+        for own in dataclasses.fields(kind)
+    )
 
 
 def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:

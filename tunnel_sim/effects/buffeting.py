@@ -38,6 +38,7 @@ class Buffeting(Effect):
         "Gauss–Markov process: Gillespie, Phys. Rev. E 54 (1996) 2084, doi 10.1103/PhysRevE.54.2084",
     )
     example = (0.02, 8.0)
+    autonomous = False
     fitted = False
     random = "broad_band"
 

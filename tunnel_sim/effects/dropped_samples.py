@@ -35,6 +35,7 @@ class DroppedSamples(Effect):
     )
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.02,)
+    autonomous = False
     skips = True
 
     lost_time: float = parameter(

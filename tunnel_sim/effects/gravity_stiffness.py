@@ -38,7 +38,15 @@ class GravityStiffness(Effect):
         "Kg", "N m/rad", "greatest restoring moment", scale=0.3, lower=-1e5, upper=1e5
     )
     rest_angle: float = parameter(
-        "βg", "rad", "equilibrium angle under gravity alone", scale=0.1, lower=-3.2, upper=3.2
+        "βg",
+        "rad",
+        "equilibrium angle under gravity alone",
+        scale=0.1,
+        lower=-3.2,
+        upper=3.2,
+        fit_lower=-1.6,  # beyond a right angle the same moment has the other sign of Kg
+        fit_upper=1.6,
+        beside_spring=True,  # without a spring it is one with the sensor's zero
     )
 
     @classmethod

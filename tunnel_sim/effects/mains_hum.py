@@ -28,6 +28,7 @@ class MainsHum(Effect):
     signature = "A spectral line at the mains frequency in every run, independent of the motion."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.002, 60.0)
+    autonomous = False
     fitted = False
     line = "mains"
 

@@ -30,7 +30,13 @@ class QuadraticDamping(Effect):
     example = (0.01,)
 
     coefficient: float = parameter(
-        "C2", "N m s2/rad2", "coefficient of the squared rate", scale=0.002, lower=-1e4, upper=1e4
+        "C2",
+        "N m s2/rad2",
+        "coefficient of the squared rate",
+        scale=0.002,
+        lower=-1e4,
+        upper=1e4,
+        fit_lower=0.0,
     )
 
     exponent: float = exponent("n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0)

@@ -34,6 +34,7 @@ class RodFlexibility(Effect):
     )
     references = ("Meirovitch, Fundamentals of Vibrations, McGraw-Hill 2001",)
     example = (0.001, 0.3)
+    autonomous = False
     tries = 3
 
     compliance: float = parameter(

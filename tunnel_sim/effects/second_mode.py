@@ -35,6 +35,7 @@ class SecondMode(Effect):
     signature = "A decaying line from the release on, at one frequency whatever the spring and the wind."
     references = ("Meirovitch, Fundamentals of Vibrations, McGraw-Hill 2001",)
     example = (0.005, 60.0, 0.01)
+    autonomous = False
     line = "ringing"
     ahead_of_sensor = True
 

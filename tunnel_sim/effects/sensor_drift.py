@@ -29,6 +29,7 @@ class SensorDrift(Effect):
     )
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.01,)
+    autonomous = False
 
     drift: float = parameter("d", "rad", "drift over the run", scale=0.002, lower=-1.0, upper=1.0)
     settling: float = settling()

@@ -34,6 +34,7 @@ class SensorHysteresis(Effect):
         "Visintin, Differential Models of Hysteresis, Springer 1994, doi 10.1007/978-3-662-11557-2",
     )
     example = (0.003,)
+    autonomous = False
     remembers = True
     ahead_of_sensor = True
 

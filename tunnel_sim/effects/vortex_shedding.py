@@ -25,6 +25,7 @@ class VortexShedding(Effect):
     signature = "A spectral line whose frequency is proportional to the wind speed."
     references = ("Bearman, Annu. Rev. Fluid Mech. 16 (1984) 195, doi 10.1146/annurev.fl.16.010184.001211",)
     example = (0.1, 0.02)
+    autonomous = False
     line = "shedding"
     random = "narrow_band"
 

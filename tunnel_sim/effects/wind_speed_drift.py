@@ -32,6 +32,7 @@ class WindSpeedDrift(Effect):
     signature = "The frequency of wind-on runs changes with time rather than with amplitude."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
     example = (0.1,)
+    autonomous = False
 
     drift: float = parameter(
         "d", "1", "relative gain of speed over the run", scale=0.02, lower=-0.9, upper=5.0

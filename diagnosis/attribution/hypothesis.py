@@ -1,31 +1,19 @@
-"""Which effect: every one of the vocabulary, and pairs, added to the nominal model and fitted."""
+"""The nominal model with effects added and fitted; their forms freed where that pays."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_growing
+from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
-from diagnosis.policy import (
-    ALWAYS_FITTED,
-    FORM_SHARE,
-    FREED_FROM,
-    FREED_HYPOTHESES,
-    PAIR_BASES,
-    PAIR_SECONDS,
-    PREDICTED_SHARE,
-)
-from tunnel_sim.effects import Effect
+from diagnosis.policy import FORM_SHARE, FREED_FROM, FREED_HYPOTHESES
 from tunnel_sim.effects.base import ParameterInfo
 
 _POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,63 +42,20 @@ class Hypothesis:
         return sum(i.form for k in problem.effects if k.name in problem.free_forms for i in k.parameters())
 
 
-def rank_singles(
-    nominal: Fit, kinds: Sequence[type[Effect]], progress: Progress | None = None
-) -> list[Hypothesis]:
-    """Add each effect alone.
+def with_forms(found: Sequence[Hypothesis], base: Fit, count: int = FREED_HYPOTHESES) -> list[Hypothesis]:
+    """Free the forms of the best hypotheses where the textbook form leaves a good part open.
 
     Args:
-        nominal: the fit without any.
-        kinds: effects to try.
-        progress: called with the name of each effect.
+        found: fitted hypotheses.
+        base: the best fit with one effect less.
+        count: how many of the best are tried with free forms.
 
     Returns:
-        Fitted hypotheses, best first. Effects that linear theory predicts to close next to nothing are left
-        out.
+        All hypotheses, best first.
     """
-    found = []
-    for kind, starts in _worth_fitting(nominal, kinds, ALWAYS_FITTED):
-        if progress is not None:
-            progress(kind.name)
-        best = _best_fit(_tried(kind, starts, nominal), nominal)
-        if best is not None:
-            found.append(Hypothesis((kind.name,), best))
-    return _with_forms(found, nominal)
-
-
-def rank_pairs(
-    singles: Sequence[Hypothesis], kinds: Sequence[type[Effect]], progress: Progress | None = None
-) -> list[Hypothesis]:
-    """Add a second effect to the best single ones.
-
-    Args:
-        singles: best first.
-        kinds: effects to try.
-        progress: called with the names of each pair.
-
-    Returns:
-        Fitted pairs, best first.
-    """
-    found: dict[tuple[str, ...], Hypothesis] = {}
-    for single in singles[:PAIR_BASES]:
-        others = [kind for kind in kinds if kind.name not in single.effects]
-        for kind, starts in _worth_fitting(single.fit, others, 0)[:PAIR_SECONDS]:
-            if progress is not None:
-                progress(f"{single.effects[0]} + {kind.name}")
-            best = _best_fit(_tried(kind, starts, single.fit), single.fit)
-            if best is None:
-                continue
-            pair = Hypothesis((*single.effects, kind.name), best)
-            if pair.names not in found or best.total < found[pair.names].fit.total:
-                found[pair.names] = pair
-    return _with_forms(list(found.values()), singles[0].fit)
-
-
-def _with_forms(found: list[Hypothesis], base: Fit) -> list[Hypothesis]:
-    """Free the forms of the best hypotheses where the textbook form leaves a good part open; best first."""
     ranked = sorted(found, key=lambda h: h.fit.total)
-    freed = [_freed_if_it_pays(h, base) for h in ranked[:FREED_HYPOTHESES]]
-    return sorted([*freed, *ranked[FREED_HYPOTHESES:]], key=lambda h: h.fit.total)
+    freed = [_freed_if_it_pays(h, base) for h in ranked[:count]]
+    return sorted([*freed, *ranked[count:]], key=lambda h: h.fit.total)
 
 
 def _freed_if_it_pays(hypothesis: Hypothesis, base: Fit) -> Hypothesis:
@@ -174,34 +119,3 @@ def _free_forms(fitted: Fit, tolerance: float = 1e-4) -> Fit | None:
 def _within(info: ParameterInfo) -> float:
     """Where a form starts: at the textbook value, or half a step inside a bound, where its slope may vanish."""
     return info.default + 0.5 * info.scale if info.default == info.lower else info.default
-
-
-def _worth_fitting(
-    base: Fit, kinds: Iterable[type[Effect]], always: int
-) -> list[tuple[type[Effect], list[StartingPoint]]]:
-    scored = [(kind, starts) for kind in kinds if (starts := starting_points(base, kind))]
-    scored.sort(key=lambda item: -item[1][0].predicted_drop)
-    limit = 0.0 if always == 0 else PREDICTED_SHARE * base.total
-    return [item for i, item in enumerate(scored) if i < always or item[1][0].predicted_drop > limit]
-
-
-def _tried(kind: type[Effect], starts: Sequence[StartingPoint], base: Fit) -> Sequence[StartingPoint]:
-    return starts if is_gross(base) else starts[: kind.tries]
-
-
-def _best_fit(starts: Sequence[StartingPoint], base: Fit) -> Fit | None:
-    best: Fit | None = None
-    if is_gross(base):
-        # linear theory does not hold there: the balance of moments goes first
-        starts = sorted(starts, key=lambda start: not start.balanced)[:2]
-    for start in starts:
-        try:
-            if is_gross(base):
-                found = fit_growing(start.problem, start.point)
-            else:
-                found = fit(start.problem, start.point, base=base)
-        except (FitError, np.linalg.LinAlgError):
-            continue
-        if np.isfinite(found.total) and (best is None or found.total < best.total):
-            best = found
-    return best

@@ -1,0 +1,60 @@
+"""The answer for the similar campaign in the units of the campaign that was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from diagnosis.fitting.similarity import Similarity
+from diagnosis.result import Diagnosis, ParameterEstimate
+
+_NEXT_RUN = {"spring_stiffness": "N m/rad", "duration": "s"}
+
+
+def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
+    """The answer with the parameters of the measured rig; what remains (`Rest`) has its units already.
+
+    Args:
+        answer: for the similar campaign; its maps and places are in the measured campaign's units already.
+        similarity: how that was made.
+
+    Returns:
+        The same answer in the measured campaign's units.
+    """
+
+    def own(values: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
+        return {name: own_estimate(value, similarity) for name, value in values.items()}
+
+    return replace(
+        answer,
+        candidates=tuple(replace(c, parameters=own(c.parameters)) for c in answer.candidates),
+        coefficients=replace(
+            answer.coefficients,
+            before=own(answer.coefficients.before),
+            after=own(answer.coefficients.after),
+        ),
+        next_run=None if answer.next_run is None else _next_run(answer.next_run, similarity),
+    )
+
+
+def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> ParameterEstimate:
+    """An estimate in the measured campaign's units.
+
+    Args:
+        estimate: for the similar campaign.
+        similarity: how that was made.
+
+    Returns:
+        The same quantity, its value and standard deviation changed alike.
+    """
+    std = estimate.std
+    return replace(
+        estimate,
+        value=similarity.own(estimate.value, estimate.unit),
+        std=None if std is None else similarity.own(std, estimate.unit),
+    )
+
+
+def _next_run(run: Mapping[str, Any], similarity: Similarity) -> dict[str, Any]:
+    return {name: similarity.own(v, _NEXT_RUN[name]) if name in _NEXT_RUN else v for name, v in run.items()}

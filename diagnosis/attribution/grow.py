@@ -1,0 +1,232 @@
+"""Which effects: sets of causes, grown one effect at a time from the nominal model and pruned in the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.attribution.decide import evidence
+from diagnosis.attribution.hypothesis import Hypothesis, with_forms
+from diagnosis.fitting.least_squares import Fit, FitError, fit
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.run_data import Data
+from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
+from diagnosis.fitting.stretches import Stretches, fit_whole, in_stretches
+from diagnosis.policy import (
+    ALWAYS_FITTED,
+    BEAM_WIDTH,
+    FREED_HYPOTHESES,
+    GROWN_BY,
+    GROWN_FROM,
+    GROWTH_EVIDENCE,
+    LENGTHENED,
+    MOST_CAUSES,
+    PREDICTED_SHARE,
+)
+from tunnel_sim.effects import Effect
+
+_ITERATIONS = 12  # of a fit on the way; the answer's own is polished
+
+Progress = Callable[[str], None]
+
+
+def grow(
+    nominal: Fit,
+    kinds: Sequence[type[Effect]],
+    progress: Progress | None = None,
+    seeds: Sequence[Hypothesis] = (),
+) -> list[Hypothesis]:
+    """Add effects one after another, to the best few sets of each size.
+
+    Args:
+        nominal: the fit without any effect.
+        kinds: effects to try.
+        progress: called with the names of each set.
+        seeds: sets fitted to the same runs; the growth goes on from the best of them.
+
+    Returns:
+        Fitted hypotheses of all sizes, best first. The growth ends where the evidence for a larger set falls or
+        could not rise, and at `MOST_CAUSES`.
+    """
+    found = {seed.names: seed for seed in seeds}
+    level = _by_evidence(seeds, nominal)[:1] or [Hypothesis((), nominal)]
+    while _may_gain(level[0], nominal):
+        count = FREED_HYPOTHESES if not level[0].effects else 1
+        children = with_forms(_children(level, kinds, progress), level[0].fit, count)
+        found |= {child.names: child for child in children}
+        ranked = _by_evidence(children, nominal)
+        if not ranked or not _goes_on(ranked[0], level[0], nominal):
+            break
+        level = [h for h in ranked[:GROWN_FROM] if _left(h) <= BEAM_WIDTH * _left(ranked[0])]
+    return sorted(found.values(), key=lambda h: h.fit.total)
+
+
+@dataclass(frozen=True, eq=False)
+class _Grown:
+    """A set of causes fitted to stretches of the runs, and to the whole runs."""
+
+    part: Hypothesis
+    whole: Hypothesis
+
+
+def grow_in_stretches(
+    nominal: Fit,
+    fit_nominal: Callable[[Data], Fit],
+    kinds: Sequence[type[Effect]],
+    progress: Progress | None = None,
+) -> list[Hypothesis]:
+    """Grow sets of causes on stretches of the runs, where the nominal model misses the motion itself.
+
+    Args:
+        nominal: its fit to the whole runs.
+        fit_nominal: fits it to any runs.
+        kinds: effects to try; those that are autonomous are.
+        progress: called with the names of each set.
+
+    Returns:
+        The best sets of each size, with textbook forms, fitted to the whole runs from their fits to stretches.
+    """
+    stretches = in_stretches(nominal.problem.data)
+    first = Hypothesis((), fit_nominal(stretches.data))
+    level, found = [_Grown(first, Hypothesis((), nominal))], []
+    able = [kind for kind in kinds if kind.autonomous]
+    while _may_gain(level[0].whole, nominal):
+        parts = sorted(_children([g.part for g in level], able, progress), key=lambda h: h.fit.total)
+        grown = [g for part in parts[:LENGTHENED] if (g := _lengthened(part, stretches, nominal)) is not None]
+        found += [g.whole for g in grown]
+        grown.sort(key=lambda g: -_evidence(g.whole, nominal))
+        if not grown or not _goes_on(grown[0].whole, level[0].whole, nominal):
+            break
+        level = grown[:GROWN_FROM]
+    return found
+
+
+def _lengthened(part: Hypothesis, stretches: Stretches, nominal: Fit) -> _Grown | None:
+    with suppress(FitError, np.linalg.LinAlgError):
+        return _Grown(part, replace(part, fit=fit_whole(part.fit, stretches, nominal.problem.data)))
+    return None
+
+
+def _left(hypothesis: Hypothesis) -> float:
+    return max(hypothesis.fit.excess, 0.0)
+
+
+def _evidence(hypothesis: Hypothesis, nominal: Fit) -> float:
+    share = _left(hypothesis) / max(nominal.excess, 1e-9)
+    return evidence(hypothesis.effects, share, hypothesis.forms, nominal.excess, nominal.chance)
+
+
+def _by_evidence(found: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
+    return sorted(found, key=lambda h: -_evidence(h, nominal))
+
+
+def _may_gain(hypothesis: Hypothesis, nominal: Fit) -> bool:
+    """Whether the evidence could rise if one more effect closed all that is left."""
+    if not hypothesis.effects:
+        return True
+    larger = (*hypothesis.effects, "")
+    best = evidence(larger, 0.0, hypothesis.forms, nominal.excess, nominal.chance)
+    return len(hypothesis.effects) < MOST_CAUSES and best > _evidence(hypothesis, nominal)
+
+
+def _goes_on(child: Hypothesis, parent: Hypothesis, nominal: Fit) -> bool:
+    """Whether a larger set may still lead on: one of two equal causes closes only half of what is left."""
+    if not parent.effects:
+        return child.fit.excess > 0.0
+    return _evidence(child, nominal) > GROWTH_EVIDENCE * _evidence(parent, nominal)
+
+
+def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The hypotheses with one effect less than a given one that were not fitted yet.
+
+    Args:
+        whole: with two effects or more.
+        found: fitted hypotheses.
+
+    Returns:
+        The missing ones, each started from the values of the whole.
+    """
+    known = {hypothesis.names for hypothesis in found}
+    smaller = []
+    for kind in whole.fit.problem.effects:
+        names = tuple(name for name in whole.effects if name != kind.name)
+        if names and tuple(sorted(names)) not in known:
+            with suppress(FitError, np.linalg.LinAlgError):
+                smaller.append(Hypothesis(names, without(whole.fit, kind)))
+    return smaller
+
+
+def without(whole: Fit, kind: type[Effect]) -> Fit:
+    """Refit with one effect taken out.
+
+    Args:
+        whole: a fit.
+        kind: one of its effects.
+
+    Returns:
+        The fit of the others, started from their values.
+
+    Raises:
+        FitError: when the model cannot be integrated.
+    """
+    problem = whole.problem
+    smaller = Problem(
+        problem.data,
+        tuple(other for other in problem.effects if other is not kind),
+        tuple((name, value) for name, value in problem.fixed if not name.startswith(f"{kind.name}.")),
+        tuple(name for name in problem.free_forms if name != kind.name),
+    )
+    values = dict(zip(problem.names, whole.point.common.tolist(), strict=True))
+    own = [True] * (whole.point.release.shape[1] - len(problem.phased))
+    own += [name != kind.name for name in problem.phased]
+    start = Point(np.array([values[name] for name in smaller.names]), whole.point.release[:, own])
+    return fit(smaller, start)
+
+
+def _children(
+    level: Sequence[Hypothesis], kinds: Sequence[type[Effect]], progress: Progress | None
+) -> list[Hypothesis]:
+    """The sets with one effect more, each fitted from its best starting points."""
+    found: dict[tuple[str, ...], Hypothesis] = {}
+    for parent in level:
+        others = [kind for kind in kinds if kind.name not in parent.effects]
+        for kind, starts in _worth_fitting(parent, others):
+            if progress is not None:
+                progress(" + ".join((*parent.effects, kind.name)))
+            best = _best_fit(starts[: kind.tries], parent.fit)
+            if best is None:
+                continue
+            child = Hypothesis((*parent.effects, kind.name), best)
+            if child.names not in found or best.total < found[child.names].fit.total:
+                found[child.names] = child
+    return list(found.values())
+
+
+def _worth_fitting(
+    parent: Hypothesis, kinds: Sequence[type[Effect]]
+) -> list[tuple[type[Effect], list[StartingPoint]]]:
+    """The effects that linear theory predicts to close most; after the nominal model generously many."""
+    scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
+    scored.sort(key=lambda item: -item[1][0].predicted_drop)
+    if parent.effects:
+        return scored[:GROWN_BY]
+    limit = PREDICTED_SHARE * parent.fit.total
+    return [item for i, item in enumerate(scored) if i < ALWAYS_FITTED or item[1][0].predicted_drop > limit]
+
+
+def _best_fit(starts: Sequence[StartingPoint], base: Fit) -> Fit | None:
+    best: Fit | None = None
+    for start in starts:
+        try:
+            if is_gross(base):
+                found = fit(start.problem, start.point)
+            else:
+                found = fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
+        except (FitError, np.linalg.LinAlgError):
+            continue
+        if np.isfinite(found.total) and (best is None or found.total < best.total):
+            best = found
+    return best

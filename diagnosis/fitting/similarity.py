@@ -1,0 +1,149 @@
+"""Dynamically similar campaigns: every rig is diagnosed as one of the same frequency and the same stiffness.
+
+The equation of motion keeps its form when time is multiplied by s, moments by m, lengths along the flow by s and
+the frontal area by m/s: inertias then change by m s², damping by m s, while angles, wind speeds, air densities, Cnβ
+and Cnr stay as they are. So every interval, frequency and moment inside the diagnosis refers to one rig, whatever
+the time scale of the rig that was measured.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.decay.spectrum import highest_peak
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
+from tunnel_sim.vocabulary.record import Record
+
+REFERENCE_FREQUENCY = 2.0
+"""Frequency of the similar rig, Hz."""
+
+REFERENCE_STIFFNESS = 16.0
+"""Median stiffness of its springs, N m/rad."""
+
+#: How a quantity changes, by its unit: powers of m and s.
+_POWERS = {
+    "N m": (1, 0),
+    "N m/rad": (1, 0),
+    "N m s/rad": (1, 1),
+    "N m s2/rad2": (1, 2),
+    "rad/(N m)": (-1, 0),
+    "kg m2": (1, 2),
+    "rad/s": (0, -1),
+    "rad/s2": (0, -2),
+    "1/s": (0, -1),
+    "1/s2": (0, -2),
+    "s": (0, 1),
+    "s2": (0, 2),
+    "Hz": (0, -1),
+}
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """How a campaign was changed into the similar one.
+
+    Args:
+        time: s, the factor on times, dimensionless.
+        moment: m, the factor on moments, dimensionless.
+        rest: angle taken off all readings, rad.
+    """
+
+    time: float = 1.0
+    moment: float = 1.0
+    rest: float = 0.0
+
+    @property
+    def area(self) -> float:
+        """The factor on the frontal area, dimensionless."""
+        return self.moment / self.time
+
+    def own(self, value: float, unit: str) -> float:
+        """A value of the similar campaign as a value of the campaign itself.
+
+        Args:
+            value: in the unit.
+            unit: SI; one without time or moment leaves the value as it is, as does a speed.
+
+        Returns:
+            In the same unit.
+        """
+        return value / self._factor(unit)
+
+    def similar(self, value: float, unit: str) -> float:
+        """A value of the campaign itself as one of the similar campaign; the reverse of `own`."""
+        return value * self._factor(unit)
+
+    def _factor(self, unit: str) -> float:
+        moment, time = _POWERS.get(unit, (0, 0))
+        return float(self.moment**moment * self.time**time)
+
+
+def similar_campaign(campaign: Campaign) -> tuple[Campaign, Similarity]:
+    """The campaign of the similar rig.
+
+    Args:
+        campaign: as measured.
+
+    Returns:
+        The similar campaign, and how it was made. Its wind-off runs have a median frequency of
+        `REFERENCE_FREQUENCY`, and its springs a median stiffness of `REFERENCE_STIFFNESS`; where no stiffness is
+        stated the inertia is 1 before and after.
+    """
+    still = [run for run in campaign.runs if not run.wind_on] or list(campaign.runs)
+    time = float(np.median([frequency(run.record) for run in still])) / REFERENCE_FREQUENCY
+    springs = [run.spring_stiffness for run in campaign.runs if run.spring_stiffness is not None]
+    normalised = len(springs) < len(campaign.runs)
+    moment = time**-2 if normalised else REFERENCE_STIFFNESS / float(np.median(springs))
+    rest = float(np.median([np.mean(run.record.yaw_rad) for run in campaign.runs]))
+    change = Similarity(time, moment, rest)
+    rate = campaign.sensor.sample_rate
+    return (
+        dataclasses.replace(
+            campaign,
+            rig=_rig(campaign.rig, change),
+            sensor=dataclasses.replace(campaign.sensor, sample_rate=None if rate is None else rate / time),
+            runs=tuple(_run(run, change) for run in campaign.runs),
+        ),
+        change,
+    )
+
+
+_PADDING = 8  # times the record, which places the peak of a few cycles to within a few per cent
+
+
+def frequency(record: Record) -> float:
+    """The frequency of a decay.
+
+    Args:
+        record: a run's reading.
+
+    Returns:
+        The peak of its spectrum, Hz.
+    """
+    swing = record.yaw_rad - np.mean(record.yaw_rad)
+    size = _PADDING * swing.size
+    place, _ = highest_peak(swing * np.hanning(swing.size), size)
+    return place * record.sample_rate / size
+
+
+def _rig(rig: RigProperties, change: Similarity) -> RigProperties:
+    inertia, width = rig.yaw_inertia, rig.width
+    return RigProperties(
+        None if inertia is None else change.similar(inertia, "kg m2"),
+        None if rig.frontal_area is None else rig.frontal_area * change.area,
+        None if rig.reference_length is None else rig.reference_length * change.time,
+        None if width is None else width * change.time,
+    )
+
+
+def _run(run: Run, change: Similarity) -> Run:
+    spring = run.spring_stiffness
+    record = Record(run.record.time_s * change.time, run.record.yaw_rad - change.rest)
+    return dataclasses.replace(
+        run,
+        record=record,
+        spring_stiffness=None if spring is None else spring * change.moment,
+    )
