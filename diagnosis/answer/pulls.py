@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.answer.small_swings import coefficient_gradient
 from diagnosis.fitting.least_squares import Fit, normal_equations
 from diagnosis.fitting.spectra import resonance
 from diagnosis.policy import CHANCE_STDS, LEAST_HALF
@@ -47,7 +48,7 @@ def coefficient_move(fit: Fit, name: str) -> float:
         The move in the coefficient's unit, reduced by what the noise alone gives (2 standard deviations, in
         quadrature); 0 where it gives as much.
     """
-    pieces = _pieces(fit, _gradient(fit, name))
+    pieces = _pieces(fit, coefficient_gradient(fit.problem.names, fit.point.common, name))
     return max(_half_difference(pieces, order) for order in pieces.orders)
 
 
@@ -99,16 +100,3 @@ def _starts(count: int, cycles: float) -> NDArray[np.int64]:
     """First block of every whole cycle of a run of ``count`` blocks with ``cycles`` cycles to a block."""
     pieces = min(max(int(count * cycles), 1), count)
     return np.arange(pieces, dtype=np.int64) * count // pieces
-
-
-def _gradient(fit: Fit, name: str) -> Array:
-    """Derivative of a coefficient with respect to the common parameters, shape (common,)."""
-    found = dict.fromkeys(fit.problem.names, 0.0)
-    if name in found:
-        found[name] = 1.0
-    else:
-        stiffness, damping = max(fit.value("stiffness"), 1e-300), fit.value("mechanical_damping")
-        root = math.sqrt(stiffness)
-        slopes = {"omega_n": (0.5 / root, 0.0), "zeta": (-0.25 * damping / root / stiffness, 0.5 / root)}
-        found["stiffness"], found["mechanical_damping"] = slopes[name]
-    return np.array(list(found.values()))

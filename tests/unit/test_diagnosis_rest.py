@@ -8,9 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.answer.coefficients import coefficients
 from diagnosis.answer.determined import meant_coefficient, meant_parameter
+from diagnosis.answer.held_out import predict_held_out
 from diagnosis.answer.pulls import coefficient_move
 from diagnosis.answer.rest import rest
+from diagnosis.answer.small_swings import coefficient_gradient, coefficient_value
 from diagnosis.attribution.decide import Weighed
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Point, Problem
@@ -158,3 +161,40 @@ def test_a_coefficient_that_could_be_anything_is_not_determined(base, name, valu
     found = meant_coefficient(ParameterEstimate(value, std, "1"), base, name)
     assert (found.determined, found.std) == (determined, std if determined else None)
     assert found.to_json_dict().get("determined", True) is determined
+
+
+NAMES = (
+    "stiffness",
+    "mechanical_damping",
+    "zero",
+    "gravity_stiffness.stiffness",
+    "cubic_stiffness.coefficient",
+)
+
+
+@pytest.mark.parametrize("name", ["omega_n", "zeta", "zero"])
+def test_small_swings_have_the_stiffness_of_spring_and_gravity(name):
+    common = np.array([30.0, 0.5, 0.01, 91.0, 7.0])
+    value = coefficient_value(NAMES, common, name)
+    assert value == pytest.approx({"omega_n": 11.0, "zeta": 0.5 / 22.0, "zero": 0.01}[name])
+    gradient = coefficient_gradient(NAMES, common, name)
+    for i, step in enumerate(1e-6 * np.eye(5)):
+        up, down = (coefficient_value(NAMES, common + s, name) for s in (step, -step))
+        assert gradient[i] == pytest.approx((up - down) / 2e-6, abs=1e-8)
+
+
+def test_a_spring_at_its_bound_does_not_matter_where_gravity_holds_the_body(data):
+    runs = tuple(replace(run, spring_stiffness=None) for run in data.runs[:1])
+    base = nominal(replace(data, runs=runs))
+    least = Point(np.array([0.0, 0.0, *base.point.common[2:]]), base.point.release)
+    alone = coefficients(replace(base, point=least), predict_held_out(base), data)
+    assert [alone[name].bound for name in ("omega_n", "zeta")] == ["lower", "lower"]
+    assert alone["zeta"].std is None
+    problem = Problem(base.problem.data, (effect_class("gravity_stiffness"),))
+    values = dict(zip(base.problem.names, least.common, strict=True))
+    values["gravity_stiffness.stiffness"] = base.value("stiffness")
+    common = np.array([values.get(name, 0.0) for name in problem.names])
+    held = fit(problem, Point(common, base.point.release), max_iterations=1)
+    found = coefficients(held, predict_held_out(held), data)["omega_n"]
+    assert found.bound is None
+    assert found.value == pytest.approx(np.sqrt(base.value("stiffness")), rel=0.01)

@@ -18,12 +18,14 @@ NAME = "diagnose"
 STEPS = {
     "noise": "estimating the noise",
     "nominal fit": "fitting the nominal model",
-    "single effects": "fitting effects",
-    "pairs": "fitting pairs of effects",
+    "effects on stretches": "fitting sets of effects to stretches of the runs",
+    "effects": "fitting sets of effects",
     "random moments": "fitting random moments",
+    "pruning": "fitting the answer without each effect",
+    "polishing": "fitting the answer to convergence",
     "where, and how far it closes": "locating the gap, predicting held-out runs",
 }
-"""Steps of the study in words; any other progress message is the name of an effect or a pair."""
+"""Steps of the study in words; any other progress message is a set of effects."""
 
 
 def run(
@@ -47,7 +49,7 @@ def run(
     """Find out why the nominal model does not fit the runs of a campaign.
 
     The nominal model is fitted to all runs, and its residuals are tested against
-    the noise. Then every effect of the vocabulary, and pairs of them, are fitted
+    the noise. Then the effects of the vocabulary, and sets of them, are fitted
     and compared. The answer is one effect or several, "none" (there is no gap) or
     "unknown" (no effect of the vocabulary explains it), each with a probability.
     Gap and coefficients are given before and after the effects are added, and
