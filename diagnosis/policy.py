@@ -61,8 +61,8 @@ PREDICTED_SHARE = 0.01
 GROWN_FROM, GROWN_BY = 3, 4
 #: Excess, in that of the best set of its size, up to which another set is grown. Judgement: time against coverage.
 BEAM_WIDTH = 3.0
-#: Factor by which the evidence for a set may fall when an effect is added, for the growth to go on. Judgement: where
-#: three equal causes are missing, the first closes a third of what is left, which lowers the evidence to 0.2.
+#: Factor by which the evidence for a set may fall when an effect is added, for the growth to go on. Judgement: of
+#: three equal causes that are missing, the first closes a third of what is left, which lowers the evidence to 0.2.
 GROWTH_EVIDENCE = 0.1
 #: Sets of each size, found on stretches, that are fitted to whole runs. Judgement: time against coverage.
 LENGTHENED = 4

@@ -86,6 +86,14 @@ GREATEST_NETWORK_DISTANCE = 0.1
 """Root mean square distance of three cycles from a damped oscillation, over its amplitude. Beyond it the networks
 are not used: they were trained on damped oscillations."""
 
+CLEAR_SWING = 0.2
+"""Share of a run's largest swing from which its peaks tell the centre: smaller swings may end off it, held by dry
+friction. Judgement."""
+
+EQUAL_SWINGS = 0.8
+"""Ratio of two swings that count as equal when centres are compared: what depends on the amplitude changes by less
+than half. Judgement."""
+
 LEAST_FOR_SCATTER = 3
 """Values whose scatter is taken for their uncertainty."""
 

@@ -76,7 +76,7 @@ def compare(problem: Problem, common: Array, release: Array) -> Comparison:
         failure = error.what
     return Comparison(
         ids=tuple(run.id for run in runs),
-        residuals=[(run.reading - p) / s for run, p, s in zip(runs, predicted, noise, strict=True)],
+        residuals=[run.scaled(run.reading - p) for run, p in zip(runs, predicted, strict=True)],
         differences=[p - f for p, f in zip(predicted, before, strict=True)],
         noise=noise,
         failure=failure,
@@ -144,7 +144,7 @@ class _Case:
     def __init__(self, problem: Problem, common: Array, own: Array, run: RunData) -> None:
         self.run = run
         self.chain = problem.chain(common, own, run)
-        self.zero = float(common[problem.nominal_names.index("zero")])
+        self.zero = problem.zero(common, own)
         physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         steps = report_substeps(physics, run.interval)
         blocks = run.reading.size + blocks_beyond(physics, run)

@@ -74,6 +74,8 @@ def planned_run(
         wind_speed=wind_speed,
         air_density=air_density if wind_speed > 0.0 else 0.0,
         duration=duration,
+        start=0.0,
+        samples=None,
     )
 
 
@@ -141,10 +143,11 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
     turns = np.array([bool(kind.line) for kind in problem.effects if kind.name in problem.phased], bool)
     count = int(turns.sum())
     steps = np.array([1e-4 * angle, 1e-3 * angle])
-    own = np.array([angle, 0.0, *np.where(turns, 0.0, 0.5)])  # samples are skipped in the middle of the run
+    start = (angle, 0.0, 0.0)[: problem.first_phase]
+    own = np.array([*start, *np.where(turns, 0.0, 0.5)])  # samples are skipped in the middle of the run
     rows = [own, *(own + np.eye(2, own.size) * steps[:, None])]
     for turn in (0.5 * np.pi, np.pi):
-        rows += list(own + turn * np.eye(own.size)[2:][turns])
+        rows += list(own + turn * np.eye(own.size)[problem.first_phase :][turns])
     values = np.stack([v[0] for v in problem.predict([Point(fit.point.common, row[None]) for row in rows])])
     if not np.all(np.isfinite(values)):
         return None

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from diagnosis.fitting.similarity import Similarity
-from diagnosis.result import Diagnosis, ParameterEstimate
+from diagnosis.result import Confirmation, Diagnosis, NoiseSummary, ParameterEstimate
 
 _NEXT_RUN = {"spring_stiffness": "N m/rad", "duration": "s"}
 
@@ -34,6 +34,8 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
             before=own(answer.coefficients.before),
             after=own(answer.coefficients.after),
         ),
+        noise=_noise(answer.noise, similarity),
+        confirmation=_confirmation(answer.confirmation, similarity),
         next_run=None if answer.next_run is None else _next_run(answer.next_run, similarity),
     )
 
@@ -53,6 +55,25 @@ def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> Paramet
         estimate,
         value=similarity.own(estimate.value, estimate.unit),
         std=None if std is None else similarity.own(std, estimate.unit),
+    )
+
+
+def _noise(noise: NoiseSummary, similarity: Similarity) -> NoiseSummary:
+    stated = noise.stated_std
+    return replace(
+        noise,
+        std=similarity.own(noise.std, similarity.reading),
+        stated_std=None if stated is None else similarity.own(stated, similarity.reading),
+    )
+
+
+def _confirmation(found: Confirmation, similarity: Similarity) -> Confirmation:
+    factor = similarity.own(1.0, similarity.reading)
+    return replace(
+        found,
+        largest_difference=found.largest_difference * factor,
+        rms_difference=found.rms_difference * factor,
+        tolerance=found.tolerance * factor,
     )
 
 

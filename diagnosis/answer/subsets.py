@@ -99,7 +99,8 @@ def restricted(whole: Fit, names: Names) -> Fit:
         tuple(name for name in large.free_forms if name in names),
     )
     common = [large.names.index(name) for name in problem.names]
-    own = [0, 1, *(2 + large.phased.index(name) for name in problem.phased)]
+    first = whole.point.release.shape[1] - len(large.phased)  # of the phases and instants
+    own = [*range(first), *(first + large.phased.index(name) for name in problem.phased)]
     return dataclasses.replace(
         whole,
         problem=problem,

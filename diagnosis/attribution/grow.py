@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.attribution.decide import evidence
-from diagnosis.attribution.hypothesis import Hypothesis, with_forms
+from diagnosis.attribution.hypothesis import Hypothesis, is_plausible, with_forms
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data
@@ -227,6 +227,7 @@ def _best_fit(starts: Sequence[StartingPoint], base: Fit) -> Fit | None:
                 found = fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
         except (FitError, np.linalg.LinAlgError):
             continue
-        if np.isfinite(found.total) and (best is None or found.total < best.total):
+        better = best is None or found.total < best.total
+        if np.isfinite(found.total) and better and is_plausible(found):
             best = found
     return best

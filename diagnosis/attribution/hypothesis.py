@@ -10,6 +10,7 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.spectra import resonance
 from diagnosis.policy import FORM_SHARE, FREED_FROM, FREED_HYPOTHESES
 from tunnel_sim.effects.base import ParameterInfo
 
@@ -40,6 +41,17 @@ class Hypothesis:
         """How many form parameters were freed."""
         problem = self.fit.problem
         return sum(i.form for k in problem.effects if k.name in problem.free_forms for i in k.parameters())
+
+
+def is_plausible(fitted: Fit) -> bool:
+    """Whether every effect of a fit is still what its name means, in every run.
+
+    Args:
+        fitted: any fit.
+    """
+    effects = fitted.problem.effects_at(fitted.point.common)
+    motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]
+    return all(effect.plausible(omega) for effect in effects for omega in motions)
 
 
 def with_forms(found: Sequence[Hypothesis], base: Fit, count: int = FREED_HYPOTHESES) -> list[Hypothesis]:
@@ -113,7 +125,7 @@ def _free_forms(fitted: Fit, tolerance: float = 1e-4) -> Fit | None:
         found = fit(freed, start, tolerance=tolerance)
     except (FitError, np.linalg.LinAlgError):
         return None
-    return found if found.total < fitted.total else None
+    return found if found.total < fitted.total and is_plausible(found) else None
 
 
 def _within(info: ParameterInfo) -> float:

@@ -65,15 +65,14 @@ class _Motion:
 
 
 def _motions(nominal: Fit) -> list[_Motion]:
-    zero = nominal.value("zero")
     runs = zip(nominal.problem.data.runs, nominal.residuals, strict=True)
     return [
         _Motion(
-            run.reading - residual * np.sqrt(run.noise_variance) - zero,
+            run.reading - residual * np.sqrt(run.noise_variance) - nominal.zero(i),
             float(np.sqrt(run.noise_variance)),
             run.interval,
         )
-        for run, residual in runs
+        for i, (run, residual) in enumerate(runs)
     ]
 
 

@@ -75,8 +75,10 @@ def offset_p_value(fit: Fit, floor: float = 1.0) -> float:
         floor: power assumed for white noise, a factor on the noise variance.
 
     Returns:
-        The p-value; the zero takes one degree of freedom.
+        The p-value; the zero takes one degree of freedom. 1 where the runs have zeros of their own.
     """
+    if fit.problem.data.own_zeros:
+        return 1.0
     total = sum(float(np.sum(residual)) ** 2 / residual.size for residual in fit.residuals)
     runs = len(fit.residuals)
     return float(chi2.sf(total / floor, runs - 1)) if runs > 1 else 1.0

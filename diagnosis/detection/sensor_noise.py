@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.detection.scattered_noise import scattered_variance
 from diagnosis.fitting.run_data import BLOCK_INTERVAL
+from diagnosis.fitting.similarity import frequency
 from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
@@ -52,6 +54,8 @@ class Noise:
 def estimate_variance(record: Record) -> tuple[float, float]:
     """Variance of the white noise, from the median of the periodogram above the motion.
 
+    Where the samples are not evenly spaced, `scattered_variance` measures it.
+
     Args:
         record: a run's reading.
 
@@ -59,10 +63,13 @@ def estimate_variance(record: Record) -> tuple[float, float]:
         Variance of one sample, rad², and its relative standard deviation. Lines such as the mains' harmonics
         do not move a median.
     """
+    if not record.uniform:
+        block = max(1, round(BLOCK_INTERVAL * record.sample_rate))
+        return scattered_variance(record, frequency(record), block)
     rate = record.sample_rate
     low = min(_FLOOR_FROM, 0.25 * rate)
-    frequency, power = floor_periodogram(record.yaw_rad, rate)
-    floor = power[(frequency > low) & (frequency < 0.49 * rate)]
+    places, power = floor_periodogram(record.yaw_rad, rate)
+    floor = power[(places > low) & (places < 0.49 * rate)]
     # a median of n exponentials scatters by 1/√n of its mean ln 2; the Hann window correlates neighbouring
     # bins: 1.57 of them carry what one would without it
     return float(np.median(floor) / _LN2 * rate / 2.0), float(np.sqrt(1.57 / floor.size) / _LN2)
@@ -192,7 +199,7 @@ class NoiseTrend:
         spread: natural logarithm of the ratio of the local variances' standard deviation to that of a normal
             distribution with their quartiles: positive for heavy tails. Skewness alone makes it about 0.1.
         step: of the lattice of the readings, rad.
-        judged: whether the sampling is fast enough for the test.
+        judged: whether any run is sampled evenly and fast enough for the test.
     """
 
     amplitude_z: float
@@ -213,10 +220,11 @@ def noise_trend(campaign: Campaign) -> NoiseTrend:
         campaign: the runs.
 
     Returns:
-        Trends of the variance of fourth differences of the reading in windows of 20 ms, pooled over runs. Their
-        null distribution is simulated (`diagnosis.detection.noise_under_null`).
+        Trends of the variance of fourth differences of the reading in windows of 20 ms, pooled over the runs with
+        evenly spaced samples. Their null distribution is simulated (`diagnosis.detection.noise_under_null`).
     """
-    values = trend_statistics([(run.record.yaw_rad[None], run.record.sample_rate) for run in campaign.runs])
+    even = [run.record for run in campaign.runs if run.record.uniform]
+    values = trend_statistics([(record.yaw_rad[None], record.sample_rate) for record in even])
     if values is None:
         return NoiseTrend(0.0, 0.0, 0.0, judged=False)
     amplitude, rate, spread = values[0].tolist()

@@ -52,7 +52,7 @@ class Fit:
     @property
     def count(self) -> int:
         """Number of residuals."""
-        return sum(r.size for r in self.residuals)
+        return sum(run.filled for run in self.problem.data.runs)
 
     @property
     def excess(self) -> float:
@@ -67,6 +67,10 @@ class Fit:
     def value(self, name: str) -> float:
         """A common parameter by name."""
         return float(self.point.common[self.problem.names.index(name)])
+
+    def zero(self, index: int) -> float:
+        """The sensor's zero in the run of an index."""
+        return self.problem.zero(self.point.common, self.point.release[index])
 
     def std(self, name: str) -> float:
         """Its standard deviation, if the model is right."""
@@ -203,8 +207,7 @@ def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
 
 def _scaled(problem: Problem, prediction: list[Array]) -> list[Array]:
     return [
-        (run.reading - values) / np.sqrt(run.noise_variance)
-        for run, values in zip(problem.data.runs, prediction, strict=True)
+        run.scaled(run.reading - values) for run, values in zip(problem.data.runs, prediction, strict=True)
     ]
 
 
@@ -272,9 +275,8 @@ def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> li
     predictions = problem.predict(points)
     result = []
     for r, run in enumerate(problem.data.runs):
-        scale = np.sqrt(run.noise_variance)
         with np.errstate(invalid="ignore"):  # a run that grew without bound; the caller looks for it
-            changes = [(moved[r] - predictions[0][r]) / scale for moved in predictions[1:]]
+            changes = [run.scaled(moved[r] - predictions[0][r]) for moved in predictions[1:]]
         common = [c / steps[known + i] for i, c in enumerate(changes[: steps.size - known])]
         ends = [c / release_steps[known_own + j][r] for j, c in enumerate(changes[steps.size - known :])]
         if base is None:

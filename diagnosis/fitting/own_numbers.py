@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
+from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION
 from tunnel_sim.vocabulary.record import Array
 
 _PADDING = 4  # zero padding of the spectra
 _DECAYS = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of a ringing in one run, nepers
-_OWN_BAND = 0.3  # of the motion's frequency: nearer to it or to its multiples a line is the motion's own
-_MULTIPLES = (1.0, 2.0, 3.0)
 _EDGE = 8  # blocks at either end of a run in which a skip cannot be told from the release or seen at all
 
 
@@ -64,7 +63,7 @@ def _beside_the_motion(reading: Array, interval: float, grid: Array) -> np.ndarr
     size = _PADDING * reading.size
     power = np.abs(np.fft.rfft((reading - reading.mean()) * np.hanning(reading.size), size))
     own = float(np.argmax(power)) / (size * interval)
-    return np.asarray(np.all([np.abs(grid - k * own) > _OWN_BAND * own for k in _MULTIPLES], axis=0))
+    return np.asarray(np.all([np.abs(grid - k * own) > NEAR_MOTION * own for k in MULTIPLES], axis=0))
 
 
 def _amplitudes(fit: Fit, grid: Array, rate: float) -> tuple[np.ndarray, Array]:

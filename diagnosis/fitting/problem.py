@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from diagnosis.fitting.run_data import Data, RunData, hermite_means
+from diagnosis.fitting.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import ParameterInfo
 from tunnel_sim.files.rig_file import load_rig
@@ -36,8 +36,9 @@ class Point:
     Args:
         common: parameters common to the runs, in the order of `Problem.names`, shape (common,).
         release: of every run its own parameters, shape (runs, own): angle (rad) and rate (rad/s) of the sensor's
-            end at the record's start, then in the effects' order the phase (rad) of each periodic one and the
-            instant (share of the run's length) of each that skips samples.
+            end at the record's start, the sensor's zero (rad) where each run has its own, then in the effects'
+            order the phase (rad) of each periodic one and the instant (share of the run's length) of each that
+            skips samples.
     """
 
     common: Array
@@ -65,7 +66,24 @@ class Problem:
         """Names of the nominal model's common parameters."""
         first = "stiffness" if self.data.normalised else "yaw_inertia"
         air = ("cn_beta", "cn_r") if self.data.wind_on else ()
-        return (first, "mechanical_damping", *air, "zero")
+        return (first, "mechanical_damping", *air, *(() if self.data.own_zeros else ("zero",)))
+
+    @property
+    def first_phase(self) -> int:
+        """Place of the first phase or instant among a run's own parameters."""
+        return 3 if self.data.own_zeros else 2
+
+    def zero(self, common: Array, own: Array) -> float:
+        """The sensor's zero in one run.
+
+        Args:
+            common: as in `Point`, shape (common,).
+            own: of the run, a row of ``Point.release``, shape (own,).
+
+        Returns:
+            In the unit of the reading.
+        """
+        return float(own[2] if self.data.own_zeros else common[self.nominal_names.index("zero")])
 
     @cached_property
     def effect_names(self) -> tuple[str, ...]:
@@ -157,7 +175,7 @@ class Problem:
         Returns:
             The effects with the phases and instants that the run has.
         """
-        phases = dict(zip(self.phased, own[2:].tolist(), strict=True))
+        phases = dict(zip(self.phased, own[self.first_phase :].tolist(), strict=True))
         drawn = tuple(phases.get(kind.name) for kind in self.effects)
         known = self.effects_at(common) if effects is None else effects
         return EffectChain(self.stated(common, own, run), known, drawn)
@@ -190,7 +208,7 @@ class _Job:
     def __init__(self, problem: Problem, point: Point, run_index: int, effects: tuple[Effect, ...]) -> None:
         run = problem.data.runs[run_index]
         self.run = run
-        self.zero = float(point.common[problem.nominal_names.index("zero")])
+        self.zero = problem.zero(point.common, point.release[run_index])
         self.chain = problem.chain(point.common, point.release[run_index], run, effects)
         physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         self.row, self.keep_alive = forward_run(physics)
@@ -204,17 +222,14 @@ class _Job:
         if self.chain.skips:
             ends = np.arange(angle.size, dtype=np.float64) * self.run.interval
             return sample_means(self.chain, Motion(ends, angle, rate), self.run, self.zero)
-        weights = hermite_means(self.run.block)
+        weights = self.run.weights
         h = self.run.interval
         mean: Array = (
             weights[0] * angle[:-1]
             + weights[1] * angle[1:]
             + h * (weights[2] * rate[:-1] + weights[3] * rate[1:])
         )
-        time = np.asarray(
-            (np.arange(mean.size) + 0.5 * (self.run.block - 1) / self.run.block) * h, np.float64
-        )
-        return self.chain.reading(self.chain.angle(mean, time) + self.zero)
+        return self.chain.reading(self.chain.angle(mean, self.run.times) + self.zero)
 
 
 def blocks_beyond(physics: RunSettings, run: RunData) -> int:
@@ -242,11 +257,8 @@ def sample_means(chain: EffectChain, motion: Motion, run: RunData, zero: float) 
     Returns:
         rad, of the shape of the run's ``reading``.
     """
-    samples = run.reading.size * run.block
-    time: Array = np.asarray(np.arange(samples) * (run.interval / run.block), np.float64)
-    reading = chain.reading(chain.seen(motion, time) + zero)
-    means: Array = reading.reshape(run.reading.size, run.block).mean(axis=1)
-    return means
+    reading = chain.reading(chain.seen(motion, run.sample_times, run.derivative) + zero)
+    return run.means(reading)
 
 
 def condensed(physics: RunSettings, data: Data) -> RunSettings:

@@ -4,17 +4,65 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from diagnosis.fitting.similarity import Similarity
+from diagnosis.fitting.similarity import AS_MEASURED, Similarity
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.aero import aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, Record
 
 #: Interval of the block means, s: the motion stays below 10 Hz and the mains at 50 Hz.
 BLOCK_INTERVAL = 4e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples that are not evenly spaced, on the uniform raster of the blocks.
+
+    A block without any has a place for one in its middle, so that every block has a mean; it does not count.
+
+    Args:
+        time: since the start of the first block, increasing, shape (m,), s.
+        block: the block that each sample lies in, shape (m,).
+        count: samples in each block, shape (n,).
+    """
+
+    time: Array
+    block: NDArray[np.int64]
+    count: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, record: Record, block: int) -> Samples:
+        """The samples of a record, in blocks that hold ``block`` of them on average.
+
+        The raster starts half a mean interval before the first sample, so that jitter moves few samples into the
+        next block.
+        """
+        blocks, interval = record.time_s.size // block, block * record.sample_interval
+        time = record.time_s - record.time_s[0] + 0.5 * record.sample_interval
+        place = np.floor(time / interval).astype(np.int64)
+        count = np.bincount(place, minlength=blocks)[:blocks]
+        empty = np.flatnonzero(count == 0)
+        order = np.argsort(np.concatenate([time[place < blocks], (empty + 0.5) * interval]))
+        time = np.concatenate([time[place < blocks], (empty + 0.5) * interval])[order]
+        return cls(time, np.concatenate([place[place < blocks], empty])[order], count)
+
+    def means(self, values: Array) -> Array:
+        """Mean over each block of one value per sample, shape (m,) or (k, m)."""
+        rows = np.atleast_2d(values)
+        sums = np.stack([np.bincount(self.block, row, self.count.size) for row in rows])
+        return np.asarray((sums / np.maximum(self.count, 1)).reshape(*values.shape[:-1], -1), np.float64)
+
+    def part(self, first: int, last: int, interval: float) -> Samples:
+        """The blocks from ``first`` up to ``last``, ``interval`` seconds long each."""
+        inside = slice(*np.searchsorted(self.block, (first, last)))
+        return Samples(
+            self.time[inside] - first * interval, self.block[inside] - first, self.count[first:last]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,14 +71,18 @@ class RunData:
 
     Args:
         id: of the run.
-        reading: block means, rad, shape (n,).
-        block: samples per block.
+        reading: block means, rad, shape (n,); interpolated where a block has no sample.
+        block: samples per block, on average where they are not evenly spaced.
         interval: between blocks, s.
-        noise_variance: of one block mean, rad².
+        noise_variance: of one block mean of ``block`` samples, rad².
         spring_stiffness: stated, N m/rad; None in normalised form.
         wind_speed: stated, m/s.
         air_density: stated, kg/m³; 0 where the wind is off.
         duration: of the record, s.
+        start: time left out at the start of the record, s.
+        derivative: which derivative of the angle the reading is: 0, 1 or 2. The units of the reading and its noise
+            follow from it.
+        samples: where they are, if they are not evenly spaced.
     """
 
     id: str
@@ -42,11 +94,95 @@ class RunData:
     wind_speed: float
     air_density: float
     duration: float
+    start: float = 0.0
+    derivative: int = 0
+    samples: Samples | None = None
 
     @property
     def wind_on(self) -> bool:
         """Whether the wind blows."""
         return self.wind_speed > 0.0
+
+    @cached_property
+    def weights(self) -> Array:
+        """Weights that turn a block's ends into its mean, as `hermite_means` gives them.
+
+        Shape (4,), or (4, n) where the samples are not evenly spaced.
+        """
+        if self.samples is None:
+            return hermite_means(self.block, self.derivative, self.interval)
+        u = self.samples.time / self.interval - self.samples.block
+        return self.samples.means(hermite_basis(u, self.derivative, self.interval))
+
+    @cached_property
+    def times(self) -> Array:
+        """Mean time of the samples of every block since the first block's start, shape (n,), s."""
+        if self.samples is None:
+            return np.asarray(
+                (np.arange(self.reading.size) + 0.5 * (self.block - 1) / self.block) * self.interval
+            )
+        return self.samples.means(self.samples.time)
+
+    @property
+    def sample_times(self) -> Array:
+        """Time of every sample in the blocks since the first block's start, shape (m,), s."""
+        if self.samples is not None:
+            return self.samples.time
+        return np.asarray(
+            np.arange(self.reading.size * self.block) * (self.interval / self.block), np.float64
+        )
+
+    def scaled(self, difference: Array) -> Array:
+        """Differences of block means as residuals, whose variance is 1 under white noise.
+
+        Args:
+            difference: of the blocks, in the unit of the reading, shape (n,).
+
+        Returns:
+            Shape (n,); blocks of fewer samples weigh less, and empty ones are 0.
+        """
+        scaled: Array = difference / np.sqrt(self.noise_variance)
+        if self.samples is None:
+            return scaled
+        seen = self.samples.count > 0
+        return np.where(seen, scaled, 0.0) * np.sqrt(self.samples.count / self.block)
+
+    @property
+    def filled(self) -> int:
+        """Number of blocks with samples."""
+        return self.reading.size if self.samples is None else int(np.count_nonzero(self.samples.count))
+
+    def means(self, values: Array) -> Array:
+        """Block means of one value per sample.
+
+        Args:
+            values: shape (m,).
+
+        Returns:
+            Shape (n,).
+        """
+        if self.samples is not None:
+            return self.samples.means(values)
+        return np.asarray(values.reshape(self.reading.size, self.block).mean(axis=1), np.float64)
+
+    def part(self, first: int = 0, last: int | None = None) -> RunData:
+        """The run from one block up to another.
+
+        Args:
+            first: its first block.
+            last: the block after its last one; None: to the end.
+
+        Returns:
+            The shorter run. Its duration is that of the record less what is left out at the start.
+        """
+        last = self.reading.size if last is None else last
+        return dataclasses.replace(
+            self,
+            reading=self.reading[first:last],
+            duration=self.duration - first * self.interval,
+            start=self.start + first * self.interval,
+            samples=None if self.samples is None else self.samples.part(first, last, self.interval),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +196,7 @@ class Data:
         width: m; likewise.
         normalised: whether the runs are fitted per unit inertia with a common stiffness.
         yaw_inertia: nominal Izz, kg m²; None where the campaign does not state it.
+        own_zeros: whether every run has a zero of its own.
         windy: whether the runs are part of a campaign with the wind on, though none of these may be: the model
             then keeps its aerodynamic parameters.
         similarity: how the campaign was made from the measured one.
@@ -71,8 +208,9 @@ class Data:
     width: float
     normalised: bool
     yaw_inertia: float | None
+    own_zeros: bool = False
     windy: bool = False
-    similarity: Similarity = Similarity()
+    similarity: Similarity = AS_MEASURED
 
     @property
     def springs(self) -> tuple[float, ...]:
@@ -125,7 +263,7 @@ class Data:
 
 
 def prepare(
-    campaign: Campaign, noise_variance: dict[str, float], similarity: Similarity = Similarity()
+    campaign: Campaign, noise_variance: dict[str, float], similarity: Similarity = AS_MEASURED
 ) -> Data:
     """Average a campaign's records in blocks.
 
@@ -139,21 +277,29 @@ def prepare(
     """
     rig = campaign.rig
     return Data(
-        runs=tuple(_prepare_run(run, noise_variance[run.id]) for run in campaign.runs),
+        runs=tuple(
+            _prepare_run(run, noise_variance[run.id], campaign.sensor.derivative) for run in campaign.runs
+        ),
         frontal_area=rig.frontal_area or similarity.area,
         reference_length=rig.reference_length or similarity.time,
         width=rig.width or 0.0,
         normalised=any(run.spring_stiffness is None for run in campaign.runs),
         yaw_inertia=rig.yaw_inertia,
+        own_zeros=campaign.sensor.zero == "per_run",
         similarity=similarity,
     )
 
 
-def _prepare_run(run: Run, noise_variance: float) -> RunData:
+def _prepare_run(run: Run, noise_variance: float, derivative: int) -> RunData:
     record = run.record
     block = max(1, round(BLOCK_INTERVAL * record.sample_rate))
     count = record.yaw_rad.size // block
-    reading = record.yaw_rad[: count * block].reshape(count, block).mean(axis=1)
+    samples = None if record.uniform else Samples.of(record, block)
+    if samples is None:
+        reading = record.yaw_rad[: count * block].reshape(count, block).mean(axis=1)
+    else:
+        since = record.time_s - record.time_s[0] + 0.5 * record.sample_interval
+        reading = samples.means(np.interp(samples.time, since, record.yaw_rad))
     return RunData(
         id=run.id,
         reading=reading,
@@ -164,22 +310,44 @@ def _prepare_run(run: Run, noise_variance: float) -> RunData:
         wind_speed=run.wind_speed,
         air_density=run.air_density or 0.0,
         duration=record.duration + record.sample_interval,
+        derivative=derivative,
+        samples=samples,
     )
 
 
-def hermite_means(block: int) -> Array:
-    """Weights that turn a step's ends into the mean over its samples.
+def hermite_basis(u: Array, derivative: int = 0, interval: float = 1.0) -> Array:
+    """The cubic through both ends of a step, or a derivative of it.
+
+    Args:
+        u: places in the step, from 0 to 1, shape (n,).
+        derivative: 0, 1 or 2.
+        interval: of the step, s.
+
+    Returns:
+        Weights of (start angle, end angle, interval × start rate, interval × end rate), shape (4, n), in units of
+        s to the power of −``derivative``: exact to the integrator's order for the angle, and to one and two orders
+        less for its derivatives.
+    """
+    basis = (
+        [2 * u**3 - 3 * u**2 + 1, -2 * u**3 + 3 * u**2, u**3 - 2 * u**2 + u, u**3 - u**2],
+        [6 * u**2 - 6 * u, -6 * u**2 + 6 * u, 3 * u**2 - 4 * u + 1, 3 * u**2 - 2 * u],
+        [12 * u - 6, -12 * u + 6, 6 * u - 4, 6 * u - 2],
+    )[derivative]
+    return np.array(basis) / interval**derivative
+
+
+def hermite_means(block: int, derivative: int = 0, interval: float = 1.0) -> Array:
+    """Weights that turn a step's ends into the mean over its evenly spaced samples.
 
     Args:
         block: samples in the step, the first at its start.
+        derivative: as in `hermite_basis`.
+        interval: of the step, s.
 
     Returns:
-        Weights of (start angle, end angle, interval × start rate, interval × end rate), shape (4,), from the
-        cubic through both ends: exact to the integrator's order.
+        As `hermite_basis`, shape (4,).
     """
-    u = np.arange(block) / block
-    basis = np.array([2 * u**3 - 3 * u**2 + 1, -2 * u**3 + 3 * u**2, u**3 - 2 * u**2 + u, u**3 - u**2])
-    means: Array = basis.mean(axis=1)
+    means: Array = hermite_basis(np.arange(block) / block, derivative, interval).mean(axis=1)
     return means
 
 
@@ -205,6 +373,4 @@ def _without_start(run: RunData) -> RunData:
     later = passages[passages > turn]
     if later.size == 0 or later[0] > values.size // 4:
         return run
-    cut = int(later[0]) + 1
-    reading = run.reading[cut:]
-    return dataclasses.replace(run, reading=reading, duration=run.duration - cut * run.interval)
+    return run.part(int(later[0]) + 1)

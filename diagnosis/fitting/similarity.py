@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.decay.spectrum import highest_peak
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
-from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record, evenly_spaced
 
 REFERENCE_FREQUENCY = 2.0
 """Frequency of the similar rig, Hz."""
@@ -49,11 +49,13 @@ class Similarity:
         time: s, the factor on times, dimensionless.
         moment: m, the factor on moments, dimensionless.
         rest: angle taken off all readings, rad.
+        reading: unit of the readings.
     """
 
     time: float = 1.0
     moment: float = 1.0
     rest: float = 0.0
+    reading: str = "rad"
 
     @property
     def area(self) -> float:
@@ -81,6 +83,10 @@ class Similarity:
         return float(self.moment**moment * self.time**time)
 
 
+AS_MEASURED = Similarity()
+"""The similarity of a campaign with itself."""
+
+
 def similar_campaign(campaign: Campaign) -> tuple[Campaign, Similarity]:
     """The campaign of the similar rig.
 
@@ -98,13 +104,13 @@ def similar_campaign(campaign: Campaign) -> tuple[Campaign, Similarity]:
     normalised = len(springs) < len(campaign.runs)
     moment = time**-2 if normalised else REFERENCE_STIFFNESS / float(np.median(springs))
     rest = float(np.median([np.mean(run.record.yaw_rad) for run in campaign.runs]))
-    change = Similarity(time, moment, rest)
-    rate = campaign.sensor.sample_rate
+    unit = ("rad", "rad/s", "rad/s2")[campaign.sensor.derivative]
+    change = Similarity(time, moment, rest if unit == "rad" else 0.0, unit)
     return (
         dataclasses.replace(
             campaign,
             rig=_rig(campaign.rig, change),
-            sensor=dataclasses.replace(campaign.sensor, sample_rate=None if rate is None else rate / time),
+            sensor=_sensor(campaign.sensor, change),
             runs=tuple(_run(run, change) for run in campaign.runs),
         ),
         change,
@@ -123,6 +129,7 @@ def frequency(record: Record) -> float:
     Returns:
         The peak of its spectrum, Hz.
     """
+    record = evenly_spaced(record, bridged=False)
     swing = record.yaw_rad - np.mean(record.yaw_rad)
     size = _PADDING * swing.size
     place, _ = highest_peak(swing * np.hanning(swing.size), size)
@@ -139,9 +146,22 @@ def _rig(rig: RigProperties, change: Similarity) -> RigProperties:
     )
 
 
+def _sensor(sensor: SensorProperties, change: Similarity) -> SensorProperties:
+    def similar(value: float | None, unit: str) -> float | None:
+        return None if value is None else change.similar(value, unit)
+
+    return dataclasses.replace(
+        sensor,
+        sample_rate=similar(sensor.sample_rate, "Hz"),
+        resolution=similar(sensor.resolution, change.reading),
+        noise_std=similar(sensor.noise_std, change.reading),
+    )
+
+
 def _run(run: Run, change: Similarity) -> Run:
     spring = run.spring_stiffness
-    record = Record(run.record.time_s * change.time, run.record.yaw_rad - change.rest)
+    readings = (run.record.yaw_rad - change.rest) * change.similar(1.0, change.reading)
+    record = Record(run.record.time_s * change.time, readings)
     return dataclasses.replace(
         run,
         record=record,

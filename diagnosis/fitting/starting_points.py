@@ -32,12 +32,15 @@ def nominal_start(data: Data) -> Point:
         the releases from the first samples.
     """
     omega2 = np.array([(2.0 * np.pi * _frequency(run)) ** 2 for run in data.runs])
-    zero = float(np.median([np.mean(run.reading) for run in data.runs]))
-    release = np.array([[np.mean(run.reading[:3]) - zero, 0.0] for run in data.runs])
+    own = [float(np.mean(run.reading)) for run in data.runs]
+    common = float(np.median(own))
+    zeros = own if data.own_zeros else [common] * len(own)
+    release = np.array([[np.mean(r.reading[:3]) - z, 0.0, z] for r, z in zip(data.runs, zeros, strict=True)])
+    release, zero = (release, ()) if data.own_zeros else (release[:, :2], (common,))
     if data.normalised:
         return Point(
             np.array(
-                [float(np.median(omega2)), 0.01 * float(np.sqrt(np.median(omega2))), *_still(data), zero]
+                [float(np.median(omega2)), 0.01 * float(np.sqrt(np.median(omega2))), *_still(data), *zero]
             ),
             release,
         )
@@ -51,7 +54,7 @@ def nominal_start(data: Data) -> Point:
     inertia = float(solution[0]) if solution[0] > 0.0 else float(np.median(spring / omega2))
     air = (float(solution[1]), 0.0) if data.wind_on else ()
     damping = 0.01 * inertia * float(np.sqrt(np.median(omega2)))
-    return Point(np.array([inertia, damping, *air, zero]), release)
+    return Point(np.array([inertia, damping, *air, *zero]), release)
 
 
 def _still(data: Data) -> tuple[float, ...]:
@@ -183,13 +186,12 @@ def _moderate_change(base: Fit, problem: Problem, values: Array, scaled: int | N
     place of the one that is lowered, None where none may be.
     """
     data = base.problem.data
-    scale = [np.sqrt(run.noise_variance) for run in data.runs]
     limit = 3.0 * np.sqrt(base.total)
     for _ in range(12):
         moved = problem.predict([Point(np.concatenate([base.point.common, values]), base.point.release)])[0]
         change = [
-            (m - run.reading) / s + r
-            for m, run, r, s in zip(moved, data.runs, base.residuals, scale, strict=True)
+            run.scaled(m - run.reading) + r
+            for m, run, r in zip(moved, data.runs, base.residuals, strict=True)
         ]
         size = float(np.sqrt(sum(float(c @ c) for c in change)))
         if np.isfinite(size) and (size <= limit or scaled is None):

@@ -14,7 +14,7 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.run_data import Data, RunData
+from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
 
 _CYCLES = 2
@@ -55,16 +55,9 @@ def in_stretches(data: Data, length: int | None = None) -> Stretches:
         count = max(1, round(run.reading.size / length))
         begins = [k * length for k in range(count)]
         for begin, end in zip(begins, [*begins[1:], run.reading.size], strict=True):
-            parts.append(_part(run, begin, end))
+            parts.append(dataclasses.replace(run.part(begin, end), id=f"{run.id} from block {begin}"))
             places.append((number, begin))
     return Stretches(data.with_runs(tuple(parts)), tuple(places), length)
-
-
-def _part(run: RunData, begin: int, end: int) -> RunData:
-    reading = run.reading[begin:end]
-    return dataclasses.replace(
-        run, id=f"{run.id} from block {begin}", reading=reading, duration=reading.size * run.interval
-    )
 
 
 def fit_whole(found: Fit, stretches: Stretches, data: Data) -> Fit:

@@ -76,7 +76,7 @@ def _backbone(fit: Fit, index: int, run: RunData, start: float) -> Backbone:
     reading = Reading(run.interval * np.arange(run.reading.size, dtype=np.float64), run.reading)
     departs = float(np.mean(fit.residuals[index] ** 2)) > COLOURED_RUN
     noise = NoiseLevel(std, "residual", std, 1.0, departs, disagrees=False)
-    windows = fit_windows(reading, decay, fit.value("zero"), noise)
+    windows = fit_windows(reading, decay, fit.zero(index), noise)
     alone = fit_run(reading, decay)
     settled = alone.runs[0] if alone.runs and alone.runs[0].decay.omega_n > 0.0 else None
     return Backbone(

@@ -24,7 +24,6 @@ from diagnosis.localisation.maps import GroupExcess, Maps, RunMap, Trace
 from diagnosis.localisation.own_units import maps_in_own_units
 from diagnosis.localisation.phase_plane import apparent_moment, motion, phase_plane
 from diagnosis.study import Study
-from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
 _TIME_BINS = 60
@@ -72,7 +71,7 @@ def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     inside = [
         within_bands(r, run, telling_bands(bands)) for r, run in zip(scaled.residuals, excesses, strict=True)
     ]
-    starts = record_starts(campaign, nominal)
+    starts = [run.start for run in nominal.problem.data.runs]
     times = [s + _mid_times(run) for s, run in zip(starts, nominal.problem.data.runs, strict=True)]
     time = _time_profile(scaled, inside, times)
     energy, z = _moment_energy(nominal, times, time.edges)
@@ -173,20 +172,6 @@ def _groups(fit: Fit, excesses: list[RunExcess], similarity: Similarity) -> tupl
 def _first_number(label: str) -> tuple[float, str]:
     head = label.split(" ")[0]
     return (float(head) if head.replace(".", "", 1).isdigit() else 0.0, label)
-
-
-def record_starts(campaign: Campaign, fit: Fit) -> list[float]:
-    """The time that the fit left out at the start of every record.
-
-    Args:
-        campaign: the records.
-        fit: of these or of their later parts, which end with them.
-
-    Returns:
-        By run, s.
-    """
-    sizes = {run.id: run.record.yaw_rad.size for run in campaign.runs}
-    return [(sizes[r.id] // r.block - r.reading.size) * r.interval for r in fit.problem.data.runs]
 
 
 def _mid_times(run: RunData) -> Array:

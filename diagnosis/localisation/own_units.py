@@ -7,7 +7,7 @@ from dataclasses import replace
 from diagnosis.fitting.similarity import Similarity
 from diagnosis.localisation.backbone import Backbone
 from diagnosis.localisation.excess import Profile
-from diagnosis.localisation.maps import Maps
+from diagnosis.localisation.maps import Maps, Trace
 from diagnosis.localisation.phase_plane import PhasePlane
 from tunnel_sim.vocabulary.record import Array
 
@@ -43,12 +43,23 @@ def maps_in_own_units(maps: Maps, similarity: Similarity) -> Maps:
         lines=tuple(replace(line, frequency=hertz(line.frequency)) for line in maps.lines),
         backbones=tuple(_backbone(curve, similarity) for curve in maps.backbones),
         phase_plane=None if plane is None else _plane(plane, similarity.own(1.0, plane.unit)),
-        traces=tuple(replace(trace, time=_times(trace.time, similarity)) for trace in maps.traces),
+        traces=tuple(_trace(trace, similarity) for trace in maps.traces),
     )
 
 
 def _times(values: Array, similarity: Similarity) -> Array:
     return values * similarity.own(1.0, "s")
+
+
+def _trace(trace: Trace, similarity: Similarity) -> Trace:
+    factor = similarity.own(1.0, similarity.reading)
+    return replace(
+        trace,
+        time=_times(trace.time, similarity),
+        before=trace.before * factor,
+        after=None if trace.after is None else trace.after * factor,
+        noise_std=trace.noise_std * factor,
+    )
 
 
 def _profile(given: Profile, factor: float) -> Profile:

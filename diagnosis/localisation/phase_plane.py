@@ -68,7 +68,7 @@ def motion(fit: Fit, index: int) -> tuple[Array, Array]:
         Angle from the zero, rad, and rate over the angular frequency, rad, each of shape (n,).
     """
     run: RunData = fit.problem.data.runs[index]
-    angle = run.reading - fit.residuals[index] * np.sqrt(run.noise_variance) - fit.value("zero")
+    angle = run.reading - fit.residuals[index] * np.sqrt(run.noise_variance) - fit.zero(index)
     omega = 2.0 * np.pi * resonance(fit, index)
     return angle, np.gradient(angle, run.interval) / omega
 

@@ -65,9 +65,9 @@ class RunFit:
     information: Array
     score: Array
 
-    def reduced(self) -> tuple[Array, Array]:
-        """Information and score of (a, k, zero) with the initial state eliminated: shapes (3, 3), (3,)."""
-        return eliminate(self.information, self.score, 3)
+    def reduced(self, keep: int = 3) -> tuple[Array, Array]:
+        """Information and score of the first ``keep`` of (a, k, zero), with all other unknowns eliminated."""
+        return eliminate(self.information, self.score, keep)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class DecayFit:
 
     Args:
         parameters: φ, shape (p,).
-        zero: the sensor's zero, rad.
+        zero: the sensor's zero, rad; the mean where every run has its own.
         runs: one per reading.
         normal: information of φ, and of the zero last where it was estimated, shape (p, p) or (p + 1, p + 1).
         converged: whether the step fell below the tolerance.
@@ -116,6 +116,7 @@ def fit_decays(
     start: Array,
     *,
     zero: float | None = None,
+    own_zeros: bool = False,
     prior: Prior | None = None,
     tolerance: float = _TOLERANCE,
 ) -> DecayFit:
@@ -125,7 +126,8 @@ def fit_decays(
         readings: the runs.
         links: one (2, p) matrix Lᵢ per run: (aᵢ, kᵢ) = Lᵢ φ.
         start: φ to start from, shape (p,).
-        zero: the sensor's zero where it is known, rad; estimated, common to the runs, where None.
+        zero: the sensor's zero where it is known, rad; estimated where None.
+        own_zeros: whether an estimated zero is each run's own; otherwise it is common to the runs.
         prior: what is known of φ beforehand. The fit is then the maximum of the posterior, and ``normal`` includes
             the information of the prior.
         tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
@@ -134,18 +136,20 @@ def fit_decays(
         The fit. ``converged`` is False where the iteration stalled: the values are then the best ones found, and
         ``runs`` is empty where even the start was out of range or held no motion.
     """
-    best = _project(readings, links, np.asarray(start, dtype=np.float64), zero, prior)
+    best = _project(readings, links, np.asarray(start, dtype=np.float64), zero, prior, own_zeros)
     samples = sum(reading.time.size for reading in readings)
     damping, converged, iteration = 0.0, False, 0
     while best.runs and not converged and iteration < _MAX_ITERATIONS:
         iteration += 1
         try:
-            normal, gradient = _shared_system(best, links, zero is None, prior)
+            normal, gradient = _shared_system(best, links, zero is None, prior, own_zeros)
             step = scaled_solve(normal + damping * np.diag(np.diag(normal)), gradient)
         except np.linalg.LinAlgError:  # no motion in a run: nothing to identify there
             break
         size = _relative_size(step[: best.parameters.size], links, best.runs)
-        trial = _project(readings, links, best.parameters + step[: best.parameters.size], zero, prior)
+        trial = _project(
+            readings, links, best.parameters + step[: best.parameters.size], zero, prior, own_zeros
+        )
         promised = float(step @ (2.0 * gradient - normal @ step))
         gain = (best.cost - trial.cost) / max(promised, 1e-300)
         converged = size <= tolerance or (size <= _ROUNDING and trial.cost >= best.cost)
@@ -158,7 +162,7 @@ def fit_decays(
     if not best.runs:
         return nothing
     try:
-        normal, _ = _shared_system(best, links, zero is None, prior)
+        normal, _ = _shared_system(best, links, zero is None, prior, own_zeros)
     except np.linalg.LinAlgError:
         return nothing
     return DecayFit(best.parameters, best.zero, best.runs, normal, converged, iteration)
@@ -242,6 +246,7 @@ def _project(
     parameters: Array,
     zero: float | None,
     prior: Prior | None = None,
+    own_zeros: bool = False,
 ) -> _Point:
     decays = [Decay(*map(float, link @ parameters)) for link in links]
     with np.errstate(over="ignore", invalid="ignore"):  # a trial far off may overflow; it is rejected then
@@ -251,21 +256,27 @@ def _project(
         return _Point(parameters, 0.0, ())
     moments = [block @ reading.yaw for block, reading in zip(rows, readings, strict=True)]
     try:
-        best_zero = _common_zero(grams, moments) if zero is None else zero
+        if own_zeros and zero is None:
+            zeros = [_common_zero([gram], [moment]) for gram, moment in zip(grams, moments, strict=True)]
+        else:
+            zeros = [_common_zero(grams, moments) if zero is None else zero] * len(grams)
         states = [
-            scaled_solve(gram[:2, :2], moment[:2] - gram[:2, 4] * best_zero)
-            for gram, moment in zip(grams, moments, strict=True)
+            scaled_solve(gram[:2, :2], moment[:2] - gram[:2, 4] * best)
+            for gram, moment, best in zip(grams, moments, zeros, strict=True)
         ]
     except np.linalg.LinAlgError:
         return _Point(parameters, 0.0, ())
     runs, cost = [], 0.0 if prior is None else prior.cost(parameters)
-    for reading, decay, block, gram, (angle, rate) in zip(readings, decays, rows, grams, states, strict=True):
-        residual = reading.yaw - best_zero - angle * block[0] - rate * block[1]
+    for reading, decay, block, gram, (angle, rate), best in zip(
+        readings, decays, rows, grams, states, zeros, strict=True
+    ):
+        residual = reading.yaw - best - angle * block[0] - rate * block[1]
         weights = _local_weights(decay, float(angle), float(rate))
         score = weights @ (block @ residual)
         runs.append(RunFit(decay, float(angle), float(rate), residual, weights @ gram @ weights.T, score))
         cost += float(residual @ residual)
-    return _Point(parameters, best_zero, tuple(runs), cost)
+    mean = zeros[0] if len(set(zeros)) == 1 else float(np.mean(zeros))
+    return _Point(parameters, mean, tuple(runs), cost)
 
 
 def _rows(time: Array, decay: Decay) -> Array:
@@ -291,9 +302,10 @@ def _common_zero(grams: Sequence[Array], moments: Sequence[Array]) -> float:
 
 
 def _shared_system(
-    point: _Point, links: Sequence[Array], with_zero: bool, prior: Prior | None
+    point: _Point, links: Sequence[Array], with_zero: bool, prior: Prior | None, own_zeros: bool
 ) -> tuple[Array, Array]:
-    keep = 3 if with_zero else 2
+    shared = with_zero and not own_zeros
+    keep = 3 if shared else 2
     normal: Array | float = 0.0
     gradient: Array | float = 0.0
     for run, link in zip(point.runs, links, strict=True):
@@ -303,7 +315,7 @@ def _shared_system(
             else [RATE, STIFFNESS, ANGLE, ANGULAR_RATE]
         )
         information, score = eliminate(run.information[np.ix_(order, order)], run.score[order], keep)
-        extended = embed(link, with_zero=with_zero)
+        extended = embed(link, with_zero=shared)
         normal = normal + extended.T @ information @ extended
         gradient = gradient + extended.T @ score
     normal, gradient = np.asarray(normal), np.asarray(gradient)

@@ -20,6 +20,7 @@ from scipy.signal import hilbert
 
 from identification.decay.damped_oscillation import free_decay
 from identification.decay.decay_fit import Reading, RunFit
+from identification.decay.thinning import even_reading
 from tunnel_sim.vocabulary.record import Array
 
 _CARRIED_ON = 6.0  # cycles past either end
@@ -56,6 +57,7 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
     Returns:
         At least one average per half cycle of the record.
     """
+    reading = even_reading(reading)
     interval = float(reading.time[-1]) / (reading.time.size - 1)
     omega = rough.decay.omega_d
     span = _CARRIED_ON * 2.0 * np.pi / omega

@@ -18,7 +18,7 @@ from scipy.special import fdtri
 from identification.estimate import NoiseLevel
 from identification.policy import LEAST_NOISE, MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
 from tunnel_sim.vocabulary.campaign import SensorProperties
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, Record
 
 _ORDER = 6
 # Variance of one sixth difference of unit white noise, and the number of samples per degree of freedom:
@@ -107,7 +107,7 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
     """The white part of a reading's noise, from its sixth differences, which hold almost none of the motion.
 
     Args:
-        reading: of many samples per cycle, shape (n,), rad.
+        reading: of many samples per cycle, evenly spaced, shape (n,), rad.
         sensor: what the campaign states; used where the reading agrees with it.
 
     Returns:
@@ -115,10 +115,48 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
     """
     peak = 0.5 * float(np.ptp(reading))
     floor = max(LEAST_NOISE * peak, 1e-300)
-    fast, degrees = _fast_part([Residual(reading, 1, 0, peak)], floor)
+    return _as_stated(*_fast_part([Residual(reading, 1, 0, peak)], floor), floor, sensor)
+
+
+def reading_noise(record: Record, sensor: SensorProperties) -> float:
+    """`white_noise` of a record, whatever its times.
+
+    Args:
+        record: of many samples per cycle.
+        sensor: what the campaign states; used where the record agrees with it.
+
+    Returns:
+        Standard deviation of one sample, rad, quantisation included.
+    """
+    if record.uniform or record.time_s.size <= 4 * _ORDER:
+        return white_noise(record.yaw_rad, sensor)
+    floor = max(0.5 * LEAST_NOISE * float(np.ptp(record.yaw_rad)), 1e-300)
+    return _as_stated(*_scattered(record), floor, sensor)
+
+
+def _as_stated(fast: float, degrees: float, floor: float, sensor: SensorProperties) -> float:
+    """The stated noise where the measured one agrees with it, else the measured one."""
     fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
     stated = stated_noise(sensor)
     return max(stated, floor) if stated is not None and _agree(fast, max(stated, floor), degrees) else fast
+
+
+def _scattered(record: Record) -> tuple[float, float]:
+    """Standard deviation and degrees of freedom of white noise on a smooth motion that is sampled at any times.
+
+    A sixth divided difference is zero for the quintic that a swing resembles over seven samples.
+    """
+    time, values = record.time_s, record.yaw_rad
+    count = time.size - _ORDER
+    nodes = np.stack([time[i : i + count] for i in range(_ORDER + 1)])
+    difference, power = np.zeros(count), np.zeros(count)
+    for i, node in enumerate(nodes):
+        away = (node - nodes) / (nodes[-1] - nodes[0])
+        away[i] = 1.0
+        weight = 1.0 / np.prod(away, axis=0)
+        difference += weight * values[i : i + count]
+        power += weight**2
+    return sqrt(float(np.mean(difference**2 / power))), count / _SAMPLES_PER_DEGREE
 
 
 def _fast_part(residuals: Sequence[Residual], fallback: float) -> tuple[float, float]:

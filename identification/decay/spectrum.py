@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from identification.decay.readable import holds_motion
-from tunnel_sim.vocabulary.record import Array, Record, read_only
+from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
 
 _PADDING = 8  # zero padding: eight times the record, so the interpolated peak sits within 1/16 of a bin
 
@@ -45,6 +45,7 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
     """
     if not holds_motion(record):
         return SpectralPeak(0.0, 0.0)
+    record = evenly_spaced(record, bridged=False)
     centred = record.yaw_rad - record.yaw_rad.mean()
     size = 1 << int(np.ceil(np.log2(padding * centred.size)))
     # Below one cycle per record the spectrum holds the offset's remainder, not the oscillation.

@@ -6,7 +6,20 @@ import numpy as np
 
 from identification.decay.decay_fit import Reading
 from identification.policy import LEAST_SAMPLES
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
+
+
+def even_reading(reading: Reading) -> Reading:
+    """A reading on a uniform raster, for methods that work by the place of a sample and not by its time.
+
+    Args:
+        reading: at any times.
+
+    Returns:
+        As `tunnel_sim.vocabulary.record.evenly_spaced`; the reading itself where its times are uniform.
+    """
+    record = Record(reading.time, reading.yaw)
+    return reading if record.uniform else Reading.from_record(evenly_spaced(record))
 
 
 def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[Reading, int]:

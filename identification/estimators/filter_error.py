@@ -27,7 +27,7 @@ from identification.decay.run_fit import (
     describe_run,
     identify_run,
 )
-from identification.decay.thinning import block_means
+from identification.decay.thinning import block_means, even_reading
 from identification.estimate import NoiseLevel, Quantity, Status
 from identification.estimators.run_by_run import RunByRun
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
@@ -67,7 +67,9 @@ class FilterError(RunByRun):
         if fit is None or noise is None or fit.decay.omega_d == 0.0:
             return None
         noise_std = white_noise(fit.residual, sensor) if noise.departs else noise.std
-        thin, factor = block_means(bare.reading, fit.decay.omega_d / (2.0 * np.pi), self.blocks_per_cycle)
+        thin, factor = block_means(
+            even_reading(bare.reading), fit.decay.omega_d / (2.0 * np.pi), self.blocks_per_cycle
+        )
         if thin.time.size < 4 * _DECIDED:
             return None
         interval = float(thin.time[-1] - thin.time[0]) / (thin.time.size - 1)

@@ -24,7 +24,7 @@ from identification.decay.decay_fit import Reading, project_run
 from identification.decay.envelope import Envelope, envelope
 from identification.decay.first_guess import starting_decay
 from identification.decay.residual_check import residual_check
-from identification.decay.residual_noise import white_noise
+from identification.decay.residual_noise import reading_noise
 from identification.decay.run_fit import describe_run, judge
 from identification.decay.windows import CYCLES, modal_quantities
 from identification.estimate import Quantity, Status, WindowEstimate
@@ -54,7 +54,7 @@ class Hilbert(RunByRun):
         if start is None:
             return RunDecay.failed(run, Status.NO_OSCILLATION)
         reading = Reading.from_record(run.record)
-        noise_std = white_noise(reading.yaw, sensor)
+        noise_std = reading_noise(run.record, sensor)
         decay, covariance, seen = start, None, None
         for _ in range(_PASSES):
             projected = project_run(reading, decay) if decay.omega_d > 0.0 else None

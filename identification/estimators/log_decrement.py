@@ -25,7 +25,7 @@ from identification.decay.decay_fit import Reading, project_run
 from identification.decay.first_guess import starting_frequency
 from identification.decay.peaks import PEAK_HALF_WIDTH, follow_peaks
 from identification.decay.residual_check import residual_check
-from identification.decay.residual_noise import white_noise
+from identification.decay.residual_noise import reading_noise
 from identification.decay.run_fit import describe_run, judge
 from identification.estimate import Status
 from identification.estimators.run_by_run import RunByRun
@@ -49,7 +49,7 @@ class LogDecrement(RunByRun):
         if frequency is None:
             return RunDecay.failed(run, Status.NO_OSCILLATION)
         reading = Reading.from_record(run.record)
-        noise_std = white_noise(reading.yaw, sensor)
+        noise_std = reading_noise(run.record, sensor)
         half_width = PEAK_HALF_WIDTH / frequency
         share = noise_std / np.sqrt(2.0 * half_width * run.record.sample_rate)
         times, heights = follow_peaks(run.record, frequency)

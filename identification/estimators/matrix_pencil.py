@@ -18,7 +18,7 @@ from identification.decay.decay_fit import Reading, project_run
 from identification.decay.first_guess import starting_frequency
 from identification.decay.pencil import PencilDecay, pencil_decay
 from identification.decay.run_fit import describe_run, judge
-from identification.decay.thinning import block_means
+from identification.decay.thinning import block_means, even_reading
 from identification.estimate import Status
 from identification.estimators.run_by_run import RunByRun
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
@@ -58,7 +58,7 @@ class MatrixPencil(RunByRun):
 
     def _pencil(self, reading: Reading, frequency: float) -> tuple[PencilDecay, int] | None:
         # Over the whole record, and again over the part that holds the decay where that is much shorter.
-        thin, factor = block_means(reading, frequency, self.blocks_per_cycle)
+        thin, factor = block_means(even_reading(reading), frequency, self.blocks_per_cycle)
         interval = float(thin.time[-1] - thin.time[0]) / max(thin.time.size - 1, 1)
         found = pencil_decay(thin.yaw, interval, 2.0 * np.pi * frequency)
         if found is None:

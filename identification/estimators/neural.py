@@ -30,7 +30,7 @@ from identification.campaign.pairing import PairedRun, paired_estimate
 from identification.decay.damped_oscillation import Decay
 from identification.decay.readable import holds_motion
 from identification.decay.residual_check import residual_check
-from identification.decay.residual_noise import white_noise
+from identification.decay.residual_noise import reading_noise
 from identification.decay.windows import modal_quantities
 from identification.estimate import Estimate, Quantity, RunEstimate, Status, WindowEstimate, by_gravity
 from identification.neural.files import read_networks, shipped_networks
@@ -136,7 +136,7 @@ def read_windows(run: Run, sensor: SensorProperties, networks: Networks) -> tupl
     """
     if not holds_motion(run.record):
         return [], 0.0
-    windows, cycles = find_windows(run.record, white_noise(run.record.yaw_rad, sensor))
+    windows, cycles = find_windows(run.record, reading_noise(run.record, sensor))
     readings = []
     for window in windows:
         reading = read_window(window, networks)

@@ -37,7 +37,7 @@ from identification.statistics.widening import (
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
 
-_JOINT_UNKNOWNS = 2  # of each run in the joint fit: its initial angle and rate
+_JOINT_UNKNOWNS = 2  # of each run in the joint fit: its initial angle and rate; its zero comes on top
 
 
 @dataclass(frozen=True)
@@ -90,60 +90,66 @@ def _joint_estimate(
 ) -> Estimate:
     runs = [run for run, _ in pairs]
     design = build_design(runs, campaign.rig)
-    fit = _joint_fit(design, [item for _, item in pairs])
+    own_zeros = campaign.sensor.zero == "per_run"
+    fit = _joint_fit(design, [item for _, item in pairs], own_zeros)
     if fit is not None and not fit.converged:
         return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_CONVERGED}))
     if fit is None or not determined(fit.normal):
         return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
     readings = [item.reading for _, item in pairs]
-    noise = noise_level(residuals_of(readings, fit.runs, fit.zero, _JOINT_UNKNOWNS), campaign.sensor)
+    unknowns = _JOINT_UNKNOWNS + own_zeros
+    noise = noise_level(residuals_of(readings, fit.runs, fit.zero, unknowns), campaign.sensor)
     covariance = fisher_covariance(fit.normal, noise)
     found = derivatives(design, fit.parameters)
-    own = found.jacobian @ covariance[:-1, :-1] @ found.jacobian.T
+    size = fit.parameters.size
+    own = found.jacobian @ covariance[:size, :size] @ found.jacobian.T
     statuses = (
         statuses | departures([noise, *(item.noise for _, item in pairs)]) | limits(design, fit.parameters)
     )
     if Status.MODEL_DEPARTS in statuses and found.names:
         windy = sum(run.wind_speed > 0.0 for run in runs)
         speaking = np.array([windy if name.startswith("cn_") else len(runs) for name in found.names])
-        influences = _influences(fit.runs, design.links, found.jacobian)
+        influences = _influences(fit.runs, design.links, found.jacobian, own_zeros)
         own = widened_covariance(own, scatter_of_runs(influences, speaking))
     air = air_of_runs(design, found, own, runs)
     return replace(
         estimate,
         statuses=by_gravity(statuses),
         runs=tuple(replace(run, **air.get(run.id, {})) for run in estimate.runs),
-        sensor_zero=Quantity(fit.zero, float(np.sqrt(covariance[-1, -1])), "rad"),
+        sensor_zero=None if own_zeros else Quantity(fit.zero, float(np.sqrt(covariance[-1, -1])), "rad"),
         noise=noise,
         **wind_off(estimate.runs, campaign.runs),
         **quantities(found, own, has_size=design.has_size),
     )
 
 
-def _joint_fit(design: Design, items: Sequence[FittedRun]) -> DecayFit | None:
+def _joint_fit(design: Design, items: Sequence[FittedRun], own_zeros: bool) -> DecayFit | None:
     # The runs' own (a, k), weighted by their information, are within a few standard deviations of the optimum.
     own = [item.fit for item in items if item.fit is not None]
     decays = np.array([[fit.decay.rate, fit.decay.stiffness] for fit in own])
     informations = [eliminate(fit.information, fit.score, 2)[0] for fit in own]
     start = combine(design, decays, informations)
-    return None if start is None else fit_decays([item.reading for item in items], design.links, start[0])
+    readings = [item.reading for item in items]
+    return None if start is None else fit_decays(readings, design.links, start[0], own_zeros=own_zeros)
 
 
-def _influences(runs: Sequence[RunFit], links: Sequence[Array], jacobian: Array) -> Array:
+def _influences(runs: Sequence[RunFit], links: Sequence[Array], jacobian: Array, own_zeros: bool) -> Array:
     """The contribution of each run's residual to parameters fitted to all runs.
 
     Args:
-        runs: of the joint fit, with the zero common to them.
+        runs: of the joint fit.
         links: one (2, p) matrix per run.
         jacobian: of the wanted parameters to φ, shape (q, p).
+        own_zeros: whether each run has its own zero, or all one.
 
     Returns:
         Shape (runs, q).
     """
-    total, scores = np.zeros((links[0].shape[1] + 1,) * 2), []
+    count = links[0].shape[1]
+    total, scores = np.zeros((count + (not own_zeros),) * 2), []
     for run, link in zip(runs, links, strict=True):
-        information, score = run.reduced()
-        extended = embed(link, with_zero=True)
+        information, score = run.reduced(2 if own_zeros else 3)
+        extended = embed(link, with_zero=not own_zeros)
         total += extended.T @ information @ extended
         scores.append(extended.T @ score)
-    return np.asarray((jacobian @ scaled_solve(total, np.array(scores).T)[:-1]).T)
+    return np.asarray((jacobian @ scaled_solve(total, np.array(scores).T)[:count]).T)

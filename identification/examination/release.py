@@ -2,8 +2,9 @@
 
 Free motion crosses its centre every half cycle, whatever its initial phase. In a longer interval between two
 crossings (or between the start of the record and the first one) the body was held, moved by hand, or at rest. The
-release is then the turning point of the motion that follows, extrapolated backwards. A hold shorter than about
-three quarters of a cycle leaves no such interval and is not detected.
+release is then the turning point of the motion that follows, extrapolated backwards. A hold in mid-record that is
+shorter than about three quarters of a cycle leaves no such interval and is not detected. At the start of a record a
+hand that pulls the body aside is also known by its slowness: a free swing takes no longer out than back.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from identification.decay.decay_fit import Reading, RunFit, fit_run
 from identification.decay.first_guess import starting_decay, starting_frequency
 from identification.decay.residual_noise import white_noise
 from tunnel_sim.vocabulary.campaign import SensorProperties
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
 _NEAR_LARGEST = 0.9  # of the largest swing: the last swing of this size comes after the release
 _LEAST_SAMPLES = 16
@@ -25,6 +26,7 @@ _WIDEST_BAND = 0.3
 # A half cycle may be longer than the next ones because of its amplitude alone: a pendulum released at 160 degrees
 # takes twice the time of its small swings.
 _LONGER = 2.0
+_SLOWER = 1.25  # a pull takes this many times as long as the swing back, and a free swing out no longer
 _GROWTH = 0.02  # e-folds of growth over the fitted half cycles: a motion that builds up has no release
 _CARRIED_BACK = (
     0.75  # of a half cycle: the release lies a quarter cycle back, the previous turning point three quarters
@@ -43,6 +45,9 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
     Returns:
         Index of the first sample of the free motion; 0 if the record starts in it, or if no oscillation is found.
     """
+    if not record.uniform:
+        even = evenly_spaced(record)
+        return int(np.searchsorted(record.time_s, even.time_s[find_release(even, sensor)]))
     free = _surely_free(record)
     if record.yaw_rad.size - free < _LEAST_SAMPLES:
         return 0
@@ -50,8 +55,10 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
     frequency = starting_frequency(later)
     if frequency is None:
         return 0
-    crossings, largest = _crossings(record, sensor, float(np.median(later.yaw_rad)), frequency)
+    crossings, largest, out = _crossings(record, sensor, float(np.median(later.yaw_rad)), frequency)
     held = _last_long_stretch(crossings, largest)
+    if held is None and largest == 1 and out[0] > _SLOWER * (crossings[1] - out[1]) + 0.5:
+        held = 0
     return 0 if held is None else _standstill(record, crossings, held)
 
 
@@ -64,10 +71,11 @@ def _surely_free(record: Record) -> int:
 
 def _crossings(
     record: Record, sensor: SensorProperties, centre: float, frequency: float
-) -> tuple[Array, int]:
+) -> tuple[Array, int, tuple[float, float]]:
     """Where the smoothed reading crosses its centre, in samples; the start of the record counts as the first.
 
-    The second value is the place of the first crossing after the largest excursion.
+    The second value is the place of the first crossing after the largest excursion; the third are the samples that
+    the smoothed reading takes to get there, and its place in samples.
     """
     yaw = record.yaw_rad
     width = max(1, min(round(_SMOOTHED * record.sample_rate / frequency), yaw.size // 4))
@@ -80,7 +88,9 @@ def _crossings(
     change = np.flatnonzero(np.diff(np.sign(smooth[outside])) != 0.0)
     middles = 0.5 * (outside[change] + outside[change + 1]) + 0.5 * width
     crossings = np.concatenate([[0.0], middles])
-    return crossings, int(np.searchsorted(crossings, np.argmax(away) + 0.5 * width))
+    steps = float(np.argmax(away))
+    turn = steps + 0.5 * width
+    return crossings, int(np.searchsorted(crossings, turn)), (steps, turn)
 
 
 def _last_long_stretch(crossings: Array, largest: int) -> int | None:

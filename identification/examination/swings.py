@@ -11,7 +11,7 @@ from identification.decay.decay_fit import Reading, project_run
 from identification.decay.first_guess import starting_frequency, thinned_reading
 from identification.decay.pencil import PencilDecay, pencil_decay
 from tunnel_sim.vocabulary.campaign import Run
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, evenly_spaced
 
 _UNKNOWNS = 5  # decay rate, stiffness, zero, initial angle and rate
 _LEAST_SAMPLES = 30  # of a part of a record whose poles are found separately
@@ -55,7 +55,7 @@ def swing_of(run: Run) -> Swing | None:
     frequency = starting_frequency(run.record)
     if frequency is None:
         return None
-    reading = thinned_reading(run.record, frequency)
+    reading = thinned_reading(evenly_spaced(run.record), frequency)
     omega = 2.0 * np.pi * frequency
     found = _poles(reading, omega)
     fitted = None if found is None else project_run(reading, found.decay)

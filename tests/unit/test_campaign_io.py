@@ -16,7 +16,7 @@ from tunnel_sim.files import campaign_io
 from tunnel_sim.files.campaign_io import read_campaign, write_campaign
 from tunnel_sim.files.run_files import read_table, table_bytes
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.cycles import count_cycles
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
@@ -157,18 +157,53 @@ def test_other_number_types_of_parquet_are_read(tmp_path: Path, dtype: type[pl.D
     np.testing.assert_array_equal(read_campaign(folder).runs[0].record.yaw_rad, np.deg2rad(degrees))
 
 
-def test_sampling_may_jitter_by_one_per_cent_and_no_more(tmp_path: Path) -> None:
+@pytest.mark.parametrize("run_format", ["parquet", "csv"])
+@pytest.mark.parametrize("kind", ["rounded", "uneven", "missing"])
+def test_times_are_kept_as_they_were_recorded(tmp_path: Path, kind: str, run_format: str) -> None:
+    record = decay(rate=193.0)
+    time, kept = record.time_s, np.ones(record.time_s.size, bool)
+    if kind == "rounded":
+        time = np.round(time, 3)
+    elif kind == "uneven":
+        time = time + 0.4 / 193.0 * np.sin(np.arange(time.size) ** 2)
+    else:
+        kept[300:340] = False
+    one = replace(
+        campaign(), sensor=SensorProperties(), runs=(Run("r", Record(time[kept], record.yaw_rad[kept]), 0.0),)
+    )
+    assert_same(read_campaign(write_campaign(one, tmp_path / "c", run_format=run_format)), one)
+
+
+@pytest.mark.parametrize("run_format", ["parquet", "csv"])
+@pytest.mark.parametrize(
+    ("quantity", "column"), [("rate", "yaw_rate_rad_s"), ("acceleration", "yaw_acceleration_rad_s2")]
+)
+def test_rates_and_accelerations_have_columns_of_their_own(
+    tmp_path: Path, quantity: Quantity, column: str, run_format: str
+) -> None:
+    """A rate of 60 rad/s is no slip of units."""
+    sensor = SensorProperties(200.0, quantity=quantity, zero="per_run")
+    one = replace(campaign(), sensor=sensor, runs=(Run("r", decay(amplitude=60.0, rate=200.0), 0.0),))
+    folder = write_campaign(one, tmp_path / "c", run_format=run_format)
+    assert_same(read_campaign(folder), one)
+    (path,) = (folder / "runs").iterdir()
+    table = pl.read_csv(path) if run_format == "csv" else pl.read_parquet(path)
+    assert table.columns == ["time_s", column]
+
+
+def test_a_rate_may_be_in_degrees_per_second(tmp_path: Path) -> None:
     record = decay(rate=200.0)
-    for share, good in ((0.009, True), (0.02, False)):
-        time = record.time_s.copy()
-        time[300:] += share / 200.0
-        rows = [f"{t!r},{y!r}" for t, y in zip(time.tolist(), record.yaw_rad.tolist(), strict=True)]
-        folder = written(tmp_path / str(share), "time_s,yaw_rad", rows)
-        if good:
-            np.testing.assert_array_equal(read_campaign(folder).runs[0].record.time_s, time)
-        else:
-            with pytest.raises(TunnelError, match="not uniform"):
-                read_campaign(folder)
+    rows = [repr(y) for y in np.rad2deg(record.yaw_rad).tolist()]
+    sensor = '[sensor]\nquantity = "rate"\nsample_rate = 200.0'
+    folder = written(tmp_path / "c", "yaw_rate_deg_s", rows, sensor)
+    np.testing.assert_allclose(read_campaign(folder).runs[0].record.yaw_rad, record.yaw_rad, rtol=1e-15)
+
+
+@pytest.mark.parametrize("centre", [np.pi, -2.0 * np.pi])
+def test_the_angle_may_rest_anywhere(tmp_path: Path, centre: float) -> None:
+    still = decay(amplitude=4.0)
+    one = replace(campaign(), runs=(Run("r", Record(still.time_s, still.yaw_rad + centre), 0.0),))
+    assert_same(read_campaign(write_campaign(one, tmp_path / "c")), one)
 
 
 def test_times_may_start_anywhere(tmp_path: Path) -> None:
@@ -251,10 +286,10 @@ def test_a_disk_that_fails_leaves_the_old_campaign_and_no_litter(
 ) -> None:
     folder = write_campaign(campaign(), tmp_path / "c")
 
-    def full(record: Record, path: Path) -> bytes:
+    def full(record: Record, path: Path, quantity: Quantity) -> bytes:
         if path.stem == "on":
             raise OSError(28, "No space left on device")
-        return table_bytes(record, path)
+        return table_bytes(record, path, quantity)
 
     monkeypatch.setattr(campaign_io, "table_bytes", full)
     for target in (folder, tmp_path / "other"):

@@ -25,6 +25,12 @@ LEAST_EXPONENT = 0.25
 SPRING_TOLERANCE = 1e-6
 """Relative difference below which two stiffnesses belong to the same spring."""
 
+NEAR_MOTION = 0.3
+"""Distance from the motion's frequency or a multiple within which a line is the motion's own, as a share of it."""
+
+MULTIPLES = (1.0, 2.0, 3.0)
+"""Multiples of the motion's frequency at which its harmonics lie."""
+
 Channel = Literal["stiffness", "damping", "forcing", "sensor", "calibration"]
 Condition = Literal["always", "wind_on"]
 
@@ -239,7 +245,7 @@ class Effect:
     @classmethod
     def parameters(cls) -> tuple[ParameterInfo, ...]:
         """The effect's parameters, the severity first."""
-        return _parameters(cls)
+        return _parameters(cls)  # type: ignore[arg-type]  # mypy takes the instances' hash for the class's
 
     @property
     def severity(self) -> float:
@@ -283,6 +289,18 @@ class Effect:
         """
         del angle, rate, spring
         return None
+
+    def plausible(self, omega: float) -> bool:
+        """Whether a fitted effect is still what its name means.
+
+        Args:
+            omega: angular frequency of the motion, rad/s.
+
+        Returns:
+            False where its parameters make it part of the motion itself.
+        """
+        del omega
+        return True
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """Uncertainty of Cnβ and Cnr due to that part of the effect's form which no free decay shows.

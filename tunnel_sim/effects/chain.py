@@ -76,21 +76,23 @@ class EffectChain:
             time_s = effect.on_time(time_s, self.stated, drawn)
         return time_s
 
-    def seen(self, motion: Motion, time_s: Array) -> Array:
+    def seen(self, motion: Motion, time_s: Array, derivative: int = 0) -> Array:
         """What the sensor sees of a motion before its zero and noise.
 
         Args:
             motion: of the rod's upper end, as long as `physics` asks for.
             time_s: of the samples by their time stamps, s, shape (n,); need not be those of the motion.
+            derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
 
         Returns:
-            The angle seen, rad, shape (n,); cubic between the motion's own times.
+            The angle seen, rad, or its derivative, rad/s or rad/s², shape (n,); cubic between the motion's own
+            times.
         """
         from scipy.interpolate import CubicHermiteSpline  # only here: slow to load
 
         true = self.true_times(time_s)
         path = CubicHermiteSpline(motion.time_s, motion.angle, motion.rate)
-        return self.angle(np.asarray(path(true), np.float64), true)
+        return self.angle(np.asarray(path(true, derivative), np.float64), true)
 
     def angle(self, angle: Array, time_s: Array) -> Array:
         """The angle that the sensor measures, before zero and noise are added.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Drawn, Effect, parameter
+from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION, Drawn, Effect, parameter
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
@@ -51,6 +51,10 @@ class SecondMode(Effect):
     exponent: float = parameter(
         "n", "1", "power of the release angle", scale=1.0, lower=0.0, upper=3.0, default=0.0, form=True
     )
+
+    def plausible(self, omega: float) -> bool:
+        """Whether its frequency is neither the motion's nor a multiple of it."""
+        return all(abs(self.frequency / omega - k) > NEAR_MOTION for k in MULTIPLES)
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Add the oscillation at a phase of the run's own."""

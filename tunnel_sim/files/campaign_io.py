@@ -29,14 +29,14 @@ from tunnel_sim.files.json_text import json_text
 from tunnel_sim.files.leftovers import clear_leftovers
 from tunnel_sim.files.plausible import plausible_run
 from tunnel_sim.files.reading import check_count
-from tunnel_sim.files.run_checks import angle_in_radians, enough_cycles, uniform_times
+from tunnel_sim.files.run_checks import enough_cycles, increasing_times, same_unit
 from tunnel_sim.files.run_files import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import whole_folder
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.record import Array, Record
 
 TRUTH_FILE = "truth.json"
 RUN_FOLDER = "runs"
@@ -112,7 +112,9 @@ def write_campaign(
     with whole_folder(folder) as partial:
         (partial / RUN_FOLDER).mkdir()
         for run in campaign.runs:
-            (partial / files[run.id]).write_bytes(table_bytes(run.record, folder / files[run.id]))
+            (partial / files[run.id]).write_bytes(
+                table_bytes(run.record, folder / files[run.id], campaign.sensor.quantity or "angle")
+            )
         if truth_text is not None:
             (partial / TRUTH_FILE).write_bytes(truth_text.encode())
         (partial / CAMPAIGN_FILE).write_bytes(tomli_w.dumps(document).encode())
@@ -135,7 +137,9 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
     path = folder / run.file
     where = run_place(path, run.id)
     _check_inside(folder, path, where)
-    time_s, reading, column = read_table(path, where, timed=sample_rate is None)
+    time_s, reading, column = read_table(
+        path, where, timed=sample_rate is None, quantity=sensor.quantity or "angle"
+    )
     if time_s is None:
         if sample_rate is None:
             raise TunnelError(
@@ -144,11 +148,7 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
                 remedy="add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml",
             )
         time_s = np.arange(reading.size) / sample_rate
-    uniform_times(time_s, sample_rate, where)
-    record = Record(time_s, angle_in_radians(reading, column, run.release_angle, where))
-    cycles = enough_cycles(record, where)
-    if sensor.plausible is not False:
-        plausible_run(record, cycles, where)
+    record = _checked(time_s, reading, column, sensor, run.release_angle, where)
     return Run(
         id=run.id,
         record=record,
@@ -157,6 +157,26 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
         air_density=run.air_density,
         release_angle=run.release_angle,
     )
+
+
+def _checked(
+    time_s: Array,
+    reading: Array,
+    column: str,
+    sensor: SensorProperties,
+    release_angle: float | None,
+    where: str,
+) -> Record:
+    """The record of a run, unless it is refused."""
+    increasing_times(time_s, sensor.sample_rate, where)
+    angle, judged = sensor.derivative == 0, sensor.plausible is not False
+    if judged and angle:
+        same_unit(reading, column, release_angle, where)
+    record = Record(time_s, reading)
+    cycles = enough_cycles(record, where)
+    if judged:
+        plausible_run(record, cycles, where, angle=angle)
+    return record
 
 
 def _check_inside(folder: Path, path: Path, where: str) -> None:
@@ -183,11 +203,7 @@ def _check_campaign(campaign: Campaign, document: dict[str, Any], folder: Path) 
             raise TunnelError(
                 "the record holds NaN or an infinity", where=where, remedy="shorten the run or leave it out"
             )
-        uniform_times(time_s, campaign.sensor.sample_rate, where)
-        angle_in_radians(yaw, "yaw_rad", run.release_angle, where)
-        cycles = enough_cycles(run.record, where)
-        if campaign.sensor.plausible is not False:
-            plausible_run(run.record, cycles, where)
+        _checked(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where)
 
 
 def _run_files(campaign: Campaign, run_format: str) -> dict[str, str]:

@@ -20,7 +20,7 @@ from tunnel_sim.files.toml_input import (
     validate,
 )
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, SensorProperties, Zero
 from tunnel_sim.vocabulary.errors import TunnelError
 
 CAMPAIGN_FILE = "campaign.toml"
@@ -55,6 +55,8 @@ class SensorTable(StrictModel):
     plausible: bool | None = Field(
         default=None, description="false to accept values that look like a wrong unit, or leave it out"
     )
+    quantity: Quantity | None = Field(default=None, description="'angle', 'rate' or 'acceleration'")
+    zero: Zero | None = Field(default=None, description="'common', 'per_run' or 'auto'")
 
 
 class RunTable(StrictModel):
@@ -148,12 +150,6 @@ def _check_run(run: RunTable, where: str) -> None:
             f"wind-on (wind_speed = {run.wind_speed:g} m/s) without air_density",
             where=where,
             remedy="give air_density in kg/m3 (about 1.2 for air)",
-        )
-    if run.release_angle is not None and abs(run.release_angle) > np.pi:
-        raise TunnelError(
-            f"release_angle = {run.release_angle:g} is beyond half a turn: it looks like degrees",
-            where=where,
-            remedy=f"give it in rad ({np.deg2rad(run.release_angle):.4g})",
         )
     windows, posix = PureWindowsPath(run.file), PurePosixPath(run.file)
     if windows.drive or windows.root or posix.is_absolute() or ".." in windows.parts + posix.parts:

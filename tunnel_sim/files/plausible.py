@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
@@ -20,6 +22,7 @@ KEEP = "state plausible = false under [sensor] to keep it"
 #: motion above half the sample rate.
 LEAST_SAMPLES_PER_CYCLE = 10.0
 _LOOKS = "it looks like"
+_TWO_TURNS = 4.0 * np.pi
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,13 @@ RANGES: Mapping[str, Range] = {
         "a model of a few millimetres up to a lorry with its trailer",
     ),
     "width": Range(1e-3, 20.0, "m", "cm or mm", "km", "a third of the reference length"),
+    "release_angle": Range(
+        -_TWO_TURNS, _TWO_TURNS, "rad", "degrees", "degrees", "as for the swing",
+    ),
+    "swing": Range(
+        0.0, _TWO_TURNS, "rad, or name the column yaw_deg", "degrees", "",
+        "a pendulum stays below half a turn and a disc between springs below two; 13 degrees are a small swing",
+    ),
     "step": Range(
         1e-7, 0.5, "s", "milliseconds", "minutes or hours",
         "no angle sensor reaches 10 MHz, and a rig is sampled more often than twice a second",
@@ -70,7 +80,8 @@ RANGES: Mapping[str, Range] = {
         "a period of minutes is that of a ship, a frequency above 1 kHz that of a tuning fork",
     ),
 }  # fmt: skip
-"""By key of ``campaign.toml``; ``step`` and ``period`` are the time step and the period of oscillation of a run."""
+"""By key of ``campaign.toml``; ``swing``, ``step`` and ``period`` are half the span of a run's angle, its mean time
+step and its period of oscillation."""
 
 
 def plausible_values(values: Mapping[str, Any], where: str) -> None:
@@ -89,18 +100,22 @@ def plausible_values(values: Mapping[str, Any], where: str) -> None:
             _check(f"{key} = {value:g} {allowed.unit}", value, allowed, where)
 
 
-def plausible_run(record: Record, cycles: float, where: str) -> None:
-    """Refuse a record whose times appear to be in a wrong unit, or that is sampled too slowly.
+def plausible_run(record: Record, cycles: float, where: str, *, angle: bool = True) -> None:
+    """Refuse a record that appears to be in a wrong unit, or that is sampled too slowly.
 
     Args:
         record: the run's reading.
         cycles: number of cycles in the record.
         where: file and run, for messages.
+        angle: whether the reading is an angle; rates and accelerations may have any size.
 
     Raises:
-        TunnelError: a time step or period outside its range, or fewer than ten samples per cycle.
+        TunnelError: a swing, time step or period outside its range, or fewer than ten samples per cycle.
     """
     step, per_cycle = record.sample_interval, record.yaw_rad.size / cycles
+    swing = 0.5 * float(np.ptp(record.yaw_rad))
+    if angle:
+        _check(f"the angle swings by ±{swing:.4g} rad", swing, RANGES["swing"], where)
     _check(f"time_s steps by {step:.3g} s", step, RANGES["step"], where)
     _check(f"a swing takes {step * per_cycle:.3g} s", step * per_cycle, RANGES["period"], where)
     if per_cycle < LEAST_SAMPLES_PER_CYCLE:

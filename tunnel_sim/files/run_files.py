@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -13,9 +13,11 @@ import polars as pl
 from numpy.typing import NDArray
 
 from tunnel_sim.files.reading import read_regular
+from tunnel_sim.files.run_table import COLUMNS
 from tunnel_sim.files.toml_input import one_line
 from tunnel_sim.files.writing import encoded
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -31,23 +33,27 @@ READERS: Mapping[str, str] = {
 }
 """Modules that read a kind of run file (`RunReader`), by its ending. A new kind is one module and one line."""
 
-_COLUMNS = "a column yaw_rad or yaw_deg, and time_s unless [sensor] sample_rate is given"
-
 
 def read_table(
-    path: Path, where: str, *, timed: bool = False, most: int = limits.RUN_SAMPLES
+    path: Path,
+    where: str,
+    *,
+    timed: bool = False,
+    quantity: Quantity = "angle",
+    most: int = limits.RUN_SAMPLES,
 ) -> tuple[Array | None, Array, str]:
-    """Read times and angles from a run file; other columns are ignored.
+    """Read times and readings from a run file; other columns are ignored.
 
     Args:
         path: a file with one of the endings in `READERS`.
         where: file and run, for messages.
         timed: whether times are required because no ``sample_rate`` is stated.
+        quantity: what the sensor measures, which names the column.
         most: greatest number of samples.
 
     Returns:
-        Times in s (None without a column time_s), the reading as written, and the name of its column:
-        ``yaw_rad`` or ``yaw_deg``. All values are finite.
+        Times in s (None without a column time_s), the reading in rad, rad/s or rad/s², and the name of its column,
+        one of those in `COLUMNS`. All values are finite.
 
     Raises:
         TunnelError: no such file, not a regular file, too large, not a table, a missing or repeated column, a
@@ -68,37 +74,55 @@ def read_table(
         readable=f"name a readable {kinds} file",
     )
     if not content.strip():
-        raise TunnelError("the file is empty", where=where, remedy=f"give it {_COLUMNS}")
-    return _columns(reader.read(content, where, most), where, timed=timed)
+        raise TunnelError(
+            "the file is empty",
+            where=where,
+            remedy=f"give it {_named(quantity)}, and time_s unless [sensor] sample_rate is given",
+        )
+    return _columns(reader.read(content, where, most), where, timed=timed, quantity=quantity)
 
 
-def table_bytes(record: Record, path: Path) -> bytes:
-    """The content of a run file with columns time_s and yaw_rad; reading it gives the same numbers.
+def table_bytes(record: Record, path: Path, quantity: Quantity = "angle") -> bytes:
+    """The content of a run file with times and readings in radians; reading it gives the same numbers.
 
     Args:
         record: what to write.
         path: the ``.csv`` or ``.parquet`` file, for the format and for messages.
+        quantity: what the readings are, which names their column.
 
     Raises:
         TunnelError: when the table cannot be encoded.
     """
-    table = pl.DataFrame({"time_s": record.time_s, "yaw_rad": record.yaw_rad})
+    table = pl.DataFrame({"time_s": record.time_s, COLUMNS[quantity][0]: record.yaw_rad})
     # CSV values have the fewest digits that read back as the same float.
     return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
 
 
-def _columns(held: FileTable, where: str, *, timed: bool) -> tuple[Array | None, Array, str]:
+def _named(quantity: Quantity) -> str:
+    return f"a column {' or '.join(COLUMNS[quantity])}"
+
+
+def _reading_column(names: Sequence[str], quantity: Quantity, where: str) -> str:
+    """The column that holds the reading."""
+    found = [name for name in COLUMNS[quantity] if name in names]
+    if len(found) > 1:
+        raise TunnelError(f"both {' and '.join(found)}", where=where, remedy="leave one of them out")
+    if found:
+        return found[0]
+    other = next((kind for kind, columns in COLUMNS.items() if not set(columns).isdisjoint(names)), None)
+    raise TunnelError(
+        f"no column {' or '.join(COLUMNS[quantity])} (columns found: {one_line(', '.join(names) or 'none', 60)})",
+        where=where,
+        remedy=f"name the {quantity}'s column {' or '.join(COLUMNS[quantity])}"
+        + (f", or state quantity = '{other}' under [sensor]" if other else ""),
+    )
+
+
+def _columns(
+    held: FileTable, where: str, *, timed: bool, quantity: Quantity
+) -> tuple[Array | None, Array, str]:
     names = held.names
-    if "yaw_rad" in names and "yaw_deg" in names:
-        raise TunnelError("both yaw_rad and yaw_deg", where=where, remedy="leave one of them out")
-    column = next((name for name in ("yaw_rad", "yaw_deg") if name in names), None)
-    if column is None:
-        found = one_line(", ".join(names) or "none", 60)
-        raise TunnelError(
-            f"no column yaw_rad or yaw_deg (columns found: {found})",
-            where=where,
-            remedy="name the angle's column yaw_rad (radians) or yaw_deg (degrees)",
-        )
+    column = _reading_column(names, quantity, where)
     stray = next((name for name in names if name != "time_s" and re.match(r"(?i)t$|time", name)), None)
     if timed and "time_s" not in names and stray is not None:
         raise TunnelError(
@@ -115,7 +139,8 @@ def _columns(held: FileTable, where: str, *, timed: bool) -> tuple[Array | None,
             "the file has no samples", where=where, remedy="record the run again or leave it out"
         )
     values = {name: _numbers(table.get_column(name), held.text, where) for name in used}
-    return values.get("time_s"), values[column], column
+    reading = np.deg2rad(values[column]) if "_deg" in column else values[column]
+    return values.get("time_s"), reading, column
 
 
 def _without_blank_end(table: pl.DataFrame) -> pl.DataFrame:

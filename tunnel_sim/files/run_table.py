@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import polars as pl
 
-USED_COLUMNS = ("time_s", "yaw_rad", "yaw_deg")
+COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "angle": ("yaw_rad", "yaw_deg"),
+    "rate": ("yaw_rate_rad_s", "yaw_rate_deg_s"),
+    "acceleration": ("yaw_acceleration_rad_s2",),
+}
+"""The columns that may hold the reading, by the sensor's quantity; the first one is written."""
+
+USED_COLUMNS = ("time_s", *(name for names in COLUMNS.values() for name in names))
 """The columns of a run file that are read; others are left alone."""
 
 

@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from tunnel_sim.vocabulary.record import Record
+
+Quantity = Literal["angle", "rate", "acceleration"]
+"""What a sensor measures: the yaw angle, or its first or second derivative."""
+
+Zero = Literal["common", "per_run", "auto"]
+"""Whether the runs have one zero, one each, or whether the records decide."""
 
 
 @dataclass(frozen=True)
@@ -26,19 +33,33 @@ class RigProperties:
 
 @dataclass(frozen=True)
 class SensorProperties:
-    """What a campaign states about its angle sensor; None where nothing is stated.
+    """What a campaign states about its sensor; None where nothing is stated.
 
     Args:
         sample_rate: Hz.
-        resolution: step of the reading, rad.
-        noise_std: standard deviation of the reading's noise, rad.
+        resolution: step of the reading, rad (rad/s or rad/s² where it measures a rate or an acceleration).
+        noise_std: standard deviation of the reading's noise, in the same unit.
         plausible: False accepts values that look like a wrong unit, and a low sample rate.
+        quantity: what the readings are; None: the angle.
+        zero: whether the runs have a common zero; None: the records decide.
     """
 
     sample_rate: float | None = None
     resolution: float | None = None
     noise_std: float | None = None
     plausible: bool | None = None
+    quantity: Quantity | None = None
+    zero: Zero | None = None
+
+    @property
+    def unit(self) -> str:
+        """Unit of the readings."""
+        return ("rad", "rad/s", "rad/s²")[self.derivative]
+
+    @property
+    def derivative(self) -> int:
+        """Which derivative of the angle the readings are: 0, 1 or 2."""
+        return 0 if self.quantity is None else ("angle", "rate", "acceleration").index(self.quantity)
 
 
 @dataclass(frozen=True)
@@ -69,7 +90,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Campaign:
-    """The runs of one rig with one sensor; the sensor's zero is unknown and the same in all runs.
+    """The runs of one rig with one sensor; the sensor's zero is unknown.
 
     Args:
         name: short name, also of the folder.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
 MAINS_HZ = (50.0, 60.0)
 # A spectral line counts when it exceeds the median of the spectrum by this factor. In white noise, where the bins
@@ -31,6 +31,7 @@ def count_cycles(record: Record) -> float:
     Returns:
         The number of cycles; 0 when nothing oscillates.
     """
+    record = evenly_spaced(record, bridged=False)
     reading = _without_hum(record)
     level = _without_trend(reading)
     # Only rounding errors remain of a constant, a linear drift or pure hum.
