@@ -167,6 +167,15 @@ COLOURED_EXCESS = 0.03
 #: Share of a coefficient's change on freeing the forms that counts as its standard deviation. Judgement, made when
 #: a blind test had shown Cnβ's intervals too narrow, and tested on campaigns drawn afterwards.
 FORM_CHANGE_STD = 0.5
+#: What remains is material where it moves a coefficient by this share, or by more than its standard deviation.
+#: Convention: derivatives are quoted to a per cent.
+MATERIAL_SHARE = 0.01
+#: A part of the data with a smaller share of the information on a coefficient is not set against the others.
+#: Judgement: its own estimate would be too uncertain.
+LEAST_HALF = 0.1
+#: A parameter whose standard deviation exceeds this multiple of its value and of its usual size, or whose range
+#: allowed is no wider than chance, is not determined. Judgement: even its order of magnitude is then unknown.
+UNDETERMINED_FACTOR = 10.0
 #: With fewer runs a caution is given. Judgement.
 FEW_RUNS = 3
 #: A caution is given where the stated noise is wrong by this factor. Judgement: rounding to one digit reaches half

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from identification.printing.numbers import at_bound, coefficient_label, significant, unit_mark, with_std
+from diagnosis.policy import LISTED_PROBABILITY
+from identification.printing.numbers import coefficient_label, estimated, significant, unit_mark
 from identification.printing.table import TextTable
 from identification.remark import Remark
 
@@ -25,14 +26,17 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
         document: of a diagnosis.
 
     Returns:
-        The verdict, where the gap is and what cannot be told apart, the answers weighed and the coefficients, and
-        the caveats.
+        The verdict, where the gap is and what cannot be told apart, the answers weighed, parameters, the gap as
+        causes are added, the coefficients, and the caveats.
     """
     return [
         document["verdict"],
         where_line(document),
         *rival_lines(document),
         candidates_table(document),
+        parameters_table(document),
+        inclusion_line(document),
+        waterfall_table(document),
         coefficients_table(document),
         *closing_lines(document),
     ]
@@ -45,7 +49,7 @@ def candidates_table(document: Document) -> TextTable:
         document: of a diagnosis.
 
     Returns:
-        A table with probability, share of the gap closed and parameters; a last row counts the others.
+        A table with probability and share of the gap closed; a last row counts the others.
     """
     rows = []
     shown = [
@@ -53,47 +57,39 @@ def candidates_table(document: Document) -> TextTable:
     ] or document["candidates"][:1]
     for candidate in shown:
         fitted = candidate["effect"] not in ("none", "unknown")
-        row = (
-            candidate["effect"],
-            probability(candidate["probability"]),
-            share(candidate["closed"]) if fitted else "–",
-            "\n".join(parameter_lines(candidate["parameters"])),
-        )
-        rows.append(row)
+        closed = share(candidate["closed"]) if fitted else "–"
+        name = candidate["effect"].replace(" + ", " +\n")
+        rows.append((name, probability(candidate["probability"]), closed))
     left = document["candidates"][len(shown) :]
     if left:
         together = sum(candidate["probability"] for candidate in left)
-        rows.append((f"{len(left)} more, together", probability(together), "", ""))
+        rows.append((f"{len(left)} more, together", probability(together), ""))
     return TextTable(
         f"Answers for {document['campaign']}",
-        ("answer", "probability", "share closed", "parameters"),
+        ("answer", "probability", "share closed"),
         tuple(rows),
         right=("probability", "share closed"),
     )
 
 
-def parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Fitted parameters, name and value on separate lines, which fit beside an answer in 80 columns.
+def parameters_table(document: Document) -> TextTable:
+    """The parameters of the answer.
 
     Args:
-        parameters: value, std and unit by name; a std of zero means that the value was given, not fitted;
-            None means that it is not known.
+        document: of a diagnosis.
 
     Returns:
-        Lines such as ``friction_moment =`` and ``  0.003991 ± 0.000006 N m``; for a pair, those of
-        each effect below its name.
+        A table with one standard deviation; without rows where the answer has none.
     """
-    lines: list[str] = []
-    effect = ""
-    for full, given in parameters.items():
+    answer = document["candidates"][0]
+    rows, effect = [], ""
+    for full, given in answer["parameters"].items():
         owner, _, name = full.rpartition(".")
-        if owner != effect:
-            effect = owner
-            lines.append(f"{owner}:")
-        value = with_std(given["value"], given["std"]) if given["std"] else significant(given["value"])
-        mark = "" if given["unit"] == "1" else " " + unit_mark(given["unit"])
-        lines += [f"{name} =", f"  {value}{mark}{at_bound(given)}"]
-    return lines
+        owner = owner or answer["effect"]
+        mark = "" if given["unit"] == "1" else unit_mark(given["unit"])
+        rows.append((owner if owner != effect else "", name, estimated(given, mark)))
+        effect = owner
+    return TextTable("Parameters ± one standard deviation", ("effect", "parameter", "estimate"), tuple(rows))
 
 
 def gap_table(document: Document) -> TextTable:
@@ -117,6 +113,57 @@ def gap_table(document: Document) -> TextTable:
     return TextTable("Gap (× noise power)", ("run", "before", after), tuple(rows), right=("before", after))
 
 
+def inclusion_line(document: Document) -> str:
+    """The effects that may be among the causes, most probable first.
+
+    Args:
+        document: of a diagnosis.
+
+    Returns:
+        A line with their probabilities; empty where none reaches 0.01.
+    """
+    found = sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1])
+    shown = [f"{name} {probability(value)}" for name, value in found if value >= LISTED_PROBABILITY]
+    return f"Among the causes, with probability: {', '.join(shown)}" if shown else ""
+
+
+def waterfall_table(document: Document) -> TextTable:
+    """How far the gap closes with each cause, and without each.
+
+    Args:
+        document: of a diagnosis.
+
+    Returns:
+        A table of excesses in multiples of the noise power; without rows where no cause is named.
+    """
+    steps, without = document.get("waterfall", ()), document.get("without", {})
+    rows = [
+        (
+            step["effect"] or "nominal model",
+            held_out_excess(step["excess"]),
+            held_out_excess(without[step["effect"]]) if step["effect"] in without else "",
+        )
+        for step in (steps if len(steps) > 1 else ())
+    ]
+    title = f"Gap as the causes are added (× noise power), {document.get('waterfall_on', '')}"
+    return TextTable(title, ("added", "left", "left without it alone"), tuple(rows), _LEFT)
+
+
+_LEFT = ("left", "left without it alone")
+
+
+def held_out_excess(value: float) -> str:
+    """An excess of any size.
+
+    Args:
+        value: in noise powers, a ratio.
+
+    Returns:
+        Three decimals where it is small, or four significant digits.
+    """
+    return f"{value:.3f}" if abs(value) < 10.0 else significant(value, 4)
+
+
 def _excess(value: float) -> str:
     """An excess to three decimals, without a sign of zero."""
     return f"{round(value, 3) + 0.0:+.3f}"
@@ -137,11 +184,12 @@ def coefficients_table(document: Document) -> TextTable:
         if name in after:
             one, two = before[name], after[name]
             change = 100.0 * (two["value"] - one["value"]) / abs(one["value"]) if one["value"] else 0.0
+            known = all(given.get("determined", True) for given in (one, two))
             row = (
                 coefficient_label(name, one["unit"]),
-                with_std(one["value"], one["std"]),
-                with_std(two["value"], two["std"]),
-                f"{change:+.2g} %",
+                estimated(one),
+                estimated(two),
+                f"{change:+.2g} %" if known else "–",
             )
             rows.append(row)
     return TextTable(

@@ -8,6 +8,7 @@ from typing import Any
 
 import polars as pl
 
+from diagnosis.closure import Rest, Waterfall
 from diagnosis.printing import diagnosis_parts
 from identification.printing.frames import wide_frame
 from identification.printing.table import as_html, as_text
@@ -28,17 +29,20 @@ class ParameterEstimate:
             known.
         unit: of both.
         bound: ``lower`` or ``upper`` where the fit stopped at that end of the range allowed; ``std`` is then None.
+        determined: whether the runs determine it; where not, ``value`` means nothing and ``std`` is None.
     """
 
     value: float
     std: float | None
     unit: str
     bound: str | None = None
+    determined: bool = True
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Value, std and unit, and the bound where there is one."""
+        """Value, std and unit; the bound where there is one, and ``determined`` where it is false."""
         data: dict[str, Any] = {"value": self.value, "std": self.std, "unit": self.unit}
-        return data if self.bound is None else data | {"bound": self.bound}
+        bound = {} if self.bound is None else {"bound": self.bound}
+        return data | bound | ({} if self.determined else {"determined": False})
 
 
 @dataclass(frozen=True)
@@ -125,11 +129,11 @@ class Candidate:
     """An answer that was considered.
 
     Args:
-        effect: name, ``none`` or ``unknown``; two names joined by `` + `` for a pair.
+        effect: name, ``none`` or ``unknown``; several names are joined by `` + ``.
         probability: that it is the answer, a fraction.
         excess_after: with it added, in the fitted runs, in units of the noise variance.
         closed: share of the gap it closes there.
-        parameters: its fitted parameters by name (``effect.parameter`` for a pair).
+        parameters: its fitted parameters by name (``effect.parameter`` where it has several effects).
     """
 
     effect: str
@@ -227,6 +231,9 @@ class Diagnosis:
         maps: data of the figures, in JSON's types.
         provenance: versions.
         remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
+        inclusion: by effect of the vocabulary, the probability that it is among the causes.
+        waterfall: how far the gap closes with each cause.
+        rest: what remains after the causes.
     """
 
     campaign: str
@@ -246,6 +253,9 @@ class Diagnosis:
     maps: Mapping[str, Any] | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[Remark, ...] = ()
+    inclusion: Mapping[str, float] = field(default_factory=dict)
+    waterfall: Waterfall = field(default_factory=Waterfall)
+    rest: Rest | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""
@@ -288,6 +298,9 @@ class Diagnosis:
                 }
                 for candidate in self.candidates
             ],
+            "inclusion": dict(self.inclusion),
+            **self.waterfall.to_json_dict(),
+            "rest": None if self.rest is None else self.rest.to_json_dict(),
             "ambiguous_with": list(self.ambiguous_with),
             "next_run": None if self.next_run is None else dict(self.next_run),
             "coefficients": {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -13,10 +13,15 @@ from diagnosis.answer.candidates import candidates
 from diagnosis.answer.cautions import cautions
 from diagnosis.answer.coefficients import coefficients, rival_fits
 from diagnosis.answer.held_out import HeldOut, predict_held_out
+from diagnosis.answer.inclusion import inclusion
 from diagnosis.answer.next_run import separating_run
+from diagnosis.answer.own_units import own_estimate
+from diagnosis.answer.pulls import coefficient_move
 from diagnosis.answer.reference_sizes import size_note, sized_coefficients
 from diagnosis.answer.reported import excess_base, gap_summary, report_fits
+from diagnosis.answer.rest import rest
 from diagnosis.answer.verdict import blind_spots, cnr_note, verdict
+from diagnosis.answer.waterfall import waterfall
 from diagnosis.attribution.decide import Weighed
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.localisation.maps import Maps
@@ -25,6 +30,7 @@ from diagnosis.result import (
     Coefficients,
     Diagnosis,
     NoiseSummary,
+    ParameterEstimate,
     Where,
 )
 from diagnosis.study import Study
@@ -58,14 +64,19 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
     gap = gap_summary(study, base, shown)
     weighed = candidates(study, base)
     data = study.nominal.problem.data
+    begun = time.perf_counter()
+    steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
+    seconds["waterfall"] = time.perf_counter() - begun
+    found = _coefficients(study, chosen, nominal_out, chosen_out)
+    left = rest(study, *_in_own_units(study, found.after, chosen), steps.steps[-1].excess)
     return Diagnosis(
         campaign=study.campaign.name,
         causes=study.causes,
         verdict=verdict(
             study.causes,
             before=gap.excess_before,
-            after=gap.excess_after,
             closed=gap.closed,
+            rest=left.words,
             probability=weighed[0].probability,
             closed_on=gap.closed_on,
             both_winds=data.wind_on and any(not run.wind_on for run in data.runs),
@@ -76,7 +87,7 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
         candidates=weighed,
         ambiguous_with=_rival_names(study),
         next_run=_next_run(study, chosen),
-        coefficients=_coefficients(study, chosen, nominal_out, chosen_out),
+        coefficients=found,
         confirmation=shown.confirmation,
         noise=_noise(study),
         blind_spots=blind_spots(
@@ -100,7 +111,21 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
             *((_LATE_START,) if study.started_late else ()),
             *_outside(study),
         ),
+        inclusion=inclusion(weighed, study.read_off),
+        waterfall=steps,
+        rest=left,
     )
+
+
+def _in_own_units(
+    study: Study, stated: Mapping[str, ParameterEstimate], chosen: Fit
+) -> tuple[dict[str, ParameterEstimate], dict[str, float]]:
+    """The coefficients stated, and how far what remains moves each, in the measured campaign's units."""
+    names = ("omega_n", "zeta") if chosen.problem.data.normalised else ("cn_beta", "cn_r")
+    return {name: own_estimate(given, study.similarity) for name, given in stated.items()}, {
+        name: study.similarity.own(coefficient_move(chosen, coefficient), given.unit)
+        for (name, given), coefficient in zip(stated.items(), names, strict=False)
+    }
 
 
 def _outside(study: Study) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.answer.determined import meant_parameter
 from diagnosis.answer.reference_sizes import parameter_unit
 from diagnosis.answer.reported import Base
 from diagnosis.attribution.decide import Weighed
@@ -83,17 +84,16 @@ def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
     found: dict[str, ParameterEstimate] = {}
     if hypothesis is not None:
         problem = hypothesis.fit.problem
-        units = {
-            f"{kind.name}.{info.name}": info.unit for kind in problem.effects for info in kind.parameters()
-        }
+        infos = {f"{kind.name}.{info.name}": info for kind in problem.effects for info in kind.parameters()}
         inflate = float(np.sqrt(1.0 + max(hypothesis.fit.excess, 0.0)))
         for name in problem.effect_names:
             fit = hypothesis.fit
             bound = fit.bound(name)
             std = None if bound else fit.std(name) * inflate
-            found[name] = ParameterEstimate(fit.value(name), std, units[name], bound)
+            given = ParameterEstimate(fit.value(name), std, infos[name].unit, bound)
+            found[name] = meant_parameter(given, infos[name])
         for name, value in problem.fixed:
-            found[name] = ParameterEstimate(value, 0.0, units[name])
+            found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
     if random is not None:
         found |= _random_parameters(random)
     return {name: replace(value, unit=parameter_unit(name, study.campaign)) for name, value in found.items()}

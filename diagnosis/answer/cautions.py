@@ -35,8 +35,9 @@ def cautions(
     fitted = [run.id for run in runs if not run.held_out]
     if named and len(fitted) == len(runs):
         found.append(
-            "No run could be held out of the fit, so the closure is that of the fitted runs, not a prediction. "
-            "Repeat every spring, with the wind off and on."
+            "No run could be held out of the fit, so the share closed is that of the fitted runs. The gap as the "
+            "causes are added is predicted for stretches of time left out. Repeat every spring, with the wind off "
+            "and on: a run left out tests more than a stretch."
         )
     elif named and fitted:
         found.append(

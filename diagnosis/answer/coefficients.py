@@ -8,7 +8,10 @@ from decimal import Decimal
 
 import numpy as np
 
+from diagnosis.answer.determined import meant_coefficient
 from diagnosis.answer.held_out import HeldOut
+from diagnosis.answer.pulls import coefficient_move
+from diagnosis.answer.small_swings import coefficient_gradient, coefficient_value, stiffness_names
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import Fit
@@ -39,11 +42,13 @@ def coefficients(
         textbook: the same effects in textbook form, where the fit freed their forms.
 
     Returns:
-        ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` in normalised form. The variance is that of the
-        fit scaled by its excess, or where the residuals are coloured the greatest of that, the delete-a-group
-        jackknife (Kott, J. Off. Stat. 17 (2001) 521) and the scatter of the runs; plus the rounding of the air
-        density, plus the part of a cause's form that no free decay shows, plus half the change made by freeing
-        the forms (another family of forms may change as much), plus the spread over rivals.
+        ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` of small swings in normalised form. The variance is
+        that of the fit scaled by its excess, or where the residuals are coloured the greatest of that, the
+        delete-a-group jackknife (Kott, J. Off. Stat. 17 (2001) 521), the scatter of the runs and half the
+        difference between two halves of the data (`diagnosis.answer.pulls`); plus the rounding of the air density,
+        plus the part of a cause's form that no free decay shows, plus half the change made by freeing the forms
+        (another family of forms may change as much), plus the spread over rivals. No standard deviation is given
+        at a bound and where the runs do not determine the coefficient.
     """
     names = ("omega_n", "zeta") if fit.problem.data.normalised else ("cn_beta", "cn_r")
     result = {}
@@ -59,8 +64,17 @@ def coefficients(
         unfreed = None if textbook is None else _value_only(textbook, name)
         moved = 0.0 if unfreed is None else FORM_CHANGE_STD * (value - unfreed)
         variance = std**2 + rounding**2 + unseen**2 + moved**2 + spread
-        result[name] = ParameterEstimate(value, math.sqrt(variance), _UNITS[name])
+        result[name] = _estimate(fit, name, value, math.sqrt(variance))
     return result
+
+
+def _estimate(fit: Fit, name: str, value: float, std: float) -> ParameterEstimate:
+    """A coefficient, marked where the fit stopped at a bound or the runs do not determine it."""
+    bound = fit.bound("mechanical_damping") if name == "zeta" else None
+    if name == "omega_n" and len(stiffness_names(fit.problem.names)) == 1:  # no gravity instead of the spring
+        bound = fit.bound("stiffness")
+    found = ParameterEstimate(value, None if bound else std, _UNITS[name], bound)
+    return meant_coefficient(found, fit, name)
 
 
 def _unseen_form(fit: Fit, name: str) -> float:
@@ -118,10 +132,12 @@ def _value(fit: Fit, held_out: HeldOut, name: str) -> tuple[float | None, float]
     scale = math.sqrt(1.0 + max(fit.excess, 0.0))
     std = _formal_std(fit, name) * scale
     if fit.excess > COLOURED_EXCESS and len(held_out.common) > 1:
-        values = [_derived(held_out.names, row, name) for row in held_out.common]
+        values = [coefficient_value(held_out.names, row, name) for row in held_out.common]
         count = len(values)
         jackknife = math.sqrt((count - 1.0) / count * sum((v - value) ** 2 for v in values if v is not None))
         std = max(std, jackknife)
+    if fit.excess > COLOURED_EXCESS:
+        std = max(std, coefficient_move(fit, name))
     if fit.excess > COLOURED_EXCESS and name in fit.problem.names:
         std = max(std, _scatter_of_runs(fit, name))
     return value, std
@@ -144,31 +160,13 @@ def _scatter_of_runs(fit: Fit, name: str) -> float:
 
 
 def _value_only(fit: Fit, name: str) -> float | None:
-    return _derived(fit.problem.names, fit.point.common, name)
-
-
-def _derived(names: tuple[str, ...], common: np.ndarray, name: str) -> float | None:
-    value = dict(zip(names, common.tolist(), strict=True))
-    if name == "omega_n":
-        return math.sqrt(max(value["stiffness"], 0.0))
-    if name == "zeta":
-        return float(value["mechanical_damping"] / (2.0 * math.sqrt(max(value["stiffness"], 1e-300))))
-    found = value.get(name)
-    return None if found is None else float(found)
+    return coefficient_value(fit.problem.names, fit.point.common, name)
 
 
 def _formal_std(fit: Fit, name: str) -> float:
     """Standard deviation from the fit's covariance, to first order."""
-    if name == "omega_n":
-        return fit.std("stiffness") / (2.0 * math.sqrt(max(fit.value("stiffness"), 1e-300)))
-    if name == "zeta":
-        stiffness, damping = fit.value("stiffness"), fit.value("mechanical_damping")
-        zeta = damping / (2.0 * math.sqrt(max(stiffness, 1e-300)))
-        relative = fit.std("stiffness") / (2.0 * max(stiffness, 1e-300))
-        return math.hypot(
-            fit.std("mechanical_damping") / (2.0 * math.sqrt(max(stiffness, 1e-300))), zeta * relative
-        )
-    return fit.std(name)
+    gradient = coefficient_gradient(fit.problem.names, fit.point.common, name)
+    return math.sqrt(max(float(gradient @ fit.covariance @ gradient), 0.0))
 
 
 def _density_rounding(campaign: Campaign) -> float:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
+from diagnosis.fitting.least_squares import Fit, FitError, clip, damped_step, scaled_residuals
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData
 from tunnel_sim.vocabulary.record import Array
 
-_FOLDS = 3
+FOLDS = 3
+_STEPS = 6  # Gauss–Newton steps without a group
+_TRIES = 4  # dampings tried in a step
+_GAIN = 1e-4  # share of χ² that a step must save
 _RELEASE_STEPS = 4  # two are enough where the slopes are those of nearly the same parameters
 _RELEASE_GAIN = 1e-6  # of a run's χ² that a step must save
 
@@ -39,7 +44,7 @@ class HeldOut:
         return {run: float(np.mean(residual**2)) - 1.0 for run, residual in self.residuals.items()}
 
 
-def folds(data: Data, count: int = _FOLDS) -> list[tuple[str, ...]]:
+def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
     """Groups of runs to leave out in turn.
 
     Args:
@@ -89,24 +94,18 @@ def predict_held_out(whole: Fit) -> HeldOut:
     found = []
     ids = [run.id for run in data.runs]
     for group in folds(data):
-        keep = [i for i, run_id in enumerate(ids) if run_id not in group]
         out = [i for i, run_id in enumerate(ids) if run_id in group]
+        seen = [np.full(run.reading.size, run.id not in group) for run in data.runs]
         try:
-            smaller = fit(
-                _restricted(whole.problem, [ids[i] for i in keep]),
-                Point(whole.point.common, whole.point.release[keep]),
-                base=_sliced(whole, keep),
-                tolerance=1e-3,
-                max_iterations=6,
-            )
+            common = fit_seen(whole, seen)[0].common
             released, left = refit_releases(
                 _restricted(whole.problem, [ids[i] for i in out]),
-                Point(smaller.point.common, whole.point.release[out]),
+                Point(common, whole.point.release[out]),
                 [whole.jacobian[i][1] for i in out],
             )
         except (FitError, np.linalg.LinAlgError):
             continue
-        found.append(smaller.point.common)
+        found.append(common)
         for k, i in enumerate(out):
             residuals[ids[i]] = left[k]
             points[ids[i]] = (released.common, released.release[k])
@@ -144,14 +143,37 @@ def _restricted(problem: Problem, ids: list[str]) -> Problem:
     return Problem(problem.data.subset(tuple(ids)), problem.effects, problem.fixed, problem.free_forms)
 
 
-def _sliced(whole: Fit, keep: list[int]) -> Fit:
-    return Fit(
-        _restricted(whole.problem, [whole.problem.data.runs[i].id for i in keep]),
-        Point(whole.point.common, whole.point.release[keep]),
-        [whole.residuals[i] for i in keep],
-        whole.chi2[keep],
-        whole.covariance,
-        [whole.jacobian[i] for i in keep],
-        whole.iterations,
-        whole.converged,
-    )
+def fit_seen(whole: Fit, seen: Sequence[NDArray[np.bool_]]) -> tuple[Point, list[Array]]:
+    """Fit some of the blocks, with the sensitivities of the fit of all blocks, which is close.
+
+    Args:
+        whole: the fit of all blocks, from which this one starts.
+        seen: by run the blocks to fit, shape (n,).
+
+    Returns:
+        The point found, and the scaled residuals of all blocks there. Parameters at a bound, and the own parameters
+        of a run that is not seen, stay as they were.
+    """
+    free = np.array([whole.bound(name) is None for name in whole.problem.names], np.float64)
+    slopes = [(c[s] * free, r[s]) for (c, r), s in zip(whole.jacobian, seen, strict=True)]
+
+    def look(point: Point) -> tuple[Point, list[Array], list[Array], float]:
+        residuals = scaled_residuals(whole.problem, point)
+        visible = [r[s] for r, s in zip(residuals, seen, strict=True)]
+        cost = sum(float(r @ r) for r in visible)
+        return point, residuals, visible, cost if np.isfinite(cost) else np.inf
+
+    damping = 1e-6
+    point, residuals, visible, cost = look(whole.point)
+    for _ in range(_STEPS):
+        before = cost
+        for _ in range(_TRIES):
+            there = look(clip(whole.problem, damped_step(whole.problem, point, visible, slopes, damping)))
+            if there[-1] < cost:
+                point, residuals, visible, cost = there
+                damping *= 0.2
+                break
+            damping = max(damping * 10.0, 1e-4)
+        if before - cost < _GAIN * before:
+            break
+    return point, residuals

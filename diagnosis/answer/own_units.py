@@ -13,7 +13,7 @@ _NEXT_RUN = {"spring_stiffness": "N m/rad", "duration": "s"}
 
 
 def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
-    """The answer with the parameters of the measured rig.
+    """The answer with the parameters of the measured rig; what remains (`Rest`) has its units already.
 
     Args:
         answer: for the similar campaign; its maps and places are in the measured campaign's units already.
@@ -24,7 +24,7 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
     """
 
     def own(values: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
-        return {name: _own(value, similarity) for name, value in values.items()}
+        return {name: own_estimate(value, similarity) for name, value in values.items()}
 
     return replace(
         answer,
@@ -40,7 +40,16 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
     )
 
 
-def _own(estimate: ParameterEstimate, similarity: Similarity) -> ParameterEstimate:
+def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> ParameterEstimate:
+    """An estimate in the measured campaign's units.
+
+    Args:
+        estimate: for the similar campaign.
+        similarity: how that was made.
+
+    Returns:
+        The same quantity, its value and standard deviation changed alike.
+    """
     std = estimate.std
     return replace(
         estimate,

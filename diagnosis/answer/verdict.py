@@ -20,8 +20,8 @@ def verdict(
     causes: Sequence[str],
     *,
     before: float,
-    after: float,
     closed: float,
+    rest: str,
     probability: float,
     closed_on: str,
     both_winds: bool,
@@ -31,8 +31,8 @@ def verdict(
     Args:
         causes: names; empty for no gap.
         before: excess of the nominal model, in units of the noise variance.
-        after: excess with the causes added, in units of the noise variance.
         closed: share of the gap closed, 0 to 1.
+        rest: what remains, in sentences (`diagnosis.closure.Rest`).
         probability: of the answer, a fraction.
         closed_on: the runs that ``closed`` was measured on, in words (`GapSummary.closed_on`).
         both_winds: whether the campaign has runs with the wind off and runs with the wind on.
@@ -48,14 +48,17 @@ def verdict(
     if tuple(causes) == ("unknown",):
         return (
             f"There is a gap ({before:.2f} times the noise power), and no effect of the vocabulary explains it. "
-            f"Do not trust the coefficients beyond the intervals given."
+            f"{rest}"
         )
-    sources = "; ".join(_source(name, both_winds=both_winds) for name in causes)
+    several = len(causes) > 1
+    sources = "; ".join(
+        _source(name, both_winds=both_winds) + (f" ({plain([name])})" if several else "") for name in causes
+    )
     return (
         f"The gap ({before:.2f} times the noise power) comes from {plain(causes)} "
         f"(probability {probability:.2f}): "
-        f"{sources}. With {'it' if len(causes) == 1 else 'them'} added, {100.0 * closed:.1f} % of the gap "
-        f"closes {closed_on}, and {max(after, 0.0):.3f} times the noise power is left."
+        f"{sources}. With {'them' if several else 'it'} added, {100.0 * closed:.1f} % of the gap "
+        f"closes {closed_on}. {rest}"
     )
 
 

@@ -143,7 +143,7 @@ class Case:
         """
         found = self.answer.get("coefficients", {}).get(when, {}).get(name)
         truth = self.coefficients.get(name)
-        if found is None or not truth or not found["std"] > 0.0:
+        if found is None or not truth or not (found["std"] or 0.0) > 0.0:
             return None
         error = found["value"] - truth
         return error / found["std"], error / abs(truth)

@@ -151,7 +151,8 @@ class _State:
         """Take one damped step; returns the drop of χ², 0 where no step lowers it."""
         for _ in range(_TRIES):
             trial = clip(
-                self.problem, _step(self.problem, self.point, self.residuals, self.jacobian, self.damping)
+                self.problem,
+                damped_step(self.problem, self.point, self.residuals, self.jacobian, self.damping),
             )
             residuals = scaled_residuals(self.problem, trial)
             cost = _cost(residuals)
@@ -319,13 +320,25 @@ def normal_equations(
     return matrix, gradient, solutions
 
 
-def _step(
+def damped_step(
     problem: Problem,
     point: Point,
     residuals: list[Array],
     jacobian: list[tuple[Array, Array]],
     damping: float,
 ) -> Point:
+    """Where a Gauss–Newton step leads.
+
+    Args:
+        problem: gives the bounds.
+        point: where to start.
+        residuals: scaled, by run.
+        jacobian: from `sensitivities`, of the same rows as the residuals.
+        damping: added to the scaled normal matrix's diagonal, dimensionless.
+
+    Returns:
+        The point, its common parameters inside their bounds.
+    """
     matrix, gradient, solutions = normal_equations(jacobian, residuals, damping)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     scaled = matrix / np.outer(scale, scale) + damping * np.eye(len(scale))

@@ -6,6 +6,7 @@ from diagnosis.localisation.inference import Finding
 from diagnosis.localisation.mapping import Survey
 from diagnosis.policy import LISTED_BAND_SHARE, LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
 from diagnosis.result import Where
+from identification.printing.numbers import p_text
 
 _LISTED = 12  # ids listed in a sentence at most
 _BAND_WORDS = {
@@ -38,7 +39,7 @@ def nowhere(found: Survey) -> str:
     least = min(1.0, count * min(run.p_value for run in found.maps.runs))
     return (
         f"Nowhere: in {count} {'run' if count == 1 else 'runs'} the residual is consistent with the noise "
-        f"(p = {least:.2g} for the run that differs most, corrected for their number)."
+        f"(p {p_text(least)} for the run that differs most, corrected for their number)."
     )
 
 

@@ -184,3 +184,38 @@ def at_bound(given: Mapping[str, Any]) -> str:
         Text such as `` (at its upper bound)``; empty inside the range.
     """
     return f" (at its {given['bound']} bound)" if given.get("bound") else ""
+
+
+def estimated(given: Mapping[str, Any], mark: str = "") -> str:
+    """An estimate of a document.
+
+    Args:
+        given: value, std and unit; ``bound`` where it stopped at the end of its range, and ``determined`` where it
+            is false. A std of zero means that the value was given, not fitted.
+        mark: of the unit, where it is to be shown.
+
+    Returns:
+        Text such as ``0.4951 ± 0.0012`` or ``not determined by these runs``.
+    """
+    if not given.get("determined", True):
+        return UNDETERMINED
+    value = with_std(given["value"], given["std"]) if given["std"] else significant(given["value"])
+    return f"{value} {mark}".rstrip() + at_bound(given)
+
+
+UNDETERMINED = "not determined by these runs"
+
+
+def p_text(value: float) -> str:
+    """A p-value, never rounded to 0.
+
+    Args:
+        value: a probability.
+
+    Returns:
+        Two significant digits, such as ``= 3.7e-08``, or ``< 1e-300``.
+    """
+    return f"= {value:.2g}" if value >= _LEAST_P else f"< {_LEAST_P:.0e}"
+
+
+_LEAST_P = 1e-300  # close to the smallest number that a computer represents

@@ -67,6 +67,25 @@ def document() -> dict[str, Any]:
             _candidate("mains_hum", 0.00005, 27.05, 0.0123),
             _candidate("sensor_delay", 0.00003, 27.15, 0.0134),
         ],
+        "inclusion": {RIVAL: 0.0654, CAUSE: 0.9321, "free_play": 0.0023},
+        "waterfall": [
+            {"effect": None, "excess": 28.45},
+            {"effect": CAUSE, "excess": 2.75},
+            {"effect": RIVAL, "excess": 0.1345},
+        ],
+        "waterfall_on": "on runs held out of the fit",
+        "without": {CAUSE: 21.85, RIVAL: 2.85},
+        "rest": {
+            "significant": True,
+            "excess": 0.1345,
+            "p_value": 1.9e-5,
+            "material": False,
+            "moves": {
+                "cn_beta": {"value": 0.00043, "relative": 0.000898, "std": 0.0013, "unit": "1/rad"},
+                "cn_r": {"value": 0.00053, "relative": 0.00206, "std": 0.0118, "unit": "1/rad"},
+            },
+            "words": "",
+        },
         "ambiguous_with": [RIVAL],
         "next_run": {
             "spring_stiffness": 81.5,

@@ -7,13 +7,14 @@ import dataclasses
 import numpy as np
 
 from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.rank import Hypothesis
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.detection.gap import GapTest
 from diagnosis.detection.mains import Hum
 from diagnosis.detection.sensor_noise import NoiseTrend, campaign_noise
 from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData, prepare
+from diagnosis.fitting.similarity import Similarity
 from diagnosis.fitting.starting_points import nominal_start
 from diagnosis.study import COARSE_STEP, HUM, Study
 from tunnel_sim.effects import Effect
@@ -96,6 +97,7 @@ def studied(data: Campaign, nominal: Fit, causes: tuple[str, ...] = (), best: Fi
     fitted = tuple(sorted(name for name in causes if name not in (HUM.name, COARSE_STEP.name)))
     return Study(
         data,
+        Similarity(),
         data,
         campaign_noise(data),
         NoiseTrend(0.0, 0.0, 0.0),

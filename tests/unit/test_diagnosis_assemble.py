@@ -14,7 +14,7 @@ from diagnosis.answer.assemble import assemble
 from diagnosis.answer.candidates import candidates
 from diagnosis.answer.reported import excess_base
 from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.rank import Hypothesis
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.investigate import investigate
 from diagnosis.localisation.localise import localise
 from tests.unit import gap_campaigns
@@ -41,6 +41,7 @@ class Value(Strict):
     std: Annotated[float, Field(ge=0.0)] | None
     unit: str
     bound: Literal["lower", "upper"] | None = None
+    determined: Literal[False] | None = None
 
 
 class RunGap(Strict):
@@ -82,6 +83,27 @@ class Coefficients(Strict):
     after: dict[str, Value]
 
 
+class Step(Strict):
+    effect: str | None
+    excess: float
+
+
+class Move(Strict):
+    value: Annotated[float, Field(ge=0.0)]
+    relative: Annotated[float, Field(ge=0.0)] | None
+    std: Annotated[float, Field(ge=0.0)] | None
+    unit: str
+
+
+class Rest(Strict):
+    significant: bool
+    excess: float
+    p_value: Annotated[float, Field(ge=0.0, le=1.0)]
+    material: bool
+    moves: dict[str, Move]
+    words: Annotated[str, Field(min_length=1)]
+
+
 class Document(Strict):
     schema_version: Literal[1]
     campaign: str
@@ -92,6 +114,11 @@ class Document(Strict):
     ambiguous_with: list[str]
     next_run: dict[str, Any] | None
     coefficients: Coefficients
+    inclusion: dict[str, Annotated[float, Field(ge=0.0, le=1.0)]]
+    waterfall: Annotated[list[Step], Field(min_length=1)]
+    waterfall_on: str
+    without: dict[str, float]
+    rest: Rest
 
     @model_validator(mode="after")
     def consistent(self) -> "Document":
@@ -108,6 +135,14 @@ class Document(Strict):
         probabilities = [candidate.probability for candidate in self.candidates]
         assert probabilities == sorted(probabilities, reverse=True)
         assert abs(sum(probabilities) - 1.0) < 1e-12
+        assert list(self.inclusion) == NAMES
+        named = [] if self.causes == ["unknown"] else self.causes
+        assert self.waterfall[0].effect is None
+        assert sorted(str(step.effect) for step in self.waterfall[1:]) == named
+        assert set(self.without) <= set(named)
+        assert set(self.rest.moves) == set(self.coefficients.after)
+        assert self.rest.excess == self.waterfall[-1].excess
+        assert self.rest.significant or not self.rest.material
         return self
 
 

@@ -10,8 +10,8 @@ import pytest
 from diagnosis.detection.mains import refine_frequency, remove_hum
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.problem import Point, Problem
-from diagnosis.printing import parameter_lines
 from diagnosis.result import ParameterEstimate
+from identification.printing.numbers import estimated
 from tests.unit.gap_campaigns import INTERVAL, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.record import Record
@@ -35,7 +35,7 @@ def test_a_parameter_at_the_end_of_its_range_says_so():
 def test_a_bound_is_shown_and_written_without_a_deviation():
     data = ParameterEstimate(0.5, None, "N m", "upper").to_json_dict()
     assert data == {"value": 0.5, "std": None, "unit": "N m", "bound": "upper"}
-    assert parameter_lines({"friction_moment": data})[-1] == "  0.5000 N m (at its upper bound)"
+    assert estimated(data, "N m") == "0.5000 N m (at its upper bound)"
 
 
 def test_the_frequency_of_a_hum_scatters_as_stated():

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from diagnosis.answer.coefficients import coefficients, rival_fits
 from diagnosis.answer.held_out import HeldOut, folds, predict_held_out
 from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.rank import Hypothesis
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.starting_points import starting_points

@@ -7,9 +7,9 @@ import pytest
 from scipy.linalg import expm
 from scipy.signal import lfilter, lsim
 
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.process_noise import fit_turbulence, fit_wandering_shedding, whiteness
 from diagnosis.attribution.random_moments import weigh_random_moments, wind_off_excess
-from diagnosis.attribution.rank import Hypothesis
 from tests.unit.gap_campaigns import (
     CN_BETA,
     CN_R,

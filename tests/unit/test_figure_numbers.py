@@ -16,6 +16,7 @@ from tests.unit.shown_numbers import assert_shows, numbers
 from tunnel_lab.diagnosis_view import figures_answer as answer
 from tunnel_lab.diagnosis_view import figures_where as where
 from tunnel_lab.diagnosis_view.figures_common import run_label
+from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
 
 Document = dict[str, Any]
 
@@ -60,6 +61,37 @@ def test_bars_of_the_answers(given: Document) -> None:
 def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
     given["candidates"][0]["probability"] = 0.9996
     assert answer.candidates_figure(given).axes[0].texts[0].get_text() == "> 99.9 %"
+
+
+def test_bars_of_the_waterfall(given: Document) -> None:
+    fig = waterfall_figure(given)
+    assert fig is not None
+    (axes,) = fig.axes
+    noise = 3.0 * np.sqrt(np.mean(np.square([0.021, 0.019, 0.017])) / 3.0)
+    shade, *bars = axes.patches
+    ends = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in bars]
+    box = shade.get_extents().transformed(axes.transData.inverted())
+    assert (box.x0, box.x1) == pytest.approx((0.1 * noise, noise))
+    wanted = [(0.1 * noise, 28.45), (2.75, 28.45), (0.1345, 2.75), (0.1 * noise, 0.1345)]
+    assert np.array(ends) == pytest.approx(np.array(wanted))
+    texts = [text.get_text() for text in axes.texts]
+    for text, value in zip(texts, (28.45, 2.75, 0.1345, 0.1345), strict=True):
+        assert_shows(text, [value])
+    labels = [label.get_text() for label in axes.get_yticklabels()]
+    assert labels == ["nominal model", "+ quadratic damping", "+ coulomb friction", "the rest: immaterial"]
+    (alone,) = axes.lines
+    assert curve(alone) == [(21.85, 1), (2.85, 2)]
+    assert axes.get_xscale() == "log"
+
+
+def test_a_waterfall_below_the_noise_ends_at_the_floor(given: Document) -> None:
+    given["waterfall"][-1]["excess"] = -0.002
+    given["maps"], given["rest"] = None, given["rest"] | {"significant": False}
+    fig = waterfall_figure(given)
+    assert fig is not None
+    assert fig.axes[0].patches[-1].get_width() == 0.0
+    assert fig.axes[0].get_yticklabels()[-1].get_text() == "the rest: within the noise"
+    assert waterfall_figure(given | {"waterfall": given["waterfall"][:1]}) is None
 
 
 def test_points_of_the_closure(given: Document) -> None:
@@ -130,6 +162,10 @@ def test_intervals_of_the_coefficients(given: Document) -> None:
             assert ends[:, 0] == pytest.approx([values["value"] - reach, values["value"] + reach])
         bottom, top = axes.get_ylim()
         assert bottom > 1 > 0 > top  # before above after
+    given["coefficients"]["after"]["cn_r"] |= {"std": None, "determined": False}
+    alone = answer.coefficients_figure(given)
+    assert alone is not None
+    assert len(alone.axes) == 1
     given["coefficients"]["after"] = {}
     assert answer.coefficients_figure(given) is None
 

@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from diagnosis.closure import Step, Waterfall
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.starting_points import starting_points
 from diagnosis.localisation.localise import localise
@@ -68,6 +69,7 @@ def document(data):
         noise=NoiseSummary(4e-4, 4e-4, "estimated", "from the records"),
         blind_spots=("an error of the clock",),
         cautions=("There is one run only.",),
+        waterfall=Waterfall((Step(None, base.excess), Step(CAUSE, 0.01)), {CAUSE: base.excess}, "somewhere"),
         seconds={"nominal fit": 0.5},
     )  # fmt: skip
     return json.loads(json.dumps(answer.to_json_dict() | {"maps": maps.to_json_dict()}, allow_nan=False))
@@ -175,7 +177,7 @@ def test_a_document_without_maps_is_rendered_too(document, data, tmp_path):
     path = write_report(bare, data, tmp_path / "report.html")
     text = path.read_text("utf-8")
     assert document["where"]["words"] in Page(text).text
-    assert text.count("<svg") == 3
+    assert text.count("<svg") == 4
 
 
 def test_no_gap_is_said_so(document, data):
@@ -195,6 +197,6 @@ def test_a_page_that_cannot_be_written_is_one_line(document, data, tmp_path):
 
 def test_figures_for_papers(document, data, tmp_path):
     written = save_diagnosis_figures(document | {"maps": None}, data, tmp_path / "figures")
-    assert [path.stem for path in written] == ["which", "how-far", "coefficients"]
+    assert [path.stem for path in written] == ["waterfall", "which", "how-far", "coefficients"]
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in written)
     assert list(diagnosis_figures(document, data)) == list(DESCRIPTIONS)

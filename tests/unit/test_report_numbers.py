@@ -107,6 +107,29 @@ def test_answers_weighed(given: Document, page: Sections) -> None:
         assert_shows(re.sub(r"rad²|s²", "", text), wanted)
 
 
+def test_effects_among_the_causes(page: Sections) -> None:
+    assert "with probability: quadratic damping 0.932, coulomb friction 0.065." in page.texts["which"]
+    assert "free play" not in page.texts["which"]
+
+
+def test_the_gap_as_the_causes_are_added(given: Document, page: Sections) -> None:
+    assert_shows(page.row("how-far-section", "nominal model"), [28.45])
+    assert_shows(page.row("how-far-section", CAUSE.replace("_", " ")), [2.75, 21.85])
+    assert_shows(page.row("how-far-section", RIVAL.replace("_", " ")), [0.1345, 2.85])
+    assert view.step_rows(given | {"waterfall": []}) == []
+
+
+def test_a_coefficient_that_is_not_determined_has_no_interval(given: Document) -> None:
+    after = {"cn_beta": {"value": 1.0, "std": None, "unit": "1/rad", "determined": False}}
+    row = view.coefficient_rows(given | {"coefficients": given["coefficients"] | {"after": after}})[0]
+    assert (row["after"], row["interval"]) == ("not determined by these runs", "–")
+
+
+def test_a_p_value_is_never_zero(given: Document) -> None:
+    none = given | {"gap": given["gap"] | {"tests": {"white": 0.0}}}
+    assert Sections(render_report(none, campaign())).row("provenance", "white") == "< 1e-300"
+
+
 def test_answers_left_out_are_counted(given: Document) -> None:
     rows, more = view.candidate_rows(given)
     assert (len(rows), more) == (4, 3)

@@ -53,12 +53,57 @@ def test_answers(given: Document) -> None:
         assert_shows(cells[1], [candidate["probability"]])
         fitted = candidate["effect"] not in ("none", "unknown")
         assert_shows(cells[2], [100 * candidate["closed"]] if fitted else [])
-        wanted: list[float] = []
-        for value in candidate["parameters"].values():
-            wanted += [value["value"], value["std"]] if value["std"] else [value["value"]]
-        assert_shows(cells[3], wanted)
     assert_shows(last[0], [3])
     assert last[1] == "< 0.001"
+
+
+def test_several_effects_of_an_answer_have_a_line_each(given: Document) -> None:
+    given["candidates"][0]["effect"] = "free_play + mains_hum + sensor_drift"
+    assert rows(printing.candidates_table(given))[0][0] == "free_play +\nmains_hum +\nsensor_drift"
+
+
+def test_parameters_of_the_answer(given: Document) -> None:
+    ((effect, name, text),) = rows(printing.parameters_table(given))
+    assert (effect, name) == (given["causes"][0], "coefficient")
+    assert_shows(text, [0.003125, 1.7e-5])
+    given["candidates"][0]["parameters"] = {
+        "a.x": {"value": 0.25, "std": 0.01, "unit": "1"},
+        "a.y": {"value": 2.5, "std": None, "unit": "1", "bound": "upper"},
+        "b.x": {"value": 0.0, "std": None, "unit": "1", "determined": False},
+    }
+    found = rows(printing.parameters_table(given))
+    assert [row[:2] for row in found] == [["a", "x"], ["", "y"], ["b", "x"]]
+    assert [row[2] for row in found] == [
+        "0.250 ± 0.010",
+        "2.500 (at its upper bound)",
+        "not determined by these runs",
+    ]
+    given["candidates"] = given["candidates"][-2:]
+    given["candidates"][0]["parameters"] = {}
+    assert rows(printing.parameters_table(given)) == []
+
+
+def test_effects_among_the_causes(given: Document) -> None:
+    line = printing.inclusion_line(given)
+    assert_shows(line, [0.9321, 0.0654])
+    assert line.index("quadratic_damping") < line.index("coulomb_friction")
+    assert printing.inclusion_line(given | {"inclusion": {"free_play": 0.009}}) == ""
+
+
+def test_the_gap_as_the_causes_are_added(given: Document) -> None:
+    table = printing.waterfall_table(given)
+    assert given["waterfall_on"] in table.title
+    first, second, third = rows(table)
+    assert_shows(first[1], [28.45])
+    assert_shows(" ".join(second[1:]), [2.75, 21.85])
+    assert_shows(" ".join(third[1:]), [0.1345, 2.85])
+    assert rows(printing.waterfall_table(given | {"waterfall": given["waterfall"][:1]})) == []
+
+
+def test_coefficients_that_are_not_determined(given: Document) -> None:
+    given["coefficients"]["after"]["cn_r"] |= {"std": None, "determined": False}
+    cells = rows(printing.coefficients_table(given))[1]
+    assert cells[2:] == ["not determined by these runs", "–"]
 
 
 def test_answers_that_have_no_probability_are_counted_with_theirs(given: Document) -> None:

@@ -21,8 +21,8 @@ def said(*causes: str, closed_on: str = "somewhere", both_winds: bool = True) ->
     return verdict(
         causes,
         before=2.0,
-        after=0.1,
         closed=0.95,
+        rest="What remains is small.",
         probability=0.9,
         closed_on=closed_on,
         both_winds=both_winds,
@@ -40,13 +40,16 @@ def said(*causes: str, closed_on: str = "somewhere", both_winds: bool = True) ->
 def test_the_runs_of_the_closure_are_named(held_out, closed_on, after_on):
     found = gap(*held_out)
     assert (found.closed_on, found.after_on) == (closed_on, after_on)
-    assert f"closes {closed_on}," in said("coulomb_friction", closed_on=found.closed_on)
+    assert f"closes {closed_on}. What remains is small." in said(
+        "coulomb_friction", closed_on=found.closed_on
+    )
 
 
 def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
     found = gap(False, False, False)
     given = document()
     given["verdict"] = said("quadratic_damping", closed_on=found.closed_on)
+    given["waterfall_on"] = "on stretches of time held out of the fit"
     given["gap"] |= {"closed_on": found.closed_on, "after_on": found.after_on}
     for run in given["gap"]["runs"]:
         run["held_out"] = False
@@ -58,6 +61,15 @@ def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
     assert "run held out" not in page
     table = gap_table(given)
     assert table.columns == ("run", "before", "after")
+
+
+def test_every_cause_of_several_is_told_with_what_it_acts_on():
+    text = said("coulomb_friction", "cubic_stiffness", "mains_hum", both_winds=False)
+    assert "from coulomb friction, cubic stiffness and mains hum (probability 0.90)" in text
+    for words in ("the damping (coulomb friction)", "the restoring moment (cubic stiffness)", "(mains hum)"):
+        assert words in text
+    assert "With them added" in text
+    assert "With it added" in said("coulomb_friction")
 
 
 @pytest.mark.parametrize("cause", ["coulomb_friction", "nonlinear_yaw_moment"])

@@ -18,12 +18,14 @@ NAME = "diagnose"
 STEPS = {
     "noise": "estimating the noise",
     "nominal fit": "fitting the nominal model",
-    "single effects": "fitting effects",
-    "pairs": "fitting pairs of effects",
+    "effects on stretches": "fitting sets of effects to stretches of the runs",
+    "effects": "fitting sets of effects",
     "random moments": "fitting random moments",
+    "pruning": "fitting the answer without each effect",
+    "polishing": "fitting the answer to convergence",
     "where, and how far it closes": "locating the gap, predicting held-out runs",
 }
-"""Steps of the study in words; any other progress message is the name of an effect or a pair."""
+"""Steps of the study in words; any other progress message is a set of effects."""
 
 
 def run(
@@ -47,11 +49,12 @@ def run(
     """Find out why the nominal model does not fit the runs of a campaign.
 
     The nominal model is fitted to all runs, and its residuals are tested against
-    the noise. Then every effect of the vocabulary, and pairs of them, are fitted
-    and compared. The answer is one or two effects, "none" (there is no gap) or
+    the noise. Then the effects of the vocabulary, and sets of them, are fitted
+    and compared. The answer is one effect or several, "none" (there is no gap) or
     "unknown" (no effect of the vocabulary explains it), each with a probability.
-    Gap and coefficients are given before and after the effects are added; the
-    gap after is predicted for runs held out of the fit, where possible.
+    Gap and coefficients are given before and after the effects are added, and
+    whether what remains could move the coefficients; the gap is predicted for
+    runs, or stretches of time, held out of the fit.
 
     [bold]Examples[/bold]
       tunnel diagnose my-campaign
@@ -152,7 +155,11 @@ def show(document: dict[str, Any]) -> None:
         if line:
             say(line)
     say("")
-    shown = (parts.candidates_table, parts.gap_table, parts.coefficients_table)
+    answers = (parts.candidates_table, parts.parameters_table)
+    show_tables(*(rich_table(table(document)) for table in answers))
+    if line := parts.inclusion_line(document):
+        say(f"{line}\n")
+    shown = (parts.waterfall_table, parts.gap_table, parts.coefficients_table)
     show_tables(*(rich_table(table(document)) for table in shown))
     for line in parts.closing_lines(document):
         say(line)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from tunnel_lab.diagnosis_view import figures_answer as answer
 from tunnel_lab.diagnosis_view import figures_where as where
 from tunnel_lab.diagnosis_view.figures_common import Document
+from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
 from tunnel_lab.plotting.plots import save
 from tunnel_sim.files.writing import output_folder
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -26,7 +27,7 @@ def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figur
     Returns:
         Figures by name, in the order of the report.
     """
-    found: dict[str, Figure | None] = {}
+    found: dict[str, Figure | None] = {"waterfall": waterfall_figure(document)}
     if document.get("maps"):
         found["where-runs"] = where.runs_figure(document)
         found["where-profiles"] = where.profiles_figure(document)

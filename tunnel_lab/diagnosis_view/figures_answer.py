@@ -144,19 +144,24 @@ def coefficients_figure(document: Document) -> Figure | None:
         document: a diagnosis.
 
     Returns:
-        A panel per coefficient; None where there is none.
+        A panel per coefficient that the runs determine; None where there is none.
     """
     before, after = (document["coefficients"][key] for key in ("before", "after"))
-    names = [name for name in before if name in after]
+    names = [
+        name
+        for name in before
+        if name in after and all(given[name].get("determined", True) for given in (before, after))
+    ]
     if not names:
         return None
     fig = figure(1.7)
     for place, name in enumerate(names, 1):
         axes = fig.add_subplot(1, len(names), place)
         for row, (values, colour, marker) in enumerate(((before, BEFORE, "s"), (after, AFTER, "o"))):
+            std = values[name]["std"]
             axes.errorbar(
-                values[name]["value"], row, xerr=1.96 * values[name]["std"], color=colour, marker=marker,
-                ms=6, capsize=4,
+                values[name]["value"], row, xerr=None if std is None else 1.96 * std, color=colour,
+                marker=marker, ms=6, capsize=4,
             )  # fmt: skip
         axes.set_yticks([0, 1], ["before", "after"])
         axes.set_ylim(1.6, -0.6)

@@ -7,7 +7,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from identification.printing.numbers import significant
+from diagnosis.printing import inclusion_line
+from identification.printing.numbers import p_text, significant
 from tunnel_lab.diagnosis_view import view
 from tunnel_lab.diagnosis_view.figures import diagnosis_figures
 from tunnel_lab.diagnosis_view.svg import inline_svg
@@ -18,6 +19,7 @@ Document = Mapping[str, Any]
 
 #: Text alternatives of the figures.
 DESCRIPTIONS = {
+    "waterfall": "Bars: what is left of the gap as the causes are added one after another.",
     "where-runs": "Heat map of the excess of every run over time, with a bar for the excess of the whole run.",
     "where-profiles": "Excess against time, against amplitude, and residual power against frequency.",
     "where-backbones": "Frequency and damping ratio of each run against amplitude, relative to the nominal model.",
@@ -89,11 +91,15 @@ def _context(document: Document, campaign: Campaign) -> dict[str, Any]:
         "candidates": candidates,
         "more": more,
         "causes": view.cause_paragraphs(document),
+        "inclusion": view.plain(inclusion_line(document)),
+        "steps": view.step_rows(document),
         "rivals": [view.plain(name) for name in document["ambiguous_with"]],
         "next_run": view.next_run_rows(document),
         "runs": view.run_rows(document, campaign),
         "coefficients": view.coefficient_rows(document),
-        "tests": [(name, f"{value:.2g}") for name, value in document["gap"]["tests"].items()],
+        "tests": [
+            (name, p_text(value).removeprefix("= ")) for name, value in document["gap"]["tests"].items()
+        ],
         "seconds": [(name, f"{value:.1f} s") for name, value in document["seconds"].items()],
         "noise": _noise_rows(document) + _confirmation_rows(document),
         "provenance": _flat(document.get("provenance") or {}),

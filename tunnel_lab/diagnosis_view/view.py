@@ -6,8 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from diagnosis.names import plain as words
 from diagnosis.policy import LISTED_PROBABILITY
-from identification.printing.numbers import COEFFICIENTS, at_bound, significant, unit_mark, with_std
+from diagnosis.printing import held_out_excess
+from identification.printing.numbers import (
+    COEFFICIENTS,
+    UNDETERMINED,
+    at_bound,
+    significant,
+    unit_mark,
+    with_std,
+)
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -46,7 +55,7 @@ def headline(document: Document) -> tuple[str, str]:
         return "No gap", "none"
     if causes == ["unknown"]:
         return "Unexplained gap", "unknown"
-    names = " and ".join(plain(name) for name in causes)
+    names = words(causes)
     if document["ambiguous_with"]:
         return f"{names}, or {' or '.join(plain(n) for n in document['ambiguous_with'])}", "open"
     return names, "found"
@@ -174,6 +183,26 @@ def candidate_rows(document: Document) -> tuple[list[dict[str, Any]], int]:
     return rows, max(len(candidates) - count, 0)
 
 
+def step_rows(document: Document) -> list[dict[str, str]]:
+    """The gap as the causes are added.
+
+    Args:
+        document: the diagnosis.
+
+    Returns:
+        What is added, what is left, and what is left without it alone; none where no cause is named.
+    """
+    steps, without = document.get("waterfall", []), document.get("without", {})
+    return [
+        {
+            "name": plain(step["effect"] or "nominal model"),
+            "left": _minus(held_out_excess(step["excess"])),
+            "without": _minus(held_out_excess(without[step["effect"]])) if step["effect"] in without else "",
+        }
+        for step in (steps if len(steps) > 1 else ())
+    ]
+
+
 def estimate(values: Document) -> str:
     """A value with its standard deviation and unit.
 
@@ -184,6 +213,8 @@ def estimate(values: Document) -> str:
         Text such as ``0.00401 ± 0.00002 N m``.
     """
     unit = str(values.get("unit", ""))
+    if not values.get("determined", True):
+        return UNDETERMINED
     number = (
         with_std(values["value"], values["std"])
         if values["std"]
@@ -241,6 +272,8 @@ def coefficient_rows(document: Document) -> list[dict[str, str]]:
 
 
 def _interval95(values: Document) -> str:
+    if values["std"] is None:
+        return "–"
     reach = 1.96 * values["std"]
     return f"{_minus(significant(values['value'] - reach))} to {_minus(significant(values['value'] + reach))}"
 

@@ -1,0 +1,110 @@
+"""Fits of some of an answer's causes, started from the fit of all of them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Collection
+from contextlib import suppress
+from functools import partial
+
+import numpy as np
+
+from diagnosis.fitting.least_squares import Fit, FitError, fit
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.starting_points import starting_points
+from diagnosis.study import Study
+from tunnel_sim.effects import Effect
+
+_ITERATIONS = 6  # the fit of all causes is close for the parameters that are left
+_NO_GAIN = 0.999  # of the χ² of a fit of fewer causes: another start may do better
+
+Names = frozenset[str]
+
+
+class Subsets:
+    """Fits by the set of causes in them, each made once."""
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self.causes: Names = frozenset(kind.name for kind in study.chosen.problem.effects)
+        self._fits: dict[Names, Fit] = {self.causes: study.chosen, frozenset(): study.nominal}
+
+    def __call__(self, names: Collection[str]) -> Fit:
+        """The best fit found with these causes.
+
+        Args:
+            names: some of the causes.
+
+        Returns:
+            The study's own fit, or else one started from the fit of all causes. Where a fit of fewer of them is
+            better, the missing cause is added to that; a cause that gains nothing leaves the fit as it was.
+        """
+        key = frozenset(names)
+        if key not in self._fits:
+            fewer = min((known for known in self._fits if known < key), key=lambda k: self._fits[k].total)
+            own = self._study.hypothesis(sorted(key))
+            found = self._from_all(key) if own is None else own.fit
+            if found is None or found.total > _NO_GAIN * self._fits[fewer].total:
+                found = self._from_fewer(fewer, key) or found
+            known = self._fits[fewer]
+            self._fits[key] = known if found is None or found.total > known.total else found
+        return self._fits[key]
+
+    def _from_all(self, names: Names) -> Fit | None:
+        """A fit started from that of all causes, with its sensitivities."""
+        start = restricted(self._study.chosen, names)
+        return _fitted(
+            lambda: fit(start.problem, start.point, base=start, tolerance=1e-3, max_iterations=_ITERATIONS)
+        )
+
+    def _from_fewer(self, fewer: Names, names: Names) -> Fit | None:
+        """A fit in which the missing causes are added to a fit of fewer, one after another."""
+        kinds = [kind for kind in self._study.chosen.problem.effects if kind.name in names - fewer]
+        found: Fit | None = self._fits[fewer]
+        for kind in kinds:
+            found = None if found is None else _one_more(found, kind)
+        return found
+
+
+def _one_more(base: Fit, kind: type[Effect]) -> Fit | None:
+    """The better of the fits from the first two starting points of an effect; None where none succeeds."""
+    starts = starting_points(base, kind)[:2]
+    tried = [_fitted(partial(fit, start.problem, start.point)) for start in starts]
+    return min((found for found in tried if found), key=lambda found: found.total, default=None)
+
+
+def _fitted(attempt: Callable[[], Fit]) -> Fit | None:
+    """The result of a fit; None where it fails."""
+    with suppress(FitError, np.linalg.LinAlgError):
+        found = attempt()
+        return found if np.isfinite(found.total) else None
+    return None
+
+
+def restricted(whole: Fit, names: Names) -> Fit:
+    """A fit with some effects taken out and everything else as it was; its residuals are still those of the whole.
+
+    Args:
+        whole: with more effects.
+        names: of the effects to keep.
+
+    Returns:
+        A start, with its sensitivities, for the fit of the smaller problem.
+    """
+    large = whole.problem
+    problem = Problem(
+        large.data,
+        tuple(kind for kind in large.effects if kind.name in names),
+        tuple((name, value) for name, value in large.fixed if name.split(".")[0] in names),
+        tuple(name for name in large.free_forms if name in names),
+    )
+    common = [large.names.index(name) for name in problem.names]
+    first = whole.point.release.shape[1] - len(large.phased)  # of the phases and instants
+    own = [*range(first), *(first + large.phased.index(name) for name in problem.phased)]
+    return dataclasses.replace(
+        whole,
+        problem=problem,
+        point=Point(whole.point.common[common], whole.point.release[:, own]),
+        covariance=whole.covariance[np.ix_(common, common)],
+        jacobian=[(c[:, common], r[:, own]) for c, r in whole.jacobian],
+    )

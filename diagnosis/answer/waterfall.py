@@ -1,0 +1,125 @@
+"""How far the gap closes with each cause, on readings that no fit has seen (decision 0016)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from diagnosis.answer.held_out import HeldOut, predict_held_out
+from diagnosis.answer.reported import Base
+from diagnosis.answer.stretches import Turns, predict_stretches, turns_of
+from diagnosis.answer.subsets import Names, Subsets
+from diagnosis.attribution.random_moments import RandomAnswer
+from diagnosis.closure import Step, Waterfall
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.study import COARSE_STEP, HUM, Study
+from tunnel_sim.vocabulary.record import Array
+
+
+def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfall:
+    """Add the causes one after another in their best order, and take each alone out of the whole.
+
+    Args:
+        study: what was found.
+        base: what an excess is measured against.
+        known: runs held out of fits, where that is done already.
+
+    Returns:
+        The excesses, by the fits' own integrator. The order is greedy: each cause is the one that closes most next
+        in the fitted readings. A random moment comes last, because it absorbs what the others would explain.
+    """
+    models = _Models(study, base, known)
+    names: Names = frozenset()
+    steps = [Step(None, models.excess(names))]
+    left = sorted(models.causes)
+    while left:
+        best = min(left, key=lambda name: models.fitted_excess(names | {name}))
+        names |= {best}
+        left.remove(best)
+        steps.append(Step(best, models.excess(names)))
+    random = study.random_answer(study.fitted)
+    if random is None:
+        without = {name: models.excess(models.causes - {name}) for name in sorted(models.causes)}
+    else:
+        last = models.random_excess(random)
+        without = {name: last + size for name, size in models.read_off.items()}
+        without[random.kind.name] = steps[-1].excess
+        steps.append(Step(random.kind.name, last))
+    return Waterfall(tuple(steps), without, models.words)
+
+
+class _Models:
+    """The model with some of the causes: what it leaves of the gap."""
+
+    def __init__(self, study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> None:
+        self._study, self._base, self._known = study, base, dict(known)
+        named = study.causes != ("unknown",)
+        powers = {HUM.name: base.hum, COARSE_STEP.name: base.extra}
+        self.read_off = {name: powers[name] for name in study.read_off if named}  # and what each adds
+        self._ratio = 1.0 + base.extra  # of the estimated noise to the base
+        self._always = base.hum + base.extra - sum(self.read_off.values())
+        self._fit = Subsets(study)
+        self.causes: Names = self._fit.causes | self.read_off.keys()
+        out = self._held_out(study.nominal)
+        self._ids = [run.id for run in study.nominal.problem.data.runs]
+        self._turns: Turns = turns_of(study.nominal, {run for run in self._ids if run not in out.residuals})
+        self._excess: dict[Fit, float] = {}
+
+    @property
+    def words(self) -> str:
+        """What is held out of the fits."""
+        runs = len(self._held_out(self._study.nominal).residuals)
+        if runs == len(self._ids):
+            return "on runs held out of the fit"
+        if runs == 0:
+            return "on stretches of time held out of the fit"
+        return "on runs held out of the fit, and on stretches of time where a run is the only one of its kind"
+
+    def fitted_excess(self, names: Names) -> float:
+        """What the causes leave in the readings they are fitted to, in noise variances of a sample."""
+        fitted = self._fit(names - self.read_off.keys())
+        return self._in_samples(dict(zip(self._ids, fitted.residuals, strict=True))) + self._left(names)
+
+    def excess(self, names: Names) -> float:
+        """What the causes leave in readings held out of the fit, in noise variances of a sample."""
+        fitted = self._fit(names - self.read_off.keys())
+        if fitted not in self._excess:
+            self._excess[fitted] = self._in_samples(self._predicted(fitted))
+        return self._excess[fitted] + self._left(names)
+
+    def random_excess(self, random: RandomAnswer) -> float:
+        """What all causes and a random moment leave: the moment's innovations where the wind is on."""
+        runs = self._study.nominal.problem.data.runs
+        still = self._predicted(self._study.chosen)
+        by_run = {
+            run.id: random.process.excess if run.wind_on else float(np.mean(still[run.id] ** 2)) - 1.0
+            for run in runs
+        }
+        return self._weighted(by_run) + self._left(self.causes)
+
+    def _left(self, names: Names) -> float:
+        """What the causes read off the records, as far as not among the names, add to the excess."""
+        return self._always + sum(size for name, size in self.read_off.items() if name not in names)
+
+    def _predicted(self, fitted: Fit) -> dict[str, Array]:
+        seen = dict(zip(self._ids, fitted.residuals, strict=True))
+        found = seen | self._held_out(fitted).residuals | predict_stretches(fitted, self._turns)
+        still = {run.id: run.reading / np.sqrt(run.noise_variance) for run in fitted.problem.data.runs}
+        # a prediction that grows without bound is as good as none
+        return {run: r if np.all(np.isfinite(r)) else still[run] for run, r in found.items()}
+
+    def _held_out(self, fitted: Fit) -> HeldOut:
+        if fitted not in self._known:
+            self._known[fitted] = predict_held_out(fitted)
+        return self._known[fitted]
+
+    def _in_samples(self, residuals: Mapping[str, Array]) -> float:
+        return self._weighted({run: float(np.mean(r**2)) - 1.0 for run, r in residuals.items()})
+
+    def _weighted(self, excess: Mapping[str, float]) -> float:
+        """Mean over the runs' samples of an excess given in block means, in noise variances of a sample."""
+        runs = self._study.nominal.problem.data.runs
+        sizes = np.array([run.reading.size * run.block for run in runs], np.float64)
+        own = np.array([excess[run.id] / run.block for run in runs])
+        return float(sizes @ own / sizes.sum() * self._ratio)
