@@ -68,7 +68,7 @@ def _repetitions(fit: Fit, white: Mapping[str, float], step: float) -> Array:
     rng = np.random.default_rng([zlib.crc32(run.reading.tobytes()) for run in runs])
     readings = []
     for run, residual in zip(runs, fit.residuals, strict=True):
-        motion = _motion(run.reading - residual * np.sqrt(run.noise_variance), run.block)
+        motion = _motion(run.reading - run.unscaled(residual), run.block)
         reading = motion + white[run.id] * rng.standard_normal((count, motion.size))
         if step > 0.0:
             # the lattice's origin is not known

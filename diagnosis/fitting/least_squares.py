@@ -223,10 +223,11 @@ def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
 
 
 def _scaled(problem: Problem, prediction: list[Array]) -> list[Array]:
-    return [
-        (run.reading - values) / np.sqrt(run.noise_variance)
-        for run, values in zip(problem.data.runs, prediction, strict=True)
-    ]
+    with np.errstate(invalid="ignore"):  # a run that grew without bound; its cost is infinite
+        return [
+            run.scaled(run.reading - values)
+            for run, values in zip(problem.data.runs, prediction, strict=True)
+        ]
 
 
 def _cost(residuals: list[Array]) -> float:
@@ -293,9 +294,8 @@ def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> li
     predictions = problem.predict(points)
     result = []
     for r, run in enumerate(problem.data.runs):
-        scale = np.sqrt(run.noise_variance)
         with np.errstate(invalid="ignore"):  # a run that grew without bound; the caller looks for it
-            changes = [(moved[r] - predictions[0][r]) / scale for moved in predictions[1:]]
+            changes = [run.scaled(moved[r] - predictions[0][r]) for moved in predictions[1:]]
         common = [c / steps[known + i] for i, c in enumerate(changes[: steps.size - known])]
         ends = [c / release_steps[known_own + j][r] for j, c in enumerate(changes[steps.size - known :])]
         if base is None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from diagnosis.fitting.whitening import WHITE, colour, colouring, response, whiten
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.aero import aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import Campaign, Run
@@ -25,11 +26,12 @@ class RunData:
         reading: block means, rad, shape (n,).
         block: samples per block.
         interval: between blocks, s.
-        noise_variance: of one block mean, rad².
+        noise_variance: of one block mean, rad²; where the noise is coloured, of its innovations.
         spring_stiffness: stated, N m/rad; None in normalised form.
         wind_speed: stated, m/s.
         air_density: stated, kg/m³; 0 where the wind is off.
         duration: of the record, s.
+        whitening: filter that makes the noise of the block means white, its first tap 1, shape (order + 1,).
     """
 
     id: str
@@ -41,11 +43,61 @@ class RunData:
     wind_speed: float
     air_density: float
     duration: float
+    whitening: Array = field(default_factory=lambda: WHITE)
 
     @property
     def wind_on(self) -> bool:
         """Whether the wind blows."""
         return self.wind_speed > 0.0
+
+    def scaled(self, difference: Array) -> Array:
+        """A difference of readings as white residuals.
+
+        Args:
+            difference: of block means, rad, shape (n,).
+
+        Returns:
+            In noise standard deviations, shape (n,).
+        """
+        return np.asarray(whiten(difference, self.whitening) / np.sqrt(self.noise_variance), np.float64)
+
+    def unscaled(self, residual: Array) -> Array:
+        """The inverse of `scaled`.
+
+        Args:
+            residual: white, in noise standard deviations, shape (n,).
+
+        Returns:
+            Difference of block means, rad, shape (n,).
+        """
+        return np.asarray(colour(residual * np.sqrt(self.noise_variance), self.whitening), np.float64)
+
+    @property
+    def noise_std(self) -> float:
+        """Standard deviation of the noise of one block mean, rad."""
+        return float(np.sqrt(self.noise_variance)) * colouring(self.whitening)
+
+    def noise_at(self, frequency: float | Array) -> Array:
+        """The noise at a frequency.
+
+        Args:
+            frequency: Hz, any shape.
+
+        Returns:
+            Standard deviation of white noise of the same density, rad, of the frequency's shape.
+        """
+        return np.asarray(np.sqrt(self.noise_variance) / np.abs(self.response(frequency)))
+
+    def response(self, frequency: float | Array) -> np.ndarray:
+        """What the whitening filter makes of a sinusoid.
+
+        Args:
+            frequency: Hz, any shape.
+
+        Returns:
+            Complex factor, dimensionless, of the frequency's shape; 1 where the noise is white.
+        """
+        return response(self.whitening, np.asarray(frequency) * self.interval)
 
 
 @dataclass(frozen=True, eq=False)

@@ -129,7 +129,7 @@ def is_gross(fit: Fit) -> bool:
         True where the residual holds more than a hundredth of the reading's power.
     """
     readings = sum(
-        float(np.sum((r.reading - np.mean(r.reading)) ** 2 / r.noise_variance)) for r in fit.problem.data.runs
+        float(np.sum(r.scaled(r.reading - np.mean(r.reading)) ** 2)) for r in fit.problem.data.runs
     )
     return fit.total > GROSS_MISFIT * readings
 
@@ -197,13 +197,12 @@ def _moderate_change(base: Fit, problem: Problem, values: Array, scaled: int | N
     place of the one that is lowered, None where none may be.
     """
     data = base.problem.data
-    scale = [np.sqrt(run.noise_variance) for run in data.runs]
     limit = 3.0 * np.sqrt(base.total)
     for _ in range(12):
         moved = problem.predict([Point(np.concatenate([base.point.common, values]), base.point.release)])[0]
         change = [
-            (m - run.reading) / s + r
-            for m, run, r, s in zip(moved, data.runs, base.residuals, scale, strict=True)
+            run.scaled(m - run.reading) + r
+            for m, run, r in zip(moved, data.runs, base.residuals, strict=True)
         ]
         size = float(np.sqrt(sum(float(c @ c) for c in change)))
         if np.isfinite(size) and (size <= limit or scaled is None):

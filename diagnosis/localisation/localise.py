@@ -91,7 +91,7 @@ def _with_hum(study: Study) -> list[Array]:
     readings = {run.id: run.reading for run in given.runs}
     # the fit may leave a record's start out; both end together
     return [
-        r + (readings[run.id][-run.reading.size :] - run.reading) / np.sqrt(run.noise_variance)
+        r + run.scaled(readings[run.id][-run.reading.size :] - run.reading)
         for r, run in zip(residuals, data.runs, strict=True)
     ]
 
