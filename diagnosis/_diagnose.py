@@ -41,7 +41,7 @@ def diagnose(
     if progress is not None:
         progress("where, and how far it closes")
     where, maps = localise(study)
-    return replace(assemble(study, where, maps, left_out), remarks=examined.remarks)
+    return replace(assemble(study, where, maps, left_out), remarks=(*examined.remarks, *study.noise.remarks))
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

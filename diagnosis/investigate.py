@@ -13,7 +13,7 @@ from diagnosis.attribution.decide import Weighed, form_floor, weigh
 from diagnosis.attribution.outsiders import weigh_outsiders
 from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
 from diagnosis.attribution.rank import Hypothesis, polish, rank_pairs, rank_singles
-from diagnosis.detection.gap import test_gap
+from diagnosis.detection.gap import judge
 from diagnosis.detection.mains import find_hum, refine_frequency, remove_hum
 from diagnosis.detection.refusal import refuse_indefinite
 from diagnosis.detection.sensor_noise import campaign_noise, noise_trend, reading_step
@@ -94,7 +94,7 @@ def _test(campaign: Campaign, allowed: set[str], clock: _Clock) -> Study:
         started_late = is_gross(nominal)
         if started_late:
             nominal = fit_nominal(without_start(nominal.problem.data))
-        test = test_gap(nominal, noise, trend, coarse_step=coarse)
+        nominal, noise, test = judge(nominal, noise, trend, coarse_step=coarse)
     return Study(campaign, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
 
 

@@ -23,6 +23,14 @@ NOISE_AGREES = 3.0
 NOISE_OF_ITS_OWN = 4.065
 #: Heavier tails than white noise has, by this factor, are accepted. Judgement: sensor noise is not quite normal.
 NOISE_TAILS = 1.15
+#: Rate at which white noise is said to be coloured. Convention: as a gap.
+COLOUR_FALSE_ALARM_RATE = 1e-3
+#: Rate at which steady noise is said to differ between parts of the records in one band, which is then left out of
+#: its spectrum. Convention: one in a hundred, since the spectrum is interpolated there.
+COLOUR_STEADY_RATE = 0.01
+#: Where a gap remains, the noise counts as coloured only if its spectrum beyond this multiple of the motion's
+#: frequency is. Judgement: `diagnosis.detection.gap.BANDS` count as the motion's up to there.
+BEYOND_THE_MOTION = 3.5
 #: Stated noise is often rounded to one digit, which changes its square by up to this factor. Arithmetic.
 ROUNDED_NOISE = 1.5
 #: Gap, in noise variances of a sample, below which noise that misbehaves explains all of it. Judgement: as much

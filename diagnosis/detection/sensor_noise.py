@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.fitting.run_data import BLOCK_INTERVAL
+from diagnosis.detection.noise_colour import Colour
+from diagnosis.fitting.run_data import BLOCK_INTERVAL, Data
 from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
@@ -30,6 +31,8 @@ class Noise:
             fits, where the records contain less noise than that.
         reason: why, in words.
         estimate: the records' own variance, mean over the runs, rad²; None: the one used.
+        relative: standard deviation of that estimate, a share of it.
+        colour: of the noise of block means, relative to white noise of the variance used; None where it is white.
     """
 
     variance: dict[str, float]
@@ -37,6 +40,8 @@ class Noise:
     source: str
     reason: str
     estimate: float | None = None
+    relative: float = 0.0
+    colour: Colour | None = None
 
     @property
     def used(self) -> float:
@@ -47,6 +52,57 @@ class Noise:
     def estimated(self) -> float:
         """The records' own variance, mean over the runs, rad²."""
         return self.used if self.estimate is None else self.estimate
+
+    @property
+    def margin(self) -> float:
+        """Factor by which the noise may exceed the one used: stated noise may be a little low and still agree."""
+        return 1.0 if self.colour else max(self.estimated / self.used, 1.0)
+
+    def coloured(self, colour: Colour, data: Data) -> Noise:
+        """The same noise, found to be coloured.
+
+        Args:
+            colour: its spectrum.
+            data: the runs, whitened for that spectrum.
+
+        Returns:
+            The noise with the colour, and with an estimate that holds the power below the blocks' rate too.
+        """
+        means = np.mean([run.noise_std**2 for run in data.runs])
+        white = [self.variance[run.id] for run in data.runs]
+        blocks = np.mean([value / run.block for value, run in zip(white, data.runs, strict=True)])
+        whole = float(np.mean(white) + means - blocks)
+        reason = f"it is coloured, {np.sqrt(whole):.3g} rad in all"
+        return replace(self, source="estimated", reason=reason, estimate=whole, colour=colour)
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of one sample, rad."""
+        return float(np.sqrt(self.used if self.colour is None else self.estimated))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """A sentence where the noise is coloured."""
+        if self.colour is None:
+            return ()
+        span = float(self.colour.frequency[-1] / self.colour.frequency[0])
+        ratio = float(np.exp(np.ptp(self.colour.level)))
+        return (
+            f"The sensor's noise is coloured: {self.std:.3g} rad in all, and its power per hertz varies by a factor of "
+            f"{ratio:.3g} over a factor of {span:.3g} in frequency, in the same way throughout the runs. "
+            f"It is not a gap.",
+        )
+
+    def spread(self, frequency: Array) -> float:
+        """How well the noise is known.
+
+        Args:
+            frequency: Hz, shape (n,).
+
+        Returns:
+            Standard deviation of its mean power over these frequencies, a share of it.
+        """
+        return self.relative if self.colour is None else self.colour.spread(frequency)
 
 
 def estimate_variance(record: Record) -> tuple[float, float]:
@@ -106,16 +162,16 @@ def campaign_noise(campaign: Campaign) -> Noise:
     stated = _stated_variance(campaign.sensor, pooled)
     found = f"{np.sqrt(pooled):.3g} ± {0.5 * uncertainty * np.sqrt(pooled):.1g} rad"
     if stated is None:
-        return Noise(estimated, None, "estimated", "the campaign states no noise", pooled)
+        return Noise(estimated, None, "estimated", "the campaign states no noise", pooled, uncertainty)
     if not uniform:
         said = f"their noise differs by run, {np.sqrt(variances.min()):.3g} to {np.sqrt(variances.max()):.3g} rad"
     elif abs(pooled / stated - 1.0) < NOISE_AGREES * uncertainty:
         used = dict.fromkeys(estimated, stated)
-        return Noise(used, stated, "stated", f"the records agree: {found}", pooled)
+        return Noise(used, stated, "stated", f"the records agree: {found}", pooled, uncertainty)
     else:
         said = f"they contain {found}"
     reason = f"the records contradict the stated {np.sqrt(stated):.3g} rad: {said}"
-    return Noise(estimated, stated, "estimated", reason, pooled)
+    return Noise(estimated, stated, "estimated", reason, pooled, uncertainty)
 
 
 def _stated_variance(sensor: SensorProperties, estimate: float) -> float | None:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.detection.gap import chance
 from diagnosis.fitting.run_data import RunData
-from diagnosis.localisation.excess import RunExcess, chance
+from diagnosis.localisation.excess import RunExcess
 from diagnosis.policy import LINE_CONTRAST, PLACE_FALSE_ALARM_RATE
 from tunnel_sim.vocabulary.record import Array
 
