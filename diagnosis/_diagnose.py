@@ -8,6 +8,7 @@ from dataclasses import replace
 from diagnosis.answer.assemble import assemble
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.refusal import refuse_hopeless
+from diagnosis.detection.sensor_noise import noise_remarks
 from diagnosis.investigate import Progress, investigate
 from diagnosis.localisation.localise import localise
 from diagnosis.result import Diagnosis
@@ -41,7 +42,8 @@ def diagnose(
     if progress is not None:
         progress("where, and how far it closes")
     where, maps = localise(study)
-    return replace(assemble(study, where, maps, left_out), remarks=(*examined.remarks, *study.noise.remarks))
+    remarks = (*examined.remarks, *noise_remarks(study.noise, study.trend))
+    return replace(assemble(study, where, maps, left_out), remarks=remarks)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

@@ -94,7 +94,7 @@ def _test(campaign: Campaign, allowed: set[str], clock: _Clock) -> Study:
         started_late = is_gross(nominal)
         if started_late:
             nominal = fit_nominal(without_start(nominal.problem.data))
-        nominal, noise, test = judge(nominal, noise, trend, coarse_step=coarse)
+        nominal, noise, test = judge(nominal, noise, trend, step=step, coarse_step=coarse)
     return Study(campaign, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
 
 

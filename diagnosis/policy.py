@@ -28,6 +28,9 @@ COLOUR_FALSE_ALARM_RATE = 1e-3
 #: Rate at which steady noise is said to differ between parts of the records in one band, which is then left out of
 #: its spectrum. Convention: one in a hundred, since the spectrum is interpolated there.
 COLOUR_STEADY_RATE = 0.01
+#: Ratio of the greatest to the smallest motion among the parts of the records from which noise is seen not to
+#: follow the motion. Judgement: power that does would then differ by a factor of four.
+COLOUR_AMPLITUDES = 2.0
 #: Where a gap remains, the noise counts as coloured only if its spectrum beyond this multiple of the motion's
 #: frequency is. Judgement: `diagnosis.detection.gap.BANDS` count as the motion's up to there.
 BEYOND_THE_MOTION = 3.5

@@ -16,7 +16,7 @@ from scipy.stats import chi2
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.spectra import resonance
-from diagnosis.policy import COLOUR_FALSE_ALARM_RATE, COLOUR_STEADY_RATE, FLOOR_TOLERANCE
+from diagnosis.policy import COLOUR_AMPLITUDES, COLOUR_FALSE_ALARM_RATE, COLOUR_STEADY_RATE, FLOOR_TOLERANCE
 from tunnel_sim.vocabulary.record import Array
 
 _PARTS = 8  # parts of records to compare, at least
@@ -89,7 +89,8 @@ def noise_colour(nominal: Fit, beyond: float = 0.0) -> Colour | None:
         parts of the records.
     """
     parts = [part for i in range(len(nominal.residuals)) for part in _parts(nominal, i)]
-    if len(parts) < 2:
+    sizes = [part.motion for part in parts]
+    if not sizes or max(sizes) < COLOUR_AMPLITUDES * min(sizes):
         return None
     lowest = max(
         _LOWEST * max(part.frequency[1] for part in parts),
@@ -116,11 +117,12 @@ def noise_colour(nominal: Fit, beyond: float = 0.0) -> Colour | None:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Periodogram of a part of a record between the harmonics, in units of white noise, with its frequencies."""
+    """A part of a record: its periodogram, in units of white noise, and the size of the motion (rad)."""
 
     frequency: Array
     power: Array
-    between: Array
+    between: Array  # which ordinates lie between the harmonics of the motion
+    motion: float
 
     def by_band(self, edges: Array) -> tuple[Array, Array]:
         """Mean power and number of independent ordinates by band, shape (bands,) each."""
@@ -137,8 +139,8 @@ def _parts(fit: Fit, index: int) -> list[_Part]:
     cycles = run.reading.size * run.interval * own
     wanted = max(2, -(-_PARTS // len(fit.residuals)))
     count = min(wanted, int(cycles / _CYCLES))
-    values = run.unscaled(fit.residuals[index]) / np.sqrt(run.noise_variance)
-    return [_part(values[piece], run, own) for piece in _pieces(values.size, count)]
+    values = run.unscaled(fit.residuals[index])
+    return [_part(values[p], run.reading[p] - values[p], run, own) for p in _pieces(values.size, count)]
 
 
 def _pieces(size: int, count: int) -> list[slice]:
@@ -146,16 +148,17 @@ def _pieces(size: int, count: int) -> list[slice]:
     return [slice(i * length, (i + 1) * length) for i in range(count)]
 
 
-def _part(values: Array, run: RunData, own: float) -> _Part:
+def _part(values: Array, motion: Array, run: RunData, own: float) -> _Part:
     window = np.hanning(values.size)
-    power = np.abs(np.fft.rfft((values - values.mean()) * window)) ** 2 / float(window @ window)
+    scale = run.noise_variance * float(window @ window)
+    power = np.abs(np.fft.rfft((values - values.mean()) * window)) ** 2 / scale
     frequency = np.fft.rfftfreq(values.size, run.interval)
     order = frequency / own
     multiple = np.round(order)
     beside = np.where(multiple > 0, np.abs(order - multiple) >= _BESIDE, True)
     beside &= frequency * values.size * run.interval > _LOWEST
     beside[-1] = False  # the ordinate at half the sampling rate has one degree of freedom
-    return _Part(np.asarray(frequency, np.float64), np.asarray(power, np.float64), beside)
+    return _Part(np.asarray(frequency), np.asarray(power), beside, float(np.std(motion)))
 
 
 def _band_edges(low: float, high: float) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.detection.noise_colour import Colour
 from diagnosis.fitting.run_data import BLOCK_INTERVAL, Data
 from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
+from identification.remark import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -80,19 +81,6 @@ class Noise:
         """Standard deviation of one sample, rad."""
         return float(np.sqrt(self.used if self.colour is None else self.estimated))
 
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """A sentence where the noise is coloured."""
-        if self.colour is None:
-            return ()
-        span = float(self.colour.frequency[-1] / self.colour.frequency[0])
-        ratio = float(np.exp(np.ptp(self.colour.level)))
-        return (
-            f"The sensor's noise is coloured: {self.std:.3g} rad in all, and its power per hertz varies by a factor of "
-            f"{ratio:.3g} over a factor of {span:.3g} in frequency, in the same way throughout the runs. "
-            f"It is not a gap.",
-        )
-
     def spread(self, frequency: Array) -> float:
         """How well the noise is known.
 
@@ -150,7 +138,10 @@ def campaign_noise(campaign: Campaign) -> Noise:
         The stated noise where the runs agree with one another and their mean agrees with it, within `NOISE_AGREES`
         standard deviations of the estimate; else the estimate, pooled over runs where they agree with one another.
     """
-    estimates = {run.id: estimate_variance(run.record) for run in campaign.runs}
+    # however slow the motion, the error of a rounded reading is that large
+    rounded = lattice_step(campaign) ** 2 / 12.0
+    measured = {run.id: estimate_variance(run.record) for run in campaign.runs}
+    estimates = {run: (max(value, rounded), std) for run, (value, std) in measured.items()}
     variances = np.array([value for value, _ in estimates.values()])
     relative = np.array([std for _, std in estimates.values()])
     pooled, uncertainty = float(np.mean(variances)), float(np.sqrt(np.sum(relative**2)) / relative.size)
@@ -227,14 +218,33 @@ def reading_step(campaign: Campaign) -> float:
         The smallest difference between distinct readings, rad. This is the true resolution where the record
         visits neighbouring steps, as every decay does; it is far below any step where readings are continuous.
     """
-    steps = []
-    for run in campaign.runs:
-        distinct = np.unique(run.record.yaw_rad)
-        gaps = np.diff(distinct)
-        gaps = gaps[gaps > 1e-9]  # the same step printed twice with different rounding
-        if gaps.size:
-            steps.append(float(np.quantile(gaps, 0.02)))
-    return min(steps, default=0.0)
+    return min((float(np.quantile(gaps, 0.02)) for gaps in _gaps(campaign)), default=0.0)
+
+
+def lattice_step(campaign: Campaign) -> float:
+    """The step of the lattice on which the readings lie, where they do.
+
+    Args:
+        campaign: the runs.
+
+    Returns:
+        As `reading_step`, rad; 0 where the differences between distinct readings are not multiples of it.
+    """
+    step = reading_step(campaign)
+    multiples = np.concatenate([gaps / step for gaps in _gaps(campaign)]) if step > 0.0 else np.full(1, 0.5)
+    # differences of continuous readings are a quarter of a step off in the median, rounded ones hardly at all
+    return step if np.median(np.abs(multiples - np.round(multiples))) < _OFF_LATTICE else 0.0
+
+
+def _gaps(campaign: Campaign) -> list[Array]:
+    """Differences between neighbouring distinct readings, by run, rad; runs of a single reading are left out."""
+    gaps = [np.diff(np.unique(run.record.yaw_rad)) for run in campaign.runs]
+    # the same step may be printed twice with different rounding
+    clear = [found[found > 1e-9] for found in gaps]
+    return [found for found in clear if found.size]
+
+
+_OFF_LATTICE = 0.1  # of a step: printed readings are rounded once more
 
 
 @dataclass(frozen=True)
@@ -324,3 +334,31 @@ def _local_levels(reading: Array, rate: float) -> tuple[Array, Array, Array]:
     level = level / np.maximum(level.mean(axis=-1, keepdims=True), 1e-300) - 1.0
     angle = windows(reading[..., 2:]).mean(axis=-1)
     return level, _standardised(angle**2), _standardised(np.gradient(angle, axis=-1) ** 2)
+
+
+def noise_remarks(noise: Noise, trend: NoiseTrend) -> tuple[Remark, ...]:
+    """What the user should know of the noise.
+
+    Args:
+        noise: of the campaign.
+        trend: of the noise with the motion.
+
+    Returns:
+        Remarks where the noise is coloured, and where the sampling is too slow to compare it with the motion.
+    """
+    found = []
+    runs = tuple(noise.variance)
+    if noise.colour is not None:
+        span = noise.colour.frequency[-1] / noise.colour.frequency[0]
+        ratio = np.exp(np.ptp(noise.colour.level))
+        what = (
+            f"the sensor's noise is coloured: {noise.std:.3g} rad in all, and its power per hertz varies by a factor "
+            f"of {ratio:.3g} over a factor of {span:.3g} in frequency, in the same way throughout the runs"
+        )
+        found.append(Remark(Outcome.NOTED, runs, what, "the diagnosis allows for it, and it is not a cause"))
+    if not trend.judged:
+        what = "sampled too slowly to test whether the noise follows the motion or comes in bursts"
+        found.append(
+            Remark(Outcome.NOTED, runs, what, "sample at 240 times the motion's frequency or faster")
+        )
+    return tuple(found)
