@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from diagnosis.answer.assemble import assemble
 from diagnosis.detection.comparable import comparable_runs
+from diagnosis.detection.noise_remarks import noise_remarks
 from diagnosis.detection.refusal import refuse_hopeless
-from diagnosis.detection.sensor_noise import noise_remarks
 from diagnosis.investigate import Progress, investigate
 from diagnosis.localisation.localise import localise
 from diagnosis.result import Diagnosis

@@ -107,11 +107,11 @@ def judge(
     if allowed is not None:
         nominal = refit(Problem(allowed), nominal.point)
     plain = test_gap(nominal, noise, trend, coarse_step=coarse_step, errors=errors)
-    found = None if not plain.detected or is_gross(nominal) else noise_colour(nominal)
+    found = None if is_gross(nominal) else noise_colour(nominal)
     if found is None:
         return nominal, noise, plain
     white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
-    coloured = noise.coloured(found, white.problem.data)
+    coloured = noise.coloured(found, nominal.problem.data)
     test = test_gap(white, coloured, trend, coarse_step=coarse_step, errors=errors)
     still = any(not run.wind_on for run in nominal.problem.data.runs)
     if test.detected and not (still and noise_colour(nominal, beyond=BEYOND_THE_MOTION)):

@@ -61,6 +61,18 @@ class Colour:
         below = np.minimum(place - places[0], 0.0)
         return np.asarray(np.interp(place, places, self.level) + self.slope * below)
 
+    def mean(self, count: int, interval: float) -> float:
+        """The mean power over the frequencies of a record.
+
+        Args:
+            count: values in the record.
+            interval: between them, s.
+
+        Returns:
+            The power ratio.
+        """
+        return float(np.mean(np.exp(self.at(np.fft.rfftfreq(count, interval)[1:]))))
+
     def spread(self, frequency: Array) -> float:
         """How well the mean power over some frequencies is known.
 

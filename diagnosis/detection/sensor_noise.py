@@ -10,7 +10,6 @@ import numpy as np
 from diagnosis.detection.noise_colour import Colour
 from diagnosis.fitting.run_data import BLOCK_INTERVAL, Data
 from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
-from identification.remark import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -63,16 +62,17 @@ class Noise:
         """The same noise, found to be coloured.
 
         Args:
-            colour: its spectrum.
-            data: the runs, whitened for that spectrum.
+            colour: its spectrum, from block means.
+            data: the runs.
 
         Returns:
-            The noise with the colour, and with an estimate that holds the power below the blocks' rate too.
+            The noise with the colour, and with an estimate of all its power that the records' lengths resolve.
         """
-        means = np.mean([run.noise_std**2 for run in data.runs])
-        white = [self.variance[run.id] for run in data.runs]
-        blocks = np.mean([value / run.block for value, run in zip(white, data.runs, strict=True)])
-        whole = float(np.mean(white) + means - blocks)
+        extra = [
+            self.variance[run.id] / run.block * (colour.mean(run.reading.size, run.interval) - 1.0)
+            for run in data.runs
+        ]
+        whole = float(np.mean(list(self.variance.values())) + np.mean(extra))
         reason = f"it is coloured, {np.sqrt(whole):.3g} rad in all"
         return replace(self, source="estimated", reason=reason, estimate=whole, colour=colour)
 
@@ -334,31 +334,3 @@ def _local_levels(reading: Array, rate: float) -> tuple[Array, Array, Array]:
     level = level / np.maximum(level.mean(axis=-1, keepdims=True), 1e-300) - 1.0
     angle = windows(reading[..., 2:]).mean(axis=-1)
     return level, _standardised(angle**2), _standardised(np.gradient(angle, axis=-1) ** 2)
-
-
-def noise_remarks(noise: Noise, trend: NoiseTrend) -> tuple[Remark, ...]:
-    """What the user should know of the noise.
-
-    Args:
-        noise: of the campaign.
-        trend: of the noise with the motion.
-
-    Returns:
-        Remarks where the noise is coloured, and where the sampling is too slow to compare it with the motion.
-    """
-    found = []
-    runs = tuple(noise.variance)
-    if noise.colour is not None:
-        span = noise.colour.frequency[-1] / noise.colour.frequency[0]
-        ratio = np.exp(np.ptp(noise.colour.level))
-        what = (
-            f"the sensor's noise is coloured: {noise.std:.3g} rad in all, and its power per hertz varies by a factor "
-            f"of {ratio:.3g} over a factor of {span:.3g} in frequency, in the same way throughout the runs"
-        )
-        found.append(Remark(Outcome.NOTED, runs, what, "the diagnosis allows for it, and it is not a cause"))
-    if not trend.judged:
-        what = "sampled too slowly to test whether the noise follows the motion or comes in bursts"
-        found.append(
-            Remark(Outcome.NOTED, runs, what, "sample at 240 times the motion's frequency or faster")
-        )
-    return tuple(found)
