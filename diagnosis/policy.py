@@ -87,7 +87,7 @@ EXACT_MISFIT = 0.001
 #: Excess of block means beyond which that share no longer grows with the gap. Tuned: a motion missed grossly is
 #: no reason to overlook a second effect a thousand times the noise.
 FORM_MISFIT_UP_TO = 1000.0
-#: Standard deviations by which chance may change a share. Convention.
+#: Standard deviations by which chance may change a share or a slope. Convention.
 CHANCE_STDS = 2.0
 #: Share at which a cause is as likely as an unknown one. Tuned.
 UNKNOWN_SHARE = 0.2

@@ -16,7 +16,13 @@ from scipy.stats import chi2
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.spectra import resonance
-from diagnosis.policy import COLOUR_AMPLITUDES, COLOUR_FALSE_ALARM_RATE, COLOUR_STEADY_RATE, FLOOR_TOLERANCE
+from diagnosis.policy import (
+    CHANCE_STDS,
+    COLOUR_AMPLITUDES,
+    COLOUR_FALSE_ALARM_RATE,
+    COLOUR_STEADY_RATE,
+    FLOOR_TOLERANCE,
+)
 from tunnel_sim.vocabulary.record import Array
 
 _PARTS = 8  # parts of records to compare, at least
@@ -38,8 +44,9 @@ class Colour:
         frequency: centres of bands, Hz, ascending, shape (n,).
         level: natural logarithm of the power over that of the white noise assumed before, shape (n,).
         std: of the levels, shape (n,).
-        slope: of the level against the logarithm of frequency below the first band, 0 or less.
-        slope_std: its standard deviation.
+        slope: assumed of the level against the logarithm of frequency below the first band: that of the lowest
+            bands, made steeper by what chance may hide, between 0 and that of a random walk, −2.
+        slope_std: standard deviation of the slope of the lowest bands.
     """
 
     frequency: Array
@@ -123,7 +130,8 @@ def noise_colour(nominal: Fit, beyond: float = 0.0) -> Colour | None:
     if _flat(level, std):
         return None
     centres = np.sqrt(edges[1:] * edges[:-1])[steady]
-    slope, slope_std = _slope(np.log(centres), level, std) if steady[0] else (0.0, 0.0)
+    # where a gap hides the lowest bands, making the slope steeper would take the gap for noise
+    slope, slope_std = _slope(np.log(centres), level, std, CHANCE_STDS if steady[0] else 0.0)
     return Colour(centres, level, std, slope, slope_std)
 
 
@@ -202,13 +210,14 @@ def _flat(level: Array, std: Array) -> bool:
     return float(weight @ (level - mean) ** 2) < float(chi2.isf(COLOUR_FALSE_ALARM_RATE, level.size - 1))
 
 
-def _slope(place: Array, level: Array, std: Array) -> tuple[float, float]:
-    """Slope of the lowest bands, not above zero, and its standard deviation."""
+def _slope(place: Array, level: Array, std: Array, stds: float) -> tuple[float, float]:
+    """Slope to assume below the lowest bands, theirs made steeper by standard deviations, and the size of one."""
     use = slice(0, _SLOPE_BANDS)
     weight = 1.0 / std[use] ** 2
     centred = place[use] - float(weight @ place[use] / weight.sum())
     power = float(weight @ centred**2)
-    return min(float((weight * centred) @ level[use]) / power, 0.0), float(np.sqrt(1.0 / power))
+    slope, deviation = float((weight * centred) @ level[use]) / power, float(np.sqrt(1.0 / power))
+    return float(np.clip(slope - stds * deviation, -2.0, 0.0)), deviation
 
 
 def whitened(data: Data, colour: Colour) -> Data:
