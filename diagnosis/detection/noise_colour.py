@@ -78,7 +78,7 @@ class Colour:
         Returns:
             The power ratio.
         """
-        return float(np.mean(np.exp(self.at(np.fft.rfftfreq(count, interval)[1:]))))
+        return float(np.mean(np.exp(self.at(np.asarray(np.fft.rfftfreq(count, interval)[1:], np.float64)))))
 
     def spread(self, frequency: Array) -> float:
         """How well the mean power over some frequencies is known.
