@@ -8,6 +8,7 @@ from dataclasses import replace
 from diagnosis.answer.assemble import assemble
 from diagnosis.answer.own_units import in_own_units
 from diagnosis.detection.comparable import comparable_runs
+from diagnosis.detection.noise_remarks import noise_remarks
 from diagnosis.detection.refusal import refuse_hopeless
 from diagnosis.investigate import Progress, investigate
 from diagnosis.localisation.localise import localise
@@ -42,7 +43,8 @@ def diagnose(
     if progress is not None:
         progress("where, and how far it closes")
     where, maps = localise(study)
-    answer = replace(assemble(study, where, maps, left_out), remarks=examined.remarks)
+    remarks = (*examined.remarks, *noise_remarks(study.noise, study.trend))
+    answer = replace(assemble(study, where, maps, left_out), remarks=remarks)
     return in_own_units(answer, study.similarity)
 
 

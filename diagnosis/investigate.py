@@ -14,7 +14,7 @@ from diagnosis.attribution.grow import grow, grow_in_stretches, prune
 from diagnosis.attribution.hypothesis import Hypothesis, polish
 from diagnosis.attribution.outsiders import weigh_outsiders
 from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
-from diagnosis.detection.gap import test_gap
+from diagnosis.detection.gap import judge
 from diagnosis.detection.mains import find_hum, refine_frequency, remove_hum
 from diagnosis.detection.refusal import refuse_indefinite
 from diagnosis.detection.sensor_noise import campaign_noise, noise_trend, reading_step
@@ -96,7 +96,7 @@ def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: 
         started_late = is_gross(nominal)
         if started_late:
             nominal = fit_nominal(without_start(nominal.problem.data))
-        test = test_gap(nominal, noise, trend, coarse_step=coarse)
+        nominal, noise, test = judge(nominal, noise, trend, step=step, coarse_step=coarse)
     return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
 
 

@@ -23,6 +23,17 @@ NOISE_AGREES = 3.0
 NOISE_OF_ITS_OWN = 4.065
 #: Heavier tails than white noise has, by this factor, are accepted. Judgement: sensor noise is not quite normal.
 NOISE_TAILS = 1.15
+#: Rate at which white noise is said to be coloured. Convention: as a gap.
+COLOUR_FALSE_ALARM_RATE = 1e-3
+#: Rate at which steady noise is said to differ between parts of the records in one band, which is then left out of
+#: its spectrum. Convention: one in a hundred, since the spectrum is interpolated there.
+COLOUR_STEADY_RATE = 0.01
+#: Ratio of the greatest to the smallest motion among the parts of the records from which noise is seen not to
+#: follow the motion. Judgement: power that does would then differ by a factor of four.
+COLOUR_AMPLITUDES = 2.0
+#: Where a gap remains, the noise counts as coloured only if its spectrum beyond this multiple of the motion's
+#: frequency is. Judgement: `diagnosis.detection.gap.BANDS` count as the motion's up to there.
+BEYOND_THE_MOTION = 3.5
 #: Stated noise is often rounded to one digit, which changes its square by up to this factor. Arithmetic.
 ROUNDED_NOISE = 1.5
 #: Gap, in noise variances of a sample, below which noise that misbehaves explains all of it. Judgement: as much
@@ -85,7 +96,7 @@ EXACT_MISFIT = 0.001
 #: Excess of block means beyond which that share no longer grows with the gap. Tuned: a motion missed grossly is
 #: no reason to overlook a second effect a thousand times the noise.
 FORM_MISFIT_UP_TO = 1000.0
-#: Standard deviations by which chance may change a share. Convention.
+#: Standard deviations by which chance may change a share or a slope. Convention.
 CHANCE_STDS = 2.0
 #: Share at which a cause is as likely as an unknown one. Tuned.
 UNKNOWN_SHARE = 0.2

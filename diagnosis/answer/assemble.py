@@ -180,4 +180,4 @@ def _next_run(study: Study, chosen: Fit) -> dict[str, Any] | None:
 def _noise(study: Study) -> NoiseSummary:
     noise = study.noise
     stated = None if noise.stated_variance is None else float(np.sqrt(noise.stated_variance))
-    return NoiseSummary(float(np.sqrt(noise.used)), stated, noise.source, noise.reason)
+    return NoiseSummary(noise.std, stated, noise.source, noise.reason)

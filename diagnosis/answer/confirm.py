@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,6 +37,7 @@ class Comparison:
         differences: MuJoCo's block means minus the forward integrator's, rad, by run.
         noise: standard deviation of a block mean's noise, rad, by run.
         failure: why MuJoCo could not predict the runs; empty where it did.
+        shifts: the differences in noise standard deviations, whitened like the residuals, by run.
     """
 
     ids: tuple[str, ...]
@@ -44,6 +45,7 @@ class Comparison:
     differences: list[Array]
     noise: tuple[float, ...]
     failure: str = ""
+    shifts: list[Array] = field(default_factory=list)
 
     @property
     def excess(self) -> float:
@@ -67,7 +69,7 @@ def compare(problem: Problem, common: Array, release: Array) -> Comparison:
     each = np.broadcast_to(common, (len(runs), common.shape[-1]))
     distinct, which = np.unique(each, axis=0, return_inverse=True)
     forward = problem.predict([Point(row, release) for row in distinct])
-    noise = tuple(float(np.sqrt(run.noise_variance)) for run in runs)
+    noise = tuple(run.noise_std for run in runs)
     before = [forward[int(k)][i] for i, k in enumerate(which.ravel())]
     predicted, failure = before, ""
     try:
@@ -77,6 +79,7 @@ def compare(problem: Problem, common: Array, release: Array) -> Comparison:
     return Comparison(
         ids=tuple(run.id for run in runs),
         residuals=[run.scaled(run.reading - p) for run, p in zip(runs, predicted, strict=True)],
+        shifts=[run.scaled(p - f) for run, p, f in zip(runs, predicted, before, strict=True)],
         differences=[p - f for p, f in zip(predicted, before, strict=True)],
         noise=noise,
         failure=failure,

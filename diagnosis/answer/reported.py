@@ -74,8 +74,8 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
 def _corrected(held_out: HeldOut, fitted: Comparison) -> dict[str, Array]:
     """Residuals of held-out runs with MuJoCo's differences from the fit of all runs taken off."""
     return {
-        run: held_out.residuals[run] - difference / noise
-        for run, difference, noise in zip(fitted.ids, fitted.differences, fitted.noise, strict=True)
+        run: held_out.residuals[run] - shift
+        for run, shift in zip(fitted.ids, fitted.shifts, strict=True)
         if run in held_out.residuals
     }
 

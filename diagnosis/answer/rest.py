@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from diagnosis.closure import Move, Rest
 from diagnosis.detection.gap import test_gap
+from diagnosis.detection.rounding import rounding_errors
 from diagnosis.policy import GAP_FALSE_ALARM_RATE, MATERIAL_SHARE
 from diagnosis.result import ParameterEstimate
 from diagnosis.study import Study
@@ -60,7 +61,8 @@ def _p_value(study: Study) -> float:
     if study.chosen is study.nominal:
         return study.test.p_value
     # no cause changes the tests of the noise itself: those of the residuals count
-    return test_gap(study.chosen, study.noise, study.trend, coarse_step=True).p_value
+    errors = rounding_errors(study.chosen, study.noise.variance, study.step)
+    return test_gap(study.chosen, study.noise, study.trend, coarse_step=True, errors=errors).p_value
 
 
 def _words(

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.run_data import RunData
 from diagnosis.fitting.starting_points import project_out
 from tunnel_sim.vocabulary.record import Array
 
@@ -57,20 +58,18 @@ def weigh_outsiders(nominal: Fit) -> Outsider | None:
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """One run: the nominal model's angle from its zero (rad), the noise of a block mean (rad), the interval (s)."""
+    """One run, and the nominal model's angle from its zero (rad)."""
 
     angle: Array
-    noise: float
-    interval: float
+    run: RunData
 
 
 def _motions(nominal: Fit) -> list[_Motion]:
     runs = zip(nominal.problem.data.runs, nominal.residuals, strict=True)
     return [
         _Motion(
-            run.reading - residual * np.sqrt(run.noise_variance) - nominal.zero(i),
-            float(np.sqrt(run.noise_variance)),
-            run.interval,
+            run.reading - run.unscaled(residual) - nominal.zero(i),
+            run,
         )
         for i, (run, residual) in enumerate(runs)
     ]
@@ -83,10 +82,10 @@ def _zero_follows_power(motions: list[_Motion]) -> list[list[Array]]:
         columns = []
         for motion in motions:
             square = motion.angle**2
-            keep = np.exp(-motion.interval / time) if time > 0.0 else 0.0
+            keep = np.exp(-motion.run.interval / time) if time > 0.0 else 0.0
             # at rest before the release, or held at the release angle for long
             start = keep * square[0] if settled else 0.0
-            columns.append(lfilter([1.0 - keep], [1.0, -keep], square, zi=[start])[0] / motion.noise)
+            columns.append(motion.run.scaled(lfilter([1.0 - keep], [1.0, -keep], square, zi=[start])[0]))
         trials.append(columns)
     return trials
 

@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from diagnosis.fitting.least_squares import Fit
-from diagnosis.fitting.spectra import linear_coefficients
+from diagnosis.fitting.spectra import linear_coefficients, resonance
 from tunnel_sim.vocabulary.record import Array
 
 _INTERVAL = 0.012  # s between the residuals the filter sees: well above the rig's frequencies
@@ -188,12 +188,20 @@ def _channel(fit: Fit, run_index: int) -> _Channel | None:
     count = run.reading.size // group
     scale = np.sqrt(run.noise_variance)
     residual = (fit.residuals[run_index][: count * group] * scale).reshape(count, group).mean(axis=1)
+    # residuals are white: the rig's response, a narrow band, has passed through the same filter
+    passed = scale / float(run.noise_at(resonance(fit, run_index)))
     data = fit.problem.data
     moment = 0.5 * run.air_density * run.wind_speed**2 * data.frontal_area * data.reference_length / inertia
     oscillator = np.array([[0.0, 1.0], [-stiffness / inertia, -damping / inertia]])
     reduced = run.wind_speed / data.width if data.width > 0.0 else 0.0
     return _Channel(
-        run.id, residual, run.noise_variance / group, group * run.interval, oscillator, moment, reduced
+        run.id,
+        residual,
+        run.noise_variance / group,
+        group * run.interval,
+        oscillator,
+        passed * moment,
+        reduced,
     )
 
 

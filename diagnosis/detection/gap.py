@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
 
+from diagnosis.detection.noise_colour import noise_colour, whitened
 from diagnosis.detection.noise_under_null import level_p_value, trend_p_values
+from diagnosis.detection.rounding import rounding_errors, with_rounding
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.least_squares import fit as refit
+from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.spectra import resonance
-from diagnosis.policy import FLOOR_TOLERANCE, GAP_FALSE_ALARM_RATE, NOISE_FALSE_ALARM_SHARE
+from diagnosis.fitting.starting_points import is_gross
+from diagnosis.policy import BEYOND_THE_MOTION, FLOOR_TOLERANCE, GAP_FALSE_ALARM_RATE, NOISE_FALSE_ALARM_SHARE
+from tunnel_sim.vocabulary.record import Array
 
+Spread = Callable[[Array], float]
 BANDS = ("below", "f0", "2f0", "3f0", "above")
 
 
@@ -35,7 +42,14 @@ class GapTest:
     noisy: bool
 
 
-def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) -> GapTest:
+def test_gap(
+    fit: Fit,
+    noise: Noise,
+    trend: NoiseTrend,
+    *,
+    coarse_step: bool,
+    errors: Sequence[Array] | None,
+) -> GapTest:
     """Test whether a fit's residuals and the noise are consistent with white noise.
 
     Args:
@@ -44,13 +58,16 @@ def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
         trend: of the noise with the motion.
         coarse_step: whether the reading's step is known to be coarser than stated; the level and trend of the
             noise are then not tested.
+        errors: what noise and rounding leave in the block means, by run, repetitions of it, shape (repetitions,
+            blocks), rad; None where they are white.
 
     Returns:
         The verdict at `GAP_FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
     """
-    # stated noise may be a little below that of the records and still agree with it
-    floor = (1.0 + FLOOR_TOLERANCE) * max(noise.estimated / noise.used, 1.0)
-    tests = dict(zip(BANDS, band_p_values(fit, floor), strict=True)) | {"offset": offset_p_value(fit, floor)}
+    level, scatter = (np.ones(6), np.zeros(6)) if errors is None else _under_rounding(fit, errors)
+    floor = (1.0 + FLOOR_TOLERANCE) * noise.margin * level
+    tests = dict(zip(BANDS, band_p_values(fit, floor[:-1], noise.spread, scatter[:-1]), strict=True))
+    tests["offset"] = offset_p_value(fit, floor[-1], noise.spread, scatter[-1])
     noisy: dict[str, float] = {}
     if not coarse_step and noise.source != "floor":
         noisy |= trend_p_values(trend, fit, noise)
@@ -67,43 +84,136 @@ def test_gap(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
     )
 
 
-def offset_p_value(fit: Fit, floor: float = 1.0) -> float:
+def judge(
+    nominal: Fit, noise: Noise, trend: NoiseTrend, *, step: float, coarse_step: bool
+) -> tuple[Fit, Noise, GapTest]:
+    """Test for a gap, and decide between a gap and coloured noise.
+
+    Args:
+        nominal: fit of the nominal model to runs prepared for white noise.
+        noise: the campaign's.
+        trend: of the noise with the motion.
+        step: of the lattice of the readings, rad; 0 where there is none.
+        coarse_step: as `test_gap` takes it.
+
+    Returns:
+        The fit, the noise and the verdict. The noise of the fit allows for rounding, whose error is not white where
+        the motion is slow and the noise small, and fit and noise are whitened where the noise is coloured. Where
+        whitening does not close the gap, colour is believed only if runs with the wind off have it, and if it shows
+        above the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion.
+    """
+    errors = rounding_errors(nominal, noise.variance, step)
+    allowed = None if errors is None else with_rounding(nominal.problem.data, errors)
+    if allowed is not None:
+        nominal = refit(Problem(allowed), nominal.point)
+    plain = test_gap(nominal, noise, trend, coarse_step=coarse_step, errors=errors)
+    found = None if is_gross(nominal) else noise_colour(nominal)
+    if found is None:
+        return nominal, noise, plain
+    white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
+    coloured = noise.coloured(found, nominal.problem.data)
+    test = test_gap(white, coloured, trend, coarse_step=coarse_step, errors=errors)
+    still = any(not run.wind_on for run in nominal.problem.data.runs)
+    if test.detected and not (still and noise_colour(nominal, beyond=BEYOND_THE_MOTION)):
+        return nominal, noise, plain
+    return white, coloured, test
+
+
+def chance(total: float, freedom: float, relative: float) -> float:
+    """Probability that white noise reaches a sum of squares.
+
+    Args:
+        total: sum of squares, in units of the noise variance.
+        freedom: degrees of freedom, a number of coefficients.
+        relative: standard deviation of the noise variance, as a share of it.
+
+    Returns:
+        The upper tail of a χ² variable, widened for the uncertainty of the noise level.
+    """
+    if freedom <= 0.0:
+        return 1.0
+    stretch = 1.0 + 0.5 * freedom * relative**2
+    return float(chi2.sf(total / stretch, freedom / stretch))
+
+
+def _known(_frequency: Array) -> float:
+    return 0.0
+
+
+def offset_p_value(fit: Fit, floor: float = 1.0, spread: Spread = _known, scatter: float = 0.0) -> float:
     """Probability that white noise alone moves the runs' means as far from the common zero.
 
     Args:
         fit: its residuals, in noise standard deviations.
         floor: power assumed for white noise, a factor on the noise variance.
+        spread: gives the standard deviation of the noise's mean power over some frequencies (Hz), a share of it.
+        scatter: standard deviation of the floor, a share of it.
 
     Returns:
         The p-value; the zero takes one degree of freedom. 1 where the runs have zeros of their own.
     """
     if fit.problem.data.own_zeros:
         return 1.0
-    total = sum(float(np.sum(residual)) ** 2 / residual.size for residual in fit.residuals)
-    runs = len(fit.residuals)
-    return float(chi2.sf(total / floor, runs - 1)) if runs > 1 else 1.0
+    lowest = np.array([1.0 / max(run.duration for run in fit.problem.data.runs)])
+    relative = float(np.hypot(spread(lowest), scatter))
+    return chance(_offsets(fit.residuals) / floor, len(fit.residuals) - 1.0, relative)
 
 
-def band_p_values(fit: Fit, floor: float = 1.0) -> tuple[float, ...]:
+def _offsets(residuals: Sequence[Array]) -> float:
+    """Sum of the squared means of the runs' residuals, in their variances under white noise."""
+    return sum(float(np.sum(residual)) ** 2 / residual.size for residual in residuals)
+
+
+def band_p_values(
+    fit: Fit, floor: float | Array = 1.0, spread: Spread = _known, scatter: float | Array = 0.0
+) -> tuple[float, ...]:
     """Probability that white noise alone gives as much power in each band, summed over the runs.
 
     Args:
         fit: its residuals, in noise standard deviations.
-        floor: power assumed for white noise, a factor on the noise variance.
+        floor: power assumed for white noise, a factor on the noise variance; one for all bands, or shape (bands,).
+        spread: gives the standard deviation of the noise's mean power over some frequencies (Hz), a share of it.
+        scatter: standard deviation of the floor, a share of it, of its shape.
 
     Returns:
         One p-value per band of `BANDS`; the bands are multiples of each run's own frequency.
     """
-    power, count = np.zeros(len(BANDS)), np.zeros(len(BANDS))
-    for index, (run, residual) in enumerate(zip(fit.problem.data.runs, fit.residuals, strict=True)):
+    values = []
+    each = np.broadcast_to(floor, len(BANDS)), np.broadcast_to(scatter, len(BANDS))
+    for (power, place), level, share in zip(_by_band(fit, fit.residuals), *each, strict=True):
+        relative = float(np.hypot(spread(place), share)) if place.size else 0.0
+        # each ordinate is half a χ² of two degrees of freedom
+        values.append(chance(2.0 * float(power.sum()) / level, 2.0 * place.size, relative))
+    return tuple(values)
+
+
+def _by_band(fit: Fit, residuals: Sequence[Array]) -> list[tuple[Array, Array]]:
+    """Power and frequency (Hz) of the periodograms' ordinates, all runs together, by band."""
+    bands, powers, frequencies = [], [], []
+    for index, (run, residual) in enumerate(zip(fit.problem.data.runs, residuals, strict=True)):
         spectrum = np.abs(np.fft.rfft(residual)) ** 2 / residual.size
         frequency = np.fft.rfftfreq(residual.size, run.interval)
         multiple = frequency[1:-1] / max(resonance(fit, index), 1e-9)
         band = np.clip(np.floor(multiple + 0.5), 0, len(BANDS) - 1).astype(int)
-        power += np.bincount(band, spectrum[1:-1], len(BANDS))
-        count += np.bincount(band, minlength=len(BANDS))
+        bands.append(band)
+        powers.append(spectrum[1:-1])
+        frequencies.append(frequency[1:-1])
+    where, power, place = (np.concatenate(column) for column in (bands, powers, frequencies))
     # each ordinate is half a χ² of two degrees of freedom
-    values = [
-        float(chi2.sf(2.0 * p / floor, 2.0 * n)) if n > 0 else 1.0 for p, n in zip(power, count, strict=True)
-    ]
-    return tuple(values)
+    return [(power[where == index], place[where == index]) for index in range(len(BANDS))]
+
+
+def _under_rounding(fit: Fit, errors: Sequence[Array]) -> tuple[Array, Array]:
+    """Level of the tests' statistics under noise and rounding, and its scatter beyond that of white noise.
+
+    Both are shares of what white noise of the fit's variance gives, shape (tests,): the bands, then the offset.
+    """
+    found, count = [], np.ones(len(BANDS) + 1)
+    for number in range(len(errors[0])):
+        residuals = [run.scaled(e[number]) for run, e in zip(fit.problem.data.runs, errors, strict=True)]
+        bands = _by_band(fit, residuals)
+        count = np.array([*(max(place.size, 1) for _, place in bands), 0.5 * len(residuals)])
+        found.append([*(float(power.sum()) for power, _ in bands), 0.5 * _offsets(residuals)] / count)
+    level = np.mean(found, axis=0)
+    beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-300) ** 2 - 1.0 / count
+    return np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))

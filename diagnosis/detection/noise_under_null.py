@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.stats import binom, t
 
+from diagnosis.detection.rounding import repeated, samples
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend, trend_statistics
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.policy import NOISE_TAILS, ROUNDED_NOISE
@@ -61,33 +60,15 @@ def _p_values(trend: NoiseTrend, chance: Array) -> Array:
 
 def _repetitions(fit: Fit, white: Mapping[str, float], step: float) -> Array:
     """Statistics of the campaign repeated, shape (repetitions, 3)."""
-    runs = fit.problem.data.runs
-    samples = sum(run.reading.size * run.block for run in runs)
-    count = int(np.clip(_SAMPLES / samples, _FEWEST, _REPETITIONS))
-    # seeded by the readings: the same campaign is always compared with the same repetitions
-    rng = np.random.default_rng([zlib.crc32(run.reading.tobytes()) for run in runs])
-    readings = []
-    for run, residual in zip(runs, fit.residuals, strict=True):
-        if run.samples is not None:
-            continue  # such runs have no part in the trend
-        motion = _motion(run.reading - residual * np.sqrt(run.noise_variance), run.block)
-        reading = motion + white[run.id] * rng.standard_normal((count, motion.size))
-        if step > 0.0:
-            # the lattice's origin is not known
-            shift = step * rng.uniform(size=(count, 1))
-            reading = step * np.round((reading + shift) / step)
-        readings.append((reading, run.block / run.interval))
+    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
+    readings = [
+        (reading, run.block / run.interval)
+        for run, _, reading in repeated(fit, white, step, count)
+        if run.samples is None  # the others have no part in the trend
+    ]
     found = trend_statistics(readings)
     assert found is not None  # the campaign was judged
     return found
-
-
-def _motion(blocks: Array, block: int) -> Array:
-    """Samples of a motion from its block means."""
-    if block == 1:
-        return blocks
-    centres = np.arange(blocks.size) * block + 0.5 * (block - 1)
-    return np.asarray(CubicSpline(centres, blocks)(np.arange(blocks.size * block)), np.float64)
 
 
 def level_p_value(fit: Fit, noise: Noise) -> float:
@@ -103,8 +84,7 @@ def level_p_value(fit: Fit, noise: Noise) -> float:
     """
     assert noise.stated_variance is not None
     level = noise.estimated / (ROUNDED_NOISE * noise.stated_variance)
-    samples = sum(run.reading.size * run.block for run in fit.problem.data.runs)
-    ordinates = max(int(_ABOVE * 0.5 * samples / _HANN), 1)
+    ordinates = max(int(_ABOVE * 0.5 * samples(fit) / _HANN), 1)
     return float(binom.sf((ordinates - 1) // 2, ordinates, 2.0**-level))
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.detection.noise_colour import Colour
 from diagnosis.detection.scattered_noise import scattered_variance
-from diagnosis.fitting.run_data import BLOCK_INTERVAL
+from diagnosis.fitting.run_data import BLOCK_INTERVAL, Data
 from diagnosis.fitting.similarity import frequency
 from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
@@ -32,6 +33,8 @@ class Noise:
             fits, where the records contain less noise than that.
         reason: why, in words.
         estimate: the records' own variance, mean over the runs, rad²; None: the one used.
+        relative: standard deviation of that estimate, a share of it.
+        colour: of the noise of block means, relative to white noise of the variance used; None where it is white.
     """
 
     variance: dict[str, float]
@@ -39,6 +42,8 @@ class Noise:
     source: str
     reason: str
     estimate: float | None = None
+    relative: float = 0.0
+    colour: Colour | None = None
 
     @property
     def used(self) -> float:
@@ -49,6 +54,45 @@ class Noise:
     def estimated(self) -> float:
         """The records' own variance, mean over the runs, rad²."""
         return self.used if self.estimate is None else self.estimate
+
+    @property
+    def margin(self) -> float:
+        """Factor by which the noise may exceed the one used: stated noise may be a little low and still agree."""
+        return 1.0 if self.colour else max(self.estimated / self.used, 1.0)
+
+    def coloured(self, colour: Colour, data: Data) -> Noise:
+        """The same noise, found to be coloured.
+
+        Args:
+            colour: its spectrum, from block means.
+            data: the runs.
+
+        Returns:
+            The noise with the colour, and with an estimate of all its power that the records' lengths resolve.
+        """
+        extra = [
+            self.variance[run.id] / run.block * (colour.mean(run.reading.size, run.interval) - 1.0)
+            for run in data.runs
+        ]
+        whole = float(np.mean(list(self.variance.values())) + np.mean(extra))
+        reason = f"it is coloured, {np.sqrt(whole):.3g} rad in all"
+        return replace(self, source="estimated", reason=reason, estimate=whole, colour=colour)
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of one sample, rad."""
+        return float(np.sqrt(self.used if self.colour is None else self.estimated))
+
+    def spread(self, frequency: Array) -> float:
+        """How well the noise is known.
+
+        Args:
+            frequency: Hz, shape (n,).
+
+        Returns:
+            Standard deviation of its mean power over these frequencies, a share of it.
+        """
+        return self.relative if self.colour is None else self.colour.spread(frequency)
 
 
 def estimate_variance(record: Record) -> tuple[float, float]:
@@ -101,7 +145,10 @@ def campaign_noise(campaign: Campaign) -> Noise:
         The stated noise where the runs agree with one another and their mean agrees with it, within `NOISE_AGREES`
         standard deviations of the estimate; else the estimate, pooled over runs where they agree with one another.
     """
-    estimates = {run.id: estimate_variance(run.record) for run in campaign.runs}
+    # however slow the motion, the error of a rounded reading is that large
+    rounded = lattice_step(campaign) ** 2 / 12.0
+    measured = {run.id: estimate_variance(run.record) for run in campaign.runs}
+    estimates = {run: (max(value, rounded), std) for run, (value, std) in measured.items()}
     variances = np.array([value for value, _ in estimates.values()])
     relative = np.array([std for _, std in estimates.values()])
     pooled, uncertainty = float(np.mean(variances)), float(np.sqrt(np.sum(relative**2)) / relative.size)
@@ -113,16 +160,16 @@ def campaign_noise(campaign: Campaign) -> Noise:
     stated = _stated_variance(campaign.sensor, pooled)
     found = f"{np.sqrt(pooled):.3g} ± {0.5 * uncertainty * np.sqrt(pooled):.1g} rad"
     if stated is None:
-        return Noise(estimated, None, "estimated", "the campaign states no noise", pooled)
+        return Noise(estimated, None, "estimated", "the campaign states no noise", pooled, uncertainty)
     if not uniform:
         said = f"their noise differs by run, {np.sqrt(variances.min()):.3g} to {np.sqrt(variances.max()):.3g} rad"
     elif abs(pooled / stated - 1.0) < NOISE_AGREES * uncertainty:
         used = dict.fromkeys(estimated, stated)
-        return Noise(used, stated, "stated", f"the records agree: {found}", pooled)
+        return Noise(used, stated, "stated", f"the records agree: {found}", pooled, uncertainty)
     else:
         said = f"they contain {found}"
     reason = f"the records contradict the stated {np.sqrt(stated):.3g} rad: {said}"
-    return Noise(estimated, stated, "estimated", reason, pooled)
+    return Noise(estimated, stated, "estimated", reason, pooled, uncertainty)
 
 
 def _stated_variance(sensor: SensorProperties, estimate: float) -> float | None:
@@ -178,14 +225,33 @@ def reading_step(campaign: Campaign) -> float:
         The smallest difference between distinct readings, rad. This is the true resolution where the record
         visits neighbouring steps, as every decay does; it is far below any step where readings are continuous.
     """
-    steps = []
-    for run in campaign.runs:
-        distinct = np.unique(run.record.yaw_rad)
-        gaps = np.diff(distinct)
-        gaps = gaps[gaps > 1e-9]  # the same step printed twice with different rounding
-        if gaps.size:
-            steps.append(float(np.quantile(gaps, 0.02)))
-    return min(steps, default=0.0)
+    return min((float(np.quantile(gaps, 0.02)) for gaps in _gaps(campaign)), default=0.0)
+
+
+def lattice_step(campaign: Campaign) -> float:
+    """The step of the lattice on which the readings lie, where they do.
+
+    Args:
+        campaign: the runs.
+
+    Returns:
+        As `reading_step`, rad; 0 where the differences between distinct readings are not multiples of it.
+    """
+    step = reading_step(campaign)
+    multiples = np.concatenate([gaps / step for gaps in _gaps(campaign)]) if step > 0.0 else np.full(1, 0.5)
+    # differences of continuous readings are a quarter of a step off in the median, rounded ones hardly at all
+    return step if np.median(np.abs(multiples - np.round(multiples))) < _OFF_LATTICE else 0.0
+
+
+def _gaps(campaign: Campaign) -> list[Array]:
+    """Differences between neighbouring distinct readings, by run, rad; runs of a single reading are left out."""
+    gaps = [np.diff(np.unique(run.record.yaw_rad)) for run in campaign.runs]
+    # the same step may be printed twice with different rounding
+    clear = [found[found > 1e-9] for found in gaps]
+    return [found for found in clear if found.size]
+
+
+_OFF_LATTICE = 0.1  # of a step: printed readings are rounded once more
 
 
 @dataclass(frozen=True)

@@ -206,9 +206,11 @@ def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
 
 
 def _scaled(problem: Problem, prediction: list[Array]) -> list[Array]:
-    return [
-        run.scaled(run.reading - values) for run, values in zip(problem.data.runs, prediction, strict=True)
-    ]
+    with np.errstate(invalid="ignore"):  # a run that grew without bound; its cost is infinite
+        return [
+            run.scaled(run.reading - values)
+            for run, values in zip(problem.data.runs, prediction, strict=True)
+        ]
 
 
 def _cost(residuals: list[Array]) -> float:

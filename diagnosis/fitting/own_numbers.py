@@ -76,7 +76,7 @@ def _amplitudes(fit: Fit, grid: Array, rate: float) -> tuple[np.ndarray, Array]:
         index = np.round(grid * size * run.interval).astype(int)
         power = float(decay @ decay)
         found = 2.0 * np.conj(transform[index]) / power
-        amplitudes.append(found * np.sqrt(run.noise_variance))
+        amplitudes.append(found * np.sqrt(run.noise_variance) / run.response(grid))
         drops.append(0.5 * np.abs(found) ** 2 * power)
     return np.array(amplitudes), np.array(drops)
 
@@ -107,9 +107,8 @@ def _run_skip(fit: Fit, number: int) -> tuple[float, float, float] | None:
     run, residual = fit.problem.data.runs[number], fit.residuals[number]
     if residual.size < 4 * _EDGE:
         return None
-    scale = np.sqrt(run.noise_variance)
     basis = np.linalg.qr(np.column_stack(fit.jacobian[number]))[0]
-    slope = np.gradient(run.reading / scale - residual, run.interval)
+    slope = run.scaled(np.gradient(run.reading - run.unscaled(residual), run.interval))
     left = residual - basis @ (basis.T @ residual)
 
     def after(values: Array) -> Array:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.fitting.similarity import AS_MEASURED, Similarity
+from diagnosis.fitting.whitening import WHITE, colour, colouring, response, whiten
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.aero import aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import Campaign, Run
@@ -74,7 +75,7 @@ class RunData:
         reading: block means, rad, shape (n,); interpolated where a block has no sample.
         block: samples per block, on average where they are not evenly spaced.
         interval: between blocks, s.
-        noise_variance: of one block mean of ``block`` samples, rad².
+        noise_variance: of one block mean of ``block`` samples, rad²; of its innovations where it is coloured.
         spring_stiffness: stated, N m/rad; None in normalised form.
         wind_speed: stated, m/s.
         air_density: stated, kg/m³; 0 where the wind is off.
@@ -83,6 +84,7 @@ class RunData:
         derivative: which derivative of the angle the reading is: 0, 1 or 2. The units of the reading and its noise
             follow from it.
         samples: where they are, if they are not evenly spaced.
+        whitening: filter that makes the noise of the block means white, its first tap 1, shape (order + 1,).
     """
 
     id: str
@@ -97,6 +99,7 @@ class RunData:
     start: float = 0.0
     derivative: int = 0
     samples: Samples | None = None
+    whitening: Array = field(default_factory=lambda: WHITE)
 
     @property
     def wind_on(self) -> bool:
@@ -133,19 +136,31 @@ class RunData:
         )
 
     def scaled(self, difference: Array) -> Array:
-        """Differences of block means as residuals, whose variance is 1 under white noise.
+        """A difference of readings as white residuals.
 
         Args:
-            difference: of the blocks, in the unit of the reading, shape (n,).
+            difference: of block means, in the unit of the reading, shape (n,).
 
         Returns:
-            Shape (n,); blocks of fewer samples weigh less, and empty ones are 0.
+            In noise standard deviations, shape (n,); blocks of fewer samples weigh less, and empty ones are 0.
         """
-        scaled: Array = difference / np.sqrt(self.noise_variance)
         if self.samples is None:
-            return scaled
-        seen = self.samples.count > 0
-        return np.where(seen, scaled, 0.0) * np.sqrt(self.samples.count / self.block)
+            return np.asarray(whiten(difference, self.whitening) / np.sqrt(self.noise_variance), np.float64)
+        seen = np.where(self.samples.count > 0, difference, 0.0)
+        return whiten(seen, self.whitening) * np.sqrt(self.samples.count / (self.block * self.noise_variance))
+
+    def unscaled(self, residual: Array) -> Array:
+        """The inverse of `scaled`.
+
+        Args:
+            residual: white, in noise standard deviations, shape (n,).
+
+        Returns:
+            Difference of block means, in the unit of the reading, shape (n,); 0 in empty blocks.
+        """
+        if self.samples is not None:
+            residual = residual / np.sqrt(np.maximum(self.samples.count, 1) / self.block)
+        return np.asarray(colour(residual * np.sqrt(self.noise_variance), self.whitening), np.float64)
 
     @property
     def filled(self) -> int:
@@ -183,6 +198,33 @@ class RunData:
             start=self.start + first * self.interval,
             samples=None if self.samples is None else self.samples.part(first, last, self.interval),
         )
+
+    @property
+    def noise_std(self) -> float:
+        """Standard deviation of the noise of one block mean, rad."""
+        return float(np.sqrt(self.noise_variance)) * colouring(self.whitening)
+
+    def noise_at(self, frequency: float | Array) -> Array:
+        """The noise at a frequency.
+
+        Args:
+            frequency: Hz, any shape.
+
+        Returns:
+            Standard deviation of white noise of the same density, rad, of the frequency's shape.
+        """
+        return np.asarray(np.sqrt(self.noise_variance) / np.abs(self.response(frequency)))
+
+    def response(self, frequency: float | Array) -> np.ndarray:
+        """What the whitening filter makes of a sinusoid.
+
+        Args:
+            frequency: Hz, any shape.
+
+        Returns:
+            Complex factor, dimensionless, of the frequency's shape; 1 where the noise is white.
+        """
+        return response(self.whitening, np.asarray(frequency) * self.interval)
 
 
 @dataclass(frozen=True, eq=False)

@@ -114,16 +114,18 @@ def mains_line(fit: Fit) -> Line | None:
     )
     floor = float(np.max(np.sum([s.power(beside) for s in spectra], axis=0)))
     drop = float(total.max())
-    gain = [_block_gain(best, run.interval, run.block) for run in data.runs]
+    gain = [_block_gain(best, run.interval, run.block) * run.response(best) for run in data.runs]
     scale = [np.sqrt(run.noise_variance) / g for run, g in zip(data.runs, gain, strict=True)]
     amplitude = float(
-        np.sqrt(np.mean([(np.abs(s.at(best)) * k) ** 2 for s, k in zip(spectra, scale, strict=True)]))
+        np.sqrt(np.mean([np.abs(s.at(best) * k) ** 2 for s, k in zip(spectra, scale, strict=True)]))
     )
     amplitude *= float(
         np.sqrt(1.5)
     )  # the smoothed transform keeps the noise's level: lines lose a third of power
     # transform is of cos − i sin: a sine a sin(ωt + φ) gives a exp(i(φ − π/2))
-    phases = np.array([float(np.angle(s.at(best))) + np.pi / 2 for s in spectra])
+    phases = np.array(
+        [float(np.angle(s.at(best) * k)) + np.pi / 2 for s, k in zip(spectra, scale, strict=True)]
+    )
     return Line(best, drop, drop / max(floor, 1e-9), amplitude, phases, len(spectra))
 
 
@@ -178,7 +180,8 @@ def shedding_line(fit: Fit) -> Line | None:
     amplitudes = []
     for i, speed in zip(concerned, speeds, strict=True):
         frequency = best * speed / data.width
-        gain = _forced_gain(fit, i, frequency) / np.sqrt(data.runs[i].noise_variance)
+        run = data.runs[i]
+        gain = _forced_gain(fit, i, frequency) / np.sqrt(run.noise_variance) * run.response(frequency)
         value = complex(spectra[i].at(frequency))
         phases[i] = float(np.angle(value / gain)) + np.pi / 2
         amplitudes.append((abs(value) / abs(gain), abs(gain) ** 2))

@@ -127,7 +127,7 @@ def is_gross(fit: Fit) -> bool:
         True where the residual holds more than a hundredth of the reading's power.
     """
     readings = sum(
-        float(np.sum((r.reading - np.mean(r.reading)) ** 2 / r.noise_variance)) for r in fit.problem.data.runs
+        float(np.sum(r.scaled(r.reading - np.mean(r.reading)) ** 2)) for r in fit.problem.data.runs
     )
     return fit.total > GROSS_MISFIT * readings
 

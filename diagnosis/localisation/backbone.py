@@ -12,7 +12,7 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import RunData
-from diagnosis.fitting.spectra import linear_coefficients
+from diagnosis.fitting.spectra import linear_coefficients, resonance
 from diagnosis.policy import COLOURED_RUN
 from identification.decay.damped_oscillation import Decay
 from identification.decay.decay_fit import Reading, fit_run
@@ -72,7 +72,7 @@ def backbones(fit: Fit, starts: Sequence[float] = ()) -> list[Backbone]:
 def _backbone(fit: Fit, index: int, run: RunData, start: float) -> Backbone:
     inertia, damping, stiffness = linear_coefficients(fit, index)
     decay = Decay(0.5 * damping / inertia, max(stiffness, 1e-12) / inertia)
-    std = float(np.sqrt(run.noise_variance))
+    std = float(run.noise_at(resonance(fit, index)))
     reading = Reading(run.interval * np.arange(run.reading.size, dtype=np.float64), run.reading)
     departs = float(np.mean(fit.residuals[index] ** 2)) > COLOURED_RUN
     noise = NoiseLevel(std, "residual", std, 1.0, departs, disagrees=False)

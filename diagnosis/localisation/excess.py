@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import dct, idct
-from scipy.stats import chi2
 
+from diagnosis.detection.gap import chance
 from diagnosis.detection.sensor_noise import estimate_variance
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import resonance
@@ -75,23 +75,6 @@ class RunExcess:
                 freedom = power.size - (self.absorbed if name == "f0" else 0.0)
                 tests.append(chance(float(power.sum()), freedom, self.relative))
         return min(1.0, len(tests) * min(tests))
-
-
-def chance(total: float, freedom: float, relative: float) -> float:
-    """Probability that white noise reaches a sum of squares.
-
-    Args:
-        total: sum of squares, in units of the noise variance.
-        freedom: degrees of freedom, a number of coefficients.
-        relative: standard deviation of the noise variance, as a share of it.
-
-    Returns:
-        The upper tail of a χ² variable, widened for the uncertainty of the noise level.
-    """
-    if freedom <= 0.0:
-        return 1.0
-    stretch = 1.0 + 0.5 * freedom * relative**2
-    return float(chi2.sf(total / stretch, freedom / stretch))
 
 
 def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:

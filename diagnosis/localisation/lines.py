@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.localisation.excess import RunExcess, chance
+from diagnosis.detection.gap import chance
+from diagnosis.fitting.run_data import RunData
+from diagnosis.localisation.excess import RunExcess
 from diagnosis.policy import LINE_CONTRAST, PLACE_FALSE_ALARM_RATE
 from tunnel_sim.vocabulary.record import Array
 
@@ -36,22 +39,20 @@ class ResidualLine:
     amplitude: float
 
 
-def residual_lines(runs: list[RunExcess], noise_std: list[float]) -> tuple[ResidualLine, ...]:
+def residual_lines(runs: list[RunExcess], data: Sequence[RunData]) -> tuple[ResidualLine, ...]:
     """The lines that stand out of the residual of single runs.
 
     Args:
         runs: squared residuals by frequency.
-        noise_std: of one residual, rad, by run.
+        data: the runs they belong to.
 
     Returns:
         At most two per run, strongest first in each, in the order of the runs.
     """
-    return tuple(
-        line for run, std in zip(runs, noise_std, strict=True) for line in _lines(run, std, len(runs))
-    )
+    return tuple(line for run, own in zip(runs, data, strict=True) for line in _lines(run, own, len(runs)))
 
 
-def _lines(run: RunExcess, noise_std: float, runs: int) -> list[ResidualLine]:
+def _lines(run: RunExcess, own: RunData, runs: int) -> list[ResidualLine]:
     local = np.convolve(run.power, np.ones(_WIDTH), mode="same")
     order = run.frequency / run.resonance
     harmonic = (np.abs(order - np.round(order)) < _HARMONIC) & (order < 3.5)
@@ -67,8 +68,8 @@ def _lines(run: RunExcess, noise_std: float, runs: int) -> list[ResidualLine]:
         if not open_to[index] or near or local[index] < LINE_CONTRAST * _around(local, index):
             continue
         whole = max(float(run.power.sum()) - run.power.size, excess)
-        amplitude = noise_std * float(np.sqrt(2.0 * excess / run.power.size))
         frequency = float(np.average(run.frequency[_near(index, run)], weights=run.power[_near(index, run)]))
+        amplitude = float(own.noise_at(frequency)) * float(np.sqrt(2.0 * excess / run.power.size))
         found.append(ResidualLine(run.id, frequency, excess / whole, amplitude))
     return found
 

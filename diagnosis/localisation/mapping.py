@@ -77,7 +77,6 @@ def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     energy, z = _moment_energy(nominal, times, time.edges)
     after = None if best is None else _spectrum(run_excesses(campaign, best), _log_edges(excesses)).mean
     resonances = [run.resonance for run in excesses]
-    noise = [float(np.sqrt(run.noise_variance)) for run in nominal.problem.data.runs]
     maps = Maps(
         runs=_run_maps(scaled, excesses),
         groups=_groups(scaled, excesses, study.similarity),
@@ -89,7 +88,7 @@ def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         frequency_after=after,
         resonance=(min(resonances), max(resonances)),
         bands=bands,
-        lines=residual_lines(excesses, noise),
+        lines=residual_lines(excesses, nominal.problem.data.runs),
         backbones=tuple(backbones(nominal, starts)),
         phase_plane=phase_plane(nominal, chosen),
         traces=_traces(nominal, best, excesses, times),
@@ -267,12 +266,14 @@ def _trace(nominal: Fit, best: Fit | None, index: int, times: Array) -> Trace:
     run = nominal.problem.data.runs[index]
     group = max(1, -(-run.reading.size // _TRACE_POINTS))
     count = run.reading.size // group
-    std = float(np.sqrt(run.noise_variance))
+    std = run.noise_std
 
     def means(values: Array) -> Array:
         grouped: Array = values[: count * group].reshape(count, group).mean(axis=1)
         return grouped
 
     time = means(times)
-    after = None if best is None else means(best.residuals[index] * std)
-    return Trace(run.id, time, means(nominal.residuals[index] * std), after, std / float(np.sqrt(group)))
+    after = None if best is None else means(run.unscaled(best.residuals[index]))
+    return Trace(
+        run.id, time, means(run.unscaled(nominal.residuals[index])), after, std / float(np.sqrt(group))
+    )

@@ -68,7 +68,7 @@ def motion(fit: Fit, index: int) -> tuple[Array, Array]:
         Angle from the zero, rad, and rate over the angular frequency, rad, each of shape (n,).
     """
     run: RunData = fit.problem.data.runs[index]
-    angle = run.reading - fit.residuals[index] * np.sqrt(run.noise_variance) - fit.zero(index)
+    angle = run.reading - run.unscaled(fit.residuals[index]) - fit.zero(index)
     omega = 2.0 * np.pi * resonance(fit, index)
     return angle, np.gradient(angle, run.interval) / omega
 
@@ -90,11 +90,11 @@ def apparent_moment(fit: Fit, index: int) -> Apparent | None:
     if width < 5 or width > run.reading.size // 4:
         return None
     kernel = _kernel(width, run.interval, frequency, (stiffness, damping, inertia))
-    scale = float(np.sqrt(run.noise_variance))
+    scale = float(run.noise_at(frequency))
     angle, rate = motion(fit, index)
     half = width // 2
     inner = slice(half, run.reading.size - half)
-    moment = np.convolve(fit.residuals[index] * scale, kernel, mode="valid")
+    moment = np.convolve(run.unscaled(fit.residuals[index]), kernel, mode="valid")
     return Apparent(angle[inner], rate[inner], moment, half, kernel, scale)
 
 

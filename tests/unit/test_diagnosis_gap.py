@@ -31,8 +31,8 @@ def at_a_kilohertz(fitted):
     return replace(fitted, problem=replace(fitted.problem, data=replace(fitted.problem.data, runs=runs)))
 
 
-def verdict(fit, *, noise=NOISE, trend=STEADY, coarse_step=False):
-    return gap.test_gap(fit, noise, trend, coarse_step=coarse_step)
+def verdict(fit, *, noise=NOISE, trend=STEADY, coarse_step=False, errors=None):
+    return gap.test_gap(fit, noise, trend, coarse_step=coarse_step, errors=errors)
 
 
 def test_white_residuals_raise_no_more_alarms_than_stated(fitted):

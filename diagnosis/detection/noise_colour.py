@@ -1,0 +1,267 @@
+"""The colour of the sensor's noise: its spectrum where the motion is not, the same in all runs and at all times.
+
+Coloured noise differs from a gap in three properties. It is as strong with the wind off as on, it is as strong at
+the start of a record as at its end, and it is smooth across the motion's frequency and its harmonics. Its spectrum
+is therefore taken between the harmonics, in parts of all records, where these parts agree. A gap changes with the
+wind or the amplitude, and lies at the harmonics, across which the spectrum is interpolated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.run_data import Data, RunData
+from diagnosis.fitting.spectra import resonance
+from diagnosis.policy import (
+    CHANCE_STDS,
+    COLOUR_AMPLITUDES,
+    COLOUR_FALSE_ALARM_RATE,
+    COLOUR_STEADY_RATE,
+    FLOOR_TOLERANCE,
+)
+from tunnel_sim.vocabulary.record import Array
+
+_PARTS = 8  # parts of records to compare, at least
+_CYCLES = 8.0  # of the motion in a part, at least: its windowed line then stays within the share left out
+_BESIDE = 0.25  # of the motion's frequency, on either side of its harmonics, left out
+_LOWEST = 2.5  # cycles in a part: the window's lobe about zero frequency ends there
+_OCTAVE_PARTS = 2  # bands in an octave
+_SLOPE_BANDS = 4  # lowest bands that give the slope below them
+#: Neighbouring ordinates under a Hann window: as many carry the information of one independent ordinate.
+_HANN = 1.94
+_LONGEST = 512  # taps of the whitening filter
+
+
+@dataclass(frozen=True, eq=False)
+class Colour:
+    """A spectrum of the noise of block means.
+
+    Args:
+        frequency: centres of bands, Hz, ascending, shape (n,).
+        level: natural logarithm of the power over that of the white noise assumed before, shape (n,).
+        std: of the levels, shape (n,).
+        slope: assumed of the level against the logarithm of frequency below the first band: that of the lowest
+            bands, made steeper by what chance may hide, between 0 and that of a random walk, −2.
+        slope_std: standard deviation of the slope of the lowest bands.
+    """
+
+    frequency: Array
+    level: Array
+    std: Array
+    slope: float
+    slope_std: float
+
+    def at(self, frequency: Array) -> Array:
+        """The level at some frequencies.
+
+        Args:
+            frequency: Hz, above zero, any shape.
+
+        Returns:
+            Natural logarithm of the power ratio, of the frequency's shape.
+        """
+        place, places = np.log(frequency), np.log(self.frequency)
+        below = np.minimum(place - places[0], 0.0)
+        return np.asarray(np.interp(place, places, self.level) + self.slope * below)
+
+    def mean(self, count: int, interval: float) -> float:
+        """The mean power over the frequencies of a record.
+
+        Args:
+            count: values in the record.
+            interval: between them, s.
+
+        Returns:
+            The power ratio.
+        """
+        return float(np.mean(np.exp(self.at(np.asarray(np.fft.rfftfreq(count, interval)[1:], np.float64)))))
+
+    def spread(self, frequency: Array) -> float:
+        """How well the mean power over some frequencies is known.
+
+        Args:
+            frequency: Hz, above zero, shape (n,).
+
+        Returns:
+            Standard deviation of the mean power, a share of it.
+        """
+        place, places = np.log(frequency), np.log(self.frequency)
+        nearest = np.argmin(np.abs(place[:, None] - places), axis=1)
+        share = np.bincount(nearest, minlength=places.size) / place.size
+        below = float(np.mean(np.minimum(place - places[0], 0.0)))
+        return float(np.sqrt(np.sum((share * self.std) ** 2) + (below * self.slope_std) ** 2))
+
+
+def noise_colour(nominal: Fit, beyond: float = 0.0) -> Colour | None:
+    """The colour of the noise in the residuals of a fit.
+
+    Args:
+        nominal: any fit whose residuals were scaled as white.
+        beyond: multiple of the motion's frequency, from which on the spectrum is regarded.
+
+    Returns:
+        The spectrum; None where it is flat within `FLOOR_TOLERANCE` and chance, or no bands are the same in all
+        parts of the records.
+    """
+    parts = [part for i in range(len(nominal.residuals)) for part in _parts(nominal, i)]
+    sizes = [part.motion for part in parts]
+    if not sizes or max(sizes) < COLOUR_AMPLITUDES * min(sizes):
+        return None
+    lowest = max(
+        _LOWEST * max(part.frequency[1] for part in parts),
+        beyond * max(resonance(nominal, i) for i in range(len(nominal.residuals))),
+    )
+    highest = 0.5 / max(run.interval for run in nominal.problem.data.runs)
+    if highest < 2.0 * lowest:
+        return None
+    edges = _band_edges(lowest, highest)
+    cells = [part.by_band(edges) for part in parts]
+    power, count = (np.array(column) for column in zip(*cells, strict=True))
+    steady = _steady(power, count)
+    if steady.sum() < 2:
+        return None
+    total = count.sum(axis=0)
+    level = np.log(np.sum(power * count, axis=0)[steady] / total[steady])
+    std = np.sqrt(1.0 / total[steady])
+    if _flat(level, std):
+        return None
+    centres = np.sqrt(edges[1:] * edges[:-1])[steady]
+    # where a gap hides the lowest bands, making the slope steeper would take the gap for noise
+    slope, slope_std = _slope(np.log(centres), level, std, CHANCE_STDS if steady[0] else 0.0)
+    return Colour(centres, level, std, slope, slope_std)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A part of a record: its periodogram, in units of white noise, and the size of the motion (rad)."""
+
+    frequency: Array
+    power: Array
+    between: Array  # which ordinates lie between the harmonics of the motion
+    motion: float
+
+    def by_band(self, edges: Array) -> tuple[Array, Array]:
+        """Mean power and number of independent ordinates by band, shape (bands,) each."""
+        band = np.searchsorted(edges, self.frequency[self.between], side="right") - 1
+        inside = (band >= 0) & (band < edges.size - 1)
+        count = np.bincount(band[inside], minlength=edges.size - 1)
+        power = np.bincount(band[inside], self.power[self.between][inside], edges.size - 1)
+        return power / np.maximum(count, 1), count / _HANN
+
+
+def _parts(fit: Fit, index: int) -> list[_Part]:
+    """The parts of one run; none where it is shorter than one part."""
+    run, own = fit.problem.data.runs[index], resonance(fit, index)
+    cycles = run.reading.size * run.interval * own
+    wanted = max(2, -(-_PARTS // len(fit.residuals)))
+    count = min(wanted, int(cycles / _CYCLES))
+    values = run.unscaled(fit.residuals[index])
+    return [_part(values[p], run.reading[p] - values[p], run, own) for p in _pieces(values.size, count)]
+
+
+def _pieces(size: int, count: int) -> list[slice]:
+    length = size // max(count, 1)
+    return [slice(i * length, (i + 1) * length) for i in range(count)]
+
+
+def _part(values: Array, motion: Array, run: RunData, own: float) -> _Part:
+    window = np.hanning(values.size)
+    scale = run.noise_variance * float(window @ window)
+    power = np.abs(np.fft.rfft((values - values.mean()) * window)) ** 2 / scale
+    frequency = np.fft.rfftfreq(values.size, run.interval)
+    order = frequency / own
+    multiple = np.round(order)
+    beside = np.where(multiple > 0, np.abs(order - multiple) >= _BESIDE, True)
+    beside &= frequency * values.size * run.interval > _LOWEST
+    beside[-1] = False  # the ordinate at half the sampling rate has one degree of freedom
+    return _Part(np.asarray(frequency), np.asarray(power), beside, float(np.std(motion)))
+
+
+def _band_edges(low: float, high: float) -> Array:
+    """Edges of equal ratio, Hz, an octave or more apart."""
+    return np.geomspace(low, high, round(_OCTAVE_PARTS * np.log2(high / low)) + 1)
+
+
+def _steady(power: Array, count: Array) -> np.ndarray:
+    """Which bands have one level in all parts, by a likelihood ratio of gamma variables; shape (bands,).
+
+    Bartlett's correction makes the statistic nearly χ² for few ordinates (Proc. R. Soc. A 160 (1937) 268,
+    doi 10.1098/rspa.1937.0109).
+    """
+    total = count.sum(axis=0)
+    mean = np.sum(power * count, axis=0) / np.maximum(total, 1e-300)
+    ratio = np.where(count > 0, power, 1.0) / np.where(mean > 0.0, mean, 1.0)
+    ratio = np.maximum(np.where(count > 0, ratio, 1.0), 1e-300)
+    corrected = count / (1.0 + 1.0 / (6.0 * np.maximum(count, 1e-300)))
+    statistic = 2.0 * np.sum(corrected * (ratio - 1.0 - np.log(ratio)), axis=0)
+    freedom = np.sum(count > 0, axis=0) - 1
+    limit = chi2.isf(COLOUR_STEADY_RATE, np.maximum(freedom, 1))
+    return np.asarray((freedom > 0) & (mean > 0.0) & (statistic < limit))
+
+
+def _flat(level: Array, std: Array) -> bool:
+    """Whether the levels are one constant within the tolerance and chance."""
+    weight = 1.0 / (std**2 + FLOOR_TOLERANCE**2)
+    mean = float(weight @ level / weight.sum())
+    return float(weight @ (level - mean) ** 2) < float(chi2.isf(COLOUR_FALSE_ALARM_RATE, level.size - 1))
+
+
+def _slope(place: Array, level: Array, std: Array, stds: float) -> tuple[float, float]:
+    """Slope to assume below the lowest bands, theirs made steeper by standard deviations, and the size of one."""
+    use = slice(0, _SLOPE_BANDS)
+    weight = 1.0 / std[use] ** 2
+    centred = place[use] - float(weight @ place[use] / weight.sum())
+    power = float(weight @ centred**2)
+    slope, deviation = float((weight * centred) @ level[use]) / power, float(np.sqrt(1.0 / power))
+    return float(np.clip(slope - stds * deviation, -2.0, 0.0)), deviation
+
+
+def whitened(data: Data, colour: Colour) -> Data:
+    """The data with a filter that makes noise of a colour white.
+
+    Args:
+        data: prepared for white noise.
+        colour: of its noise.
+
+    Returns:
+        The runs with the filter and the variance of the innovations.
+    """
+    longest = max(run.reading.size for run in data.runs)
+    total = sum(run.reading.size for run in data.runs)
+    filters = {run.interval: _filter(colour, run.interval, longest, total) for run in data.runs}
+    return data.with_runs(
+        tuple(
+            replace(
+                run,
+                whitening=filters[run.interval][0],
+                noise_variance=run.noise_variance * filters[run.interval][1],
+            )
+            for run in data.runs
+        )
+    )
+
+
+def _filter(colour: Colour, interval: float, longest: int, total: int) -> tuple[Array, float]:
+    """Whitening filter at an interval (s), and the variance of the innovations over that of the white noise.
+
+    The Levinson recursion (S. M. Kay, Modern Spectral Estimation, 1988, sect. 6.3) stops at the order beyond which
+    all records together hold less than one nat of evidence for another; the gain of all further orders is known
+    from the spectrum (Kolmogorov).
+    """
+    size = 2 ** int(np.ceil(np.log2(8 * longest)))
+    frequency = np.maximum(np.arange(size // 2 + 1) / size, 0.25 / longest) / interval
+    spectrum = colour.at(frequency)
+    covariance = np.fft.irfft(np.exp(spectrum), size)
+    least = np.exp(np.mean(np.concatenate([spectrum, spectrum[-2:0:-1]])))
+    whitening, variance = np.ones(1), float(covariance[0])
+    while whitening.size <= _LONGEST and 0.5 * total * np.log(variance / least) > 1.0:
+        order = whitening.size
+        reflection = -float(whitening @ covariance[order:0:-1]) / variance
+        grown = np.append(whitening, 0.0)
+        whitening = grown + reflection * grown[::-1]
+        variance *= 1.0 - reflection**2
+    return whitening, variance

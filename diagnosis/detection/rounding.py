@@ -1,0 +1,110 @@
+"""The error of readings that lie on a lattice: white where noise or fast motion blurs the steps, else not.
+
+The rounding error of a slow motion follows the motion: it is not independent from sample to sample, averaging
+reduces it little, and it has power at the motion's frequency. How much is found by rounding the fitted motion again
+with other origins of the lattice.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.run_data import Data, RunData
+from tunnel_sim.vocabulary.record import Array
+
+#: Noise of this many steps makes the rounding error independent of the motion to within a ten-thousandth: the first
+#: harmonic of the error falls with exp(−4π²σ²/q²) (B. Widrow and I. Kollár, Quantization Noise, 2008, ch. 11).
+_BLURS = 0.5
+_REPETITIONS, _FEWEST, _SAMPLES = 16, 4, 2.5e6
+
+
+def seeded(fit: Fit) -> np.random.Generator:
+    """A generator seeded by the readings, so that one campaign is always compared with the same repetitions."""
+    return np.random.default_rng([zlib.crc32(run.reading.tobytes()) for run in fit.problem.data.runs])
+
+
+def samples(fit: Fit) -> int:
+    """Number of samples in all runs of a fit."""
+    return sum(run.reading.size * run.block for run in fit.problem.data.runs)
+
+
+def repeated(
+    fit: Fit, white: Mapping[str, float], step: float, count: int
+) -> Iterator[tuple[RunData, Array, Array]]:
+    """Read the fitted motion again, with white noise and a lattice of unknown origin.
+
+    Args:
+        fit: gives the motion.
+        white: standard deviation of a sample's noise before rounding, rad, by run id.
+        step: of the lattice, rad; 0 where there is none.
+        count: of the repetitions.
+
+    Yields:
+        Every run with the samples of its motion, shape (n,), and of the readings, shape (count, n), rad.
+    """
+    rng = seeded(fit)
+    for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
+        motion = _motion(run.reading - run.unscaled(residual), run.block)
+        reading = motion + white[run.id] * rng.standard_normal((count, motion.size))
+        if step > 0.0:
+            shift = step * rng.uniform(size=(count, 1))
+            # back to the angle: the origin belongs to the lattice, not to the motion
+            reading = step * np.round((reading + shift) / step) - shift
+        yield run, motion, reading
+
+
+def _motion(blocks: Array, block: int) -> Array:
+    """Samples of a motion from its block means."""
+    if block == 1:
+        return blocks
+    centres = np.arange(blocks.size) * block + 0.5 * (block - 1)
+    return np.asarray(CubicSpline(centres, blocks)(np.arange(blocks.size * block)), np.float64)
+
+
+def rounding_errors(fit: Fit, variance: Mapping[str, float], step: float) -> list[Array] | None:
+    """What noise and rounding alone leave in the block means.
+
+    Args:
+        fit: gives the motion.
+        variance: of one sample, rounding included, rad², by run id.
+        step: of the lattice, rad.
+
+    Returns:
+        By run, repetitions of it, shape (repetitions, blocks), rad; None where the noise is large enough to make
+        the rounding error white.
+    """
+    white = {run: float(np.sqrt(max(value - step**2 / 12.0, 0.0))) for run, value in variance.items()}
+    if min(white.values()) > _BLURS * step:
+        return None
+    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
+    return [
+        (reading - motion).reshape(count, run.reading.size, run.block).mean(axis=2)
+        for run, motion, reading in repeated(fit, white, step, count)
+    ]
+
+
+def with_rounding(data: Data, errors: Sequence[Array]) -> Data | None:
+    """The data with noise of block means that is not below the errors of rounding.
+
+    Args:
+        data: prepared for white noise.
+        errors: from `rounding_errors`.
+
+    Returns:
+        The runs, their noise variance raised where averaging does not reduce the errors as it reduces white noise;
+        at most to that of one sample. None where none is raised.
+    """
+    raised = [
+        float(np.clip(np.mean(error**2), run.noise_variance, run.noise_variance * run.block))
+        for run, error in zip(data.runs, errors, strict=True)
+    ]
+    if all(run.noise_variance == value for run, value in zip(data.runs, raised, strict=True)):
+        return None
+    runs = [replace(run, noise_variance=value) for run, value in zip(data.runs, raised, strict=True)]
+    return data.with_runs(tuple(runs))

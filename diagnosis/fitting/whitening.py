@@ -1,0 +1,96 @@
+"""Whitening of coloured noise: an autoregressive filter that is exact from the first value of a record on."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.signal import lfilter, lfiltic, oaconvolve
+
+from tunnel_sim.vocabulary.record import Array
+
+#: The filter of white noise, which changes nothing.
+WHITE: Array = np.ones(1)
+
+
+def whiten(values: Array, whitening: Array) -> Array:
+    """Predict every value from those before it, and keep the errors.
+
+    Args:
+        values: of a record, shape (n,), any unit.
+        whitening: the errors' filter, 1 and the negative autoregressive coefficients, shape (order + 1,).
+
+    Returns:
+        Shape (n,), of the values' unit. Noise of that spectrum becomes white with the variance of its innovations;
+        the first values are predicted from the fewer before them, and scaled to the same variance.
+    """
+    if whitening.size == 1:
+        return values
+    errors = oaconvolve(values, whitening)[: values.size]
+    start = _start(whitening.tobytes())[: values.size, : values.size]
+    errors[: len(start)] = start @ values[: len(start)]
+    return np.asarray(errors, np.float64)
+
+
+def colour(errors: Array, whitening: Array) -> Array:
+    """The values of which `whiten` makes these errors.
+
+    Args:
+        errors: shape (n,), any unit.
+        whitening: the filter, shape (order + 1,).
+
+    Returns:
+        The values, shape (n,), of the same unit.
+    """
+    if whitening.size == 1:
+        return errors
+    start = _start(whitening.tobytes())[: errors.size, : errors.size]
+    first = solve_triangular(start, errors[: len(start)], lower=True)
+    memory = lfiltic([1.0], whitening, first[::-1])
+    return np.concatenate([first, lfilter([1.0], whitening, errors[len(start) :], zi=memory)[0]])
+
+
+def response(whitening: Array, frequency: Array) -> np.ndarray:
+    """The frequency response of a whitening filter.
+
+    Args:
+        whitening: the filter, shape (order + 1,).
+        frequency: in cycles per value, any shape.
+
+    Returns:
+        Complex factor, of the frequency's shape.
+    """
+    return np.asarray(np.polynomial.polynomial.polyval(np.exp(-2j * np.pi * frequency), whitening))
+
+
+def colouring(whitening: Array) -> float:
+    """Standard deviation of noise over that of its innovations.
+
+    Args:
+        whitening: the filter, shape (order + 1,).
+
+    Returns:
+        The ratio, 1 or more.
+    """
+    return 1.0 if whitening.size == 1 else 1.0 / float(_start(whitening.tobytes())[0, 0])
+
+
+@lru_cache(maxsize=8)
+def _start(filter_bytes: bytes) -> Array:
+    """Predictors of the first values from all before them, over their standard deviation, shape (order, order).
+
+    The predictors of lower order follow from the filter by the Levinson recursion taken backwards (S. M. Kay,
+    Modern Spectral Estimation, 1988, sect. 6.3).
+    """
+    predictor = np.frombuffer(filter_bytes)
+    order = predictor.size - 1
+    rows = np.zeros((order, order))
+    variance = 1.0  # of the prediction error, in that of the whole filter
+    for m in range(order, 0, -1):
+        reflection = predictor[-1]
+        left = 1.0 - reflection**2
+        predictor = (predictor - reflection * predictor[::-1])[:-1] / left
+        variance /= left
+        rows[m - 1, :m] = predictor[::-1] / np.sqrt(variance)
+    return rows

@@ -1,0 +1,138 @@
+"""Coloured sensor noise is whitened and is no gap; turbulence, blows and effects are not taken for it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from diagnosis.detection import gap
+from diagnosis.detection.noise_colour import noise_colour
+from diagnosis.detection.noise_remarks import noise_remarks
+from diagnosis.detection.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
+from tests.unit.gap_campaigns import NOISE, campaign, nominal, with_blow
+from tests.unit.test_diagnosis_process_noise import buffeted
+from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.record import Record
+
+COLOURS = ("ar1", "ar2", "pink")
+
+
+def colour(name, count, rng):
+    """Noise of unit variance."""
+    white = rng.standard_normal(count + 2000)
+    if name == "pink":
+        frequency = np.fft.rfftfreq(white.size)
+        values = np.fft.irfft(np.fft.rfft(white) / np.sqrt(np.maximum(frequency, frequency[1])))
+    else:
+        values = lfilter([1.0], [1.0, -0.9] if name == "ar1" else [1.0, -1.6, 0.8], white)
+    return values[2000:] / np.std(values)
+
+
+def coloured(data, name, size=2.0, seed=1):
+    """The campaign with coloured noise added, its size in standard deviations of the white noise, none stated."""
+    rng = np.random.default_rng(seed)
+    runs = []
+    for run in data.runs:
+        yaw = run.record.yaw_rad + size * NOISE * colour(name, run.record.yaw_rad.size, rng)
+        runs.append(dataclasses.replace(run, record=Record(run.record.time_s, yaw)))
+    sensor = dataclasses.replace(data.sensor, noise_std=None)
+    return dataclasses.replace(data, runs=tuple(runs), sensor=sensor)
+
+
+def judged(data):
+    """Fit, noise and verdict."""
+    return gap.judge(
+        nominal(data), campaign_noise(data), noise_trend(data), step=reading_step(data), coarse_step=False
+    )
+
+
+@pytest.mark.parametrize("name", COLOURS)
+def test_coloured_noise_alone_is_not_a_gap(name):
+    fit, noise, found = judged(coloured(campaign(), name))
+    assert not found.detected
+    assert noise.colour is not None
+    # the lowest frequencies hold much of pink noise's power, and are known least
+    assert noise.std == pytest.approx(NOISE * np.sqrt(5.0), rel=0.25 if name == "pink" else 0.1)
+    assert abs(fit.excess) < 0.06
+    # were it taken for white noise, it would be one
+    assert min(gap.band_p_values(nominal(coloured(campaign(), name)))) < 1e-6
+
+
+@pytest.mark.parametrize("name", COLOURS)
+@pytest.mark.parametrize(
+    "effect", [effect_class("coulomb_friction")(0.003), effect_class("cubic_stiffness")(0.3)]
+)
+def test_an_effect_beneath_coloured_noise_is_still_a_gap(name, effect):
+    fit, noise, found = judged(coloured(campaign(effect), name))
+    assert found.detected
+    assert noise.colour is not None
+    assert fit.problem.data.runs[0].whitening.size > 1
+    assert min(found.tests, key=found.tests.__getitem__) in ("below", "f0", "offset")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_white_noise_is_left_alone(seed):
+    data = campaign(seed=seed)
+    before = nominal(data)
+    fit, noise, _ = gap.judge(
+        before, campaign_noise(data), noise_trend(data), step=reading_step(data), coarse_step=False
+    )
+    assert fit is before
+    assert noise.colour is None
+    assert all(run.whitening.size == 1 for run in fit.problem.data.runs)
+
+
+@pytest.mark.parametrize("keep", [(0.0, 15.0, 25.0), (15.0, 25.0), (25.0,)])
+def test_turbulence_is_not_taken_for_coloured_noise(keep):
+    """Not even where every run has it, at one wind speed."""
+    data = buffeted(campaign(), 0.01, 4.0)
+    data = dataclasses.replace(data, runs=tuple(run for run in data.runs if run.wind_speed in keep))
+    fit, noise, found = judged(data)
+    assert found.detected
+    assert noise.colour is None
+    assert fit.problem.data.runs[0].whitening.size == 1
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        with_blow(campaign(), 2e-3, 4.0),
+        campaign(effect_class("free_play")(0.01)),
+        campaign(effect_class("asymmetric_stiffness")(0.3)),
+    ],
+    ids=("blow", "free play", "asymmetric"),
+)
+def test_a_gap_beside_white_noise_leaves_it_white(data):
+    _, noise, found = judged(data)
+    assert found.detected
+    assert noise.colour is None
+
+
+def test_the_spectrum_and_its_uncertainty_are_those_of_the_noise():
+    """Truth: the spectrum of AR(1) noise beside white noise, from its formula."""
+    size, pole = 3.0, 0.9
+    colours = [noise_colour(nominal(coloured(campaign(seed=s), "ar1", size, seed=s))) for s in range(12)]
+    frequency = np.array([1.0, 3.0, 10.0, 60.0])
+    turn = np.exp(-2j * np.pi * frequency * 4e-3)
+    density = 1.0 + size**2 * (1.0 - pole**2) / np.abs(1.0 - pole * turn) ** 2
+    assumed = [campaign_noise(coloured(campaign(seed=s), "ar1", size, seed=s)).used for s in range(12)]
+    found = [
+        found.at(frequency) + np.log(variance / NOISE**2)
+        for found, variance in zip(colours, assumed, strict=True)
+    ]
+    scatter = np.std(found, axis=0, ddof=1)
+    assert np.all(np.abs(np.mean(found, axis=0) - np.log(density)) < 4.0 * scatter / np.sqrt(12) + 0.1)
+    claimed = np.array([[one.spread(np.array([f])) for f in frequency] for one in colours]).mean(axis=0)
+    assert np.all(scatter < 2.0 * claimed)
+    assert np.all(scatter > 0.25 * claimed)
+
+
+def test_what_is_said_of_the_noise():
+    slow = NoiseTrend(0.0, 0.0, 0.0, judged=False)
+    data = coloured(campaign(), "pink")
+    _, noise, _ = judged(data)
+    said = [str(remark) for remark in noise_remarks(noise, slow)]
+    assert f"noise is coloured: {noise.std:.3g} rad" in said[0]
+    assert "too slowly" in said[1]
+    assert noise_remarks(campaign_noise(campaign()), NoiseTrend(0.0, 0.0, 0.0)) == ()

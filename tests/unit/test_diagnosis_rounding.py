@@ -1,0 +1,87 @@
+"""Rounding of slow motions: its error is not white, is allowed for, and is not a gap."""
+
+import numpy as np
+import pytest
+
+from diagnosis.detection import gap
+from diagnosis.detection.rounding import rounding_errors, with_rounding
+from diagnosis.detection.sensor_noise import campaign_noise, lattice_step, noise_trend, reading_step
+from diagnosis.fitting.run_data import prepare
+from diagnosis.investigate import fit_nominal
+from tests.reference import free_decays
+from tests.reference.free_decays import Setting, with_records
+
+DEGREE = np.pi / 180.0
+SETTINGS = (Setting(16.12, 0.0), Setting(20.0, 0.0), Setting(16.12, 20.0), Setting(20.0, 20.0))
+
+
+def decays(rate, step, *, noise=1e-6, duration=6.0, seed=1):
+    """Four runs of the nominal model in closed form, at about 2 Hz, with next to no noise before rounding."""
+    return free_decays.campaign(
+        SETTINGS,
+        noise=noise,
+        stated_noise=None,
+        resolution=step,
+        rate=rate,
+        duration=duration,
+        rng=np.random.default_rng(seed),
+    )
+
+
+def judged(data):
+    """Fit, noise and verdict."""
+    noise = campaign_noise(data)
+    fit = fit_nominal(prepare(data, noise.variance))
+    return gap.judge(fit, noise, noise_trend(data), step=reading_step(data), coarse_step=False)
+
+
+@pytest.mark.parametrize(
+    ("rate", "step"), [(20.0, DEGREE), (100.0, DEGREE), (1000.0, DEGREE), (4000.0, 0.1 * DEGREE)]
+)
+def test_the_rounding_of_a_slow_motion_is_not_a_gap(rate, step):
+    _, noise, found = judged(decays(rate, step))
+    assert not found.detected, found.tests
+    assert noise.colour is None
+    assert all(value >= step**2 / 12.0 * (1.0 - 1e-9) for value in noise.variance.values())
+
+
+@pytest.mark.parametrize(("rate", "step"), [(20.0, DEGREE), (1000.0, DEGREE)])
+def test_a_motion_that_the_model_misses_is_a_gap_beside_the_rounding(rate, step):
+    def stiffening(time, yaw):
+        return step * np.round((yaw + 0.1 * np.exp(-0.3 * time) * np.sin(3.0 * np.pi * time)) / step)
+
+    assert judged(with_records(decays(rate, None), stiffening))[2].detected
+
+
+def test_noise_that_blurs_the_steps_needs_no_allowance():
+    data = decays(500.0, 4e-4, noise=4e-4)
+    noise = campaign_noise(data)
+    fit = fit_nominal(prepare(data, noise.variance))
+    assert rounding_errors(fit, noise.variance, reading_step(data)) is None
+    assert judged(data)[0].problem.data.runs[0].noise_variance == noise.variance["r01"] / 2
+
+
+def test_averaging_hardly_reduces_the_error_of_a_motion_slower_than_the_steps():
+    """Truth: a motion that stays within a few steps is off by a twelfth of a step's square, averaged or not."""
+    small = tuple(Setting(s.spring, s.speed, 2.0 * DEGREE) for s in SETTINGS)
+    data = free_decays.campaign(
+        small, noise=1e-6, stated_noise=None, resolution=DEGREE, rate=1000.0, duration=6.0,
+        rng=np.random.default_rng(2),
+    )  # fmt: skip
+    noise = campaign_noise(data)
+    fit = fit_nominal(prepare(data, noise.variance))
+    errors = rounding_errors(fit, noise.variance, reading_step(data))
+    allowed = with_rounding(fit.problem.data, errors)
+    for run, error in zip(allowed.runs, errors, strict=True):
+        assert run.block == 4
+        assert np.mean(error**2) == pytest.approx(DEGREE**2 / 12.0, rel=0.3)
+        assert run.noise_variance > 0.7 * noise.variance[run.id]
+
+
+@pytest.mark.parametrize("step", [DEGREE, 5e-4])
+def test_only_readings_on_a_lattice_have_its_step(step):
+    assert lattice_step(decays(200.0, step)) == pytest.approx(step, rel=1e-6)
+    printed = with_records(decays(200.0, DEGREE), lambda _time, yaw: np.round(yaw, 3))
+    assert lattice_step(printed) == pytest.approx(DEGREE, rel=0.06)
+    assert lattice_step(decays(200.0, None, noise=4e-4)) == 0.0
+    assert lattice_step(decays(200.0, None, noise=0.0)) == 0.0

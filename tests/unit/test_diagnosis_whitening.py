@@ -1,0 +1,49 @@
+"""Whitening: exact for autoregressive noise from the first value on, and nothing at all for white noise."""
+
+import numpy as np
+import pytest
+from scipy.linalg import cholesky, solve_triangular, toeplitz
+from scipy.signal import lfilter
+
+from diagnosis.fitting.run_data import RunData
+from diagnosis.fitting.whitening import WHITE, colour, colouring, response, whiten
+
+FILTERS = (np.array([1.0, -0.9]), np.array([1.0, -1.2, 0.6]), np.array([1.0, 0.5, 0.0, -0.3]))
+
+
+def autocovariance(whitening, count):
+    """Of the noise whose innovations have unit variance, from its impulse response."""
+    impulse = lfilter([1.0], whitening, np.eye(1, 5000)[0])
+    return np.array([impulse[: 5000 - k] @ impulse[k:] for k in range(count)])
+
+
+@pytest.mark.parametrize("whitening", FILTERS)
+def test_whitening_is_the_inverse_of_the_cholesky_factor(whitening):
+    """Truth: the triangular factor of the covariance matrix, from scipy's own factorisation."""
+    covariance = autocovariance(whitening, 12)
+    values = np.random.default_rng(1).normal(size=12)
+    expected = solve_triangular(cholesky(toeplitz(covariance), lower=True), values, lower=True)
+    assert whiten(values, whitening) == pytest.approx(expected, abs=1e-9)
+    assert colour(whiten(values, whitening), whitening) == pytest.approx(values, abs=1e-9)
+    # a record shorter than the filter is whitened by the same predictors
+    assert whiten(values[:2], whitening) == pytest.approx(expected[:2], abs=1e-9)
+    assert colour(expected[:2], whitening) == pytest.approx(values[:2], abs=1e-9)
+    assert colouring(whitening) == pytest.approx(np.sqrt(covariance[0]), rel=1e-9)
+
+
+def test_white_noise_is_left_as_it_is():
+    values = np.random.default_rng(2).normal(size=50)
+    assert whiten(values, WHITE) is values
+    assert colour(values, WHITE) is values
+    assert colouring(WHITE) == 1.0
+    assert np.array_equal(response(WHITE, np.array([0.0, 0.3])), [1.0, 1.0])
+
+
+def test_a_run_scales_a_sinusoid_by_its_response():
+    run = RunData("r1", np.zeros(4000), 4, 4e-3, 1e-6, None, 0.0, 0.0, 16.0, FILTERS[1])
+    wave = np.exp(2j * np.pi * 3.0 * run.interval * np.arange(4000))
+    scaled = run.scaled(wave.real) + 1j * run.scaled(wave.imag)
+    assert scaled[100:] / wave[100:] == pytest.approx(run.response(3.0) / 1e-3, rel=1e-9)
+    assert run.noise_at(3.0) == pytest.approx(1e-3 / abs(run.response(3.0)))
+    assert run.unscaled(run.scaled(wave.real)) == pytest.approx(wave.real, abs=1e-9)
+    assert run.noise_std == pytest.approx(1e-3 * np.sqrt(autocovariance(FILTERS[1], 1)[0]), rel=1e-9)
