@@ -126,7 +126,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
 def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
     """The study where the nominal model misses the motion itself: sets are weighed by their fits to stretches.
 
-    The answer's own fit is one of the whole runs.
+    The answer and its parts are fitted to the whole runs in the end.
     """
     data = found.nominal.problem.data
     with clock.step("effects"):
@@ -134,12 +134,12 @@ def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clo
     found = replace(found, hypotheses=grown.hypotheses, outsider=weigh_outsiders(grown.nominal))
     found = _pruned(found, grown.nominal, clock)
     weighed = _weighed(found, grown.nominal)
-    if weighed[0].effects != ("unknown",):
-        with clock.step("polishing"):
-            polished = _polished(found.hypotheses, weighed[0], ())
-            whole = [grown.whole(h, data) if h.names == weighed[0].effects else h for h in polished]
-            found = replace(found, hypotheses=tuple(whole))
-    return replace(found, weighed=tuple(weighed))
+    with clock.step("polishing"):
+        polished = _polished(found.hypotheses, weighed[0], ())
+        answer = set(weighed[0].effects)
+        whole = [grown.whole(h, data) if answer.issuperset(h.names) else h for h in polished]
+    kept = tuple(h for h in whole if h is not None)
+    return replace(found, hypotheses=kept, weighed=tuple(weighed))
 
 
 def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:

@@ -72,11 +72,11 @@ class InStretches:
     stretches: Stretches
     hypotheses: tuple[Hypothesis, ...]
 
-    def whole(self, hypothesis: Hypothesis, data: Data) -> Hypothesis:
-        """The hypothesis fitted to whole runs, from its fit to stretches; as it is where that fails."""
+    def whole(self, hypothesis: Hypothesis, data: Data) -> Hypothesis | None:
+        """The hypothesis fitted to whole runs, from its fit to stretches; None where that fails."""
         with suppress(FitError, np.linalg.LinAlgError):
             return replace(hypothesis, fit=fit_longer(hypothesis.fit, self.stretches, data)[0])
-        return hypothesis
+        return None
 
 
 @dataclass(frozen=True, eq=False)
