@@ -69,7 +69,7 @@ ALWAYS_FITTED = 7
 #: Predicted drop, as a share of χ², beyond which others are fitted too. Judgement.
 PREDICTED_SHARE = 0.01
 #: Sets of each size to which another effect is added, and effects fitted to each. Judgement: time against coverage.
-GROWN_FROM, GROWN_BY = 3, 4
+GROWN_FROM, GROWN_BY = 2, 4
 #: Excess, in that of the best set of its size, up to which another set is grown. Judgement: time against coverage.
 BEAM_WIDTH = 3.0
 #: Factor by which the evidence for a set may fall when an effect is added, for the growth to go on. Judgement: of
