@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import lsq_linear
-from scipy.signal import savgol_filter
+from scipy.signal import detrend, savgol_filter
 
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData
@@ -39,7 +39,10 @@ def equation_error_start(problem: Problem) -> Point | None:
     for run, own_zero in zip(data.runs, own, strict=True):
         zero = own_zero if data.own_zeros else common_zero
         angle, rate, acceleration = _smoothed(run, zero)
-        start = (float(run.reading[0] - zero), float(rate[: max(1, rate.size // 200)].mean()))
+        start = (
+            float(angle[0] if run.derivative else run.reading[0] - zero),
+            float(rate[: max(1, rate.size // 200)].mean()),
+        )
         releases.append((*start, zero) if data.own_zeros else start)
         edge = max(3, angle.size // 100)
         inside = slice(edge, -edge)
@@ -81,6 +84,8 @@ def _smoothed(run: RunData, zero: float) -> tuple[Array, Array, Array]:
     period = 2.0 * run.interval * values.size / max(len(crossings), 2)
     length = max(2 * int(0.5 * _SMOOTHING * period / run.interval) + 1, _ORDER + 2 + _ORDER % 2)
     length = min(length, values.size - 1 + values.size % 2)
+    for _ in range(run.derivative):  # a rate's integral, whose drift is the zero's error
+        values = detrend(np.cumsum(values) * run.interval)
     found = [savgol_filter(values, length, _ORDER, deriv=k, delta=run.interval) for k in range(3)]
     return found[0], found[1], found[2]
 

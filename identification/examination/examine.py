@@ -8,6 +8,7 @@ from identification.campaign.derivatives import loads
 from identification.examination.clock import with_clocks
 from identification.examination.growth import growing_runs
 from identification.examination.labels import exchanged_labels
+from identification.examination.rates import noted_quantity
 from identification.examination.release import find_release
 from identification.examination.repeated import without_repeats
 from identification.examination.spring_line import springs_off_the_line
@@ -40,7 +41,7 @@ def examine(campaign: Campaign) -> Examined:
     kept, repeats = without_repeats(campaign)
     if any(remark.outcome is Outcome.REFUSED for remark in repeats):
         return Examined(campaign, repeats)
-    noted = wide_swings(kept)
+    noted = (*noted_quantity(kept), *wide_swings(kept))
     kept, clocks = with_clocks(kept)
     kept, releases = from_releases(kept)
     kept, zeros = with_zeros(kept)
