@@ -39,6 +39,10 @@ def diagnose(
     examined = examine(campaign).accepted()
     refuse_hopeless(examined.campaign)
     campaign, left_out = comparable_runs(examined.campaign)
+    if campaign.sensor.derivative:
+        # Their sizes are those of angles, and their ranges too.
+        kinds = [kind for kind in kinds if kind.channel != "sensor"]
+        left_out = (*left_out, f"Effects of the sensor are not tried on {campaign.sensor.quantity}s.")
     study = investigate(campaign, kinds, progress)
     if progress is not None:
         progress("where, and how far it closes")

@@ -7,6 +7,7 @@ from dataclasses import replace
 from identification.estimate import Estimate, RunEstimate, Status, by_gravity
 from identification.estimators import Estimator, make_estimator
 from identification.examination.examine import examine
+from identification.examination.rates import as_angles
 from identification.remark import Examined
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -37,7 +38,8 @@ def identify(
     if not campaign.runs:
         raise TunnelError("campaign without runs", where=campaign.name, remedy="add at least one run")
     examined = examine(campaign).accepted()
-    estimate = _of_all_runs(campaign, examined, chosen.estimate(examined.campaign))
+    estimate = as_angles(chosen.estimate(examined.campaign), campaign.sensor)
+    estimate = _of_all_runs(campaign, examined, estimate)
     if throw and estimate.status.failed:
         what, _, remedy = estimate.status.value.partition(": ")
         raise TunnelError(what, where=campaign.name, remedy=remedy)

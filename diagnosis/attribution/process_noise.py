@@ -179,7 +179,7 @@ def _simplex(start: Array, bounds: Array) -> Array:
 
 def _channel(fit: Fit, run_index: int) -> _Channel | None:
     run = fit.problem.data.runs[run_index]
-    if not run.wind_on:
+    if not run.wind_on or run.derivative:  # the filter's reading is an angle
         return None
     inertia, damping, stiffness = linear_coefficients(fit, run_index)
     if stiffness <= 0.0 or damping <= 0.0:

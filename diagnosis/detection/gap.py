@@ -215,5 +215,5 @@ def _under_rounding(fit: Fit, errors: Sequence[Array]) -> tuple[Array, Array]:
         count = np.array([*(max(place.size, 1) for _, place in bands), 0.5 * len(residuals)])
         found.append([*(float(power.sum()) for power, _ in bands), 0.5 * _offsets(residuals)] / count)
     level = np.mean(found, axis=0)
-    beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-300) ** 2 - 1.0 / count
+    beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
     return np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))

@@ -231,9 +231,10 @@ def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
 
 
 def _forced_gain(fit: Fit, run_index: int, frequency: float) -> complex:
-    """Angle per unit moment coefficient at a frequency, rad."""
+    """Reading per unit moment coefficient at a frequency."""
     data: Data = fit.problem.data
     run = data.runs[run_index]
     inertia, damping, stiffness = linear_coefficients(fit, run_index)
     omega = 2.0 * np.pi * frequency
-    return complex(data.air_moment(run) / (stiffness - inertia * omega**2 + 1j * omega * damping))
+    gain = data.air_moment(run) / (stiffness - inertia * omega**2 + 1j * omega * damping)
+    return complex(gain * (1j * omega) ** run.derivative)

@@ -82,7 +82,7 @@ def _backbone(fit: Fit, index: int, run: RunData, start: float) -> Backbone:
     return Backbone(
         run.id,
         np.array([start + w.start_s + 0.5 * w.duration_s for w in windows]),
-        np.array([w.amplitude.value for w in windows]),
+        np.array([w.amplitude.value / w.omega_n.value**run.derivative for w in windows]),
         np.array([w.omega_n.value for w in windows]) / (2.0 * np.pi),
         np.array([w.omega_n.std for w in windows]) / (2.0 * np.pi),
         np.array([w.zeta.value for w in windows]),

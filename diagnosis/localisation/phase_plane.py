@@ -68,9 +68,12 @@ def motion(fit: Fit, index: int) -> tuple[Array, Array]:
         Angle from the zero, rad, and rate over the angular frequency, rad, each of shape (n,).
     """
     run: RunData = fit.problem.data.runs[index]
-    angle = run.reading - run.unscaled(fit.residuals[index]) - fit.zero(index)
+    reading = run.reading - run.unscaled(fit.residuals[index]) - fit.zero(index)
     omega = 2.0 * np.pi * resonance(fit, index)
-    return angle, np.gradient(angle, run.interval) / omega
+    slope = np.gradient(reading, run.interval) / omega
+    # Each derivative of an oscillation leads by a quarter cycle and is ω times as large.
+    angle, rate = ((reading, slope), (-slope, reading), (-reading, -slope))[run.derivative]
+    return angle / omega**run.derivative, rate / omega**run.derivative
 
 
 def apparent_moment(fit: Fit, index: int) -> Apparent | None:
@@ -81,13 +84,13 @@ def apparent_moment(fit: Fit, index: int) -> Apparent | None:
         index: of the run.
 
     Returns:
-        The moment; None where the run is sampled too slowly or too short.
+        The moment; None where the run is sampled too slowly or too short, or the reading is not an angle.
     """
     run = fit.problem.data.runs[index]
     inertia, damping, stiffness = linear_coefficients(fit, index)
     frequency = resonance(fit, index)
     width = 2 * round(0.5 * _WINDOW / (frequency * run.interval)) + 1
-    if width < 5 or width > run.reading.size // 4:
+    if run.derivative or width < 5 or width > run.reading.size // 4:
         return None
     kernel = _kernel(width, run.interval, frequency, (stiffness, damping, inertia))
     scale = float(run.noise_at(frequency))

@@ -8,8 +8,10 @@ from identification.campaign.derivatives import loads
 from identification.examination.clock import with_clocks
 from identification.examination.growth import growing_runs
 from identification.examination.labels import exchanged_labels
+from identification.examination.rates import noted_quantity
 from identification.examination.release import find_release
 from identification.examination.repeated import without_repeats
+from identification.examination.rest import without_rest
 from identification.examination.spring_line import springs_off_the_line
 from identification.examination.swings import swing_of
 from identification.examination.turns import wide_swings
@@ -23,8 +25,9 @@ def examine(campaign: Campaign) -> Examined:
     """Check a campaign's records against one another and against what is stated of them.
 
     Repeated records are counted once. Rounded time stamps are replaced by the clock behind them. Samples before
-    the release are cut off. Runs whose zeros differ get one each. Motion that grows with the wind off, and springs
-    or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies are noted.
+    the release, and most of a long rest beside the centre, are cut off. Runs whose zeros differ get one each.
+    Motion that grows with the wind off, and springs or wind speeds assigned to the wrong runs, are refused. Springs
+    that do not fit the frequencies are noted.
 
     Args:
         campaign: measured or simulated runs.
@@ -40,13 +43,14 @@ def examine(campaign: Campaign) -> Examined:
     kept, repeats = without_repeats(campaign)
     if any(remark.outcome is Outcome.REFUSED for remark in repeats):
         return Examined(campaign, repeats)
-    noted = wide_swings(kept)
+    noted = (*noted_quantity(kept), *wide_swings(kept))
     kept, clocks = with_clocks(kept)
     kept, releases = from_releases(kept)
+    kept, rests = without_rest(kept)
     kept, zeros = with_zeros(kept)
     swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
     faults = growing_runs(swings) or exchanged_labels(swings) or springs_off_the_line(swings)
-    return Examined(kept, (*repeats, *noted, *clocks, *releases, *zeros, *faults))
+    return Examined(kept, (*repeats, *noted, *clocks, *releases, *rests, *zeros, *faults))
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

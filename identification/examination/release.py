@@ -57,7 +57,12 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
         return 0
     crossings, largest, out = _crossings(record, sensor, float(np.median(later.yaw_rad)), frequency)
     held = _last_long_stretch(crossings, largest)
-    if held is None and largest == 1 and out[0] > _SLOWER * (crossings[1] - out[1]) + 0.5:
+    if (
+        held is None
+        and largest == 1
+        and crossings.size > 2
+        and out[0] > _SLOWER * (crossings[1] - out[1]) + 0.5
+    ):
         held = 0
     return 0 if held is None else _standstill(record, crossings, held)
 

@@ -24,9 +24,9 @@ class Centre:
 
     Args:
         run: the run.
-        zero: in the unit of the reading.
-        std: its standard deviation, which includes the change along the run.
-        swing: half the largest distance of two neighbouring peaks.
+        zero: rad (rad/s or rad/s² where the reading is a rate or an acceleration).
+        std: its standard deviation, in the same unit; it includes the change along the run.
+        swing: half the largest distance of two neighbouring peaks, in the same unit.
     """
 
     run: Run

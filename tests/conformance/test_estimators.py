@@ -8,8 +8,9 @@ import pytest
 
 from identification import Estimate, Status, identify
 from identification.estimators import ALL_ESTIMATORS, ENTRIES, make_estimator
-from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, campaign, with_records
+from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, angle_of, campaign, with_records
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
 
 NAMES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 # Relative error on a noise-free campaign of the nominal model, where it is not ORDINARY_ACCURACY.
@@ -235,3 +236,49 @@ def test_empty_campaign_is_bad_input(noisy):
 def test_every_status_says_what_to_do():
     for status in Status:
         assert status is Status.OK or len(status.value.split(": ", 1)) == 2
+
+
+def uneven(data):
+    """Each run keeps nine tenths of its samples, at random, and loses 30 ms at once."""
+    rng = np.random.default_rng(12)
+    runs = []
+    for run in data.runs:
+        time = run.record.time_s
+        kept = (rng.uniform(size=time.size) < 0.9) & ((time < 1.0) | (time > 1.03))
+        runs.append(replace(run, record=Record(time[kept], run.record.yaw_rad[kept])))
+    return replace(data, runs=tuple(runs))
+
+
+@each_estimator
+def test_samples_may_be_missing(name, noisy):
+    estimate = identify(uneven(noisy), name)
+    assert "samples are missing" in estimate.remarks[0].what
+    for quantity in NAMES:
+        found, truth = getattr(estimate, quantity), getattr(Truth(), quantity)
+        assert abs(found.value - truth) < 6.0 * found.std + accuracy(name) * abs(truth)
+
+
+@each_estimator
+def test_a_rate_has_the_frequency_and_the_damping_of_the_angle(name):
+    step = 1e-4
+    settings = TWELVE[:2]
+    truth = Truth()
+    data = campaign(settings)
+    rates = []
+    for run, setting in zip(data.runs, settings, strict=True):
+        time = run.record.time_s + step
+        rate = (angle_of(setting, truth, time + step) - angle_of(setting, truth, time - step)) / (2.0 * step)
+        rates.append(replace(run, record=Record(time, rate)))
+    sensor = replace(data.sensor, quantity="rate")
+    found = checked(identify(replace(data, runs=tuple(rates), sensor=sensor), name), data)
+    angles = identify(data, name)
+    assert "rates" in found.remarks[0].what
+    for one, other in zip(found.runs, angles.runs, strict=True):
+        allowed = 10.0 * accuracy(name) + 1e-6
+        assert one.omega_n.value == pytest.approx(other.omega_n.value, rel=allowed)
+        assert one.zeta.value == pytest.approx(other.zeta.value, rel=10.0 * allowed)
+        assert one.initial_angle is None
+        assert one.sensor_zero is None or one.sensor_zero.unit == "rad/s"
+        for window, same in zip(one.windows, other.windows, strict=False):
+            assert window.amplitude.value == pytest.approx(same.amplitude.value, rel=0.02)
+            assert window.amplitude.unit == "rad"

@@ -48,6 +48,27 @@ def test_a_record_may_start_anywhere_in_the_swing(start):
     assert find_release(Record(record.time_s[start:], record.yaw_rad[start:]), SensorProperties()) == 0
 
 
+@pytest.mark.parametrize("cycles", [0.5, 0.6, 0.7])
+@pytest.mark.parametrize("angle", [ANGLE, -ANGLE])
+def test_a_hand_that_pulls_the_body_aside_is_known_by_its_slowness(cycles, angle):
+    free = run("r", 16.0, 0.0, angle=angle)
+    pull = np.arange(round(cycles * 2.0 * np.pi / np.sqrt(160.0) * RATE))
+    before = angle * np.sin(0.5 * np.pi * pull / pull.size) + 0.003
+    found = find_release(
+        reading(free, np.concatenate([before, free.record.yaw_rad])).record, SensorProperties()
+    )
+    assert abs(found - pull.size) <= 0.02 * RATE
+
+
+def test_the_release_is_found_at_uneven_times():
+    free = run("r", 16.0, 0.0)
+    held = reading(free, np.concatenate([np.full(HELD, free.record.yaw_rad[0]), free.record.yaw_rad])).record
+    kept = np.random.default_rng(3).uniform(size=held.time_s.size) > 0.2
+    uneven = Record(held.time_s[kept], held.yaw_rad[kept])
+    found = find_release(uneven, SensorProperties())
+    assert uneven.time_s[found] == pytest.approx(HELD / RATE, abs=0.006)
+
+
 def test_a_plateau_of_a_clipping_sensor_is_no_hold():
     record = run("r", 16.0, 0.0).record
     clipped = Record(record.time_s, np.clip(record.yaw_rad, -0.2, 0.2))
