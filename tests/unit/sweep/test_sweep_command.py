@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -176,6 +177,33 @@ def test_what_runs_cannot_give_is_no_failure(here, tmp_path: Path) -> None:
     assert {"omega_n", "zeta"} <= {line.quantity for line in lines}
     assert not {"cn_beta", "cn_r", "sensor_zero"} & {line.quantity for line in lines}
     assert all(line.score.failures.count == 0 for line in lines)
+
+
+def test_damaged_times_are_named_and_can_be_removed(
+    sweep: Sweep, here, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Times have no checksum; a FIFO in the place of a file would block whoever opens it."""
+    run_sweep(sweep, tmp_path / "out", here)
+    first, second, *others = sorted((tmp_path / "out" / "timings").iterdir())
+    first.unlink()
+    second.unlink()
+    os.mkfifo(second)
+    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 2
+    assert f"{second}: cannot be read (it is not a regular file); remove it" in unwrapped(capsys)
+    second.unlink()
+    pl.DataFrame({"step": ["pack"]}).write_parquet(second)
+    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 2
+    assert "is not a table of times" in unwrapped(capsys)
+    second.unlink()
+    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
+    assert "Time per run" in capsys.readouterr().out
+    for path in others:
+        path.unlink()
+    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
+
+
+def unwrapped(capsys: pytest.CaptureFixture[str]) -> str:
+    return capsys.readouterr().err.replace("\n", "")
 
 
 def test_a_figure_without_quantities_to_draw_is_none() -> None:
