@@ -104,6 +104,13 @@ def quiet_torch():
         yield
 
 
+def test_the_weight_of_the_errors_stays_above_zero_where_every_pair_is_used_up():
+    """As many pairs as directions, a prior far below: N − γ is below the rounding error of N."""
+    new = updated(Hyperparameters(1e-20, 1.0), np.ones(8), 1e-3, 1.0, 8)
+    assert new.beta > 0.0
+    assert np.isfinite(log_evidence(new, np.ones(8), 1e-3, 1.0, (8, 541)))
+
+
 def test_every_step_lowers_the_cost_it_was_taken_for():
     problem = Problem.of(training_pairs(SHORT.data, DAMPING), SIZES[DAMPING], unit_deviation=False)
     progress = Progress(first_weights(problem.sizes, np.random.default_rng(1)))
