@@ -161,6 +161,26 @@ def test_the_same_seed_gives_the_same_bits_at_any_thread_count(kind: type[Effect
 
 
 @each_effect
+def test_without_its_random_part_an_effect_is_refused_rather_than_left_out(kind: type[Effect]) -> None:
+    times = np.arange(100) / 100.0
+
+    def applied(effect: Effect) -> None:
+        chain = EffectChain(WIND_ON, (effect,), (None,))
+        chain.physics()
+        chain.angle(np.zeros(100), chain.true_times(times))
+
+    applied(kind())  # the null does nothing, drawn or not
+    if example(kind).draw(WIND_ON, np.random.default_rng(1)) is None:
+        applied(example(kind))
+        return
+    with pytest.raises(
+        TunnelError, match=f"effect {kind.name}: the random part of the run is missing"
+    ) as caught:
+        applied(example(kind))
+    assert str(caught.value).isprintable()
+
+
+@each_effect
 def test_another_seed_gives_another_draw_only_where_one_is_drawn(kind: type[Effect]) -> None:
     quiet = SensorModel(noise_std=0.0, resolution=0.0)
     one, other = (
