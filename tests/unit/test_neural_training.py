@@ -25,7 +25,7 @@ from identification.neural.network import parameter_count
 from identification.neural.networks import held_out_errors
 from identification.neural.shape import network_inputs, response_points
 from identification.neural.train import TrainingSpec, train
-from identification.neural.training_set import DAMPING, SIZES, DataSpec, training_pairs
+from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, training_pairs
 from tunnel_sim.vocabulary.errors import TunnelError
 
 SHORT = TrainingSpec(seed=5, data=DataSpec(zeta_count=40, grid=(5, 9), test_count=50), starts=2,
@@ -136,6 +136,19 @@ def test_a_short_training_repeats_to_the_bit_and_another_seed_does_not():
     assert first.weights == second.weights
     assert first.record == second.record
     assert train(replace(SHORT, seed=6)).weights != first.weights
+
+
+def test_the_record_says_why_each_training_stopped():
+    kept = []
+    train(SHORT, keep=kept.append)
+    stuck = next(held for held in kept if len(held.ended) == 1 and held.running is not None)
+    stuck = replace(stuck, running=replace(stuck.running, finished=True))
+    starts = [
+        start for net in train(SHORT, resume=stuck).record["networks"].values() for start in net["starts"]
+    ]
+    said = [(start["stopped_because"], start["steps"]) for start in starts]
+    whole = [("all steps taken", SHORT.steps(which)) for which in (DAMPING, FREQUENCY) for _ in range(2)]
+    assert said == [whole[0], ("no step lowers F", 1), *whole[2:]]
 
 
 @pytest.mark.parametrize("stop", [3, 6, 15, 27])

@@ -7,6 +7,8 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import polars as pl
 import pytest
@@ -20,6 +22,7 @@ from tunnel_lab.sweep.product import Sweep
 from tunnel_lab.sweep.reading import read_sweep
 from tunnel_lab.sweep.rows import RESULT_COLUMNS
 from tunnel_lab.sweep.summary import Line, _lines, summarise
+from tunnel_sim.vocabulary.errors import TunnelError
 
 EFFECT = 'name = "coulomb_friction"\nparameters = { friction_moment = [0.002, 0.02] }'
 
@@ -167,6 +170,39 @@ def test_figures_by_hand() -> None:
     assert (ten.bias.std, ten.coverage.value) == (pytest.approx(0.0, abs=1e-9), 0.0)
     assert one.rmse.value == pytest.approx(((1.0 + 1.0 + 100.0) / 3.0) ** 0.5)
     assert one.coverage.value == pytest.approx(2.0 / 3.0)
+
+
+def test_each_line_has_the_rows_of_one_estimator_and_quantity_that_were_asked(tmp_path: Path) -> None:
+    """Left out are rows without a truth, and values that the runs cannot give; any other status is a failure."""
+    good, none = hand_made([2.02, 1.98]), hand_made([None, None], "no_wind_on")
+    given = hand_made([2.2]).with_columns(pl.lit("no_wind_on").alias("status"))
+    failed, untrue = (
+        hand_made([None], "raised"),
+        hand_made([2.0]).with_columns(truth=pl.lit(None, pl.Float64)),
+    )
+    parts = [
+        part.with_columns(estimator=pl.lit(estimator), quantity=pl.lit(quantity))
+        for estimator, quantity, *some in (
+            ("a", "zeta", good, none, given, failed, untrue),
+            ("a", "omega_n", good),
+            ("b", "zeta", good, failed, failed),
+            ("b", "omega_n", none),
+        )
+        for part in some
+    ]
+    document = SimpleNamespace(estimators=["a", "b"])
+    store: Any = SimpleNamespace(
+        scan=lambda: pl.concat(parts).lazy(), sweep=SimpleNamespace(document=document), folder=tmp_path
+    )
+    found = {
+        (line.estimator, line.quantity): (line.score.count, line.score.failures.count)
+        for line in summarise(store)
+        if line.axis == "all"
+    }
+    assert found == {("a", "zeta"): (4, 1), ("a", "omega_n"): (2, 0), ("b", "zeta"): (4, 2)}
+    document.estimators = []
+    with pytest.raises(TunnelError, match="the sweep has no estimators"):
+        summarise(store)
 
 
 def test_what_runs_cannot_give_is_no_failure(here, tmp_path: Path) -> None:
