@@ -134,6 +134,17 @@ def test_fits_take_shorter_steps_for_a_faster_body() -> None:
     assert found == [1, 2, 6]
 
 
+@pytest.mark.parametrize("interval", [4e-3, 2e-2, 1.0])
+def test_a_fit_does_not_follow_a_body_too_fast_for_any_record(interval: float) -> None:
+    """A trial inertia near zero once took 24,000 steps per block mean, a diagnosis minutes instead of seconds."""
+    inertia = PLAIN.spring_stiffness / (np.pi / interval) ** 2  # half a turn per block mean: still followed
+    slow, fast, least = (
+        fit_substeps(replace(PLAIN, yaw_inertia=inertia / factor), interval) for factor in (1.0, 100.0, 1e9)
+    )
+    assert interval / slow * np.pi / interval <= 0.055 * (1.0 + 1e-12)
+    assert fast == least <= 2 * slow
+
+
 def test_the_rod_s_free_frequency_is_below_that_on_a_spring() -> None:
     twist = RodTwist(1e-3, 0.2)
     assert twist.free_frequency(0.1) == pytest.approx(np.sqrt(1.0 / (1e-3 * 0.1 * 0.2 * 0.8)), rel=1e-12)
