@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fuzz import readers, tables, trials
+from tests.fuzz import readers, tables, trials, values
 from tests.fuzz.summary import causes, causes_table
 from tests.fuzz.trials import Outcome, run_trial
 from tests.fuzz.workers import run_trials
@@ -50,6 +50,17 @@ def test_seed_and_number_alone_decide_a_trial():
     first = [run_trial(7, index) for index in range(5)]
     assert [run_trial(7, index).verdict for index in reversed(range(5))] == [o.verdict for o in first][::-1]
     assert [trials.chosen(7, index)[1] for index in range(5)] == [o.target for o in first]
+
+
+@pytest.mark.parametrize(
+    "value",
+    [10**400, -(10**400), 2**63, 1.7976931348623157e308, 0.5],
+    ids=lambda value: f"{len(str(value))} characters",
+)
+def test_any_number_can_be_moved(value):
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        values.moved_number(value, rng)
 
 
 def planted(folder: Path, _rng: np.random.Generator) -> None:
