@@ -68,8 +68,8 @@ def whole_steps(sample_rate: float) -> float:
 def fit_substeps(run: RunSettings, interval: float) -> int:
     """How many steps the fits take from one block mean to the next.
 
-    A fit may try a body that turns more than half a turn between block means. Such a body is not followed: the steps
-    are too long for it, and its motion decays at once or grows without bound.
+    A fit may try a body that turns more than half a turn between block means. Such a body is not followed: the
+    steps are too long for it, and its motion decays at once or grows without bound.
 
     Args:
         run: the run's physics, effects included.
