@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fuzz import readers, tables, trials, values
+from tests.fuzz import campaigns, readers, tables, trials, values
 from tests.fuzz.summary import causes, causes_table
 from tests.fuzz.trials import Outcome, run_trial
 from tests.fuzz.workers import run_trials
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
 
 SEED = 1
 READER_TRIALS, IDENTIFY_TRIALS = 2000, 60
@@ -61,6 +62,13 @@ def test_any_number_can_be_moved(value):
     rng = np.random.default_rng(1)
     for _ in range(50):
         values.moved_number(value, rng)
+
+
+@pytest.mark.parametrize("change", campaigns.READINGS)
+@pytest.mark.parametrize("count", [2, 8, 300])
+def test_changed_readings_are_still_a_record(change, count):
+    for seed in range(30):
+        Record(*change(np.arange(count) / 50.0, np.cos(np.arange(count)), np.random.default_rng(seed)))
 
 
 def planted(folder: Path, _rng: np.random.Generator) -> None:
