@@ -138,6 +138,15 @@ def test_a_short_training_repeats_to_the_bit_and_another_seed_does_not():
     assert train(replace(SHORT, seed=6)).weights != first.weights
 
 
+def test_the_progress_is_the_work_done_of_all_work():
+    told = []
+    train(SHORT, tell=lambda done, _text: told.append(done))
+    steps = [SHORT.work(which) for which in (DAMPING, FREQUENCY) for _ in range(2 * SHORT.steps(which))]
+    assert sorted(set(told)) == np.cumsum(steps).tolist()
+    assert told == sorted(told)
+    assert told[-1] == SHORT.total_work
+
+
 def test_the_record_says_why_each_training_stopped():
     kept = []
     train(SHORT, keep=kept.append)

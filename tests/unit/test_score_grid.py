@@ -140,6 +140,8 @@ def test_trials_survive_the_disk(small, tmp_path):
     assert (again.grid, again.estimators) == (small, NAMES)
     frame = scores_frame(results)
     assert frame.height == 2 * 2 + 2 * 4
+    for name, kind in (("zeta", "decay"), ("frequency_hz", "decay"), ("wind_speed_m_per_s", "campaign")):
+        assert (frame[name].is_not_null() == (frame["kind"] == kind)).all()  # what a cell has not is left out
     assert frame["coverage_low"].is_between(0.0, 1.0).all()
 
 

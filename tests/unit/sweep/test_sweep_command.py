@@ -172,6 +172,41 @@ def test_figures_by_hand() -> None:
     assert one.coverage.value == pytest.approx(2.0 / 3.0)
 
 
+def test_errors_about_a_truth_of_zero_are_in_its_unit() -> None:
+    rows = hand_made([0.02, -0.02, 0.1, 0.1]).with_columns(truth=pl.lit(0.0), unit=pl.lit("rad"))
+    for truth, unit, rmse in ((0.0, "rad", 0.1), (-1.0, "%", 110.0)):
+        *_, last = _lines(rows.with_columns(truth=pl.lit(truth)), "e", "sensor_zero")
+        assert (last.score.rmse.value, last.score.rmse.unit) == (pytest.approx(rmse), unit)
+
+
+def test_a_row_of_the_csv_is_its_line_with_intervals() -> None:
+    overall, *_ = _lines(hand_made([2.02, 1.98, 2.2, 2.2, None, 2.2], "raised"), "e", "zeta")
+    row = overall.to_row()
+    assert (row["axis"], row["at"], row["unit"], row["count"]) == ("all", None, "%", 6)
+    assert (row["bias"], row["rmse"]) == (pytest.approx(6.0), pytest.approx((302.0 / 5.0) ** 0.5))
+    assert (row["failures"], row["coverage"]) == (pytest.approx(1.0 / 6.0), pytest.approx(0.4))
+    for name in ("failures", "coverage"):
+        assert 0.0 < row[f"{name}_low"] < row[name] < row[f"{name}_high"] < 1.0
+    none, *_ = _lines(hand_made([None, None], "raised"), "e", "zeta")
+    empty = none.to_row()
+    assert empty["failures"] == 1.0
+    assert [empty[name] for name in ("unit", "bias", "rmse_std", "coverage", "coverage_low")] == [None] * 5
+
+
+def test_a_figure_has_a_column_of_panels_for_each_quantity() -> None:
+    values = {"zeta": [2.02, 1.98, 2.2, 2.2], "omega_n": [2.0, 2.02, 2.04, 2.08]}
+    lines = [line for name, some in values.items() for line in _lines(hand_made(some), "e", name)]
+    along = [line for line in lines if line.axis == "noise_std"]
+    drawn = figures.error_figure(along)
+    assert drawn is not None
+    panels = [[line.get_ydata().tolist() for line in axes.get_lines()[:1]] for axes in drawn.axes]
+    wanted = [[quantity, figure] for quantity in ("omega_n", "zeta") for figure in ("rmse", "bias")]
+    assert panels == [
+        [[getattr(line.score, figure).value for line in along if line.quantity == quantity]]
+        for quantity, figure in wanted
+    ]
+
+
 def test_each_line_has_the_rows_of_one_estimator_and_quantity_that_were_asked(tmp_path: Path) -> None:
     """Left out are rows without a truth, and values that the runs cannot give; any other status is a failure."""
     good, none = hand_made([2.02, 1.98]), hand_made([None, None], "no_wind_on")
