@@ -167,11 +167,17 @@ PARTIAL = {
 }
 
 
+@cache
+def partial_campaign(case):
+    settings, options, *_ = PARTIAL[case]
+    return campaign(settings, noise=5e-4, rng=np.random.default_rng(5), **options)
+
+
 @each_estimator
 @pytest.mark.parametrize("case", PARTIAL)
 def test_partial_campaigns_give_what_they_can_and_say_the_rest(name, case):
-    settings, options, status, expected = PARTIAL[case]
-    data = campaign(settings, noise=5e-4, rng=np.random.default_rng(5), **options)
+    _, _, status, expected = PARTIAL[case]
+    data = partial_campaign(case)
     estimate = checked(identify(data, name), data)
     for quantity in expected:
         truth = getattr(Truth(), quantity)
