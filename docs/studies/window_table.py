@@ -186,7 +186,7 @@ def simulate_windows(
 
     Args:
         state: the rig.
-        effects: what acts beyond the linear model.
+        effects: effects to add to the linear model; none with a random part, of which one table shows one draw.
         omega_n: base natural frequency in the state ``base``, rad/s.
         zeta: base damping ratio there.
         count: of consecutive windows of three cycles from the release on.
@@ -194,6 +194,9 @@ def simulate_windows(
 
     Returns:
         Both columns; None where the motion does not oscillate through all windows.
+
+    Raises:
+        TunnelError: when an effect has a random part.
     """
     rig = load_rig()
     inertia, mechanical = base_dynamics(state if base is None else base, omega_n, zeta, rig)
@@ -234,7 +237,7 @@ def base_dynamics(state: RigState, omega_n: float, zeta: float, rig: Rig) -> tup
 
 
 def _read(rig: Rig, stated: RunSettings, effects: Sequence[Effect]) -> tuple[Array, Array]:
-    chain = EffectChain(stated, tuple(effects), (None,) * len(effects))  # random effects are not asked
+    chain = EffectChain(stated, tuple(effects), (None,) * len(effects))
     try:
         motion = forward_motion(rig, chain.physics(), _RATE)
     except ValueError:  # grows without bound

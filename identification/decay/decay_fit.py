@@ -298,6 +298,8 @@ def _common_zero(grams: Sequence[Array], moments: Sequence[Array]) -> float:
         information, score = eliminate(gram[np.ix_(order, order)], moment[order], 1)
         denominator += float(information[0, 0])
         numerator += float(score[0])
+    if not denominator > 0.0:  # motions so slow that they are constants: so is the zero
+        raise np.linalg.LinAlgError("the zero cannot be distinguished from the motion")
     return numerator / denominator
 
 

@@ -22,6 +22,9 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
+_LARGEST = 1e20
+"""Largest weight, α, β and μ, and one over the smallest α and β: with these no product of a step overflows."""
+
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
@@ -82,8 +85,13 @@ def _progress(weights: Array, state: Sequence[float]) -> Progress:
     numbers = np.array([alpha, beta, damping], dtype=np.float64)
     if weights.size not in map(parameter_count, SIZES.values()) or weights.dtype != np.float64:
         raise ValueError("weights of another network")
-    if not (np.isfinite(weights).all() and np.isfinite(numbers).all() and min(alpha, beta, damping) >= 0.0):
-        raise ValueError("not finite")
+    # Comparisons with NaN are false.
+    if not (
+        np.abs(weights).max() <= _LARGEST and numbers.max() <= _LARGEST and min(alpha, beta) >= 1.0 / _LARGEST
+    ):
+        raise ValueError("out of range")
+    if not damping >= 0.0:
+        raise ValueError("a negative damping")
     if not isinstance(iteration, int) or iteration < 0 or not isinstance(finished, bool | int):
         raise TypeError("not a number of steps")
     return Progress(weights, Hyperparameters(alpha, beta), damping, iteration, bool(finished))

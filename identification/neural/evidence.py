@@ -68,9 +68,10 @@ def updated(
         The new ones.
     """
     gamma = held.effective_parameters(eigenvalues)
-    tiny = np.finfo(np.float64).tiny
+    tiny, epsilon = np.finfo(np.float64).tiny, np.finfo(np.float64).eps
+    left = max(samples - gamma, epsilon * samples)  # γ is below N, but rounding may make it N
     return Hyperparameters(
-        gamma / (2.0 * max(squared_weights, tiny)), (samples - gamma) / (2.0 * max(squared_errors, tiny))
+        gamma / (2.0 * max(squared_weights, tiny)), left / (2.0 * max(squared_errors, tiny))
     )
 
 

@@ -149,15 +149,35 @@ def test_the_bounds_are_those_stated(kind: type[Effect]) -> None:
 @each_effect
 def test_the_same_seed_gives_the_same_bits_at_any_thread_count(kind: type[Effect]) -> None:
     effects, runs = (example(kind),), [replace(WIND_ON, duration=0.4), replace(WIND_OFF, duration=0.4)] * 2
-    one, two, three = (
+    one, three = (
         simulate_batch(
             RIG, runs, SENSOR, [np.random.default_rng([7, i]) for i in range(4)], effects=effects, nthread=n
         )
-        for n in (1, 2, 3)
+        for n in (1, 3)
     )
     loop = [record(effects, run, seed=[7, i]) for i, run in enumerate(runs)]
-    for others in (two, three, loop):
+    for others in (three, loop):
         assert all(same(a, b) for a, b in zip(one, others, strict=True))
+
+
+@each_effect
+def test_without_its_random_part_an_effect_is_refused_rather_than_left_out(kind: type[Effect]) -> None:
+    times = np.arange(100) / 100.0
+
+    def applied(effect: Effect) -> None:
+        chain = EffectChain(WIND_ON, (effect,), (None,))
+        chain.physics()
+        chain.angle(np.zeros(100), chain.true_times(times))
+
+    applied(kind())  # the null does nothing, drawn or not
+    if example(kind).draw(WIND_ON, np.random.default_rng(1)) is None:
+        applied(example(kind))
+        return
+    with pytest.raises(
+        TunnelError, match=f"effect {kind.name}: the random part of the run is missing"
+    ) as caught:
+        applied(example(kind))
+    assert str(caught.value).isprintable()
 
 
 @each_effect

@@ -42,7 +42,9 @@ def main(arguments: list[str] | None = None) -> int:
         _run(given, shares, outcomes)
     print(counts_table(outcomes))
     found = sum(outcome.verdict == "finding" for outcome in outcomes)
-    print(f"\n{len(outcomes)} trials, seed {given.seed}, {time.monotonic() - begun:.0f} s; {found} findings")
+    peak = max((outcome.memory for outcome in outcomes), default=0) / 2**20
+    spent = f"{time.monotonic() - begun:.0f} s, {peak:.0f} MiB at most"
+    print(f"\n{len(outcomes)} trials, seed {given.seed}, {spent}; {found} findings")
     if found:
         print("\n" + causes_table(outcomes, given.seed, given.only))
     return 1 if found else 0

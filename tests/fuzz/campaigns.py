@@ -149,7 +149,7 @@ def _shortened(time: Array, yaw: Array, rng: Rng) -> Pair:
 
 
 def _thinned(time: Array, yaw: Array, rng: Rng) -> Pair:
-    step = int(rng.integers(2, 9))
+    step = min(int(rng.integers(2, 9)), yaw.size - 1)  # a record has two samples or more
     return time[::step], yaw[::step]
 
 

@@ -281,7 +281,9 @@ def _changed_array(values: np.ndarray, rng: Rng) -> np.ndarray:
     if kind == 1:
         return values.reshape(1, -1)
     if kind == 2:
-        return values.astype((np.float32, np.int64, np.bool_, np.float16)[rng.integers(4)])
+        kind = (np.float32, np.int64, np.bool_, np.float16)[rng.integers(4)]
+        with np.errstate(all="ignore"):  # a value may already be odd; what is judged is its reader
+            return values.astype(kind)
     changed = np.array(values, dtype=np.float64)
     odd = float(rng.choice((0.0, -1.0, 1e-300, 1e300, 1e30, float("nan"), float("inf"))))
     changed.reshape(-1)[rng.integers(changed.size) if kind == 3 and changed.size else slice(None)] = odd

@@ -11,14 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fuzz import readers, tables, trials
+from tests.fuzz import campaigns, readers, tables, trials, values
 from tests.fuzz.summary import causes, causes_table
 from tests.fuzz.trials import Outcome, run_trial
 from tests.fuzz.workers import run_trials
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
 
 SEED = 1
-READER_TRIALS, IDENTIFY_TRIALS = 2000, 60
+READER_TRIALS, IDENTIFY_TRIALS = 1000, 60
+"""A share that the quick suite can afford: some twenty checkpoints, the rarest files."""
 
 
 @pytest.mark.parametrize(("group", "count"), [("readers", READER_TRIALS), ("identify", IDENTIFY_TRIALS)])
@@ -50,6 +52,24 @@ def test_seed_and_number_alone_decide_a_trial():
     first = [run_trial(7, index) for index in range(5)]
     assert [run_trial(7, index).verdict for index in reversed(range(5))] == [o.verdict for o in first][::-1]
     assert [trials.chosen(7, index)[1] for index in range(5)] == [o.target for o in first]
+
+
+@pytest.mark.parametrize(
+    "value",
+    [10**400, -(10**400), 2**63, 1.7976931348623157e308, 0.5],
+    ids=lambda value: f"{len(str(value))} characters",
+)
+def test_any_number_can_be_moved(value):
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        values.moved_number(value, rng)
+
+
+@pytest.mark.parametrize("change", campaigns.READINGS)
+@pytest.mark.parametrize("count", [2, 8, 300])
+def test_changed_readings_are_still_a_record(change, count):
+    for seed in range(30):
+        Record(*change(np.arange(count) / 50.0, np.cos(np.arange(count)), np.random.default_rng(seed)))
 
 
 def planted(folder: Path, _rng: np.random.Generator) -> None:

@@ -50,6 +50,7 @@ class Outcome:
         deepest: file and line where it was raised, in whatever library.
         message: its first line.
         seconds: processor time.
+        memory: most that the process has held so far, bytes.
     """
 
     index: int
@@ -60,6 +61,7 @@ class Outcome:
     deepest: str = ""
     message: str = ""
     seconds: float = 0.0
+    memory: int = 0
 
 
 def chosen(
@@ -113,11 +115,12 @@ def run_trial(
     finally:
         _close_figures()
         shutil.rmtree(folder, ignore_errors=True)
-    if found.verdict != "finding" and resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 > MEMORY:
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    if found.verdict != "finding" and memory > MEMORY:
         found = Outcome(index, name, "finding", "Memory", name, name, f"more than {MEMORY / 2**30:g} GiB")
     if show and raised is not None:
         traceback.print_exception(raised)
-    return Outcome(**{**vars(found), "seconds": _processor_time() - before})
+    return Outcome(**{**vars(found), "seconds": _processor_time() - before, "memory": memory})
 
 
 def _refused(index: int, name: str, error: TunnelError) -> Outcome:

@@ -55,10 +55,10 @@ def moved_number(value: float, rng: Rng) -> Tree:
         return [value, value]
     if kind == 3 and abs(value) < 2**53:
         return int(value)
+    if abs(value) > 1e15:  # a whole number that no float holds is neither moved nor scaled
+        return 0
     if kind == 4:
         return value + float(rng.normal()) * 1e-9
-    if abs(value) > 1e15:  # a whole number that no float holds is not scaled
-        return 0
     return float(value) * 10.0 ** float(rng.integers(-12, 13))
 
 

@@ -12,6 +12,9 @@ from coverage import CoverageData
 
 from tests.mutation.draw import PACKAGES, Mutant
 
+READS_SOURCES = "tests/architecture/test_values.py"
+"""A test of every class that reads the source as text, which no coverage shows."""
+
 
 class Chooser:
     """Coverage by test and the tests' durations of one or more runs of the suite.
@@ -58,7 +61,8 @@ class Chooser:
         """Tests of the files that import a module; of a file without a record all, unseen."""
         files = _importing_tests(self._root, path)
         known = self._tests(f"{name}|run" for file in files for name in self._by_file.get(file, ()))
-        return [*(file for file in files if file not in self._by_file), *self._cheapest(known - done)]
+        unseen = (file for file in files if file not in self._by_file)
+        return [*unseen, *self._cheapest(known - done), READS_SOURCES]
 
     def _importers(self, path: str) -> Iterable[str]:
         """Contexts of the modules that import a module none of whose lines ran inside a test."""

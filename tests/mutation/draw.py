@@ -46,7 +46,10 @@ class Mutant:
 
     def source(self, text: str) -> str | None:
         """The module with the change, None where it cannot be made."""
-        changed: str | None = mutate_code(text, get_operator(self.operator)(), self.occurrence)
+        try:
+            changed: str | None = mutate_code(text, get_operator(self.operator)(), self.occurrence)
+        except AttributeError:  # cosmic-ray cannot replace an exception with dots in its name
+            return None
         return changed
 
     def words(self, root: Path) -> str:

@@ -25,7 +25,7 @@ from identification.neural.network import parameter_count
 from identification.neural.networks import held_out_errors
 from identification.neural.shape import network_inputs, response_points
 from identification.neural.train import TrainingSpec, train
-from identification.neural.training_set import DAMPING, SIZES, DataSpec, training_pairs
+from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, training_pairs
 from tunnel_sim.vocabulary.errors import TunnelError
 
 SHORT = TrainingSpec(seed=5, data=DataSpec(zeta_count=40, grid=(5, 9), test_count=50), starts=2,
@@ -104,6 +104,13 @@ def quiet_torch():
         yield
 
 
+def test_the_weight_of_the_errors_stays_above_zero_where_every_pair_is_used_up():
+    """As many pairs as directions, a prior far below: N − γ is below the rounding error of N."""
+    new = updated(Hyperparameters(1e-20, 1.0), np.ones(8), 1e-3, 1.0, 8)
+    assert new.beta > 0.0
+    assert np.isfinite(log_evidence(new, np.ones(8), 1e-3, 1.0, (8, 541)))
+
+
 def test_every_step_lowers_the_cost_it_was_taken_for():
     problem = Problem.of(training_pairs(SHORT.data, DAMPING), SIZES[DAMPING], unit_deviation=False)
     progress = Progress(first_weights(problem.sizes, np.random.default_rng(1)))
@@ -129,6 +136,28 @@ def test_a_short_training_repeats_to_the_bit_and_another_seed_does_not():
     assert first.weights == second.weights
     assert first.record == second.record
     assert train(replace(SHORT, seed=6)).weights != first.weights
+
+
+def test_the_progress_is_the_work_done_of_all_work():
+    told = []
+    train(SHORT, tell=lambda done, _text: told.append(done))
+    steps = [SHORT.work(which) for which in (DAMPING, FREQUENCY) for _ in range(2 * SHORT.steps(which))]
+    assert sorted(set(told)) == np.cumsum(steps).tolist()
+    assert told == sorted(told)
+    assert told[-1] == SHORT.total_work
+
+
+def test_the_record_says_why_each_training_stopped():
+    kept = []
+    train(SHORT, keep=kept.append)
+    stuck = next(held for held in kept if len(held.ended) == 1 and held.running is not None)
+    stuck = replace(stuck, running=replace(stuck.running, finished=True))
+    starts = [
+        start for net in train(SHORT, resume=stuck).record["networks"].values() for start in net["starts"]
+    ]
+    said = [(start["stopped_because"], start["steps"]) for start in starts]
+    whole = [("all steps taken", SHORT.steps(which)) for which in (DAMPING, FREQUENCY) for _ in range(2)]
+    assert said == [whole[0], ("no step lowers F", 1), *whole[2:]]
 
 
 @pytest.mark.parametrize("stop", [3, 6, 15, 27])

@@ -14,6 +14,14 @@ from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, camp
 from tunnel_sim.vocabulary.record import Record
 
 
+@pytest.mark.parametrize("stiffness", [0.0, 1e-30, 1e-300])
+def test_a_motion_that_is_a_constant_cannot_be_distinguished_from_the_zero(stiffness):
+    time = np.arange(64) / 64.0  # sums of these are exact: what is left of the constant is zero
+    fit = fit_run(Reading(time, 0.3 + 0.01 * np.sin(9.0 * time)), Decay(0.0, stiffness))
+    assert fit.runs == ()
+    assert not fit.converged
+
+
 @pytest.mark.parametrize("zeta", [-0.002, 0.0, 0.001, 0.02, 0.2, 0.7, 1.0, 1.6])
 @pytest.mark.parametrize("omega", [1.5, 12.0, 26.0])
 def test_one_record_converges_from_data_alone(zeta, omega):

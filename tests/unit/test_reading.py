@@ -243,12 +243,16 @@ def test_a_checkpoint_that_is_another_ones_is_none(tmp_path: Path) -> None:
     for state, ended, size in (
         (good, -1, 541), (good, 9, 541), (good, "1", 541), (good, None, 541), (good, 1, 7), ("x", 1, 541),
         ([[0.1, 1.0, "x", 3, False]], 1, 541), ([[0.1, 1.0, 0.005, -3, False]], 1, 541), ([[1.0]], 1, 541),
-        ([None], 1, 541),
+        ([None], 1, 541), ([[0.1, 0.0, 0.005, 3, False]], 1, 541), ([[0.0, 1.0, 0.005, 3, False]], 1, 541),
+        ([[0.1, 1e300, 0.005, 3, False]], 1, 541), ([[0.1, 1.0, -1.0, 3, False]], 1, 541),
     ):  # fmt: skip
         text = json.dumps({"spec": {}, "state": state, "ended": ended})
         content = save({"weights.0": np.zeros(size)}, {"training": text})
         assert Checkpoint.from_bytes(content, {}) is None, (state, ended, size)
     text = json.dumps({"spec": {}, "state": good, "ended": 1})
+    for weight in (1e300, float("nan"), float("inf")):
+        content = save({"weights.0": np.full(541, weight)}, {"training": text})
+        assert Checkpoint.from_bytes(content, {}) is None, weight
     found = Checkpoint.from_bytes(save({"weights.0": np.zeros(541)}, {"training": text}), {})
     assert found is not None
     assert len(found.ended) == 1
@@ -298,9 +302,10 @@ def trials(**changes: object) -> pl.DataFrame:
     cell = {"kind": "decay", "noise": 0.01, "duration": 4.0, "amplitude": 0.35, "sample_rate": 500.0}
     cell |= {"resolution": 0.0, "zeta": 0.02, "frequency": 2.0, "springs": []}
     grid = {"name": "g", "seed": 1, "trials": 2, "trials_of": {}, "cells": [cell]}
-    row = {"cell": 0, "trial": 0, "estimator": "hilbert", "unit": "1", "truth": 1.0, "value": 1.0, "std": 0.1}
+    row = {"cell": 0, "trial": 0, "estimator": "hilbert", "truth": 1.0, "value": 1.0, "std": 0.1}
     row |= {"bound": 0.1, "status": "ok", "milliseconds": 1.0, "grid": json.dumps(grid)}
-    return pl.DataFrame([row | {"quantity": name} | changes for name in ("zeta", "omega_n")])
+    units = {"zeta": "1", "omega_n": "rad/s"}
+    return pl.DataFrame([row | {"quantity": name, "unit": unit} | changes for name, unit in units.items()])
 
 
 def test_a_baseline_that_cannot_be_counted_is_refused(tmp_path: Path) -> None:
@@ -310,6 +315,10 @@ def test_a_baseline_that_cannot_be_counted_is_refused(tmp_path: Path) -> None:
     for changes in (
         {"grid": "[" * DEEP}, {"grid": "{}"}, {"grid": None}, {"grid": 3}, {"cell": 7}, {"cell": -1},
         {"cell": "x"}, {"value": None}, {"truth": None}, {"status": None}, {"estimator": None}, {"truth": "1"},
+        {"unit": "1"}, {"unit": "[bold]"}, {"bound": 0.0}, {"bound": -0.1}, {"value": 2.0, "bound": 5e-324},
+        {"value": 2.0, "bound": 1e-300}, {"value": 2.0, "std": 1e-300}, {"truth": 1e-300, "bound": None},
+        {"truth": 0.0, "bound": None}, {"std": -0.1}, {"value": 1e101}, {"truth": float("nan")},
+        {"bound": float("inf")},
     ):  # fmt: skip
         trials(**changes).write_parquet(path)
         refused(read_trials, path)

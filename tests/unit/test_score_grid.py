@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.scoring.accuracy import score
 from tests.reference.free_decays import damped_cosine
 from tunnel_lab.scoring import work
 from tunnel_lab.scoring.draw import draw_trial
@@ -140,6 +141,15 @@ def test_trials_survive_the_disk(small, tmp_path):
     assert (again.grid, again.estimators) == (small, NAMES)
     frame = scores_frame(results)
     assert frame.height == 2 * 2 + 2 * 4
+    for row, trials in zip(frame.iter_rows(named=True), results.trials().values(), strict=True):
+        judged = score(trials)
+        figures = {**vars(judged), "relative_bias_percent": judged.relative_bias}
+        for name in ("bias", "relative_bias_percent", "bias_in_stds", "rmse", "rmse_over_bound"):
+            figure = figures[name]
+            wanted = (None, None) if figure is None else (figure.value, figure.std)
+            assert (row[name], row[f"{name}_std_error"]) == wanted
+    for name, kind in (("zeta", "decay"), ("frequency_hz", "decay"), ("wind_speed_m_per_s", "campaign")):
+        assert (frame[name].is_not_null() == (frame["kind"] == kind)).all()  # what a cell has not is left out
     assert frame["coverage_low"].is_between(0.0, 1.0).all()
 
 

@@ -134,6 +134,36 @@ def test_fits_take_shorter_steps_for_a_faster_body() -> None:
     assert found == [1, 2, 6]
 
 
+@pytest.mark.parametrize("interval", [4e-3, 2e-2, 1.0])
+def test_a_fit_does_not_follow_a_body_too_fast_for_any_record(interval: float) -> None:
+    """A trial inertia near zero once took 24,000 steps per block mean, a diagnosis minutes instead of seconds."""
+    inertia = PLAIN.spring_stiffness / (np.pi / interval) ** 2  # half a turn per block mean: still followed
+    slow, fast, least = (
+        fit_substeps(replace(PLAIN, yaw_inertia=inertia / factor), interval) for factor in (1.0, 100.0, 1e9)
+    )
+    assert interval / slow * np.pi / interval <= 0.055 * (1.0 + 1e-12)
+    assert fast == least <= 2 * slow
+
+
+@pytest.mark.parametrize(("compliance", "steps"), [(1e-2, 1), (1e-3, 2), (1e-4, 6), (1e-6, 20)])
+def test_a_fit_follows_the_rod_down_to_a_fifth_of_a_millisecond(compliance: float, steps: int) -> None:
+    run = replace(PLAIN, spring_stiffness=16.12, rod_twist=RodTwist(compliance, 0.3))
+    rod = np.sqrt(1.0 / (compliance * 0.1014 * 0.3 * 0.7))
+    assert np.ceil(4e-3 / max(0.5 / rod, 2e-4)) == steps
+    assert fit_substeps(run, 4e-3) == steps
+
+
+@given(st.floats(1e-6, 1e-1), st.floats(0.02, 0.98), st.floats(1.0, 100.0))
+def test_the_rods_frequency_is_bounded_by_both_modes_together(
+    compliance: float, share: float, spring: float
+) -> None:
+    """Two inertias joined by the rod, one of them on the spring: the squares of both modes add up to the trace."""
+    k = 1.0 / compliance
+    one, other = 0.1 * share, 0.1 * (1.0 - share)
+    squares = np.linalg.eigvals([[(k + spring) / one, -k / one], [-k / other, k / other]]).real
+    assert RodTwist(compliance, share).frequency(0.1, spring) ** 2 == pytest.approx(squares.sum(), rel=1e-6)
+
+
 def test_the_rod_s_free_frequency_is_below_that_on_a_spring() -> None:
     twist = RodTwist(1e-3, 0.2)
     assert twist.free_frequency(0.1) == pytest.approx(np.sqrt(1.0 / (1e-3 * 0.1 * 0.2 * 0.8)), rel=1e-12)

@@ -63,6 +63,11 @@ def test_quadratic_damping_adds_in_proportion_to_the_amplitude() -> None:
     assert found.zeta - ZETA == pytest.approx(4.0 / (3.0 * np.pi) * c2 / inertia * amplitude, rel=0.02)
 
 
+def test_an_effect_with_a_random_part_is_refused_rather_than_left_out() -> None:
+    with pytest.raises(TunnelError, match="effect mains_hum: the random part of the run is missing"):
+        columns(effect_from("mains_hum", {"amplitude": 0.002}))
+
+
 def test_a_body_that_comes_to_rest_gives_no_table() -> None:
     effect = effect_from("coulomb_friction", {"friction_moment": 0.5})
     assert simulate_windows(rig_state(), [effect], OMEGA, ZETA, COUNT) is None

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from identification.estimate import Quantity
 from identification.scoring.accuracy import Outcome, Score, Trials, collect, score
 from tunnel_lab.scoring.grid import NO_EFFECT, Cell, Grid
-from tunnel_lab.scoring.work import Row, describe
+from tunnel_lab.scoring.work import Row, describe, unit_of
 from tunnel_sim.files.json_text import json_line
 from tunnel_sim.files.reading import as_described, frame_schema, parse_json, read_frame, read_regular
 from tunnel_sim.files.writing import write_whole
@@ -162,12 +162,28 @@ def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
         found.setdefault(row["estimator"], set()).add((row["cell"], row["quantity"]))
         if None in [row[name] for name in ("trial", "estimator", "unit", "truth", "status")]:
             raise ValueError("a row without its truth or status")
+        if row["unit"] != unit_of(row["quantity"]):
+            raise ValueError("a unit that is not the quantity's")
         if (row["value"] is None) != (row["std"] is None):
             raise ValueError("a value without its standard deviation")
-        if any(abs(row[name] or 0.0) > limits.LARGEST_NUMBER for name in ("value", "std", "truth", "bound")):
+        if not _can_be_scored(row):
             raise ValueError("a number out of all range")
     if not found or any(cells != wanted for cells in found.values()):
         raise ValueError("cells that are not those of the grid")
+
+
+def _can_be_scored(row: Row) -> bool:
+    """Whether the row's error is a number over its bound, its truth and its standard deviation."""
+    truth, value, std, bound = (row[name] for name in ("truth", "value", "std", "bound"))
+    given = [abs(number) for number in (truth, value, std, bound) if number is not None]
+    if not all(number <= limits.LARGEST_NUMBER for number in given):  # false for NaN as well
+        return False
+    if (bound is not None and bound <= 0.0) or (bound is None and truth == 0.0):
+        return False
+    if value is None:
+        return True
+    scales = [abs(scale) for scale in (truth, std, bound) if scale]
+    return bool(std >= 0.0) and all(abs(value - truth) / scale <= limits.LARGEST_NUMBER for scale in scales)
 
 
 def scores_frame(results: Results) -> pl.DataFrame:

@@ -109,7 +109,6 @@ def estimate_rows(
         The rows; value and std are None where the estimator failed.
     """
     from identification import identify
-    from identification.estimate import UNITS
 
     begun = time.perf_counter()
     try:
@@ -127,7 +126,7 @@ def estimate_rows(
                 **about,
                 "estimator": estimator,
                 "quantity": quantity,
-                "unit": {"zeta": "1", "omega_n": "rad/s"}.get(quantity) or UNITS[quantity],
+                "unit": unit_of(quantity),
                 "truth": value,
                 "value": None if answer is None else answer.value,
                 "std": None if answer is None else answer.std,
@@ -137,6 +136,20 @@ def estimate_rows(
             }
         )
     return rows
+
+
+def unit_of(quantity: str) -> str:
+    """Unit of a scored quantity.
+
+    Args:
+        quantity: its name.
+
+    Raises:
+        KeyError: when no cell scores it.
+    """
+    from identification.estimate import UNITS
+
+    return {**UNITS, "zeta": "1", "omega_n": "rad/s"}[quantity]
 
 
 def score_grid(

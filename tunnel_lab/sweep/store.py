@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from tunnel_lab.sweep.product import Sweep
 from tunnel_sim.files.leftovers import clear_leftovers
-from tunnel_sim.files.reading import as_described, read_json, read_regular
+from tunnel_sim.files.reading import as_described, frame_schema, read_frame, read_json, read_regular
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import output_folder, write_json, write_whole
 from tunnel_sim.vocabulary import limits
@@ -32,6 +32,7 @@ SCHEMA_VERSION = 1
 MANIFEST = "sweep.json"
 RESULTS, RECORDS, TIMINGS, CHECKSUMS = "results", "records", "timings", "checksums"
 _ELSEWHERE = "name another --out"
+_TIMING_COLUMNS = ("step", "runs", "seconds")
 
 
 @dataclass(frozen=True)
@@ -82,11 +83,30 @@ class Store:
         for name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS):
             clear_leftovers(self.folder / name)
 
+    def timings(self) -> pl.DataFrame:
+        """The times of the finished shards; a shard whose times were removed is left out.
+
+        Returns:
+            Columns ``step``, ``runs`` and ``seconds``, with a row for each step of each shard.
+
+        Raises:
+            TunnelError: when one is damaged.
+        """
+        import polars as pl
+
+        from tunnel_lab.sweep.rows import TIMING_COLUMNS
+
+        paths = [self._part(TIMINGS, index) for index in self.finished()]
+        used = {name: TIMING_COLUMNS[name] for name in _TIMING_COLUMNS}
+        return pl.concat(
+            [pl.DataFrame(schema=used), *(_read_timing(path) for path in paths if path.exists())]
+        )
+
     def scan(self, dataset: str = RESULTS) -> pl.LazyFrame:
         """The rows of the finished shards, in the order of the cases.
 
         Args:
-            dataset: ``results``, ``records`` or ``timings``.
+            dataset: ``results`` or ``records``.
 
         Returns:
             The rows, not yet read.
@@ -193,6 +213,17 @@ def open_store(folder: Path) -> Store:
     with as_described("is not a sweep", shown(path), _ELSEWHERE):
         made_with = {str(name): str(value) for name, value in document["made_with"].items()}
         return Store(folder, Sweep.from_json(json.dumps(document["sweep"])), made_with)
+
+
+def _read_timing(path: Path) -> pl.DataFrame:
+    """The times of one shard. They have no checksum, so the file may be anything: a FIFO would block Polars."""
+    where, remedy = shown(path), "remove it: no result depends on it"
+    content = read_regular(path, limits.DATA_BYTES, readable=remedy)
+    with as_described("is not a table of times", where, remedy):
+        schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
+        if missing := [name for name in _TIMING_COLUMNS if name not in schema]:
+            raise ValueError(f"no column {missing[0]}")
+        return read_frame(content, where, remedy, _TIMING_COLUMNS)
 
 
 def _check_same(store: Store, sweep: Sweep, versions: Mapping[str, str]) -> None:

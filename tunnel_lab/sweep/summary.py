@@ -200,5 +200,5 @@ def paces(store: Store) -> Sequence[Pace]:
     wanted = [each.quantile(share, "linear").alias(str(share)) for share in (0.5, 0.25, 0.75)]
     folder = shown(store.folder / TIMINGS)
     with as_described("cannot be read as a sweep's timings", folder, "remove it: no result depends on it"):
-        table = store.scan(TIMINGS).group_by("step", maintain_order=True).agg(*wanted).collect()
+        table = store.timings().group_by("step", maintain_order=True).agg(*wanted)
         return [Pace(str(step), float(a), float(b), float(c)) for step, a, b, c in table.iter_rows()]

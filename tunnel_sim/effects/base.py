@@ -328,6 +328,45 @@ class Effect:
         del stated
         return float(rng.uniform(0.0, 2.0 * np.pi)) if self.line else None
 
+    def drawn_number(self, drawn: Drawn) -> float:
+        """The phase or instant that a run drew; without it the effect would silently do nothing.
+
+        Args:
+            drawn: what `draw` returned for the run.
+
+        Returns:
+            A phase in rad, or an instant as a share of the run.
+
+        Raises:
+            TunnelError: when no number was drawn.
+        """
+        if not isinstance(drawn, float):
+            raise self._undrawn()
+        return drawn
+
+    def drawn_numbers(self, drawn: Drawn) -> Array:
+        """The random numbers that a run drew; without them the effect would silently do nothing.
+
+        Args:
+            drawn: what `draw` returned for the run.
+
+        Returns:
+            The numbers, shape (n,).
+
+        Raises:
+            TunnelError: when none were drawn.
+        """
+        if not isinstance(drawn, np.ndarray):
+            raise self._undrawn()
+        return drawn
+
+    def _undrawn(self) -> TunnelError:
+        return TunnelError(
+            "the random part of the run is missing",
+            where=f"effect {self.name}",
+            remedy="draw it with EffectChain.draw, or leave the effect out",
+        )
+
     def law(self) -> Mapping[str, float]:
         """The effect's parameters in the moment law, by name, for an effect that is a term of the law."""
         return {}

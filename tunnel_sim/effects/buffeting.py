@@ -69,11 +69,12 @@ class Buffeting(Effect):
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Add the random moment as a sampled forcing."""
-        if stated.wind_speed <= 0.0 or self.is_null or not isinstance(drawn, np.ndarray):
+        if stated.wind_speed <= 0.0 or self.is_null:
             return run
+        white = self.drawn_numbers(drawn)
         from scipy.signal import lfilter  # here, because it is slow to load
 
         decay = exp(-2.0 * pi * self.bandwidth * _INTERVAL)
-        kicks = np.concatenate([drawn[:1], sqrt(1.0 - decay**2) * drawn[1:]])
+        kicks = np.concatenate([white[:1], sqrt(1.0 - decay**2) * white[1:]])
         series = Series(tuple((self.intensity * lfilter([1.0], [1.0, -decay], kicks)).tolist()), _INTERVAL)
         return dataclasses.replace(run, series={**run.series, "forcing": series})

@@ -58,10 +58,7 @@ class EffectChain:
     @property
     def skips(self) -> bool:
         """Whether the motion is read at other times than stated."""
-        return any(
-            effect.skips and not effect.is_null and drawn is not None
-            for effect, drawn in zip(self.effects, self.drawn, strict=True)
-        )
+        return any(effect.skips and not effect.is_null for effect in self.effects)
 
     def true_times(self, time_s: Array) -> Array:
         """When the motion is read.

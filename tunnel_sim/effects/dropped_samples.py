@@ -50,14 +50,16 @@ class DroppedSamples(Effect):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Let the motion go on for as long as it is read."""
         del stated
-        if self.is_null or drawn is None:
+        if self.is_null:
             return run
+        self.drawn_number(drawn)  # an error here, before the motion is computed
         return dataclasses.replace(run, duration=run.duration + self.lost_time + _MARGIN)
 
     def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """The true time runs ahead of the stamps from the instant on."""
-        if self.is_null or not isinstance(drawn, float):
+        if self.is_null:
             return time_s
+        instant = self.drawn_number(drawn) * stated.duration
         interval = time_s[1] - time_s[0]
-        after = np.clip((time_s - drawn * stated.duration) / interval + 0.5, 0.0, 1.0)
+        after = np.clip((time_s - instant) / interval + 0.5, 0.0, 1.0)
         return np.asarray(time_s + self.lost_time * after, np.float64)

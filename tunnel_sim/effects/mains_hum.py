@@ -40,6 +40,7 @@ class MainsHum(Effect):
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Add the hum at the phase drawn for the run."""
         del stated
-        if self.is_null or not isinstance(drawn, float):
+        if self.is_null:
             return angle
-        return angle + self.amplitude * np.sin(2.0 * np.pi * self.frequency * time_s + drawn)
+        phase = self.drawn_number(drawn)
+        return angle + self.amplitude * np.sin(2.0 * np.pi * self.frequency * time_s + phase)

@@ -58,10 +58,11 @@ class SecondMode(Effect):
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Add the oscillation at a phase of the run's own."""
-        if self.is_null or not isinstance(drawn, float):
+        if self.is_null:
             return angle
+        phase = self.drawn_number(drawn)
         size = self.amplitude * (abs(stated.release_angle) / _REFERENCE_RELEASE) ** self.exponent
         since = np.maximum(time_s, 0.0)  # the body is held before the release
         turn = self.frequency * since
-        wave = size * np.exp(-self.damping_ratio * turn) * np.cos(turn + drawn)
+        wave = size * np.exp(-self.damping_ratio * turn) * np.cos(turn + phase)
         return np.asarray(angle + wave, np.float64)

@@ -45,8 +45,11 @@ class VortexShedding(Effect):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the terms of the moment law, with the phase drawn for the run."""
         del stated
-        if self.is_null or not isinstance(drawn, float):
+        if self.is_null:
             return run
         return with_law(
-            run, shedding_amplitude=self.amplitude, strouhal_number=self.strouhal_number, shedding_phase=drawn
+            run,
+            shedding_amplitude=self.amplitude,
+            strouhal_number=self.strouhal_number,
+            shedding_phase=self.drawn_number(drawn),
         )

@@ -44,6 +44,7 @@ REPORT_STEP = 2e-3
 _FIT_STEP = 4.001e-3  # s: no shorter than a block mean, whatever its last digit
 _FIT_BODY_TURN = 0.055  # rad: some 1e-6 rad over 10 s
 _FIT_SHORTEST = 2e-4  # s, however stiff the rod
+_FIT_MOST_TURN = pi  # rad from one block mean to the next: no record shows a faster oscillation
 _REPORT_ROD_TURN = 0.25  # rad
 _REPORT_SHORTEST = 1e-4  # s
 _UNSTABLE = 2.5  # rad per step; the method diverges beyond 2.8
@@ -67,6 +68,9 @@ def whole_steps(sample_rate: float) -> float:
 def fit_substeps(run: RunSettings, interval: float) -> int:
     """How many steps the fits take from one block mean to the next.
 
+    A fit may try a body that turns more than half a turn between block means. Such a body is not followed: the
+    steps are too long for it, and its motion decays at once or grows without bound.
+
     Args:
         run: the run's physics, effects included.
         interval: between block means, s.
@@ -75,7 +79,7 @@ def fit_substeps(run: RunSettings, interval: float) -> int:
         One or more.
     """
     body = sqrt(run.spring_stiffness / run.yaw_inertia)
-    longest = min(_FIT_STEP, _FIT_BODY_TURN / max(body, 1e-9))
+    longest = min(_FIT_STEP, _FIT_BODY_TURN / min(max(body, 1e-9), _FIT_MOST_TURN / interval))
     if run.rod_twist is not None:
         rod = run.rod_twist.free_frequency(run.yaw_inertia)
         longest = min(longest, max(ROD_TURN / rod, _FIT_SHORTEST))

@@ -209,7 +209,10 @@ class Window:
         return contextlib.nullcontext()
 
     def set_figures(self, figures) -> None:
-        self.seen.append(int(figures[1].linepnt[0]))
+        corner, figure = figures
+        self.seen.append(int(figure.linepnt[0]))
+        self.corner = (corner.left, corner.bottom, corner.width, corner.height)
+        self.trace = np.array(figure.linedata[0]).reshape(-1, 2)
 
     def set_texts(self, texts) -> None:
         assert "pause" in texts[3]
@@ -230,6 +233,10 @@ def test_the_window_follows_the_clock_and_the_keys() -> None:
     window_loop(window, live, controls, 1.0, clock=lambda: clock.now, sleep=sleep)
     assert live.data.time == pytest.approx(1.0, abs=0.05)
     assert window.seen[-1] > 20
+    last = window.trace[window.seen[-1] - 1]
+    np.testing.assert_allclose(last, [live.data.time, live.angle], atol=1e-6)  # drawn in single precision
+    assert not window.trace[window.seen[-1] :].any()
+    assert window.corner == (800, 0, 400, 225)  # lower right of a window whose size is not yet known
     controls.key(32)
     before = live.data.time
     window_loop(Window(10), live, controls, 1.0, clock=lambda: clock.now, sleep=sleep)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import polars as pl
 import pytest
@@ -19,6 +22,7 @@ from tunnel_lab.sweep.product import Sweep
 from tunnel_lab.sweep.reading import read_sweep
 from tunnel_lab.sweep.rows import RESULT_COLUMNS
 from tunnel_lab.sweep.summary import Line, _lines, summarise
+from tunnel_sim.vocabulary.errors import TunnelError
 
 EFFECT = 'name = "coulomb_friction"\nparameters = { friction_moment = [0.002, 0.02] }'
 
@@ -168,6 +172,74 @@ def test_figures_by_hand() -> None:
     assert one.coverage.value == pytest.approx(2.0 / 3.0)
 
 
+def test_errors_about_a_truth_of_zero_are_in_its_unit() -> None:
+    rows = hand_made([0.02, -0.02, 0.1, 0.1]).with_columns(truth=pl.lit(0.0), unit=pl.lit("rad"))
+    for truth, unit, rmse in ((0.0, "rad", 0.1), (-1.0, "%", 110.0)):
+        *_, last = _lines(rows.with_columns(truth=pl.lit(truth)), "e", "sensor_zero")
+        assert (last.score.rmse.value, last.score.rmse.unit) == (pytest.approx(rmse), unit)
+
+
+def test_a_row_of_the_csv_is_its_line_with_intervals() -> None:
+    overall, *_ = _lines(hand_made([2.02, 1.98, 2.2, 2.2, None, 2.2], "raised"), "e", "zeta")
+    row = overall.to_row()
+    assert (row["axis"], row["at"], row["unit"], row["count"]) == ("all", None, "%", 6)
+    assert (row["bias"], row["rmse"]) == (pytest.approx(6.0), pytest.approx((302.0 / 5.0) ** 0.5))
+    assert (row["failures"], row["coverage"]) == (pytest.approx(1.0 / 6.0), pytest.approx(0.4))
+    for name in ("failures", "coverage"):
+        assert 0.0 < row[f"{name}_low"] < row[name] < row[f"{name}_high"] < 1.0
+    none, *_ = _lines(hand_made([None, None], "raised"), "e", "zeta")
+    empty = none.to_row()
+    assert empty["failures"] == 1.0
+    assert [empty[name] for name in ("unit", "bias", "rmse_std", "coverage", "coverage_low")] == [None] * 5
+
+
+def test_a_figure_has_a_column_of_panels_for_each_quantity() -> None:
+    values = {"zeta": [2.02, 1.98, 2.2, 2.2], "omega_n": [2.0, 2.02, 2.04, 2.08]}
+    lines = [line for name, some in values.items() for line in _lines(hand_made(some), "e", name)]
+    along = [line for line in lines if line.axis == "noise_std"]
+    drawn = figures.error_figure(along)
+    assert drawn is not None
+    panels = [[line.get_ydata().tolist() for line in axes.get_lines()[:1]] for axes in drawn.axes]
+    wanted = [[quantity, figure] for quantity in ("omega_n", "zeta") for figure in ("rmse", "bias")]
+    assert panels == [
+        [[getattr(line.score, figure).value for line in along if line.quantity == quantity]]
+        for quantity, figure in wanted
+    ]
+
+
+def test_each_line_has_the_rows_of_one_estimator_and_quantity_that_were_asked(tmp_path: Path) -> None:
+    """Left out are rows without a truth, and values that the runs cannot give; any other status is a failure."""
+    good, none = hand_made([2.02, 1.98]), hand_made([None, None], "no_wind_on")
+    given = hand_made([2.2]).with_columns(pl.lit("no_wind_on").alias("status"))
+    failed, untrue = (
+        hand_made([None], "raised"),
+        hand_made([2.0]).with_columns(truth=pl.lit(None, pl.Float64)),
+    )
+    parts = [
+        part.with_columns(estimator=pl.lit(estimator), quantity=pl.lit(quantity))
+        for estimator, quantity, *some in (
+            ("a", "zeta", good, none, given, failed, untrue),
+            ("a", "omega_n", good),
+            ("b", "zeta", good, failed, failed),
+            ("b", "omega_n", none),
+        )
+        for part in some
+    ]
+    document = SimpleNamespace(estimators=["a", "b"])
+    store: Any = SimpleNamespace(
+        scan=lambda: pl.concat(parts).lazy(), sweep=SimpleNamespace(document=document), folder=tmp_path
+    )
+    found = {
+        (line.estimator, line.quantity): (line.score.count, line.score.failures.count)
+        for line in summarise(store)
+        if line.axis == "all"
+    }
+    assert found == {("a", "zeta"): (4, 1), ("a", "omega_n"): (2, 0), ("b", "zeta"): (4, 2)}
+    document.estimators = []
+    with pytest.raises(TunnelError, match="the sweep has no estimators"):
+        summarise(store)
+
+
 def test_what_runs_cannot_give_is_no_failure(here, tmp_path: Path) -> None:
     """The conventional method estimates no zero: it has no line; wind-off runs give no Cnβ: nor has that."""
     text = SMALL.replace("[0.0, 15.0]", "[0.0]")
@@ -176,6 +248,33 @@ def test_what_runs_cannot_give_is_no_failure(here, tmp_path: Path) -> None:
     assert {"omega_n", "zeta"} <= {line.quantity for line in lines}
     assert not {"cn_beta", "cn_r", "sensor_zero"} & {line.quantity for line in lines}
     assert all(line.score.failures.count == 0 for line in lines)
+
+
+def test_damaged_times_are_named_and_can_be_removed(
+    sweep: Sweep, here, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Times have no checksum; a FIFO in the place of a file would block whoever opens it."""
+    run_sweep(sweep, tmp_path / "out", here)
+    first, second, *others = sorted((tmp_path / "out" / "timings").iterdir())
+    first.unlink()
+    second.unlink()
+    os.mkfifo(second)
+    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 2
+    assert f"{second}: cannot be read (it is not a regular file); remove it" in unwrapped(capsys)
+    second.unlink()
+    pl.DataFrame({"step": ["pack"]}).write_parquet(second)
+    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 2
+    assert "is not a table of times" in unwrapped(capsys)
+    second.unlink()
+    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
+    assert "Time per run" in capsys.readouterr().out
+    for path in others:
+        path.unlink()
+    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
+
+
+def unwrapped(capsys: pytest.CaptureFixture[str]) -> str:
+    return capsys.readouterr().err.replace("\n", "")
 
 
 def test_a_figure_without_quantities_to_draw_is_none() -> None:
