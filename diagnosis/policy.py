@@ -59,6 +59,9 @@ COARSE_STEP_POWER = 1.2
 #: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
 #: fifth apart. Judgement: what depends on amplitude changes a frequency gradually, and seldom as much.
 SAME_SPRING = 1.1
+#: Frequency with the wind on over that with it off, from which a run swings in another mode. Judgement: the air
+#: would have to stiffen the spring by 1.25 times its own stiffness.
+ANOTHER_MODE = 1.5
 #: Share of the readings' power in the residual beyond which a fit misses the motion itself. Judgement.
 GROSS_MISFIT = 0.01
 

@@ -6,9 +6,10 @@ import itertools
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
+from statistics import median
 
 from diagnosis.fitting.similarity import frequency
-from diagnosis.policy import SAME_SPRING
+from diagnosis.policy import ANOTHER_MODE, SAME_SPRING
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 
 
@@ -22,7 +23,8 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
         The campaign of the remaining runs, and sentences that say which were left out and why; none where all
         runs remain. Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those
         that state it, if equal). Of runs that do not state it, those with the same frequency at the same wind
-        speed remain: only they can have one spring.
+        speed remain: only they can have one spring. A wind-on run that swings in another mode than the wind-off
+        runs of its spring is left out.
     """
     stated = [run for run in campaign.runs if run.spring_stiffness is not None]
     bare = [run for run in campaign.runs if run.spring_stiffness is None]
@@ -45,12 +47,31 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
                 f"these separately."
             )
         kept = same
+    elsewhere = _in_another_mode(kept)
+    if elsewhere:
+        said.append(
+            f"Left out, since they swing in another mode, {ANOTHER_MODE:g} times as fast as the same spring with "
+            f"the wind off or faster: {_ids(elsewhere)}. Diagnose these separately."
+        )
+        kept = [run for run in kept if run not in elsewhere]
     order = {run.id for run in kept}
     return replace(campaign, runs=tuple(run for run in campaign.runs if run.id in order)), tuple(said)
 
 
 def _ids(runs: Sequence[Run]) -> str:
     return ", ".join(run.id for run in runs)
+
+
+def _in_another_mode(runs: Sequence[Run]) -> list[Run]:
+    """Wind-on runs far above the frequency of the wind-off runs of the same spring."""
+    still: dict[float | None, list[float]] = defaultdict(list)
+    for run in runs:
+        if not run.wind_on:
+            still[run.spring_stiffness].append(frequency(run.record))
+    windy = [run for run in runs if run.wind_on and run.spring_stiffness in still]
+    return [
+        run for run in windy if frequency(run.record) > ANOTHER_MODE * median(still[run.spring_stiffness])
+    ]
 
 
 def _of_one_spring(runs: Sequence[Run]) -> list[Run]:

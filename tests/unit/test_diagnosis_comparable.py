@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.detection.comparable import comparable_runs, frequency
+from diagnosis.detection.comparable import comparable_runs
+from diagnosis.fitting.similarity import frequency
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of
+from tunnel_sim.vocabulary.record import Record
 
 NOISE = 4e-4
 STIFFNESSES = (16.12, 21.02)
@@ -122,3 +124,12 @@ def test_unlike_springs_that_are_not_stated_are_no_gap():
     answer = diagnose(decays(PAIR, bare=range(6)), kinds=vocabulary(["sensor_drift"]))
     assert answer.causes == ()
     assert any("may not have the spring of the rest" in text for text in answer.cautions)
+
+
+def test_a_wind_on_run_in_another_mode_is_left_out():
+    data = decays(PAIR[:3])
+    fast = replace(data.runs[2], record=Record(0.5 * data.runs[2].record.time_s, data.runs[2].record.yaw_rad))
+    found, (said,) = comparable_runs(replace(data, runs=(*data.runs[:2], fast)))
+    assert [run.id for run in found.runs] == ["r01", "r02"]
+    assert "another mode" in said
+    assert "r03" in said
