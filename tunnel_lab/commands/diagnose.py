@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,6 @@ NAME = "diagnose"
 STEPS = {
     "noise": "estimating the noise",
     "nominal fit": "fitting the nominal model",
-    "effects on stretches": "fitting sets of effects to stretches of the runs",
     "effects": "fitting sets of effects",
     "random moments": "fitting random moments",
     "pruning": "fitting the answer without each effect",
@@ -115,7 +115,7 @@ def diagnose_with_progress(campaign: Campaign, kinds: tuple[type[Effect], ...]) 
 
 @contextmanager
 def step_display() -> Iterator[Callable[[str], None]]:
-    """A spinner with the step, the effect tried and the time.
+    """A spinner with the step, the effect tried and the time; one line per step where no terminal shows it.
 
     Yields:
         The function to call with each step.
@@ -128,13 +128,15 @@ def step_display() -> Iterator[Callable[[str], None]]:
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     with Progress(*columns, console=terminal, disable=not terminal.is_terminal, transient=True) as progress:
         task = progress.add_task("starting", total=None)
-        step = ""
+        step, begun = "", time.perf_counter()
 
         def tell(text: str) -> None:
             nonlocal step
             if text in STEPS:
                 step = STEPS[text]
                 progress.update(task, description=step)
+                if not terminal.is_terminal:
+                    terminal.print(f"{time.perf_counter() - begun:.1f} s: {step}", markup=False)
             else:
                 progress.update(task, description=f"{step}: {text}")
 
