@@ -48,8 +48,10 @@ def grow(nominal: Fit, kinds: Sequence[type[Effect]], progress: Progress | None 
     found: dict[tuple[str, ...], Hypothesis] = {}
     level = [Hypothesis((), nominal)]
     while _may_gain(level[0], nominal):
-        count = FREED_HYPOTHESES if not level[0].effects else 1
-        children = with_forms(_children(level, kinds, progress), level[0].fit, count)
+        children = _children(level, kinds, progress)
+        if all(_may_gain(child, nominal) for child in children):  # else freeing a form gains nothing
+            count = FREED_HYPOTHESES if not level[0].effects else 1
+            children = with_forms(children, level[0].fit, count)
         found |= {child.names: child for child in children}
         ranked = _by_evidence(children, nominal)
         if not ranked or not _goes_on(ranked[0], level[0], nominal):
