@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION, Drawn, Effect, parameter
+from tunnel_sim.effects.base import NEAR_MOTION, Drawn, Effect, parameter
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
@@ -53,8 +53,8 @@ class SecondMode(Effect):
     )
 
     def plausible(self, omega: float) -> bool:
-        """Whether its frequency is neither the motion's nor a multiple of it."""
-        return all(abs(self.frequency / omega - k) > NEAR_MOTION for k in MULTIPLES)
+        """Whether its frequency is not the motion's."""
+        return abs(self.frequency / omega - 1.0) > NEAR_MOTION
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Add the oscillation at a phase of the run's own."""
