@@ -73,7 +73,15 @@ class InStretches:
     hypotheses: tuple[Hypothesis, ...]
 
     def whole(self, hypothesis: Hypothesis, data: Data) -> Hypothesis:
-        """The hypothesis fitted to whole runs, from its fit to stretches; as it is where that fails."""
+        """The hypothesis fitted to whole runs, from its fit to stretches.
+
+        Args:
+            hypothesis: fitted to the stretches.
+            data: the runs.
+
+        Returns:
+            The same effects; as given where the fit fails.
+        """
         with suppress(FitError, np.linalg.LinAlgError):
             return replace(hypothesis, fit=fit_longer(hypothesis.fit, self.stretches, data)[0])
         return hypothesis

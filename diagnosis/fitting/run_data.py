@@ -58,7 +58,13 @@ class Samples:
         return np.asarray((sums / np.maximum(self.count, 1)).reshape(*values.shape[:-1], -1), np.float64)
 
     def part(self, first: int, last: int, interval: float) -> Samples:
-        """The blocks from ``first`` up to ``last``, ``interval`` seconds long each."""
+        """The samples of some blocks.
+
+        Args:
+            first: the first block.
+            last: the block after the last one.
+            interval: length of a block, s.
+        """
         inside = slice(*np.searchsorted(self.block, (first, last)))
         return Samples(
             self.time[inside] - first * interval, self.block[inside] - first, self.count[first:last]

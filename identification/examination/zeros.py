@@ -25,8 +25,8 @@ class Centre:
     Args:
         run: the run.
         zero: in the unit of the reading.
-        std: its standard deviation, which includes the change along the run.
-        swing: half the largest distance of two neighbouring peaks.
+        std: its standard deviation, in the same unit, which includes the change along the run.
+        swing: half the largest distance of two neighbouring peaks, in the same unit.
     """
 
     run: Run
