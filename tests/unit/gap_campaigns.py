@@ -28,8 +28,8 @@ CONDITIONS = tuple((spring, speed) for spring in (16.12, 44.84) for speed in (0.
 INERTIA, DAMPING, CN_BETA, CN_R = 0.11, 0.008, 0.45, -0.25
 
 
-def campaign(effect: Effect | None = None, *, added: Array | None = None, seed: int = 3) -> Campaign:
-    """Six runs of two springs and three speeds, one effect, and something added to every reading."""
+def campaign(*effects: Effect, added: Array | None = None, seed: int = 3) -> Campaign:
+    """Six runs of two springs and three speeds, with effects, and something added to every reading."""
     count = round(DURATION / INTERVAL)
     runs = tuple(
         RunData(
@@ -37,14 +37,9 @@ def campaign(effect: Effect | None = None, *, added: Array | None = None, seed: 
         )
         for i, (spring, speed) in enumerate(CONDITIONS)
     )
-    problem = Problem(
-        Data(runs, 0.036, 0.625, 0.225, False, INERTIA), () if effect is None else (type(effect),)
-    )
-    values = (
-        []
-        if effect is None
-        else [getattr(effect, info.name) for info in effect.parameters() if not info.form]
-    )
+    kinds = tuple(type(effect) for effect in effects)
+    problem = Problem(Data(runs, 0.036, 0.625, 0.225, False, INERTIA), kinds)
+    values = [getattr(e, info.name) for e in effects for info in e.parameters() if not info.form]
     common = np.array([INERTIA, DAMPING, CN_BETA, CN_R, 0.001, *values])
     own = [np.linspace(0.2, 0.8, len(runs))] * len(
         problem.phased
