@@ -38,7 +38,7 @@ class Study:
         test: whether there is a gap, after the hum is removed.
         started_late: whether the start of every run was left out, because the nominal model misses the motion
             grossly.
-        hypotheses: fitted single effects and pairs.
+        hypotheses: fitted sets of effects.
         weighed: answers with probabilities, most probable first; empty where there is no gap.
         random: answers with a random moment that passed its tests.
         outsider: the cause outside the vocabulary that closes most of the gap; None where there is no gap.
@@ -70,7 +70,7 @@ class Study:
 
     @property
     def fitted(self) -> tuple[str, ...]:
-        """Causes found by fitting: none, one, two, or ``unknown``."""
+        """Causes found by fitting: none, one or several, or ``unknown`` alone."""
         return self.weighed[0].effects if self.weighed else ()
 
     @property

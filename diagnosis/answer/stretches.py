@@ -18,7 +18,9 @@ Turns = Sequence[NDArray[np.int64]]
 
 
 def turns_of(nominal: Fit, ids: Collection[str]) -> list[NDArray[np.int64]]:
-    """In which turn every block of every run is left out of the fit (docs/decisions/0016-held-out-in-time.md).
+    """In which turn every block of every run is left out of the fit.
+
+    See docs/decisions/0016-held-out-cause-by-cause.md.
 
     Args:
         nominal: gives the runs and their cycles.

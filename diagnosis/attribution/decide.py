@@ -72,7 +72,7 @@ def weigh(
     """Probabilities of the answers.
 
     Args:
-        shares: effect names and share of the gap they leave open, for singles and pairs.
+        shares: effect names and share of the gap they leave open, for sets of any size.
         chance: standard deviation of a share by chance alone.
         excess: of the nominal model's block means.
         outside: share that a cause outside the vocabulary leaves open; `UNKNOWN_SHARE` at most counts.
@@ -104,7 +104,7 @@ def evidence(effects: Sequence[str], share: float, forms: int, excess: float, ch
 
     Args:
         effects: names.
-        share: of the gap that they leave open.
+        share: of the gap that they leave open, a fraction.
         forms: how many of their forms were freed.
         excess: of the nominal model's block means.
         chance: standard deviation of a share by chance alone.
@@ -128,5 +128,5 @@ def _density(share: float, floor: float) -> float:
 
 
 def _prior(count: int, forms: int) -> float:
-    """Prior weight: a pair and a freed form must close so much more than one effect of textbook form."""
+    """Prior weight: every further effect and every freed form must close so much more of what is left."""
     return float(PAIR_SHARE ** (STEEPNESS * max(0, count - 1)) * FORM_SHARE ** (STEEPNESS * forms))

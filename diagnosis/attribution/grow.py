@@ -75,7 +75,15 @@ class InStretches:
     hypotheses: tuple[Hypothesis, ...]
 
     def whole(self, hypothesis: Hypothesis, data: Data) -> Hypothesis | None:
-        """The hypothesis fitted to whole runs, from its fit to stretches; None where that fails."""
+        """The hypothesis fitted to whole runs, from its fit to stretches.
+
+        Args:
+            hypothesis: fitted to the stretches.
+            data: the runs.
+
+        Returns:
+            The same effects; None where the fit fails.
+        """
         with suppress(FitError, np.linalg.LinAlgError):
             return replace(hypothesis, fit=fit_longer(hypothesis.fit, self.stretches, data)[0])
         return None

@@ -75,7 +75,15 @@ class Similarity:
         return value / self._factor(unit)
 
     def similar(self, value: float, unit: str) -> float:
-        """A value of the campaign itself as one of the similar campaign; the reverse of `own`."""
+        """A value of the campaign itself as a value of the similar campaign; the inverse of `own`.
+
+        Args:
+            value: in the unit.
+            unit: as in `own`.
+
+        Returns:
+            In the same unit.
+        """
         return value * self._factor(unit)
 
     def _factor(self, unit: str) -> float:

@@ -28,6 +28,9 @@ def long_stretch(short: Stretches) -> int:
 
     Over eighteen cycles a model of the motion shows in the phase as well; over a hundred the phase shows the clock,
     the temperature and the hand that let go.
+
+    Args:
+        short: stretches of two cycles.
     """
     return short.length * _LONG // _SHORT
 

@@ -27,6 +27,8 @@ UNITS = {
     "1", "N m", "N m/rad", "N m s2/rad2", "1/rad", "1/rad2", "rad", "rad/(N m)", "l/V", "Hz", "m/s", "rad/s", "s",
 }  # fmt: skip
 
+EXAMPLE_FREQUENCY = VALUES["second_mode"]["frequency"]
+
 each_effect = pytest.mark.parametrize("kind", ALL_EFFECTS, ids=lambda kind: kind.name)
 
 
@@ -211,3 +213,19 @@ def test_a_rod_gets_steps_short_enough_for_its_own_oscillation(compliance: float
     shorter = WIND_ON.timestep / run.timestep
     assert shorter == pytest.approx(round(shorter), abs=1e-12)  # a sample is a whole number of steps
     assert shorter < 2.5 * max(1.0, own * WIND_ON.timestep / 0.5)  # and no more of them than it needs
+
+
+@each_effect
+def test_mechanical_damping_takes_energy_in_every_fit(kind: type[Effect]) -> None:
+    """A simulated rig may be driven; what a fit finds in a real one cannot drive it."""
+    severity = kind.parameters()[0]
+    passive = kind.channel == "damping" and kind.condition == "always"
+    assert severity.lower <= severity.fit_lower <= 0.0 <= severity.fit_upper <= severity.upper
+    assert not passive or severity.fit_lower == 0.0
+
+
+@each_effect
+def test_only_a_second_mode_may_be_the_motion_itself(kind: type[Effect]) -> None:
+    implausible = [ratio for ratio in (0.5, 0.9, 1.0, 1.2, 1.5, 1.9, 2.2, 3.1, 3.5, 6.0)
+                   if not example(kind).plausible(EXAMPLE_FREQUENCY / ratio)]  # fmt: skip
+    assert implausible == ([0.9, 1.0, 1.2, 1.9, 2.2, 3.1] if kind.name == "second_mode" else [])

@@ -18,7 +18,7 @@ from diagnosis.fitting.similarity import Similarity
 from diagnosis.fitting.starting_points import nominal_start
 from diagnosis.study import COARSE_STEP, HUM, Study
 from tunnel_sim.effects import Effect
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
 INTERVAL = 4e-3
@@ -28,23 +28,37 @@ CONDITIONS = tuple((spring, speed) for spring in (16.12, 44.84) for speed in (0.
 INERTIA, DAMPING, CN_BETA, CN_R = 0.11, 0.008, 0.45, -0.25
 
 
-def campaign(effect: Effect | None = None, *, added: Array | None = None, seed: int = 3) -> Campaign:
-    """Six runs of two springs and three speeds, one effect, and something added to every reading."""
-    count = round(DURATION / INTERVAL)
+def campaign(
+    *effects: Effect,
+    added: Array | None = None,
+    seed: int = 3,
+    duration: float = DURATION,
+    quantity: Quantity | None = None,
+) -> Campaign:
+    """Six runs of two springs and three speeds, with effects, and something added to every reading."""
+    count = round(duration / INTERVAL)
+    sensor = SensorProperties(1.0 / INTERVAL, None, NOISE, quantity=quantity)
+    if quantity == "rate":
+        sensor = dataclasses.replace(sensor, noise_std=10.0 * NOISE)
+    noise = sensor.noise_std or 0.0
     runs = tuple(
         RunData(
-            f"r{i + 1}", np.zeros(count), 1, INTERVAL, NOISE**2, spring, speed, 1.2 * (speed > 0), DURATION
+            f"r{i + 1}",
+            np.zeros(count),
+            1,
+            INTERVAL,
+            NOISE**2,
+            spring,
+            speed,
+            1.2 * (speed > 0),
+            duration,
+            derivative=sensor.derivative,
         )
         for i, (spring, speed) in enumerate(CONDITIONS)
     )
-    problem = Problem(
-        Data(runs, 0.036, 0.625, 0.225, False, INERTIA), () if effect is None else (type(effect),)
-    )
-    values = (
-        []
-        if effect is None
-        else [getattr(effect, info.name) for info in effect.parameters() if not info.form]
-    )
+    kinds = tuple(type(effect) for effect in effects)
+    problem = Problem(Data(runs, 0.036, 0.625, 0.225, False, INERTIA), kinds)
+    values = [getattr(e, info.name) for e in effects for info in e.parameters() if not info.form]
     common = np.array([INERTIA, DAMPING, CN_BETA, CN_R, 0.001, *values])
     own = [np.linspace(0.2, 0.8, len(runs))] * len(
         problem.phased
@@ -56,11 +70,11 @@ def campaign(effect: Effect | None = None, *, added: Array | None = None, seed: 
     return Campaign(
         "small",
         RigProperties(INERTIA, 0.036, 0.625, 0.225),
-        SensorProperties(1.0 / INTERVAL, None, NOISE),
+        sensor,
         tuple(
             Run(
                 run.id,
-                Record(time, values + (0.0 if added is None else added) + rng.normal(0.0, NOISE, count)),
+                Record(time, values + (0.0 if added is None else added) + rng.normal(0.0, noise, count)),
                 run.wind_speed,
                 run.spring_stiffness,
                 run.air_density or None,

@@ -334,8 +334,8 @@ def test_the_chosen_fit_is_that_of_the_answer(found):
 def test_progress_is_told_and_steps_are_timed():
     told = []
     answer = diagnose(campaign(QUADRATIC), kinds=FEW, progress=told.append)
-    assert {"noise", "nominal fit", "single effects", "quadratic_damping"} <= set(told)
-    assert set(answer.seconds) >= {"noise", "nominal fit", "single effects"}
+    assert {"noise", "nominal fit", "effects", "quadratic_damping"} <= set(told)
+    assert set(answer.seconds) >= {"noise", "nominal fit", "effects"}
     assert all(seconds >= 0.0 for seconds in answer.seconds.values())
 
 

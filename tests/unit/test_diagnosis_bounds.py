@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.detection.mains import refine_frequency, remove_hum
-from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.result import ParameterEstimate
 from identification.printing.numbers import estimated
@@ -61,3 +61,17 @@ def test_the_frequency_of_a_hum_scatters_as_stated():
         stds.append(remove_hum(humming, found, NOISE**2)[1].frequency_std)
     ratio = float(np.std(errors)) / float(np.median(stds))
     assert ratio == pytest.approx(1.0, abs=0.7)  # 12 draws know it to a fifth; 3.5 of these
+
+
+@pytest.mark.parametrize("name", ["quadratic_damping", "structural_damping"])
+def test_damping_that_would_feed_the_motion_stays_at_none(name):
+    """A campaign that is driven: the fit stays at the bound and says so."""
+    kind = effect_class(name)
+    severity = kind.parameters()[0]
+    driven = kind(**{severity.name: -0.5 * severity.scale})
+    base = nominal(campaign(driven))
+    problem = Problem(base.problem.data, (kind,))
+    start = Point(np.append(base.point.common, severity.scale), base.point.release)
+    found = fit(problem, start)
+    assert found.value(f"{name}.{severity.name}") == 0.0
+    assert found.bound(f"{name}.{severity.name}") == "lower"

@@ -96,7 +96,7 @@ def test_without_a_random_moment_there_is_nothing_to_gain():
 
 
 def test_buffeting_is_offered_where_it_blows(windy):
-    (answer,) = weigh_random_moments(windy, [], [], BOTH)
+    (answer,) = weigh_random_moments(windy, [], BOTH)
     assert answer.effects == ("buffeting",)
     assert answer.share < 0.1
 
@@ -109,18 +109,18 @@ def test_one_gust_is_no_buffeting():
             b if b.wind_on else a for a, b in zip(campaign().runs, struck.runs, strict=True)
         ),
     )  # fmt: skip
-    assert weigh_random_moments(nominal(struck), [], [], BOTH) == []
+    assert weigh_random_moments(nominal(struck), [], BOTH) == []
 
 
 def test_a_gap_in_still_air_is_no_buffeting():
     fit = nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003})))
     assert wind_off_excess(fit) > 0.1
-    assert weigh_random_moments(fit, [], [], BOTH) == []
+    assert weigh_random_moments(fit, [], BOTH) == []
 
 
 def test_where_an_effect_closes_the_gap_no_random_moment_is_tried(windy):
     closed = replace(windy, chi2=np.array([float(r.size) for r in windy.residuals]))
-    assert weigh_random_moments(windy, [Hypothesis(("free_play",), closed)], [], BOTH) == []
+    assert weigh_random_moments(windy, [Hypothesis(("free_play",), closed)], BOTH) == []
 
 
 def test_runs_without_wind_have_no_random_moment():
@@ -156,10 +156,10 @@ def test_vortices_whose_phase_wanders_are_shedding_and_not_turbulence():
     assert found is not None
     assert found.spectrum.strouhal_number == pytest.approx(strouhal, rel=0.01)
     assert np.sqrt(2.0) * found.spectrum.intensity == pytest.approx(0.05, rel=0.4)
-    (answer,) = weigh_random_moments(fit, [], [], BOTH)
+    (answer,) = weigh_random_moments(fit, [], BOTH)
     assert answer.effects == ("vortex_shedding",)
     assert answer.share < 0.1
-    assert weigh_random_moments(fit, [], [], ("buffeting",)) == []
+    assert weigh_random_moments(fit, [], ("buffeting",)) == []
 
 
 def test_turbulence_about_a_frequency_is_recovered():

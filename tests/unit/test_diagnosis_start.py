@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.fitting.equation_error import equation_error_start
-from diagnosis.fitting.least_squares import fit, fit_growing
+from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import prepare
 from diagnosis.fitting.spectra import residual_spectra, resonance, shedding_line
@@ -167,43 +166,3 @@ def test_resonance_is_the_undamped_frequency_with_the_air():
 def test_a_gross_misfit_is_told_from_a_small_one():
     assert not is_gross(nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))))
     assert is_gross(nominal(campaign(effect_from("coulomb_friction", {"friction_moment": 0.3}))))
-
-
-BALANCED = {
-    "coulomb_friction": {"friction_moment": 0.1},
-    "quadratic_damping": {"coefficient": 0.05},
-    "cubic_stiffness": {"coefficient": 1.5},
-    "asymmetric_stiffness": {"coefficient": 0.5},
-    "gravity_stiffness": {"stiffness": 3.0},
-}
-
-
-@pytest.mark.parametrize("name", BALANCED)
-def test_the_balance_of_moments_starts_near_a_strong_effect(name):
-    """Near enough for growing horizons to arrive, which the nominal start's own phase would not allow."""
-    kind = effect_class(name)
-    effect = effect_from(name, BALANCED[name])
-    data = readings_of(prepared(duration=6.0), effect, NOMINAL, [[0.35, 0.0]] * 6, NOISE)
-    problem = Problem(data, (kind,), (("gravity_stiffness.rest_angle", 0.0),) * (name == "gravity_stiffness"))
-    start = equation_error_start(problem)
-    assert start is not None
-    found = fit_growing(problem, start)
-    assert abs(found.excess) < 5.0 * np.sqrt(2.0 / found.count)
-    key = problem.effect_names[0]
-    assert abs(found.value(key) - effect.severity) < 4.0 * found.std(key)
-
-
-def test_the_balance_of_moments_keeps_to_what_is_linear():
-    data = nominal(campaign()).problem.data
-    assert equation_error_start(Problem(data, (effect_class("rod_flexibility"),))) is None
-
-
-def test_the_balance_of_moments_without_stiffness_gives_a_share_of_it():
-    """Per unit inertia, and for a cubic spring per unit stiffness."""
-    data = prepared((Setting(None, 0.0), Setting(None, 0.0, 0.2)))
-    effect = effect_from("cubic_stiffness", {"coefficient": 0.8})
-    data = readings_of(data, effect, (160.0, 0.1, 0.002), [[0.5, 0.0], [0.3, 0.0]])
-    start = equation_error_start(Problem(data, (type(effect),)))
-    assert start is not None
-    assert start.common[0] == pytest.approx(160.0, rel=0.02)
-    assert start.common[3] == pytest.approx(0.8, rel=0.2)

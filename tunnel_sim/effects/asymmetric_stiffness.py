@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tunnel_sim.effects.base import Effect, exponent, parameter
-from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)
@@ -37,16 +36,9 @@ class AsymmetricStiffness(Effect):
         scale=0.05,
         lower=-2.0,
         upper=2.0,
-        per_stiffness=True,
     )
 
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 2.0)
-
-    @classmethod
-    def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
-        """The textbook form."""
-        del rate
-        return -spring * angle**2
 
     def law(self) -> Mapping[str, float]:
         """The effect's terms of the moment law."""

@@ -57,7 +57,6 @@ class ParameterInfo:
         beside_spring: whether only a spring of stated stiffness beside the effect makes it known; else it is held.
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
-        per_stiffness: whether it multiplies the spring's stiffness.
     """
 
     name: str
@@ -74,7 +73,6 @@ class ParameterInfo:
     beside_spring: bool
     chosen_spring: bool
     per_pressure: bool
-    per_stiffness: bool
 
 
 def parameter(
@@ -92,7 +90,6 @@ def parameter(
     beside_spring: bool = False,
     chosen_spring: bool = False,
     per_pressure: bool = False,
-    per_stiffness: bool = False,
 ) -> Any:
     """A dataclass field that is an effect's parameter; arguments as in `ParameterInfo`."""
     metadata = {
@@ -108,7 +105,6 @@ def parameter(
         "beside_spring": beside_spring,
         "chosen_spring": chosen_spring,
         "per_pressure": per_pressure,
-        "per_stiffness": per_stiffness,
     }
     return field(default=default, metadata=metadata)
 
@@ -200,7 +196,6 @@ class Effect:
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
     - ``exact``: whether it is a factor on a stated number, so that its form is known exactly.
     - ``tries``: how many starting points of a fit are worth trying.
-    - ``regressed_at``: parameters held fixed in a regression of moments, with their values.
     - ``caveat``: how to read the coefficients that are reported with it.
     """
 
@@ -223,7 +218,6 @@ class Effect:
     ahead_of_sensor: ClassVar[bool] = False
     exact: ClassVar[bool] = False
     tries: ClassVar[int] = 1
-    regressed_at: ClassVar[Mapping[str, float]] = {}
     caveat: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
@@ -274,21 +268,6 @@ class Effect:
         """
         severity = cls.parameters()[0]
         return (Trial({severity.name: severity.scale * moment_scale(severity, campaign)}, severity.name),)
-
-    @classmethod
-    def regressor(cls, angle: Array, rate: Array, spring: float) -> Array | None:
-        """The moment per unit of the first parameter, for a regression of the moment balance.
-
-        Args:
-            angle: rad, shape (n,).
-            rate: rad/s, shape (n,).
-            spring: stiffness of the run's spring, used where the parameter is ``per_stiffness``, N m/rad.
-
-        Returns:
-            N m per unit, shape (n,); None where the moment is not linear in the first parameter.
-        """
-        del angle, rate, spring
-        return None
 
     def plausible(self, omega: float) -> bool:
         """Whether a fitted effect is still what its name means.

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from tunnel_sim.effects.base import Drawn, Effect, parameter, with_law
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)
@@ -53,12 +50,6 @@ class CoulombFriction(Effect):
         fit_lower=5e-4,  # below it the contact moves faster than the integrator steps
         form=True,
     )
-
-    @classmethod
-    def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
-        """Friction opposes the motion."""
-        del angle, spring
-        return -np.sign(rate)
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the terms of the moment law, with steps short enough to resolve the presliding range."""

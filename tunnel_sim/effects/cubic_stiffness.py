@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tunnel_sim.effects.base import Effect, exponent, parameter
-from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)
@@ -34,16 +33,9 @@ class CubicStiffness(Effect):
         scale=0.2,
         lower=-10.0,
         upper=50.0,
-        per_stiffness=True,
     )
 
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 3.0)
-
-    @classmethod
-    def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
-        """The textbook form."""
-        del rate
-        return -spring * angle**3
 
     def law(self) -> Mapping[str, float]:
         """The effect's terms of the moment law."""

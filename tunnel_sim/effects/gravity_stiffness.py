@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
-
-import numpy as np
 
 from tunnel_sim.effects.base import Effect, parameter
-from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)
@@ -32,7 +28,6 @@ class GravityStiffness(Effect):
     )
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
     example = (0.4, 0.2)
-    regressed_at: ClassVar[Mapping[str, float]] = {"rest_angle": 0.0}  # the sensor's zero
 
     stiffness: float = parameter(
         "Kg", "N m/rad", "greatest restoring moment", scale=0.3, lower=-1e5, upper=1e5
@@ -48,12 +43,6 @@ class GravityStiffness(Effect):
         fit_upper=1.6,
         beside_spring=True,  # without a spring it is one with the sensor's zero
     )
-
-    @classmethod
-    def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
-        """The moment towards the sensor's zero."""
-        del rate, spring
-        return -np.sin(angle)
 
     def law(self) -> Mapping[str, float]:
         """The effect's terms of the moment law."""

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from tunnel_sim.effects.base import Effect, exponent, parameter
-from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)
@@ -40,12 +37,6 @@ class QuadraticDamping(Effect):
     )
 
     exponent: float = exponent("n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0)
-
-    @classmethod
-    def regressor(cls, angle: Array, rate: Array, spring: float) -> Array:
-        """Drag opposes the motion."""
-        del angle, spring
-        return -np.abs(rate) * rate
 
     def law(self) -> Mapping[str, float]:
         """The effect's terms of the moment law."""

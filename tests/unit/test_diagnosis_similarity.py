@@ -1,0 +1,208 @@
+"""Similar campaigns: the same motion in another unit of time and of moment, and the same diagnosis."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from diagnosis import diagnose, vocabulary
+from diagnosis.fitting.similarity import (
+    REFERENCE_FREQUENCY,
+    REFERENCE_STIFFNESS,
+    Similarity,
+    frequency,
+    similar_campaign,
+)
+from diagnosis.investigate import investigate
+from tests.reference import free_decays
+from tests.reference.free_decays import Setting
+from tests.unit.gap_campaigns import campaign
+from tunnel_sim.effects import ALL_EFFECTS, EffectChain, effect_from
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.record import Record
+
+#: Effects of every channel and unit, of a size that shows. Their wind speeds and angles stay as they are.
+SHOWN = {
+    "coulomb_friction": {"friction_moment": 0.05},
+    "quadratic_damping": {"coefficient": 0.01},
+    "structural_damping": {"loss_factor": 0.02},
+    "cubic_stiffness": {"coefficient": -1.0},
+    "gravity_stiffness": {"stiffness": 2.0, "rest_angle": 0.2},
+    "rod_flexibility": {"compliance": 2e-3, "inertia_share": 0.3},
+    "nonlinear_yaw_moment": {"coefficient": -1.0},
+    "nonlinear_yaw_damping": {"coefficient": 0.5},
+    "unsteady_aero_lag": {"lag": 1.0},
+    "wind_speed_offset": {"offset": 0.5},
+}
+
+
+def settings(change, effect):
+    """A run of the rig and of the effect, in the units of a similar one."""
+    run = RunSettings(
+        spring_stiffness=change.similar(16.12, "N m/rad"),
+        derivatives=AeroDerivatives(0.45, -0.25),
+        yaw_inertia=change.similar(0.11, "kg m2"),
+        mechanical_damping=change.similar(0.008, "N m s/rad"),
+        wind_speed=20.0,
+        air_density=1.2,
+        release_angle=0.35,
+        release_rate=change.similar(0.4, "rad/s"),
+        duration=change.similar(4.0, "s"),
+        timestep=change.similar(1e-3, "s"),
+    )
+    units = {info.name: info.unit for info in type(effect).parameters()}
+    values = {name: change.similar(getattr(effect, name), unit) for name, unit in units.items()}
+    return EffectChain(run, (type(effect)(**values),), (None,)).physics()
+
+
+@pytest.mark.parametrize("change", [Similarity(30.0, 0.01), Similarity(0.2, 7.0)], ids=["slow", "fast"])
+@pytest.mark.parametrize("name", SHOWN)
+def test_a_similar_rig_moves_through_the_same_angles(name, change):
+    """The equation of motion keeps its form, whatever acts: time s, moments m, lengths s and the area m/s."""
+    rig, effect = load_rig(), effect_from(name, SHOWN[name])
+    body = dataclasses.replace(
+        rig.body,
+        frontal_area=rig.body.frontal_area * change.area,
+        length=rig.body.length * change.time,
+        width=rig.body.width * change.time,
+    )
+    own = forward_motion(rig, settings(Similarity(), effect), 100.0)
+    similar = forward_motion(
+        dataclasses.replace(rig, body=body), settings(change, effect), change.similar(100.0, "Hz")
+    )
+    np.testing.assert_allclose(similar.angle, own.angle, atol=2e-7)
+    np.testing.assert_allclose(similar.rate, change.similar(1.0, "rad/s") * own.rate, atol=2e-6 / change.time)
+    still = settings(Similarity(), effect_from(name, {}))
+    assert np.max(np.abs(forward_motion(rig, still, 100.0).angle - own.angle)) > 1e-4  # the effect shows
+
+
+def test_every_unit_goes_there_and_back():
+    change = Similarity(0.03, 40.0)
+    units = {info.unit for kind in ALL_EFFECTS for info in kind.parameters()}
+    units |= {"kg m2", "N m s/rad", "s", "s2", "rad/s", "rad/s2", "1/s", "1/s2"}
+    for unit in units:
+        assert change.own(change.similar(0.7, unit), unit) == pytest.approx(0.7, rel=1e-14)
+        # the exponents are those of the unit: moments with m, seconds with s, inertias with m s²
+        as_moment = unit.replace("kg m2", "N m s2")
+        above, _, below = as_moment.partition("/")
+        moment = ("N m" in above) - ("N m" in below)
+        time = seconds(above) - seconds(below) - ("Hz" in unit)
+        if unit not in ("m/s", "l/V"):
+            assert change.similar(1.0, unit) == pytest.approx(40.0**moment * 0.03**time, rel=1e-14)
+    assert change.similar(3.0, "m/s") == change.similar(3.0, "l/V") == 3.0
+
+
+def seconds(part):
+    """Power of the second in one side of a unit's fraction."""
+    words = part.strip("()").split()
+    return ("s" in words) + 2 * ("s2" in words)
+
+
+def test_every_rig_becomes_the_reference_rig():
+    for data in (campaign(), stretched(campaign(), 1 / 30, 100.0), stretched(campaign(), 30.0, 0.01)):
+        similar, change = similar_campaign(data)
+        still = [frequency(run.record) for run in similar.runs if not run.wind_on]
+        assert np.median(still) == pytest.approx(REFERENCE_FREQUENCY)
+        assert np.median([run.spring_stiffness for run in similar.runs]) == pytest.approx(REFERENCE_STIFFNESS)
+        assert similar.sensor.sample_rate == pytest.approx(similar.runs[0].record.sample_rate)
+        assert similar.rig.frontal_area == pytest.approx(change.area * data.rig.frontal_area)
+        assert abs(np.median([np.mean(run.record.yaw_rad) for run in similar.runs])) < 1e-12
+    bare = free_decays.campaign([Setting(None, 0.0)], duration=5.0, rate=200.0)
+    _, change = similar_campaign(bare)
+    assert change.similar(1.0, "kg m2") == pytest.approx(1.0)
+
+
+def stretched(data, time, moment):
+    """The campaign of a rig whose times and moments are multiplied."""
+    change = Similarity(time, moment, reading=("rad", "rad/s", "rad/s2")[data.sensor.derivative])
+    rig, sensor, per = data.rig, data.sensor, change.similar(1.0, change.reading)
+    return dataclasses.replace(
+        data,
+        rig=dataclasses.replace(
+            rig,
+            yaw_inertia=change.similar(rig.yaw_inertia, "kg m2"),
+            frontal_area=rig.frontal_area * change.area,
+            reference_length=rig.reference_length * time,
+            width=rig.width * time,
+        ),
+        sensor=dataclasses.replace(
+            sensor, sample_rate=sensor.sample_rate / time, noise_std=sensor.noise_std * per
+        ),
+        runs=tuple(
+            dataclasses.replace(
+                run,
+                record=Record(run.record.time_s * time, run.record.yaw_rad * per),
+                spring_stiffness=run.spring_stiffness * moment,
+            )
+            for run in data.runs
+        ),
+    )
+
+
+FEW = vocabulary(["coulomb_friction", "quadratic_damping", "cubic_stiffness", "sensor_drift"])
+EXPONENTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
+GRID = [(30.0**t, 100.0**m) for t in EXPONENTS for m in EXPONENTS if (t, m) != (0.0, 0.0)]
+
+
+@pytest.fixture(scope="module")
+def twice_caused():
+    """A campaign with two causes, as angles and as rates, and what is found in them."""
+    causes = (
+        effect_from("coulomb_friction", {"friction_moment": 0.003}),
+        effect_from("cubic_stiffness", {"coefficient": -0.05}),
+    )
+    found = {}
+    for quantity in ("angle", "rate"):
+        data = campaign(*causes, duration=6.0, quantity=quantity)
+        data = dataclasses.replace(data, runs=data.runs[::2])
+        found[quantity] = (data, investigate(data, FEW))
+    return found
+
+
+def assert_same_answer(data, first, time, moment):
+    """The same causes with the same probabilities, and parameters that are stretched."""
+    found = investigate(stretched(data, time, moment), FEW)
+    assert found.causes == first.causes == ("coulomb_friction", "cubic_stiffness")
+    assert found.similarity.time == pytest.approx(first.similarity.time / time, rel=1e-6)
+    known = {answer.effects: answer.probability for answer in first.weighed}
+    for answer in found.weighed:
+        assert answer.probability == pytest.approx(known[answer.effects], abs=0.02)
+    change, units = (
+        Similarity(time, moment),
+        {f"{k.name}.{i.name}": i.unit for k in FEW for i in k.parameters()},
+    )
+    for name in first.chosen.problem.effect_names:
+        value, std = first.chosen.value(name), first.chosen.std(name)
+        expected, width = (
+            change.similar(first.similarity.own(number, units[name]), units[name]) for number in (value, std)
+        )
+        again = found.similarity.own(found.chosen.value(name), units[name])
+        assert again == pytest.approx(expected, abs=0.1 * width)
+
+
+@pytest.mark.parametrize("quantity", ["angle", "rate"])
+@pytest.mark.parametrize(("time", "moment"), [(1 / 30, 100.0), (30.0, 0.01)], ids=["fast", "slow"])
+def test_a_stretched_campaign_has_the_same_causes(twice_caused, quantity, time, moment):
+    assert_same_answer(*twice_caused[quantity], time, moment)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("quantity", ["angle", "rate"])
+@pytest.mark.parametrize(("time", "moment"), GRID)
+def test_a_campaign_stretched_by_any_factors_has_the_same_causes(twice_caused, quantity, time, moment):
+    assert_same_answer(*twice_caused[quantity], time, moment)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("time", "moment"), [(1 / 30, 0.01), (30.0, 100.0)], ids=["fast", "slow"])
+def test_the_diagnosis_of_a_stretched_campaign_is_stretched(twice_caused, time, moment):
+    """Down to the closure on held-out runs and the coefficients, which are what they were."""
+    data, _ = twice_caused["angle"]
+    first, found = diagnose(data, kinds=FEW), diagnose(stretched(data, time, moment), kinds=FEW)
+    assert found.causes == first.causes
+    assert found.gap.closed == pytest.approx(first.gap.closed, abs=1e-3)
+    for name, before in first.coefficients.after.items():
+        assert found.coefficients.after[name].value == pytest.approx(before.value, abs=0.1 * before.std)

@@ -1,0 +1,130 @@
+"""Runs in stretches: their boundaries, the fits that grow from them, and a motion far from any linear one."""
+
+import numpy as np
+import pytest
+
+from diagnosis.attribution.grow import grow_in_stretches
+from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
+from diagnosis.fitting.stretches import fit_longer, in_stretches, long_stretch
+from diagnosis.investigate import fit_nominal, investigate
+from tests.unit.gap_campaigns import CN_BETA, INERTIA, INTERVAL, campaign, nominal
+from tunnel_reference import moments
+from tunnel_reference.conditions import Conditions
+from tunnel_reference.integrator import integrate
+from tunnel_reference.terms import Phase, Term
+from tunnel_sim.effects import ALL_EFFECTS, effect_class
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
+
+
+@pytest.fixture(scope="module")
+def data():
+    return nominal(campaign()).problem.data
+
+
+def test_stretches_hold_every_block_once(data):
+    found = in_stretches(data)
+    assert found.length == round(2.0 / (REFERENCE_FREQUENCY * INTERVAL))
+    for number, run in enumerate(data.runs):
+        own = [part for part, place in zip(found.data.runs, found.places, strict=True) if place[0] == number]
+        np.testing.assert_array_equal(np.concatenate([part.reading for part in own]), run.reading)
+        assert all(0.5 <= part.reading.size / found.length <= 1.5 for part in own)
+        begins = [place[1] for place in found.places if place[0] == number]
+        assert [round(part.start / INTERVAL) for part in own] == begins
+    assert len({part.id for part in found.data.runs}) == len(found.places)
+
+
+@pytest.mark.parametrize("factor", [2, 3, 9])
+def test_longer_stretches_begin_where_shorter_ones_do(data, factor):
+    short = in_stretches(data)
+    longer = in_stretches(data, short.length * factor)
+    assert set(longer.places) <= set(short.places)
+    assert len(longer.places) < len(short.places)
+
+
+def test_sets_are_compared_over_eighteen_cycles(data):
+    short = in_stretches(data)
+    assert long_stretch(short) * INTERVAL * REFERENCE_FREQUENCY == pytest.approx(18.0)
+
+
+def test_releases_are_taken_over_from_shorter_stretches(data, monkeypatch):
+    """Where a stretch goes on into the next one, the release of the first one remains."""
+    short = in_stretches(data)
+    first = fit_nominal(short.data)
+    starts = []
+
+    def watched(problem, start, **how):
+        starts.append((problem.data, start))
+        return fit(problem, start, **how)
+
+    monkeypatch.setattr("diagnosis.fitting.stretches.fit", watched)
+    found, longest = fit_longer(first, short, data)
+    sizes = [max(run.reading.size for run in runs.runs) for runs, _ in starts]
+    assert sizes == sorted(sizes)
+    assert longest.data is data
+    known = dict(zip(short.places, first.point.release, strict=True))
+    begins = in_stretches(data, 3 * short.length).places
+    np.testing.assert_array_equal(starts[0][1].release, [known[place] for place in begins])
+    assert [run.id for run in found.problem.data.runs] == [run.id for run in data.runs]
+
+
+def test_fits_of_growing_length_reach_a_truth_far_out_of_phase(data):
+    """A twentieth of the inertia is a whole cycle at the end of the record, from which no fit returns."""
+    short = in_stretches(data)
+    right = fit_nominal(short.data)
+    far = right.point.common.copy()
+    far[0] *= 1.05
+    begun = fit(Problem(short.data), Point(far, right.point.release))
+    found, _ = fit_longer(begun, short, data)
+    assert abs(found.value("yaw_inertia") - INERTIA) < 4.0 * found.std("yaw_inertia")
+    assert abs(found.value("cn_beta") - CN_BETA) < 4.0 * found.std("cn_beta")
+    assert abs(found.excess) < 5.0 * np.sqrt(2.0 / found.count)
+
+
+def test_only_effects_without_a_memory_of_the_release_are_tried_on_stretches(data):
+    kinds = [effect_class(name) for name in ("sensor_drift", "second_mode", "quadratic_damping")]
+    told = []
+    found = grow_in_stretches(data, fit_nominal, kinds, told.append)
+    assert set(told) == {"quadratic_damping"}
+    assert all(h.fit.problem.data is not data for h in found.hypotheses)
+    whole = found.whole(found.hypotheses[0], data)
+    assert whole.fit.problem.data is data
+
+
+GRAVITY, DRY, QUADRATIC, VISCOUS = 30.9, 0.2, 0.02, 0.02  # per unit inertia
+
+
+def pendulum(amplitude=2.5, duration=40.0, noise=1e-3):
+    """A heavy pendulum with dry and quadratic damping, integrated by the reference simulator."""
+    one = np.ones(1)
+    conditions = Conditions(
+        1e-9 * one, 0.0 * one, amplitude * one, amplitude * one, 1.2, duration, 1.0, VISCOUS, 0.0, 0.0, noise,
+        sample_rate=100.0,
+    )  # fmt: skip
+    terms = [
+        Term(moments.gravity, Phase.MOMENT, {"stiffness": GRAVITY * one, "angle": 0.0 * one, "second": 0.0 * one}),
+        Term(moments.quadratic_damping, Phase.MOMENT, {"coefficient": QUADRATIC * one}),
+        Term(moments.coulomb_level, Phase.FRICTION, {"moment": DRY * one}),
+    ]  # fmt: skip
+    (motion,) = integrate([conditions], [terms])
+    reading = motion.angle[:, 0] + np.random.default_rng(6).normal(0.0, noise, conditions.samples)
+    run = Run("swing", Record(conditions.time, reading), 0.0, None, None)
+    return Campaign("pendulum", RigProperties(), SensorProperties(100.0, None, noise), (run,))
+
+
+@pytest.mark.slow
+def test_what_acts_on_a_pendulum_of_large_amplitude_is_found():
+    kinds = [kind for kind in ALL_EFFECTS if kind.fitted and kind.condition == "always"]
+    study = investigate(pendulum(), kinds)
+    assert study.causes == ("coulomb_friction", "gravity_stiffness", "quadratic_damping")
+    assert abs(study.chosen.excess) < 6.0 * np.sqrt(2.0 / study.chosen.count)
+    truth = {
+        "gravity_stiffness.stiffness": (GRAVITY, "1/s2"),
+        "coulomb_friction.friction_moment": (DRY, "1/s2"),
+        "quadratic_damping.coefficient": (QUADRATIC, "1"),
+    }
+    for name, (value, unit) in truth.items():
+        found = study.similarity.own(study.chosen.value(name), unit)
+        assert found == pytest.approx(value, rel=0.03)
