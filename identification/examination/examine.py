@@ -10,6 +10,7 @@ from identification.examination.growth import growing_runs
 from identification.examination.labels import exchanged_labels
 from identification.examination.release import find_release
 from identification.examination.repeated import without_repeats
+from identification.examination.self_excited import self_excited_runs
 from identification.examination.spring_line import springs_off_the_line
 from identification.examination.swings import swing_of
 from identification.examination.turns import wide_swings
@@ -23,7 +24,8 @@ def examine(campaign: Campaign) -> Examined:
     """Check a campaign's records against one another and against what is stated of them.
 
     Repeated records are counted once. Rounded time stamps are replaced by the clock behind them. Samples before
-    the release are cut off. Runs whose zeros differ get one each. Motion that grows with the wind off, and springs
+    the release are cut off. Wind-on runs in a limit cycle are cut to their linear growth, or left out. Runs whose
+    zeros differ get one each. Motion that grows with the wind off, and springs
     or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies are noted.
 
     Args:
@@ -43,10 +45,11 @@ def examine(campaign: Campaign) -> Examined:
     noted = wide_swings(kept)
     kept, clocks = with_clocks(kept)
     kept, releases = from_releases(kept)
+    kept, excited = self_excited_runs(kept)
     kept, zeros = with_zeros(kept)
     swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
     faults = growing_runs(swings) or exchanged_labels(swings) or springs_off_the_line(swings)
-    return Examined(kept, (*repeats, *noted, *clocks, *releases, *zeros, *faults))
+    return Examined(kept, (*repeats, *noted, *clocks, *releases, *excited, *zeros, *faults))
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
