@@ -8,6 +8,7 @@ from dataclasses import replace
 from diagnosis.answer.assemble import assemble
 from diagnosis.answer.limit_cycles import limit_cycle_answer
 from diagnosis.answer.own_units import in_own_units
+from diagnosis.answer.second_mode import second_modes
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.limit_cycles import diagnosable
 from diagnosis.detection.noise_remarks import noise_remarks
@@ -47,7 +48,11 @@ def diagnose(
     where, maps = localise(study)
     remarks = (*found.remarks, *noise_remarks(study.noise, study.trend))
     answer = in_own_units(replace(assemble(study, where, maps, left_out), remarks=remarks), study.similarity)
-    return limit_cycle_answer(answer, found.remarks) if found.limit_cycles else answer
+    if found.limit_cycles:
+        return limit_cycle_answer(answer, found.remarks)
+    if answer.causes == ("unknown",):
+        return replace(answer, cautions=(*answer.cautions, *second_modes(campaign)))
+    return answer
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:
