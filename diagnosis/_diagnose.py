@@ -6,14 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from diagnosis.answer.assemble import assemble
+from diagnosis.answer.limit_cycles import limit_cycle_answer
 from diagnosis.answer.own_units import in_own_units
+from diagnosis.answer.second_mode import second_modes
 from diagnosis.detection.comparable import comparable_runs
+from diagnosis.detection.limit_cycles import diagnosable
 from diagnosis.detection.noise_remarks import noise_remarks
 from diagnosis.detection.refusal import refuse_hopeless
 from diagnosis.investigate import Progress, investigate
 from diagnosis.localisation.localise import localise
 from diagnosis.result import Diagnosis
-from identification.examination.examine import examine
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -36,20 +38,25 @@ def diagnose(
         TunnelError: when the examination refuses the records, a run shows no decaying motion, or the nominal model
             cannot be fitted to them.
     """
-    examined = examine(campaign).accepted()
-    refuse_hopeless(examined.campaign)
-    campaign, left_out = comparable_runs(examined.campaign)
+    found = diagnosable(campaign)
+    if not found.limit_cycles:
+        refuse_hopeless(found.campaign)
+    campaign, left_out = comparable_runs(found.campaign)
     if campaign.sensor.derivative:
         # Their sizes are those of angles, and their ranges too.
         kinds = [kind for kind in kinds if kind.channel != "sensor"]
         left_out = (*left_out, f"Effects of the sensor are not tried on {campaign.sensor.quantity}s.")
-    study = investigate(campaign, kinds, progress)
+    study = investigate(campaign, () if found.limit_cycles else kinds, progress)
     if progress is not None:
         progress("where, and how far it closes")
     where, maps = localise(study)
-    remarks = (*examined.remarks, *noise_remarks(study.noise, study.trend))
-    answer = replace(assemble(study, where, maps, left_out), remarks=remarks)
-    return in_own_units(answer, study.similarity)
+    remarks = (*found.remarks, *noise_remarks(study.noise, study.trend))
+    answer = in_own_units(replace(assemble(study, where, maps, left_out), remarks=remarks), study.similarity)
+    if found.limit_cycles:
+        return limit_cycle_answer(answer, found.remarks)
+    if answer.causes == ("unknown",):
+        return replace(answer, cautions=(*answer.cautions, *second_modes(campaign)))
+    return answer
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

@@ -199,3 +199,7 @@ NOISE_CONTRADICTED = 3.0
 BLIND_CLOSED = 0.95
 #: Errors of coefficients in blind tests are counted within this many standard deviations. Convention.
 BLIND_WITHIN = 3.0
+
+#: Share of what one free decay leaves that two may leave, for a second mode to be named. Judgement: the lines must
+#: also be resolved, that is, farther apart than the sum of their half-power widths.
+SECOND_MODE_LEFT = 0.5

@@ -8,6 +8,7 @@ from identification.estimate import Estimate, RunEstimate, Status, by_gravity
 from identification.estimators import Estimator, make_estimator
 from identification.examination.examine import examine
 from identification.examination.rates import as_angles
+from identification.examination.self_excited import in_limit_cycle
 from identification.remark import Examined
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -38,8 +39,9 @@ def identify(
     if not campaign.runs:
         raise TunnelError("campaign without runs", where=campaign.name, remedy="add at least one run")
     examined = examine(campaign).accepted()
-    estimate = as_angles(chosen.estimate(examined.campaign), campaign.sensor)
-    estimate = _of_all_runs(campaign, examined, estimate)
+    left = examined.campaign
+    found = chosen.estimate(left) if left.runs else Estimate(campaign.name, chosen.name, ())
+    estimate = _of_all_runs(campaign, examined, as_angles(found, campaign.sensor))
     if throw and estimate.status.failed:
         what, _, remedy = estimate.status.value.partition(": ")
         raise TunnelError(what, where=campaign.name, remedy=remedy)
@@ -51,11 +53,15 @@ def _of_all_runs(campaign: Campaign, examined: Examined, estimate: Estimate) -> 
     if not examined.remarks:
         return estimate
     found = {run.id: run for run in estimate.runs}
-    runs = tuple(found.get(run.id, RunEstimate(run.id, (Status.REPEATED_RUN,))) for run in campaign.runs)
-    statuses = {Status.REPEATED_RUN} if len(found) < len(runs) else set()
+    cycling = {name for remark in examined.remarks if in_limit_cycle(remark.figures) for name in remark.runs}
+    left_out = {
+        run.id: RunEstimate(run.id, (Status.LIMIT_CYCLE if run.id in cycling else Status.REPEATED_RUN,))
+        for run in campaign.runs
+        if run.id not in found
+    }
     return replace(
         estimate,
-        runs=runs,
-        statuses=by_gravity({*estimate.statuses, *statuses}),
+        runs=tuple(found.get(run.id) or left_out[run.id] for run in campaign.runs),
+        statuses=by_gravity({*estimate.statuses, *(run.status for run in left_out.values())}),
         remarks=examined.remarks,
     )

@@ -1,4 +1,4 @@
-"""Packaged measurements: the paper's tables and two measured campaigns, each with its source and licence.
+"""Packaged measurements: the paper's tables and measured campaigns, each with its source and licence.
 
 The files lie in ``identification/data``; a ``SOURCE.md`` beside each says where they come from.
 The paper: "Identification of Aerodynamic Coefficients of Ground Vehicles Using Neural Network".
@@ -14,7 +14,14 @@ from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
-MEASURED_CAMPAIGNS: tuple[str, ...] = ("kvlcc2-roll-decay-0kn", "rotary-pendulum")
+MEASURED_CAMPAIGNS: tuple[str, ...] = (
+    "kvlcc2-roll-decay-0kn",
+    "lee-heave-1",
+    "lee-pitch-1",
+    "rotary-pendulum",
+    "tartaruga-growth",
+    "tartaruga-lco",
+)
 """Names of the packaged measured campaigns."""
 
 # Windows of Table III whose omega_n can be read in two ways in the scan, and the reading that is not in the file.

@@ -100,6 +100,27 @@ LEAST_FOR_SCATTER = 3
 SCATTER_TOLERANCE = 1.2
 """Factor on χ² of the networks' windows: their propagated standard deviations are good to a tenth."""
 
+# --- When a wind-on run excites itself. ---
+
+LEAST_GROWTH_WINDOWS = 4
+"""Windows of three cycles of a growing part and of a limit cycle: a line through them leaves two degrees of freedom
+for its scatter."""
+
+LEAST_STEADY_CYCLES = 20.0
+"""Cycles of a record that holds its amplitude. With `STEADY_CHANGE`, a free decay would need ζ below 0.0008, less
+than the wind alone adds to any rig. Judgement."""
+
+STEADY_CHANGE = 0.1
+"""Greatest change of the amplitude's logarithm along a steady record, at the upper end of its interval. Judgement."""
+
+SETTLED_SHARE = 0.9
+"""Share of the last amplitude from which a growing motion counts as settled: windows scatter by a few per cent.
+Judgement."""
+
+LINEAR_SHARE = 0.3
+"""Amplitude over that of the limit cycle, up to which a growth counts as linear: a saturation that grows as the
+square of the amplitude reduces the growth rate there by 9 %, and by some 2 % on average."""
+
 # --- When a random moment is assumed. ---
 
 LEAST_MOMENT_DROP = 1.0

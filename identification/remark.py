@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
@@ -29,12 +29,14 @@ class Remark:
         runs: ids of the runs it concerns.
         what: what was found, as a clause.
         remedy: what to do about it.
+        figures: numbers behind it, by name, in JSON's types; units in their names.
     """
 
     outcome: Outcome
     runs: tuple[str, ...]
     what: str
     remedy: str
+    figures: Mapping[str, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """The remark in one line: runs, what, remedy."""
@@ -42,19 +44,24 @@ class Remark:
         return f"{word} {', '.join(self.runs)}: {self.what}; {self.remedy}"
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name."""
-        return {
+        """Fields by name; the figures where there are any."""
+        document = {
             "outcome": self.outcome.value,
             "runs": list(self.runs),
             "what": self.what,
             "remedy": self.remedy,
         }
+        return document | ({"figures": dict(self.figures)} if self.figures else {})
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> Remark:
         """The inverse of `to_json_dict`."""
         return cls(
-            Outcome(data["outcome"]), tuple(map(str, data["runs"])), str(data["what"]), str(data["remedy"])
+            Outcome(data["outcome"]),
+            tuple(map(str, data["runs"])),
+            str(data["what"]),
+            str(data["remedy"]),
+            dict(data.get("figures", {})),
         )
 
 

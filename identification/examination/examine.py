@@ -12,6 +12,7 @@ from identification.examination.rates import noted_quantity
 from identification.examination.release import find_release
 from identification.examination.repeated import without_repeats
 from identification.examination.rest import without_rest
+from identification.examination.self_excited import self_excited_runs
 from identification.examination.spring_line import springs_off_the_line
 from identification.examination.swings import swing_of
 from identification.examination.turns import wide_swings
@@ -25,9 +26,9 @@ def examine(campaign: Campaign) -> Examined:
     """Check a campaign's records against one another and against what is stated of them.
 
     Repeated records are counted once. Rounded time stamps are replaced by the clock behind them. Samples before
-    the release, and most of a long rest beside the centre, are cut off. Runs whose zeros differ get one each.
-    Motion that grows with the wind off, and springs or wind speeds assigned to the wrong runs, are refused. Springs
-    that do not fit the frequencies are noted.
+    the release, and most of a long rest beside the centre, are cut off. Wind-on runs in a limit cycle are cut to
+    their linear growth, or left out. Runs whose zeros differ get one each. Motion that grows with the wind off, and
+    springs or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies are noted.
 
     Args:
         campaign: measured or simulated runs.
@@ -47,10 +48,11 @@ def examine(campaign: Campaign) -> Examined:
     kept, clocks = with_clocks(kept)
     kept, releases = from_releases(kept)
     kept, rests = without_rest(kept)
+    kept, excited = self_excited_runs(kept)
     kept, zeros = with_zeros(kept)
     swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
     faults = growing_runs(swings) or exchanged_labels(swings) or springs_off_the_line(swings)
-    return Examined(kept, (*repeats, *noted, *clocks, *releases, *rests, *zeros, *faults))
+    return Examined(kept, (*repeats, *noted, *clocks, *releases, *rests, *excited, *zeros, *faults))
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

@@ -84,10 +84,10 @@ def run(
     if json is not None and not to_stdout:
         write_json(json, document)
     if report is not None:
-        from identification.examination.examine import examine
+        from diagnosis.detection.limit_cycles import diagnosable
         from tunnel_lab.diagnosis_view import write_report
 
-        write_report(document, examine(data).campaign, report)
+        write_report(document, diagnosable(data).campaign, report)
     if to_stdout:
         typer.echo(json_text(document), nl=False)
         return

@@ -1,0 +1,37 @@
+"""The answer where every run is in a limit cycle: unknown, with what was recognised."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from diagnosis.result import Candidate, Coefficients, Diagnosis, Where
+from identification.examination.self_excited import in_limit_cycle
+from identification.remark import Remark
+
+_NOTE = "no damping ratio and no derivative is stated, since no run is a free decay"
+
+
+def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnosis:
+    """Replace the answer by what the examination recognised.
+
+    Args:
+        nominal: the answer without effects, for the gap to a free decay and the noise.
+        remarks: of the examination.
+
+    Returns:
+        The answer ``unknown``, without coefficients, place or rest.
+    """
+    found = [f"{r.runs[0]}: {r.what}" for r in remarks if in_limit_cycle(r.figures)]
+    excess = nominal.gap.excess_before
+    return replace(
+        nominal,
+        causes=("unknown",),
+        verdict=f"No run is a free decay, so no cause is named. {'. '.join(found)}.",
+        where=Where(None, None, tuple(run.id for run in nominal.gap.runs)),
+        candidates=(Candidate("unknown", 1.0, excess, 0.0),),
+        coefficients=Coefficients({}, {}, _NOTE),
+        inclusion={},
+        blind_spots=(),
+        rest=None,
+    )

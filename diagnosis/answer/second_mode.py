@@ -1,0 +1,101 @@
+"""A second mode beside the motion: what no effect of one degree of freedom explains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.policy import SECOND_MODE_LEFT
+from identification.decay.first_guess import starting_frequency, thinned_reading
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
+
+_MOST = 1024  # thinned readings used: fifty cycles
+_LEAST = 64
+_ROWS = 1.0 / 3.0  # of a Hankel matrix over the readings, as in the matrix pencil
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Decaying oscillations whose sum is fitted to a reading.
+
+    Args:
+        frequency: shape (m,), Hz.
+        rate: decay rates, shape (m,), 1/s.
+        amplitude: at the first reading, shape (m,), rad.
+        left: sum of squared residuals, rad².
+    """
+
+    frequency: Array
+    rate: Array
+    amplitude: Array
+    left: float
+
+
+def second_modes(campaign: Campaign) -> tuple[str, ...]:
+    """Name a second mode in each run that shows one.
+
+    Args:
+        campaign: the runs.
+
+    Returns:
+        A sentence for each run in which two decaying oscillations are farther apart than the sum of their half-power
+        widths and halve what one leaves.
+    """
+    return tuple(words for run in campaign.runs if (words := _second_mode(run.id, run.record)))
+
+
+def fit_modes(values: Array, interval: float, count: int) -> Modes | None:
+    """Fit a sum of decaying oscillations by the poles of a Hankel matrix.
+
+    Args:
+        values: evenly spaced readings, shape (n,), rad.
+        interval: between them, s.
+        count: number of oscillations.
+
+    Returns:
+        The modes; None where the poles are not those of so many oscillations.
+    """
+    rows = int(values.size * _ROWS)
+    hankel = np.lib.stride_tricks.sliding_window_view(values, values.size - rows + 1)
+    hankel = hankel - hankel.mean(axis=1, keepdims=True)
+    left = np.linalg.svd(hankel, full_matrices=False)[0][:, : 2 * count]
+    poles = np.linalg.eigvals(np.linalg.pinv(left[:-1]) @ left[1:]).astype(np.complex128)
+    exponents: NDArray[np.complex128] = np.log(poles[np.abs(poles) > 0.0]) / interval
+    upper = exponents[exponents.imag > 0.0]
+    if upper.size != count:
+        return None
+    waves = np.exp(np.outer(np.arange(values.size) * interval, upper))
+    columns = np.column_stack((waves.real, waves.imag, np.ones(values.size)))
+    weights = np.linalg.lstsq(columns, values, rcond=None)[0]
+    residual = values - columns @ weights
+    amplitude = np.hypot(weights[:count], weights[count : 2 * count])
+    return Modes(upper.imag / (2.0 * np.pi), -upper.real, amplitude, float(residual @ residual))
+
+
+def _second_mode(name: str, record: Record) -> str:
+    frequency = starting_frequency(record)
+    if frequency is None:
+        return ""
+    reading = thinned_reading(evenly_spaced(record), frequency)
+    values = reading.yaw[:_MOST]
+    if values.size < _LEAST:
+        return ""
+    interval = float(reading.time[-1]) / (reading.time.size - 1)
+    one, two = fit_modes(values, interval, 1), fit_modes(values, interval, 2)
+    if one is None or two is None or two.left > SECOND_MODE_LEFT * one.left or two.rate.min() < 0.0:
+        return ""
+    if np.ptp(two.frequency) < float(two.rate.sum()) / np.pi:
+        return ""
+    order = np.argsort(np.abs(two.frequency - one.frequency[0]))
+    main, second = (
+        f"{two.amplitude[i]:.2g} rad at {two.frequency[i]:.3g} Hz, which decays at {two.rate[i]:.2g} 1/s"
+        for i in order
+    )
+    return (
+        f"{name} contains a second mode: {second}, beside {main}. With it, what one free decay leaves falls by "
+        f"{100.0 * (1.0 - two.left / one.left):.0f} %. A rig with one degree of freedom has one mode: look for "
+        f"another motion, such as heave or the mount's."
+    )

@@ -1,0 +1,204 @@
+"""Diagnose measured records, and compare the answers with their sources.
+
+``python -m docs.studies.real_records [--data FOLDER]`` writes ``docs/real-records.md`` and the figures beside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from diagnosis import diagnose
+from identification.datasets import MEASURED_CAMPAIGNS, measured_campaign
+from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
+from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+
+PAGE = Path(__file__).parents[1] / "real-records.md"
+SINE, DRY, QUADRATIC = "gravity_stiffness", "coulomb_friction", "quadratic_damping"
+_KEY_PARAMETERS = 4  # shown of each answer
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What acts in a record, by its source or an energy balance.
+
+    Args:
+        causes: all that must be named; ``unknown`` where no effect of the vocabulary explains the record.
+        also: what may be named beside them.
+        words: what the answer must contain, in verdict or cautions; empty: nothing.
+        why: what is known, in a sentence.
+    """
+
+    causes: frozenset[str]
+    also: frozenset[str] = frozenset()
+    words: str = ""
+    why: str = ""
+
+
+def _expected(causes: Sequence[str], why: str, *, also: Sequence[str] = (), words: str = "") -> Expected:
+    return Expected(frozenset(causes), frozenset(also), words, why)
+
+
+EXPECTED: Mapping[str, Expected] = {
+    "kvlcc2-roll-decay-0kn": _expected(
+        (QUADRATIC,),
+        "Damping with the square of the rate (the source's fit), slight hardening, wiggles from the tank's waves.",
+        also=("cubic_stiffness",),
+    ),
+    "lee-heave-1": _expected(("unknown",), "Two coupled modes, 2.22 and 2.78 Hz.", words="second mode"),
+    "lee-pitch-1": _expected(("unknown",), "Two coupled modes, 2.22 and 2.78 Hz.", words="second mode"),
+    "rotary-pendulum": _expected(
+        (SINE, DRY, QUADRATIC), "Energy balance: dry friction and a quadratic part; gravity's sine."
+    ),
+    "tartaruga-growth": _expected(
+        ("unknown",),
+        "Self-excitation that saturates; the frequency rises by a third.",
+        words="self-excited: grows",
+    ),
+    "tartaruga-lco": _expected(
+        ("unknown",), "A steady limit cycle: it has no damping ratio.", words="steady oscillation"
+    ),
+    "cart-thesis-1": _expected(
+        (SINE, DRY, QUADRATIC),
+        "Energy balance: dry friction 61 %, quadratic damping 37 % of the loss; gravity's sine.",
+    ),
+    "pasco-raw": _expected((DRY,), "Dry friction alone, between springs."),
+    "phy180-raw": _expected(
+        (SINE, DRY), "Gravity's sine to 1.2 ms, dry friction, some quadratic damping.", also=(QUADRATIC,)
+    ),
+}
+
+
+def judge(expected: Expected, document: Mapping[str, Any]) -> bool:
+    """Whether an answer is right.
+
+    Args:
+        expected: of the record.
+        document: of the diagnosis.
+
+    Returns:
+        True where all expected causes and no others are named, and the expected words are said.
+    """
+    named = set(document["causes"])
+    said = " ".join((document["verdict"], *document["cautions"]))
+    return expected.causes <= named <= expected.causes | expected.also and expected.words in said
+
+
+def records(folder: Path | None) -> dict[str, Campaign]:
+    """The packaged records, and those of a folder.
+
+    Args:
+        folder: of campaigns; None: the packaged ones only.
+
+    Returns:
+        Campaigns by name, those with an entry in `EXPECTED`.
+    """
+    found = {name: measured_campaign(name) for name in MEASURED_CAMPAIGNS}
+    for path in sorted(folder.iterdir()) if folder is not None else ():
+        if path.name in EXPECTED and path.name not in found:
+            found[path.name] = read_campaign(path)
+    return found
+
+
+def section(name: str, document: Mapping[str, Any] | str, images: Path) -> tuple[str, str]:
+    """One record's part of the page.
+
+    Args:
+        name: of the record.
+        document: of its diagnosis, or why it was refused.
+        images: folder of the figures.
+
+    Returns:
+        Its row of the table, and its section.
+    """
+    expected = EXPECTED[name]
+    if isinstance(document, str):
+        row = f"| [{name}](#{name}) | {_names(expected.causes)} | refused | | wrong |"
+        return row, f"## {name}\nThe source: {expected.why}\n\nThe diagnosis refuses it: {document}.\n"
+    best = document["candidates"][0]
+    right = "right" if judge(expected, document) else "wrong"
+    row = (
+        f"| [{name}](#{name}) | {_names(expected.causes)} | {_names(document['causes'])} | "
+        f"{best['probability']:.2f} | {right} |"
+    )
+    caution = [text for text in document["cautions"] if expected.words and expected.words in text]
+    parts = [
+        f"## {name}",
+        f"The source: {expected.why}\n",
+        f"The diagnosis ({right}): {document['verdict']}\n",
+    ]
+    parts += [f"It adds: {text}\n" for text in caution]
+    parts += [
+        f"- `{key}`: {_value(given)}" for key, given in list(best["parameters"].items())[:_KEY_PARAMETERS]
+    ]
+    figure = waterfall_figure(document)
+    if figure is not None:
+        path = images / f"real-records-{name}.png"
+        figure.savefig(path, dpi=80)
+        parts.append(f"\n![The gap of {name} as the causes are added](images/{path.name})")
+    return row, "\n".join(parts) + "\n"
+
+
+def _names(causes: Sequence[str] | frozenset[str]) -> str:
+    return " + ".join(re.sub("_", " ", name) for name in sorted(causes)) or "none"
+
+
+def _value(given: Mapping[str, Any]) -> str:
+    std = "" if given["std"] is None else f" ± {given['std']:.1g}"
+    return f"{given['value']:.4g}{std}" + ("" if given["unit"] == "1" else f" {given['unit']}")
+
+
+def _answer(campaign: Campaign) -> Mapping[str, Any] | str:
+    try:
+        return diagnose(campaign).to_json_dict()
+    except TunnelError as refused:
+        return str(refused)
+
+
+def page(parts: Sequence[tuple[str, str]]) -> str:
+    """The whole page.
+
+    Args:
+        parts: rows and sections of the records.
+
+    Returns:
+        Markdown.
+    """
+    right = sum(row.endswith("right |") for row, _ in parts)
+    head = (
+        "# Real records\n\nWhat the diagnosis says of measured records, and what their sources or energy balances "
+        "say. `python -m docs.studies.real_records --data FOLDER` writes this page; the expected causes stand in "
+        "[real_records.py](studies/real_records.py). An answer is right if it names all of them and no others, "
+        "and, where no effect explains the record, says what was recognised. The records marked * have no stated "
+        "licence and are not packaged.\n\n"
+        f"**{right} of {len(parts)} are right.** Moments are per unit of inertia.\n\n"
+        "| record | in it | named | probability | |\n|---|---|---|---|---|\n"
+    )
+    return head + "\n".join(row for row, _ in parts) + "\n\n" + "\n".join(text for _, text in parts)
+
+
+def main() -> None:
+    """Write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, help="a folder with further campaigns")
+    images = PAGE.parent / "images"
+    found = records(parser.parse_args().data)
+    parts = []
+    for name, campaign in found.items():
+        row, text = section(name, _answer(campaign), images)
+        mark = "" if name in MEASURED_CAMPAIGNS else "*"
+        parts.append((row.replace(f"(#{name})", f"(#{name}){mark}", 1), text))
+        PAGE.write_text(
+            page(parts), encoding="utf-8"
+        )  # after each record, since a diagnosis may take minutes
+        print(row, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,255 @@
+"""Wind-on runs that excite themselves: motion that grows, and limit cycles, which are not free decays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.stats import f as variance_ratio
+
+from identification.decay.damped_oscillation import envelope_amplitude
+from identification.decay.decay_fit import Reading, project_run
+from identification.decay.first_guess import starting_frequency, thinned_reading
+from identification.decay.pencil import pencil_decay
+from identification.policy import (
+    LEAST_GROWTH_WINDOWS,
+    LEAST_STEADY_CYCLES,
+    LINEAR_SHARE,
+    MISFIT_DEVIATIONS,
+    REFUSAL_RATE,
+    SETTLED_SHARE,
+    STEADY_CHANGE,
+)
+from identification.printing.numbers import significant
+from identification.remark import Outcome, Remark
+from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
+
+_CYCLES = 3.0  # of the strongest oscillation, in a window
+_KEYS = ("time_s", "amplitude_rad", "growth_rate", "frequency_hz")
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """The oscillation in consecutive windows.
+
+    Args:
+        time: mid-window, shape (n,), s.
+        amplitude: at mid-window, shape (n,), rad.
+        frequency: shape (n,), Hz.
+    """
+
+    time: Array
+    amplitude: Array
+    frequency: Array
+
+    @property
+    def growth_rate(self) -> Array:
+        """Rate of the amplitude's logarithm, shape (n,), 1/s."""
+        return np.gradient(np.log(self.amplitude), self.time)
+
+    def figures(self) -> dict[str, Any]:
+        """Growth rate and frequency against amplitude, lists by name."""
+        values = (self.time, self.amplitude, self.growth_rate, self.frequency)
+        return {key: np.asarray(value).tolist() for key, value in zip(_KEYS, values, strict=True)}
+
+
+def self_excited_runs(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
+    """Find wind-on runs whose motion grows, or neither grows nor decays.
+
+    Args:
+        campaign: the runs, each from its release on.
+
+    Returns:
+        The campaign and a remark for each such run, with its figures. A run that settles in a limit cycle is cut to
+        the part where its growth is linear. A run without such a part is left out.
+    """
+    kept, remarks = [], []
+    for run in campaign.runs:
+        part, remark = _examined(run) if run.wind_on else (run, None)
+        kept += [] if part is None else [part]
+        remarks += [] if remark is None else [remark]
+    return (replace(campaign, runs=tuple(kept)) if remarks else campaign), tuple(remarks)
+
+
+def _examined(run: Run) -> tuple[Run | None, Remark | None]:
+    windows = windows_of(run.record)
+    if windows is None:
+        return run, None
+    if _holds(windows):
+        return None, _steady_remark(run, windows)
+    if not _grows(windows.amplitude):
+        return run, None
+    settled = _settled_from(windows)
+    limit = np.inf if settled is None else LINEAR_SHARE * _last(windows.amplitude)
+    part = _growing_part(windows, limit)
+    enough = part.stop - part.start >= LEAST_GROWTH_WINDOWS
+    remark = _growth_remark(run, windows, part if enough else None, settled)
+    if settled is None:
+        return run, remark
+    return (_cut(run, windows, part) if enough else None), remark
+
+
+def windows_of(record: Record) -> Windows | None:
+    """Amplitude and frequency in windows of about three cycles.
+
+    Args:
+        record: of one run.
+
+    Returns:
+        The windows; None where there are fewer than twice the least number of a growth.
+    """
+    frequency = starting_frequency(record)
+    if frequency is None:
+        return None
+    reading = thinned_reading(evenly_spaced(record), frequency)
+    count = int(float(reading.time[-1]) * frequency / _CYCLES)
+    if count < 2 * LEAST_GROWTH_WINDOWS:
+        return None
+    parts = np.array_split(np.arange(reading.time.size), count)
+    found = [values for part in parts if (values := _window(reading, part, frequency)) is not None]
+    if len(found) < max(2 * LEAST_GROWTH_WINDOWS, count // 2):
+        return None
+    return Windows(*np.array(found).T)
+
+
+def _window(reading: Reading, part: Array, frequency: float) -> tuple[float, float, float] | None:
+    time, yaw = reading.time[part], reading.yaw[part]
+    length = float(time[-1] - time[0])
+    found = pencil_decay(yaw, length / (time.size - 1), 2.0 * np.pi * frequency)
+    if found is None or not found.decay.omega_d > 0.0:
+        return None
+    fitted = project_run(Reading(time - time[0], yaw), found.decay)
+    if fitted is None:
+        return None
+    decay, run = found.decay, fitted[0]
+    amplitude = envelope_amplitude(decay, run.angle, run.rate) * np.exp(-0.5 * decay.rate * length)
+    if not (np.isfinite(amplitude) and amplitude > 0.0):
+        return None
+    return float(time.mean()), float(amplitude), decay.omega_d / (2.0 * np.pi)
+
+
+def _last(amplitude: Array) -> float:
+    return float(np.median(amplitude[-LEAST_GROWTH_WINDOWS:]))
+
+
+def _slope(time: Array, amplitude: Array) -> tuple[float, float]:
+    """Rate of the amplitude's logarithm and its standard deviation by the scatter, 1/s."""
+    (slope, _), covariance = np.polyfit(time, np.log(amplitude), 1, cov=True)
+    return float(slope), float(np.sqrt(covariance[0, 0]))
+
+
+def _holds(windows: Windows) -> bool:
+    """Whether the amplitude is constant along the whole record, by the upper end of its change's interval."""
+    slope, std = _slope(windows.time, windows.amplitude)
+    length = float(np.ptp(windows.time))
+    cycles = length * float(np.median(windows.frequency))
+    changes = (abs(slope) + MISFIT_DEVIATIONS * std) * length
+    return cycles >= LEAST_STEADY_CYCLES and max(changes, np.log(windows.amplitude).std()) < STEADY_CHANGE
+
+
+def _grows(amplitude: Array) -> bool:
+    """Whether the last quarter's power exceeds the first one's beyond what the envelope of a buffeted rig does.
+
+    A window's power is then exponentially distributed: χ² of two degrees of freedom.
+    """
+    quarter = amplitude.size // 4
+    first, last = (float(np.mean(part**2)) for part in (amplitude[:quarter], amplitude[-quarter:]))
+    return bool(variance_ratio.sf(last / first, 2 * quarter, 2 * quarter) < REFUSAL_RATE)
+
+
+def _settled_from(windows: Windows) -> int | None:
+    """First window of the limit cycle; None where the amplitude still grows at the end."""
+    below = np.flatnonzero(windows.amplitude < SETTLED_SHARE * _last(windows.amplitude))
+    first = int(below[-1]) + 1 if below.size else 0
+    if windows.time.size - first < LEAST_GROWTH_WINDOWS:
+        return None
+    slope, std = _slope(windows.time[first:], windows.amplitude[first:])
+    return (
+        first
+        if slope + MISFIT_DEVIATIONS * std < float(windows.growth_rate[:first].max(initial=0.0))
+        else None
+    )
+
+
+def _growing_part(windows: Windows, limit: float) -> slice:
+    """From the smallest amplitude to the last window below the limit, rad."""
+    above = np.flatnonzero(windows.amplitude > limit)
+    end = int(above[0]) if above.size else windows.time.size
+    return slice(int(np.argmin(windows.amplitude[:end])) if end else 0, end)
+
+
+def _cut(run: Run, windows: Windows, part: slice) -> Run:
+    half = 0.5 * float(windows.time[1] - windows.time[0])
+    time = run.record.time_s - run.record.time_s[0]
+    inside = (time >= windows.time[part][0] - half) & (time <= windows.time[part][-1] + half)
+    return replace(run, record=Record(run.record.time_s[inside], run.record.yaw_rad[inside]))
+
+
+def _steady_remark(run: Run, windows: Windows) -> Remark:
+    slope, std = _slope(windows.time, windows.amplitude)
+    amplitude, frequency = float(np.median(windows.amplitude)), float(np.median(windows.frequency))
+    cycles = np.ptp(windows.time) * frequency
+    return Remark(
+        Outcome.LEFT_OUT,
+        (run.id,),
+        f"steady oscillation with the wind on, self-excited or forced: {significant(amplitude, 2)} rad at "
+        f"{significant(frequency, 3)} Hz for {cycles:.0f} cycles (its amplitude changes by "
+        f"{100.0 * slope / frequency:+.1g} ± {100.0 * std / frequency:.1g} % per cycle), which has no damping ratio",
+        "record its growth from rest, or a decay at a lower wind speed",
+        {"kind": "steady", "settled_rad": amplitude, **windows.figures()},
+    )
+
+
+def _growth_remark(run: Run, windows: Windows, part: slice | None, settled: int | None) -> Remark:
+    amplitude, frequency = windows.amplitude, windows.frequency
+    shown = slice(int(np.argmin(amplitude[: settled or None])), settled) if part is None else part
+    rate, std = _slope(windows.time[shown], amplitude[shown]) if part is not None else (None, None)
+    grown = float(windows.growth_rate[:settled].max())
+    at = float(amplitude[int(np.argmax(windows.growth_rate[:settled]))])
+    last = _last(amplitude)
+    said = f"at up to {grown:.2g} 1/s" if rate is None else f"at {rate:.2g} ± {std:.1g} 1/s"
+    end = (
+        f"reaches {significant(last, 2)} rad" if settled is None else f"settles at {significant(last, 2)} rad"
+    )
+    if rate is not None and grown > rate + MISFIT_DEVIATIONS * (std or 0.0):
+        said += f" (at most {grown:.2g} 1/s, at {significant(at, 2)} rad)"
+    outcome, consequence = _consequence(settled, part)
+    return Remark(
+        outcome,
+        (run.id,),
+        f"self-excited: grows {said} from {significant(float(amplitude[shown.start]), 2)} rad, {end}; "
+        f"frequency {significant(float(np.median(frequency[shown][:3])), 3)} → "
+        f"{significant(float(np.median(frequency[-3:])), 3)} Hz",
+        consequence,
+        {
+            "kind": "growth",
+            "growth_rate_per_s": rate,
+            "growth_rate_std": std,
+            "settled_rad": None if settled is None else last,
+            **windows.figures(),
+        },
+    )
+
+
+def _consequence(settled: int | None, part: slice | None) -> tuple[Outcome, str]:
+    if settled is None:
+        return Outcome.NOTED, "its damping is negative as long as the growth is linear"
+    if part is None:
+        return Outcome.LEFT_OUT, "start from a smaller motion to record its linear growth"
+    share = f"{100.0 * LINEAR_SHARE:.0f} %"
+    return Outcome.CUT, f"frequency and damping are those of its growth up to {share} of the limit cycle"
+
+
+def in_limit_cycle(figures: Mapping[str, Any]) -> bool:
+    """Whether a remark's figures are those of a run with a limit cycle.
+
+    Args:
+        figures: of a remark, amplitudes in rad.
+
+    Returns:
+        True where the run settles, or is steady.
+    """
+    return figures.get("settled_rad") is not None
