@@ -1,4 +1,4 @@
-"""Draws what differs from one laboratory to the next: scale of the rig, protocol, colour of the noise, time stamps."""
+"""Draws the scale of the rig, the number of runs, the colour of the noise and the time stamps."""
 
 from __future__ import annotations
 

@@ -98,7 +98,9 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
         name=name,
         rig=RigProperties(
             NOMINAL_INERTIA * c.moment_scale * c.time_scale**2,
-            FRONTAL_AREA * length**2, REFERENCE_LENGTH * length, WIDTH * length,
+            FRONTAL_AREA * length**2,
+            REFERENCE_LENGTH * length,
+            WIDTH * length,
         ),
         sensor=SensorProperties(c.sample_rate / c.time_scale, c.resolution, c.stated_noise),
         runs=runs,
@@ -109,9 +111,10 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
     """The truth of a campaign, for ``truth.json``.
 
     ``effects`` is the sorted list of families (``["unknown"]`` for an effect outside the known ones, ``[]`` for
-    none). ``small`` lists the effects beside them that need not be found. ``severity`` is the excess after refitting the nominal model. ``parameters`` gives each effect's form,
-    severity parameter with its symbol, secondary parameters, and the excess for which it was scaled alone; its times
-    and moments are those before ``scale`` was applied.
+    none). ``small`` lists the effects beside them that need not be found. ``severity`` is the excess after
+    refitting the nominal model. ``parameters`` gives each effect's form, severity parameter with its symbol,
+    secondary parameters, and the excess for which it was scaled alone; its times and moments are those before
+    ``scale`` was applied.
     """
     draw, c = simulated.draw, simulated.draw.conditions
     mattering = [e for e in draw.effects if not e.small]

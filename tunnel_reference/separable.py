@@ -1,7 +1,7 @@
 """Draws effects again until each matters by itself and beside the others.
 
-An effect's signature is what it adds to the residuals of the nominal model. The part of it that is orthogonal to the
-signatures of the other effects is what no change of their sizes can imitate.
+An effect's signature is what it adds to the residuals of the nominal model. No change of the other effects' sizes
+imitates the part of it that is orthogonal to their signatures.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from tunnel_reference.draw import CampaignDraw, redraw
 from tunnel_reference.severity import read_and_fit, simulate_motions, size_effects
 
 OWN_EXCESS = 0.5
-"""Least excess of an effect that the others cannot imitate, in noise powers: of 10⁵ samples, a hundred deviations."""
+"""Least excess of an effect that the others cannot imitate, noise powers: a hundred deviations in 10⁵ samples."""
 OWN_SHARE = 0.1
-"""The same as a share of its whole excess: signatures of large effects are not exactly proportional to their size."""
+"""That excess as a share of the whole: signatures of large effects are not exactly proportional to their size."""
 ATTEMPTS = 4
 _STRIDE = 7  # samples of the signatures that are kept
 

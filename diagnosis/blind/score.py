@@ -200,7 +200,8 @@ class Score:
             ],
             "seconds": dict(zip(("median", "percentile_90", "largest"), times, strict=True)),
             "cases": [
-                {"name": c.name, "truth": list(c.truth), "small": list(c.small), "causes": None if c.causes is None else list(c.causes),
+                {"name": c.name, "truth": list(c.truth), "small": list(c.small),
+                 "causes": None if c.causes is None else list(c.causes),
                  "probability": c.probability, "right": c.right, "severity": c.severity}
                 for c in self.cases
             ],

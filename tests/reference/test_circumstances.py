@@ -32,7 +32,9 @@ def test_a_rig_of_another_scale_has_the_same_coefficients():
         square = (run.spring_stiffness - q * run.wind_speed * c.cn_beta) / inertia
         sigma = (truth["mechanical_damping"] - q * props.reference_length * c.cn_r) / (2.0 * inertia)
         expected = (c.true_stiffness[number] - c.air_stiffness[number]) / c.yaw_inertia
-        assert square == pytest.approx(expected / 0.1**2, rel=1e-4)  # the density is written with four decimals
+        assert square == pytest.approx(
+            expected / 0.1**2, rel=1e-4
+        )  # the density is written with four decimals
         lost = (c.mechanical_damping - c.air_damping[number]) / (2.0 * c.yaw_inertia)
         assert sigma == pytest.approx(lost / 0.1, rel=1e-4)
         assert run.record.time_s[-1] == pytest.approx(0.1 * c.time[-1])

@@ -46,7 +46,9 @@ def make(
     count: Annotated[int, typer.Option("--count", min=1, help="Number of campaigns.")] = 200,
     kinds: Annotated[
         str | None,
-        typer.Option("--kinds", metavar="KIND:WEIGHT,…", help="single, pair, three, four, none, outside, with weights."),
+        typer.Option(
+            "--kinds", metavar="KIND:WEIGHT,…", help="single, pair, three, four, none, outside, with weights."
+        ),
     ] = None,
     textbook: Annotated[
         float, typer.Option("--textbook", min=0, max=1, help="Share of textbook forms.")
@@ -56,9 +58,14 @@ def make(
     ] = 0.5,
     variety: Annotated[
         float,
-        typer.Option("--variety", min=0, max=1, help="Share with another scale, with few runs, with coloured noise "
-                     "and with uneven time stamps, each."),
-    ] = 0.25,  # fmt: skip
+        typer.Option(
+            "--variety",
+            min=0,
+            max=1,
+            help="Share with another scale, with few runs, with coloured noise "
+            "and with uneven time stamps, each.",
+        ),
+    ] = 0.25,
     small: Annotated[
         float,
         typer.Option("--small", min=0, max=1, help="Share with a small effect beside those that matter."),
@@ -136,7 +143,7 @@ def score(
     ] = None,
     figure: Annotated[
         Path | None,
-        typer.Option("--figure", metavar="FILE", help="Also draw the calibration of inclusion; the page shows it."),
+        typer.Option("--figure", metavar="FILE", help="Also draw the calibration of inclusion."),
     ] = None,
 ) -> None:
     """Verify all hashes, open the key and score the answers.
@@ -153,7 +160,7 @@ def score(
     from diagnosis import vocabulary
     from diagnosis.blind import score_set
     from tunnel_lab.diagnosis_view import blind_page
-    from tunnel_lab.terminal.tables import say, show_tables
+    from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.writing import refuse_unwritable, write_json, write_whole
 
     names = split_names(exclude)
@@ -169,6 +176,17 @@ def score(
         write_whole(markdown, blind_page.markdown(found, str(folder), address).encode())
     if json is not None:
         write_json(json, found.to_json_dict())
+    _show(found)
+    for path in (markdown, json, figure):
+        if path is not None:
+            say(f"Written: {path}")
+
+
+def _show(found: Score) -> None:
+    """Print the score."""
+    from tunnel_lab.diagnosis_view import blind_page
+    from tunnel_lab.terminal.tables import say, show_tables
+
     for line in blind_page.origin_lines(found):
         say(line)
     say("")
@@ -176,13 +194,10 @@ def score(
         show_tables(blind_page.as_table(section))
         if section.note:
             say(section.note + "\n")
-    for path in (markdown, json, figure):
-        if path is not None:
-            say(f"Written: {path}")
 
 
 def _draw(found: Score, path: Path) -> None:
-    """Draw the calibration of inclusion, refused where no answer states these probabilities."""
+    """Draw the calibration of inclusion; refuse where no answer states these probabilities."""
     from tunnel_lab.plotting.calibration_figure import calibration_figure
     from tunnel_lab.plotting.plots import save
     from tunnel_sim.vocabulary.errors import TunnelError

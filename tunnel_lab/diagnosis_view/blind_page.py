@@ -56,8 +56,8 @@ def sections(score: Score) -> list[Section]:
         Sections; those without rows are left out.
     """
     found = [
-        _exact(score), _found(score), _alarms(score), _calibration(score), _inclusion(score), _closure(score), _coefficients(score), _pairs(score),
-        _answers(score), _time(score),
+        _exact(score), _found(score), _alarms(score), _calibration(score), _inclusion(score),
+        _closure(score), _coefficients(score), _pairs(score), _answers(score), _time(score),
     ]  # fmt: skip
     return [section for section in found if section.rows]
 
@@ -113,7 +113,8 @@ def markdown(score: Score, folder: str, figure: str = "") -> str:
         "effects have the textbook form; `outside` campaigns have an effect that belongs to no family. Up to four",
         "effects act, each of them well above the noise by itself and beside the others. Some campaigns are of",
         "rigs of another scale of time and moments, of few runs, with coloured noise, with rounded or jittered",
-        "time stamps, or with small effects beside. Intervals are Wilson's at 95 %. This page is written by the commands below; nothing in it is typed by hand.",
+        "time stamps, or with small effects beside. Intervals are Wilson's at 95 %. This page",
+        "is written by the commands below; nothing in it is typed by hand.",
         "",
         "```bash",
         *_commands(score, folder),
@@ -170,8 +171,8 @@ def _found(score: Score) -> Section:
         for found in score.found()
     )
     note = (
-        "Small causes that act beside others are neither asked for nor false. Fast and slow rigs have periods beyond "
-        "a third and three times the standard rig's. Intervals take the causes of a campaign as independent."
+        "Small causes that act beside others are neither asked for nor false. Fast and slow rigs have periods "
+        "beyond a third and three times the standard rig's. Intervals take the causes of a campaign as independent."
     )
     headings = ("campaigns", "sets exact", "true causes found", "named causes false", "")
     return Section("Causes found and false", headings, rows, note)
@@ -184,8 +185,8 @@ def _inclusion(score: Score) -> Section:
     low, high = found.interval
     row = (f"{found.error:.4f}", f"{low:.4f}–{high:.4f}", str(found.statements), str(found.campaigns))
     note = (
-        "Of the probability of every effect that it is among the causes. The kernel is as wide as the error that it "
-        "gives (Błasiok and Nakkiran 2023); the interval is by resampling campaigns."
+        "Of the probability of every effect that it is among the causes. The kernel is as wide as the error that "
+        "it gives (Błasiok and Nakkiran 2023); the interval is by resampling campaigns."
     )
     headings = ("smooth calibration error", "95 %", "statements", "campaigns")
     return Section(INCLUSION, headings, (row,), note)
@@ -275,7 +276,8 @@ def _matrix(score: Score) -> list[str]:
     ]
     key = ", ".join(f"{number} {name}" for name, number in numbers.items())
     return [
-        "## Confusion matrix", "", "True causes in rows, answers in columns; `two or more` counts any set of effects.", "",
+        "## Confusion matrix", "",
+        "True causes in rows, answers in columns; `two or more` counts any set of effects.", "",
         *_rows(headings, rows), "", f"Columns: {key}.",
     ]  # fmt: skip
 
