@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.conditions import Conditions
 
 _TIME_SCALE = 30.0  # periods from 1/30 of the standard rig's to 30 times as long
 _MOMENT_SCALE = 100.0
@@ -42,12 +42,10 @@ def _few_runs(rng: np.random.Generator, c: Conditions) -> Conditions:
     keep = np.isin(c.spring_stiffness, rng.choice(springs, number, replace=False))
     if speeds.size:
         keep &= ~c.wind_on | (c.wind_speed == rng.choice(speeds))
-    kept: dict[str, Array] = {
-        name: getattr(c, name)[keep]
-        for name in ("spring_stiffness", "wind_speed", "release_angle", "start_angle")
-    }
-    both = np.any(kept["wind_speed"] > 0.0) and np.any(kept["wind_speed"] == 0.0)
-    return replace(c, **kept) if both else c  # type: ignore[arg-type]
+    if np.all(c.wind_on[keep]) or not np.any(c.wind_on[keep]):
+        return c
+    by_run = {name: value[keep] for name, value in vars(c).items() if np.shape(value) == keep.shape}
+    return replace(c, **by_run)
 
 
 def _coloured(rng: np.random.Generator, c: Conditions) -> Conditions:

@@ -150,7 +150,8 @@ def score(
 
     The output gives exact matches by kind with Wilson intervals, causes found and
     false by number of causes and by circumstances, false alarms, calibration of
-    the answer and of the probabilities of the effects, closure on held-out runs, errors of Cnβ and Cnr before and after,
+    the answer and of the probabilities of the effects, closure on held-out runs,
+    errors of Cnβ and Cnr before and after,
     and the answers by true cause. A folder without seal.json but with a
     truth.json in every campaign is scored as an open set and labelled as one.
 
