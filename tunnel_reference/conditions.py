@@ -58,6 +58,13 @@ class Conditions:
         stiffness_scale: true over stated stiffness.
         speed_offset: true minus stated speed where the wind is on, m/s.
         rod: the flexible rod; None where it is rigid.
+        noise_corner: corner frequency of the coloured part of the noise, Hz.
+        coloured_share: share of the noise's variance that is coloured.
+        clock_jitter: greatest delay of a sample, as a share of the sample interval; the stamps tell it.
+        clock_seed: of the delays.
+        stamp_step: step to which the written time stamps are rounded, s; 0: not rounded.
+        time_scale: time as written over time as simulated. All other times here are as simulated.
+        moment_scale: moments as written over moments as simulated. All other moments here are as simulated.
     """
 
     spring_stiffness: Array
@@ -78,6 +85,13 @@ class Conditions:
     stiffness_scale: Array = field(default_factory=lambda: np.ones(1))
     speed_offset: Array = field(default_factory=lambda: np.zeros(1))
     rod: Rod | None = None
+    noise_corner: float = 10.0
+    coloured_share: float = 0.0
+    clock_jitter: float = 0.0
+    clock_seed: int = 0
+    stamp_step: float = 0.0
+    time_scale: float = 1.0
+    moment_scale: float = 1.0
 
     @property
     def runs(self) -> int:
@@ -92,7 +106,16 @@ class Conditions:
     @property
     def time(self) -> Array:
         """Sample times from the release, s, shape (samples,)."""
-        return np.arange(self.samples) / self.sample_rate
+        even = np.arange(self.samples) / self.sample_rate
+        if self.clock_jitter == 0.0:
+            return even
+        late = np.random.default_rng(self.clock_seed).random(self.samples)
+        return even + late * self.clock_jitter / self.sample_rate
+
+    @property
+    def length_scale(self) -> float:
+        """Lengths as written over lengths as simulated: at the same density a moment scales as length⁵/time²."""
+        return float((self.moment_scale * self.time_scale**2) ** 0.2)
 
     @property
     def wind_on(self) -> NDArray[np.bool_]:

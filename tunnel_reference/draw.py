@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tunnel_reference.catalogue import Form, Group
+from tunnel_reference.circumstances import draw_circumstances
 from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.forms import FAMILIES, forms_of
 from tunnel_reference.outside import OUTSIDE_FORMS
 
-KINDS = ("single", "pair", "none", "outside")
-DEFAULT_SHARES = {"single": 0.55, "pair": 0.17, "none": 0.14, "outside": 0.14}
+NUMBERS = {"none": 0, "single": 1, "pair": 2, "three": 3, "four": 4}
+"""Number of effects that matter, by kind of campaign."""
+KINDS = (*NUMBERS, "outside")
+DEFAULT_SHARES = {"single": 0.3, "pair": 0.17, "three": 0.14, "four": 0.11, "none": 0.14, "outside": 0.14}
 _STRONG_SHARE = 0.2
+_SMALL = (0.03, 0.3)
+"""Excess of a small effect: seen in 10⁵ samples, but less than a third of the noise power."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +32,8 @@ class EffectDraw:
         sign: sign of its severity parameter.
         target: required excess of this effect alone, after refitting the nominal model.
         value: magnitude of the severity parameter; a first guess until it is scaled.
+        small: whether it is a small effect beside those that matter.
+        own: its excess less what the other effects that matter can imitate; None until it is known.
     """
 
     form: Form
@@ -34,6 +41,8 @@ class EffectDraw:
     sign: int
     target: float
     value: float
+    small: bool = False
+    own: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,29 +50,35 @@ class CampaignDraw:
     """One campaign before it is simulated.
 
     Args:
-        kind: ``single``, ``pair``, ``none`` or ``outside``.
+        kind: one of ``KINDS``.
         conditions: runs and truth.
-        effects: none, one or two.
+        effects: those that matter, then small ones.
         seed: of the sensor's noise.
+        mixture: it was drawn from.
     """
 
     kind: str
     conditions: Conditions
     effects: tuple[EffectDraw, ...]
     seed: int
+    mixture: Mixture = field(default_factory=lambda: Mixture())
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """How forms are mixed.
+    """How forms and circumstances are mixed.
 
     Args:
         textbook: probability of the textbook form.
         rare: probability that any other form is a rare one (0 for tuning sets).
+        variety: probability of another scale, of few runs, of coloured noise and of uneven time stamps, each.
+        small: probability of a small effect beside those that matter, and of a second one beside the first.
     """
 
     textbook: float = 0.5
     rare: float = 0.5
+    variety: float = 0.25
+    small: float = 0.25
 
 
 def draw_campaign(
@@ -75,7 +90,7 @@ def draw_campaign(
         rng: source of all random numbers.
         kind: one of ``KINDS``.
         mixture: of forms.
-        families: of the effects, for ``single`` (one) and ``pair`` (two); drawn when empty.
+        families: of the first effects that matter; the others are drawn.
 
     Raises:
         ValueError: for an unknown kind.
@@ -83,20 +98,39 @@ def draw_campaign(
     if kind not in KINDS:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
     mixture = mixture or Mixture()
-    conditions = draw_conditions(rng)
-    effects: tuple[EffectDraw, ...] = ()
+    number = NUMBERS.get(kind, 0)
+    names = draw_families(rng, number, families)
+    small = draw_families(rng, number + _small_number(rng, mixture.small), names)[number:] if names else ()
+    conditions = draw_circumstances(
+        rng, draw_conditions(rng), probability=mixture.variety, mains="mains_hum" in (*names, *small)
+    )
+    effects = tuple(
+        _draw_effect(rng, _draw_form(rng, name, mixture), conditions, small=name in small)
+        for name in (*names, *small)
+    )
     if kind == "outside":
         pool = _pool(OUTSIDE_FORMS, rng, mixture)
         effects = (_draw_effect(rng, pool[int(rng.integers(len(pool)))], conditions),)
-    elif kind != "none":
-        wanted = families or draw_families(rng, 1 if kind == "single" else 2)
-        effects = tuple(_draw_effect(rng, _draw_form(rng, name, mixture), conditions) for name in wanted)
-    return CampaignDraw(kind, conditions, effects, int(rng.integers(2**62)))
+    return CampaignDraw(kind, conditions, effects, int(rng.integers(2**62)), mixture)
 
 
-def draw_families(rng: np.random.Generator, number: int) -> tuple[str, ...]:
-    """Different families, equally likely."""
-    return tuple(str(name) for name in rng.choice(np.array(FAMILIES), size=number, replace=False))
+def redraw(draw: CampaignDraw) -> CampaignDraw:
+    """Another campaign of the same kind with the same first family, given by the seed of the one replaced."""
+    mattering = [e.form.family for e in draw.effects if not e.small]
+    rng = np.random.default_rng(draw.seed)
+    return draw_campaign(rng, kind=draw.kind, mixture=draw.mixture, families=mattering[:1])
+
+
+def draw_families(rng: np.random.Generator, number: int, first: Sequence[str] = ()) -> tuple[str, ...]:
+    """Different families, those after the first equally likely."""
+    others = [name for name in FAMILIES if name not in first]
+    drawn = rng.choice(np.array(others), size=max(number - len(first), 0), replace=False)
+    return (*first, *(str(name) for name in drawn))[:number]
+
+
+def _small_number(rng: np.random.Generator, probability: float) -> int:
+    """None, one or two."""
+    return 0 if rng.random() >= probability else 1 + int(rng.random() < probability)
 
 
 def _pool(forms: Sequence[Form], rng: np.random.Generator, mixture: Mixture) -> list[Form]:
@@ -116,13 +150,16 @@ def _draw_form(rng: np.random.Generator, family: str, mixture: Mixture) -> Form:
     return others[int(rng.integers(len(others)))]
 
 
-def _draw_effect(rng: np.random.Generator, form: Form, conditions: Conditions) -> EffectDraw:
+def _draw_effect(
+    rng: np.random.Generator, form: Form, conditions: Conditions, *, small: bool = False
+) -> EffectDraw:
     """Draws secondary parameters, sign and target excess: 1 to 10, in a fifth of the cases 10 to 100."""
     top = (10.0, 100.0) if rng.random() < _STRONG_SHARE else (1.0, 10.0)
+    top = _SMALL if small else top
     target = float(np.exp(rng.uniform(np.log(top[0]), np.log(top[1]))))
     extra = {k: float(v) for k, v in form.draw(rng, conditions).items()}
     sign = int(rng.choice(np.array(form.signs)))
-    return EffectDraw(form, extra, sign, target, form.start)
+    return EffectDraw(form, extra, sign, target, form.start, small)
 
 
 def draw_conditions(rng: np.random.Generator) -> Conditions:

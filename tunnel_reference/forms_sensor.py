@@ -79,8 +79,9 @@ def _hum(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
 
 
 def _hum_draw(off: float, third: float) -> Draw:
-    """Seed, frequency within ``off`` of 50 Hz, and up to ``third`` of third harmonic."""
-    return lambda g, _c: {"seed": float(g.integers(0, 2**31)), "frequency": 50.0 + g.uniform(-off, off),
+    """Seed, frequency within ``off`` of 50 Hz as written, and up to ``third`` of third harmonic."""
+    return lambda g, c: {"seed": float(g.integers(0, 2**31)),
+                         "frequency": (50.0 + g.uniform(-off, off)) * c.time_scale,
                          "third": g.uniform(0.3, 1.0) * third}  # fmt: skip
 
 

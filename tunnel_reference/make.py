@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from tunnel_reference.conditions import FRONTAL_AREA, NOMINAL_INERTIA, REFERENCE_LENGTH, WIDTH
-from tunnel_reference.draw import DEFAULT_SHARES, CampaignDraw, Mixture, draw_campaign
+from tunnel_reference.draw import DEFAULT_SHARES, NUMBERS, CampaignDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES
-from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_effects
+from tunnel_reference.separable import size_separably
+from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions
 from tunnel_sim.files.campaign_io import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
@@ -24,6 +25,8 @@ from tunnel_sim.vocabulary.record import Record
 
 SCHEMA_VERSION = 1
 _CHUNK = 400
+FEW_RUNS = 6
+"""The ordinary plans have at least as many runs."""
 
 
 def plan_kinds(count: int, shares: dict[str, float]) -> list[str]:
@@ -50,17 +53,11 @@ def draw_set(count: int, seed: int, shares: dict[str, float], mixture: Mixture) 
     order_seed, *seeds = root.spawn(count + 1)
     order = np.random.default_rng(order_seed)
     kinds = plan_kinds(count, shares)
-    singles = _in_turn(order, sum(k == "single" for k in kinds))
-    firsts = _in_turn(order, sum(k == "pair" for k in kinds))
+    firsts = {kind: _in_turn(order, kinds.count(kind)) for kind in NUMBERS if kind != "none"}
     draws = []
     for kind, child in zip(kinds, seeds, strict=True):
         rng = np.random.default_rng(child)
-        families: tuple[str, ...] = ()
-        if kind == "single":
-            families = (singles.pop(),)
-        elif kind == "pair":
-            first = firsts.pop()
-            families = (first, str(rng.choice([f for f in FAMILIES if f != first])))
+        families = (firsts[kind].pop(),) if kind in firsts else ()
         draws.append(draw_campaign(rng, kind=kind, mixture=mixture, families=families))
     return [draws[i] for i in order.permutation(count)]
 
@@ -74,22 +71,24 @@ def _in_turn(rng: np.random.Generator, number: int) -> list[str]:
 
 def simulate_set(draws: Sequence[CampaignDraw], *, progress: bool = False) -> list[Simulated]:
     """Scale the effects of drawn campaigns and simulate them."""
-    sized = size_effects(draws, progress=progress)
+    sized = size_separably(draws, progress=progress)
     if progress:
         print(f"simulating {len(sized)} campaigns", file=sys.stderr)
     return [read_and_fit(d, motion) for d, motion in zip(sized, simulate_motions(sized), strict=True)]
 
 
 def as_campaign(simulated: Simulated, name: str) -> Campaign:
-    """The campaign without its truth: stated conditions and readings."""
+    """The campaign without its truth: stated conditions and readings, in the scales of its rig."""
     c = simulated.draw.conditions
-    time = np.round(c.time, 9)
+    time = np.round(c.time, 9) if c.stamp_step == 0.0 else np.round(c.time / c.stamp_step) * c.stamp_step
+    time = np.round(time * c.time_scale, 11)
+    length, speed = c.length_scale, c.length_scale / c.time_scale
     runs = tuple(
         Run(
             id=f"r{number + 1:02d}",
             record=Record(time, np.round(simulated.readings[:, number], 7)),
-            wind_speed=float(c.wind_speed[number]),
-            spring_stiffness=float(c.spring_stiffness[number]),
+            wind_speed=float(c.wind_speed[number]) * speed,
+            spring_stiffness=float(c.spring_stiffness[number]) * c.moment_scale,
             air_density=round(c.air_density, 4),
             release_angle=float(c.release_angle[number]),
         )
@@ -97,8 +96,13 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
     )
     return Campaign(
         name=name,
-        rig=RigProperties(NOMINAL_INERTIA, FRONTAL_AREA, REFERENCE_LENGTH, WIDTH),
-        sensor=SensorProperties(c.sample_rate, c.resolution, c.stated_noise),
+        rig=RigProperties(
+            NOMINAL_INERTIA * c.moment_scale * c.time_scale**2,
+            FRONTAL_AREA * length**2,
+            REFERENCE_LENGTH * length,
+            WIDTH * length,
+        ),
+        sensor=SensorProperties(c.sample_rate / c.time_scale, c.resolution, c.stated_noise),
         runs=runs,
     )
 
@@ -107,22 +111,30 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
     """The truth of a campaign, for ``truth.json``.
 
     ``effects`` is the sorted list of families (``["unknown"]`` for an effect outside the known ones, ``[]`` for
-    none). ``severity`` is the excess after refitting the nominal model. ``parameters`` gives each effect's form,
-    severity parameter with its symbol, secondary parameters, and the excess for which it was scaled alone.
+    none). ``small`` lists the effects beside them that need not be found. ``severity`` is the excess after
+    refitting the nominal model. ``parameters`` gives each effect's form, severity parameter with its symbol,
+    secondary parameters, and the excess for which it was scaled alone; its times and moments are those before
+    ``scale`` was applied.
     """
     draw, c = simulated.draw, simulated.draw.conditions
+    mattering = [e for e in draw.effects if not e.small]
     return {
         "schema_version": SCHEMA_VERSION,
-        "yaw_inertia": c.yaw_inertia,
-        "mechanical_damping": c.mechanical_damping,
+        "yaw_inertia": c.yaw_inertia * c.moment_scale * c.time_scale**2,
+        "mechanical_damping": c.mechanical_damping * c.moment_scale * c.time_scale,
         "air_density": c.air_density,
         "cn_beta": c.cn_beta,
         "cn_r": c.cn_r,
         "noise_std": c.noise_std,
         "sensor_zero": c.zero,
-        "effects": sorted({e.form.family for e in draw.effects}),
+        "effects": sorted({e.form.family for e in mattering}),
+        "small": sorted({e.form.family for e in draw.effects if e.small}),
         "kind": draw.kind,
-        "form": [e.form.name for e in sorted(draw.effects, key=lambda e: e.form.family)],
+        "form": [e.form.name for e in sorted(mattering, key=lambda e: e.form.family)],
+        "scale": {"time": c.time_scale, "moment": c.moment_scale},
+        "few_runs": c.runs < FEW_RUNS,
+        "coloured_share": c.coloured_share,
+        "stamps": "jittered" if c.clock_jitter else "rounded" if c.stamp_step else "even",
         "severity": simulated.excess,
         "run_severity": [float(v) for v in simulated.run_excess],
         "parameters": {
@@ -132,6 +144,7 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
                 "symbol": e.form.symbol,
                 "value": e.sign * e.value,
                 "target_severity": e.target,
+                "own_severity": e.own,
                 **e.extra,
             }
             for e in draw.effects

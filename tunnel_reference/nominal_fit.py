@@ -24,11 +24,13 @@ class NominalFit:
         parameters: Izz, Cr, Cnβ, Cnr, shape (4,).
         zero: the sensor's zero, rad.
         residual_power: mean squared residual per run, rad², shape (runs,).
+        residual: shape (runs, n), rad.
     """
 
     parameters: Array
     zero: float
     residual_power: Array
+    residual: Array
 
 
 def _rates(c: Conditions, p: Array) -> tuple[Array, Array, Array, Array]:
@@ -84,7 +86,7 @@ def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
     scale = np.array([1e-3, 1e-3, 1e-2, 1e-2])
     best = np.inf
     step: NDArray[np.float64] = np.zeros(4)
-    kept: tuple[Array, float, Array] | None = None
+    kept: tuple[Array, float, Array, Array] | None = None
     for _ in range(_ITERATIONS):
         sigma, omega, d_sigma, d_omega = _rates(c, p)
         cosine, sine = _basis(time, sigma, omega)
@@ -100,7 +102,7 @@ def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
                 break
             continue
         improved = best - cost
-        best, kept = cost, (p, zero, power)
+        best, kept = cost, (p, zero, power, residual)
         quadrature = b[:, None] * cosine - a[:, None] * sine
         columns = np.stack([cosine, sine, -time * model, time * quadrature], axis=1)
         step = _newton(columns, residual, d_sigma, d_omega)
@@ -109,7 +111,7 @@ def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
         p = p + step
     if kept is None:
         raise ValueError("the readings must be finite")
-    return NominalFit(kept[0], kept[1], kept[2])
+    return NominalFit(*kept)
 
 
 def _newton(columns: Array, residual: Array, d_sigma: Array, d_omega: Array) -> Array:

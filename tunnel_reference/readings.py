@@ -79,6 +79,9 @@ def read_motion(
         The reading, shape (samples, runs), rad.
     """
     noise = conditions.noise_std * rng.standard_normal(motion.angle.shape)
+    if conditions.coloured_share > 0.0:
+        noise = _coloured(conditions, noise, rng)
+    motion = _at_stamps(conditions, motion)
     value = motion.angle
     ordered = sorted(terms, key=lambda t: t.order)
     for term in (t for t in ordered if t.order < Order.NOISE):
@@ -91,6 +94,32 @@ def read_motion(
     for term in (t for t in ordered if t.order is Order.LINE):
         value = term.law(Reading(value, motion, conditions, rng), term.params)
     return value
+
+
+def _coloured(c: Conditions, white: Array, rng: np.random.Generator) -> Array:
+    """White noise mixed with noise of a first-order spectrum; the variance remains."""
+    n = white.shape[0]
+    frequency = np.fft.rfftfreq(n, 1.0 / c.sample_rate)
+    gain = 1.0 / np.sqrt(1.0 + (frequency / c.noise_corner) ** 2)
+    gain /= np.sqrt(np.mean(gain**2))
+    drawn = np.fft.rfft(c.noise_std * rng.standard_normal(white.shape), axis=0)
+    slow = np.fft.irfft(gain[:, None] * drawn, n, axis=0)
+    return np.asarray(np.sqrt(1.0 - c.coloured_share) * white + np.sqrt(c.coloured_share) * slow)
+
+
+def _at_stamps(c: Conditions, motion: Motion) -> Motion:
+    """The motion when the samples were taken, by cubic Hermite interpolation."""
+    if c.clock_jitter == 0.0:
+        return motion
+    n, interval = motion.angle.shape[0], 1.0 / c.sample_rate
+    u = (c.time[:n] / interval - np.arange(n))[:, None]
+    after = np.minimum(np.arange(n) + 1, n - 1)
+    a, b = motion.angle, motion.angle[after]
+    ra, rb = motion.rate * interval, motion.rate[after] * interval
+    angle = (1 + 2 * u) * (1 - u) ** 2 * a + u * (1 - u) ** 2 * ra
+    angle = angle + u * u * (3 - 2 * u) * b + u * u * (u - 1) * rb
+    angle[-1] = motion.angle[-1] + u[-1] * ra[-1]
+    return Motion(angle, motion.rate + u * (motion.rate[after] - motion.rate))
 
 
 # ---- linkage

@@ -37,12 +37,14 @@ class Simulated:
         readings: shape (samples, runs), rad.
         excess: after refitting the nominal model.
         run_excess: excess by run, shape (runs,).
+        residual: of the nominal model, shape (runs, samples), rad.
     """
 
     draw: CampaignDraw
     readings: Array
     excess: float
     run_excess: Array
+    residual: Array
 
 
 def bind_effects(draw: CampaignDraw) -> tuple[Conditions, list[Bound]]:
@@ -92,8 +94,9 @@ def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
     sensor = [t for t in terms if isinstance(t, ReadingTerm)]
     readings = read_motion(conditions, motion, sensor, np.random.default_rng(draw.seed))
     readings = readings[: draw.conditions.samples]  # a motion may outlast the record
-    power = fit_nominal(draw.conditions, readings).residual_power / conditions.noise_power
-    return Simulated(draw, readings, float(np.mean(power)) - 1.0, power - 1.0)
+    fit = fit_nominal(draw.conditions, readings)
+    power = fit.residual_power / conditions.noise_power
+    return Simulated(draw, readings, float(np.mean(power)) - 1.0, power - 1.0, fit.residual)
 
 
 def _is_sensor(effect: EffectDraw, conditions: Conditions) -> bool:

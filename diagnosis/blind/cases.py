@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+UNKNOWN = ("unknown",)
+_KINDS = ("none", "single", "pair", "three", "four")
 NAMES = ("cn_beta", "cn_r")
 MODERATE = (1.0, 10.0)
 """Excess of a moderate gap: 1 to 10 times the noise power."""
@@ -19,8 +21,17 @@ class _Read(BaseModel):
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
 
+class _Scale(_Read):
+    time: float = 1.0
+
+
 class _Truth(_Read):
     effects: list[str]
+    small: list[str] = []
+    scale: _Scale = _Scale()
+    few_runs: bool = False
+    coloured_share: float = 0.0
+    stamps: str = "even"
     severity: float | None = None
     cn_beta: float = 1.0
     cn_r: float = 1.0
@@ -49,6 +60,7 @@ class _Answer(_Read):
     causes: list[str] | None
     ambiguous_with: list[str] = []
     candidates: list[_Candidate] = []
+    inclusion: dict[str, Annotated[float, Field(ge=0.0, le=1.0)]] = {}
     coefficients: _Coefficients = _Coefficients()
     gap: _Gap | None = None
     wall_s: float = 0.0
@@ -71,6 +83,11 @@ class Case:
         severity: excess of the nominal model as a ratio to the noise power; None where the truth does not say.
         coefficients: true ``cn_beta`` and ``cn_r``, 1/rad.
         answer: the diagnosis' document.
+        small: effects that act but need not be found, sorted.
+        time_scale: time over that of the standard rig.
+        few_runs: whether the protocol has few springs and speeds.
+        coloured: whether the sensor's noise is coloured.
+        stamps: ``even``, ``rounded`` or ``jittered``.
     """
 
     name: str
@@ -79,6 +96,11 @@ class Case:
     severity: float | None
     coefficients: Mapping[str, float]
     answer: Mapping[str, Any]
+    small: tuple[str, ...] = ()
+    time_scale: float = 1.0
+    few_runs: bool = False
+    coloured: bool = False
+    stamps: str = "even"
 
     @property
     def causes(self) -> tuple[str, ...] | None:
@@ -88,17 +110,27 @@ class Case:
 
     @property
     def right(self) -> bool:
-        """Whether the causes are exactly the true ones."""
-        return self.causes == self.truth
+        """Whether the causes are exactly the true ones; small ones may be among them."""
+        return self.causes is not None and set(self.causes) - set(self.small) == set(self.truth)
+
+    @property
+    def number(self) -> int | None:
+        """Number of causes that matter; None outside the vocabulary."""
+        return None if self.truth == UNKNOWN else len(self.truth)
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The effects named; none where the answer is ``unknown`` or missing."""
+        return () if self.causes in (None, UNKNOWN) else tuple(self.causes or ())
 
     @property
     def kind(self) -> str:
-        """``none``, ``single``, ``pair``, ``outside`` or ``withheld``."""
+        """``none``, ``single``, ``pair``, ``three``, ``four``, ``outside`` or ``withheld``."""
         if self.withheld:
             return "withheld"
         if self.truth == ("unknown",):
             return "outside"
-        return ("none", "single", "pair")[min(len(self.truth), 2)]
+        return _KINDS[min(len(self.truth), 4)]
 
     @property
     def severity_class(self) -> str:
@@ -177,6 +209,11 @@ def case(
         severity=stated.severity,
         coefficients={key: float(truth[key]) for key in NAMES if key in truth},
         answer=answer,
+        small=tuple(sorted(stated.small)),
+        time_scale=stated.scale.time,
+        few_runs=stated.few_runs,
+        coloured=stated.coloured_share > 0.0,
+        stamps=stated.stamps,
     )
 
 

@@ -42,8 +42,8 @@ def make_blind(
         out: folder to make.
         count: number of campaigns.
         seed: of everything drawn; the same arguments give the same campaigns.
-        shares: weight of each kind of campaign: single, pair, none, outside.
-        mixture: how often forms other than the textbook form are drawn.
+        shares: weight of each kind of campaign, of `tunnel_reference.draw.KINDS`.
+        mixture: how often other forms, other circumstances and small effects are drawn.
         key: file of the key; inside the folder, beside the campaigns, when None.
         progress: called with the number of campaigns written and the number in all.
         tell_steps: report on standard error how the sizing of the effects proceeds.
@@ -73,6 +73,8 @@ def make_blind(
                 "kinds": dict(shares),
                 "textbook": mixture.textbook,
                 "rare": mixture.rare,
+                "variety": mixture.variety,
+                "small": mixture.small,
             },
             "truths": truths,
         }

@@ -20,6 +20,8 @@ from diagnosis.blind.files import (
     read_document,
     read_hashes,
 )
+from diagnosis.blind.found import Found, found_by_group, inclusions
+from diagnosis.blind.smooth import SmoothCalibration, smooth_calibration
 from diagnosis.blind.statistics import CalibrationBin, Share, calibration, share_of
 from diagnosis.policy import BLIND_CLOSED, BLIND_WITHIN
 from tunnel_sim.files.reading import as_described
@@ -68,7 +70,7 @@ class Score:
     def exact(self) -> dict[str, Share]:
         """Exact match of the causes, by kind of campaign and severity (times the noise power)."""
         found = {}
-        for kind in ("single", "pair", "none", "outside", "withheld"):
+        for kind in ("single", "pair", "three", "four", "none", "outside", "withheld"):
             cases = [c for c in self.cases if c.kind == kind]
             found[kind] = share_of([c.right for c in cases])
             if kind == "single":
@@ -103,6 +105,14 @@ class Score:
         known = [(p, right) for p, right in given if p is not None]
         return calibration([p for p, _ in known], [right for _, right in known])
 
+    def found(self) -> list[Found]:
+        """True causes found and false ones named, by number of causes and by circumstances."""
+        return found_by_group(self.cases)
+
+    def inclusion(self) -> SmoothCalibration | None:
+        """Calibration of the probabilities that each effect is among the causes; None where they are not stated."""
+        return smooth_calibration(inclusions(self.cases))
+
     def false_alarms(self) -> Share:
         """How many campaigns without a gap were given a cause, ``unknown`` included."""
         return share_of([not c.right for c in self.cases if c.kind == "none"])
@@ -112,8 +122,8 @@ class Score:
         return share_of([c.causes == () for c in self.cases if c.kind != "none"])
 
     def rivals(self) -> Share:
-        """Of wrong answers to one or two effects, how many name the truth as a possible confusion."""
-        wrong = [c for c in self.cases if c.kind in ("single", "pair") and not c.right]
+        """Of wrong answers where known effects act, how many name the truth as a possible confusion."""
+        wrong = [c for c in self.cases if c.number and not c.right]
         return share_of([c.rival for c in wrong])
 
     def closure(self) -> tuple[Share, float, float]:
@@ -160,6 +170,7 @@ class Score:
         error, bins = self.calibration()
         share, median, low = self.closure()
         times = self.seconds()
+        inclusion = self.inclusion()
         return {
             "schema_version": 1,
             "sealed": self.sealed,
@@ -176,6 +187,8 @@ class Score:
                     {"low": b.low, "high": b.high, "mean": b.mean, "right": b.right.to_json_dict()} for b in bins
                 ],
             },
+            "found": {found.group: found.to_json_dict() for found in self.found()},
+            "inclusion_calibration": None if inclusion is None else inclusion.to_json_dict(),
             "false_alarms": self.false_alarms().to_json_dict(),
             "missed": self.missed().to_json_dict(),
             "rivals_named": self.rivals().to_json_dict(),
@@ -187,7 +200,8 @@ class Score:
             ],
             "seconds": dict(zip(("median", "percentile_90", "largest"), times, strict=True)),
             "cases": [
-                {"name": c.name, "truth": list(c.truth), "causes": None if c.causes is None else list(c.causes),
+                {"name": c.name, "truth": list(c.truth), "small": list(c.small),
+                 "causes": None if c.causes is None else list(c.causes),
                  "probability": c.probability, "right": c.right, "severity": c.severity}
                 for c in self.cases
             ],
@@ -244,6 +258,8 @@ def _made_with(document: Mapping[str, Any]) -> dict[str, Any]:
         "kinds": {str(kind): float(share) for kind, share in document["kinds"].items()},
         "textbook": float(document["textbook"]),
         "rare": float(document["rare"]),
+        "variety": float(document.get("variety", 0.0)),
+        "small": float(document.get("small", 0.0)),
     }
 
 

@@ -20,6 +20,7 @@ from tests.unit.gone_reader import unheard
 from tunnel_lab.cli import main
 from tunnel_lab.diagnosis_view import blind_page
 from tunnel_reference import draw
+from tunnel_reference.draw import Mixture
 from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -31,7 +32,13 @@ def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("blind") / "set"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(draw, "draw_conditions", lambda _rng: c)
-        make_blind(folder, count=3, seed=5, shares={"single": 2.0, "none": 1.0})
+        make_blind(
+            folder,
+            count=3,
+            seed=5,
+            shares={"single": 2.0, "none": 1.0},
+            mixture=Mixture(variety=0.0, small=0.0),
+        )
     return folder
 
 
@@ -106,8 +113,9 @@ def test_the_same_seed_gives_the_same_campaigns_under_another_salt(made, tmp_pat
     c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
     monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
     key = make_blind(
-        tmp_path / "b", count=3, seed=5, shares={"single": 2.0, "none": 1.0}, key=tmp_path / "away.json"
-    )
+        tmp_path / "b", count=3, seed=5, shares={"single": 2.0, "none": 1.0},
+        mixture=Mixture(variety=0.0, small=0.0), key=tmp_path / "away.json",
+    )  # fmt: skip
     assert key == tmp_path / "away.json"
     assert not (tmp_path / "b" / "key.json").exists()
     one, two = (json.loads(p.read_text()) for p in (made / "key.json", key))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tunnel_lab.terminal.options import split_names
+
+if TYPE_CHECKING:
+    from diagnosis.blind import Score
 
 NAME = "blind"
 HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.
@@ -42,7 +46,9 @@ def make(
     count: Annotated[int, typer.Option("--count", min=1, help="Number of campaigns.")] = 200,
     kinds: Annotated[
         str | None,
-        typer.Option("--kinds", metavar="KIND:WEIGHT,…", help="single, pair, none, outside, with weights."),
+        typer.Option(
+            "--kinds", metavar="KIND:WEIGHT,…", help="single, pair, three, four, none, outside, with weights."
+        ),
     ] = None,
     textbook: Annotated[
         float, typer.Option("--textbook", min=0, max=1, help="Share of textbook forms.")
@@ -50,15 +56,30 @@ def make(
     rare: Annotated[
         float, typer.Option("--rare", min=0, max=1, help="Share of rare forms in the rest.")
     ] = 0.5,
+    variety: Annotated[
+        float,
+        typer.Option(
+            "--variety",
+            min=0,
+            max=1,
+            help="Share with another scale, with few runs, with coloured noise "
+            "and with uneven time stamps, each.",
+        ),
+    ] = 0.25,
+    small: Annotated[
+        float,
+        typer.Option("--small", min=0, max=1, help="Share with a small effect beside those that matter."),
+    ] = 0.25,
     key: KeyFile = None,
 ) -> None:
     """Make a set: campaigns without truth, the sealed key, and its published hash.
 
     Springs, speeds, releases, coefficients and noise of every campaign are drawn
-    at random. It has one effect, two, none, or one outside the vocabulary, in the
-    textbook form or another, sized to 1–100 times the noise power. The same seed
-    gives the same campaigns. This takes two minutes plus half a second for each
-    campaign.
+    at random. It has up to four effects that matter, or one outside the vocabulary,
+    in the textbook form or another, each sized to 1–100 times the noise power. No
+    two of them imitate each other. Small effects beside them need not be found.
+    The same seed gives the same campaigns. This takes five minutes plus a second
+    for each campaign.
 
     [bold]Exit status[/bold]
       0 made, 2 bad input, 130 interrupted; no incomplete set is left.
@@ -74,7 +95,7 @@ def make(
         refuse_unwritable(key)
     with bar("writing campaigns", count) as tell:
         where = make_blind(
-            out, count=count, seed=seed, shares=shares, mixture=Mixture(textbook, rare), key=key,
+            out, count=count, seed=seed, shares=shares, mixture=Mixture(textbook, rare, variety, small), key=key,
             progress=lambda done, total: tell(done, total, ""), tell_steps=_terminal(),
         )  # fmt: skip
     say(f"Written: {out} ({count} campaigns), key {where}")
@@ -120,11 +141,17 @@ def score(
     json: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Also write all figures and cases as JSON.")
     ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option("--figure", metavar="FILE", help="Also draw the calibration of inclusion."),
+    ] = None,
 ) -> None:
     """Verify all hashes, open the key and score the answers.
 
-    The output gives exact matches by kind with Wilson intervals, false alarms,
-    calibration, closure on held-out runs, errors of Cnβ and Cnr before and after,
+    The output gives exact matches by kind with Wilson intervals, causes found and
+    false by number of causes and by circumstances, false alarms, calibration of
+    the answer and of the probabilities of the effects, closure on held-out runs,
+    errors of Cnβ and Cnr before and after,
     and the answers by true cause. A folder without seal.json but with a
     truth.json in every campaign is scored as an open set and labelled as one.
 
@@ -134,19 +161,33 @@ def score(
     from diagnosis import vocabulary
     from diagnosis.blind import score_set
     from tunnel_lab.diagnosis_view import blind_page
-    from tunnel_lab.terminal.tables import say, show_tables
+    from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.writing import refuse_unwritable, write_json, write_whole
 
     names = split_names(exclude)
     vocabulary(exclude=names)
-    for path in (markdown, json):
+    for path in (markdown, json, figure):
         if path is not None:
             refuse_unwritable(path)
     found = score_set(folder, excluded=names, key=key)
+    if figure is not None:
+        _draw(found, figure)
     if markdown is not None:
-        write_whole(markdown, blind_page.markdown(found, str(folder)).encode())
+        address = "" if figure is None else os.path.relpath(figure, markdown.parent)
+        write_whole(markdown, blind_page.markdown(found, str(folder), address).encode())
     if json is not None:
         write_json(json, found.to_json_dict())
+    _show(found)
+    for path in (markdown, json, figure):
+        if path is not None:
+            say(f"Written: {path}")
+
+
+def _show(found: Score) -> None:
+    """Print the score."""
+    from tunnel_lab.diagnosis_view import blind_page
+    from tunnel_lab.terminal.tables import say, show_tables
+
     for line in blind_page.origin_lines(found):
         say(line)
     say("")
@@ -154,9 +195,18 @@ def score(
         show_tables(blind_page.as_table(section))
         if section.note:
             say(section.note + "\n")
-    for path in (markdown, json):
-        if path is not None:
-            say(f"Written: {path}")
+
+
+def _draw(found: Score, path: Path) -> None:
+    """Draw the calibration of inclusion; refuse where no answer states these probabilities."""
+    from tunnel_lab.plotting.calibration_figure import calibration_figure
+    from tunnel_lab.plotting.plots import save
+    from tunnel_sim.vocabulary.errors import TunnelError
+
+    calibration = found.inclusion()
+    if calibration is None:
+        raise TunnelError("no answer states inclusion", where="--figure", remedy="diagnose the set again")
+    save(calibration_figure(calibration), path)
 
 
 def _terminal() -> bool:

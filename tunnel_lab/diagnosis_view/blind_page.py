@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from diagnosis.blind import Score
     from diagnosis.blind.statistics import Share
 
+INCLUSION = "Calibration of inclusion"
 NAMES = {"cn_beta": "Cnβ", "cn_r": "Cnr"}
 KINDS = {
     "single": "one effect",
@@ -19,6 +20,8 @@ KINDS = {
     "single, 1 to 10": "· 1 to 10 × noise power",
     "single, above 10": "· above 10 × noise power",
     "pair": "two effects",
+    "three": "three effects",
+    "four": "four effects",
     "none": "none acts",
     "outside": "outside the vocabulary",
     "withheld": "withheld from the vocabulary",
@@ -53,8 +56,8 @@ def sections(score: Score) -> list[Section]:
         Sections; those without rows are left out.
     """
     found = [
-        _exact(score), _alarms(score), _calibration(score), _closure(score), _coefficients(score), _pairs(score),
-        _answers(score), _time(score),
+        _exact(score), _found(score), _alarms(score), _calibration(score), _inclusion(score),
+        _closure(score), _coefficients(score), _pairs(score), _answers(score), _time(score),
     ]  # fmt: skip
     return [section for section in found if section.rows]
 
@@ -89,12 +92,13 @@ def origin_lines(score: Score) -> list[str]:
     return lines
 
 
-def markdown(score: Score, folder: str) -> str:
+def markdown(score: Score, folder: str, figure: str = "") -> str:
     """The page.
 
     Args:
         score: of a set.
         folder: of the set, as typed.
+        figure: address of the figure of the calibration of inclusion, relative to the page; none when empty.
 
     Returns:
         Markdown, tables and the full confusion matrix included.
@@ -106,8 +110,11 @@ def markdown(score: Score, folder: str) -> str:
         "The campaigns are drawn and simulated by the reference simulator (`tunnel_reference`). It has another",
         "integrator, another friction law, and more forms of every effect than the fitted one. The campaigns",
         "are diagnosed without their truth, and the answers are scored against the sealed key. Half of all",
-        "effects have the textbook form; `outside` campaigns have an effect that belongs to no family. Intervals",
-        "are Wilson's at 95 %. This page is written by the commands below; nothing in it is typed by hand.",
+        "effects have the textbook form; `outside` campaigns have an effect that belongs to no family. Up to four",
+        "effects act, each of them well above the noise by itself and beside the others. Some campaigns are of",
+        "rigs of another scale of time and moments, of few runs, with coloured noise, with rounded or jittered",
+        "time stamps, or with small effects beside. Intervals are Wilson's at 95 %. This page",
+        "is written by the commands below; nothing in it is typed by hand.",
         "",
         "```bash",
         *_commands(score, folder),
@@ -121,6 +128,8 @@ def markdown(score: Score, folder: str) -> str:
         lines += ["", f"## {section.title}", "", *_rows(section.headings, section.rows)]
         if section.note:
             lines += ["", section.note]
+        if figure and section.title == INCLUSION:
+            lines += ["", f"![Stated and observed probability that an effect is among the causes]({figure})"]
     return "\n".join([*lines, "", *_matrix(score), ""])
 
 
@@ -131,7 +140,8 @@ def _commands(score: Score, folder: str) -> list[str]:
     kinds = ",".join(f"{kind}:{share:g}" for kind, share in made["kinds"].items())
     return [
         f"tunnel blind make {folder} --count {made['count']} --seed {made['seed']} --kinds {kinds} "
-        f"--textbook {made['textbook']:g} --rare {made['rare']:g}"
+        f"--textbook {made['textbook']:g} --rare {made['rare']:g} "
+        f"--variety {made['variety']:g} --small {made['small']:g}"
     ]
 
 
@@ -153,6 +163,33 @@ def _alarms(score: Score) -> Section:
     }
     rows = tuple((name, *_share(found)) for name, found in entries.items() if found.total)
     return Section("Alarms", ("", "number", "of", "share", "95 %"), rows)
+
+
+def _found(score: Score) -> Section:
+    rows = tuple(
+        (found.group, *(_brief(share) for share in (found.exact, found.found, found.false)), "")
+        for found in score.found()
+    )
+    note = (
+        "Small causes that act beside others are neither asked for nor false. Fast and slow rigs have periods "
+        "beyond a third and three times the standard rig's. Intervals take the causes of a campaign as independent."
+    )
+    headings = ("campaigns", "sets exact", "true causes found", "named causes false", "")
+    return Section("Causes found and false", headings, rows, note)
+
+
+def _inclusion(score: Score) -> Section:
+    found = score.inclusion()
+    if found is None:
+        return Section(INCLUSION, (), ())
+    low, high = found.interval
+    row = (f"{found.error:.4f}", f"{low:.4f}–{high:.4f}", str(found.statements), str(found.campaigns))
+    note = (
+        "Of the probability of every effect that it is among the causes. The kernel is as wide as the error that "
+        "it gives (Błasiok and Nakkiran 2023); the interval is by resampling campaigns."
+    )
+    headings = ("smooth calibration error", "95 %", "statements", "campaigns")
+    return Section(INCLUSION, headings, (row,), note)
 
 
 def _calibration(score: Score) -> Section:
@@ -239,7 +276,8 @@ def _matrix(score: Score) -> list[str]:
     ]
     key = ", ".join(f"{number} {name}" for name, number in numbers.items())
     return [
-        "## Confusion matrix", "", "True causes in rows, answers in columns; `two or more` counts any pair.", "",
+        "## Confusion matrix", "",
+        "True causes in rows, answers in columns; `two or more` counts any set of effects.", "",
         *_rows(headings, rows), "", f"Columns: {key}.",
     ]  # fmt: skip
 
@@ -254,6 +292,14 @@ def _order(name: str) -> tuple[int, str]:
     """Effects by name, then pairs, none, unknown, and no answer."""
     last = ("two or more", "none", "unknown", "withheld", "no answer")
     return (last.index(name) + 1 if name in last else 0, name)
+
+
+def _brief(share: Share) -> str:
+    """Count, number of all, share and interval in one cell; a dash of none."""
+    if not share.total:
+        return "–"
+    count, total, value, interval = _share(share)
+    return f"{count}/{total}, {value} ({interval})"
 
 
 def _share(share: Share) -> tuple[str, str, str, str]:

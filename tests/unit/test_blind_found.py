@@ -1,0 +1,111 @@
+"""The score by number of causes, and smooth calibration. Truth: hand counts, and statements drawn as stated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.blind.cases import case
+from diagnosis.blind.found import found_by_group, inclusions
+from diagnosis.blind.score import Score
+from diagnosis.blind.smooth import smooth_calibration
+from diagnosis.blind.statistics import Share
+from tests.unit.test_blind import document
+from tunnel_lab.diagnosis_view import blind_page
+from tunnel_lab.plotting.calibration_figure import calibration_figure
+
+THREE = ["coulomb_friction", "gravity_stiffness", "quadratic_damping"]
+
+
+def made(truth, said, *, inclusion=None, **more):
+    answer = document(said) | ({} if inclusion is None else {"inclusion": inclusion})
+    return case("c", {"effects": truth, **more}, answer)
+
+
+CASES = (
+    made(THREE, THREE),
+    made(THREE, [*THREE[:2], "mains_hum"], small=["mains_hum"]),  # one missed; the small one does not count
+    made(THREE, [THREE[0], "free_play"]),  # two missed, one false
+    made([*THREE, "free_play"], ["unknown"], scale={"time": 0.1}),
+    made(["free_play"], ["free_play", "mains_hum"], small=["mains_hum"], scale={"time": 10.0}),
+    made([], ["sensor_drift"], coloured_share=0.6),
+    made([], [], stamps="jittered"),
+    made(["unknown"], ["unknown"], few_runs=True),
+    made(["unknown"], ["mains_hum"]),
+)
+
+
+def test_causes_found_and_false_are_those_counted_by_hand():
+    found = {f.group: f for f in found_by_group(CASES)}
+    assert found["three causes"].exact == Share(1, 3)
+    assert found["three causes"].found == Share(6, 9)
+    assert found["three causes"].false == Share(1, 7)
+    assert (found["four causes"].found, found["four causes"].false) == (Share(0, 4), Share(0, 0))
+    assert found["one cause"].exact == found["slow rigs"].exact == Share(1, 1)
+    assert found["fast rigs"].exact == found["none acts, coloured noise"].exact == Share(0, 1)
+    assert found["none acts, rounded or jittered stamps"].exact == found["few runs"].exact == Share(1, 1)
+    assert found["none acts"].false == Share(1, 1)
+    assert found["outside the vocabulary"].false == Share(1, 1)
+    assert found["all"].exact == Share(4, 9)
+    assert "two causes" not in found
+
+
+def test_kinds_go_up_to_four():
+    exact = Score(CASES, (), "", "", {}, False).exact()
+    assert (exact["three"], exact["four"]) == (Share(1, 3), Share(0, 1))
+
+
+def test_a_truth_of_the_first_edition_has_no_small_causes_and_an_even_clock():
+    one = case("c", {"effects": ["free_play"], "schema_version": 1}, document(["free_play"]))
+    assert (one.small, one.stamps, one.time_scale, one.coloured) == ((), "even", 1.0, False)
+
+
+def test_inclusions_leave_small_causes_out():
+    one = made(["free_play"], ["free_play"], small=["mains_hum"],
+               inclusion={"free_play": 0.9, "mains_hum": 0.4, "buffeting": 0.1})  # fmt: skip
+    assert inclusions([one, CASES[0]]) == [([0.9, 0.1], [True, False])]
+
+
+@pytest.mark.parametrize("bad", [{"free_play": 1.5}, {"free_play": "x"}, [0.5]])
+def test_an_inclusion_that_is_not_a_probability_is_refused(bad):
+    with pytest.raises(ValueError, match="validation error"):
+        made(["free_play"], ["free_play"], inclusion=bad)
+
+
+def drawn(shift, seed=1, campaigns=600):
+    """Campaigns of 24 statements, true as often as stated plus a shift."""
+    rng = np.random.default_rng(seed)
+    p = rng.uniform(0.2, 0.8, (campaigns, 24))
+    return [(list(a), list(b)) for a, b in zip(p, rng.random(p.shape) < p + shift, strict=True)]
+
+
+def test_a_calibrated_answerer_has_a_small_smooth_error():
+    found = smooth_calibration(drawn(0.0))
+    assert found.error < 0.02
+    assert np.all(np.abs(found.observed - found.stated)[(found.stated > 0.25) & (found.stated < 0.75)] < 0.06)
+
+
+@pytest.mark.parametrize("shift", [-0.15, 0.15])
+def test_the_smooth_error_is_the_shift_of_the_statements(shift):
+    found = smooth_calibration(drawn(shift))
+    assert found.error == pytest.approx(0.15, abs=0.015)
+    assert found.interval[0] < found.error < found.interval[1]
+    assert found.error == pytest.approx(found.width, rel=1e-3)
+
+
+def test_certain_and_wrong_is_the_whole_error():
+    assert smooth_calibration([([1.0, 1.0], [False, False])]).error == pytest.approx(1.0, abs=0.01)
+    assert smooth_calibration([]) is None
+
+
+def test_the_page_and_the_figure_show_the_calibration_of_inclusion():
+    cases = tuple(made(["free_play"], ["free_play"], inclusion={"free_play": 0.9}) for _ in range(5))
+    score = Score(cases, (), "", "", {}, False)
+    page = blind_page.markdown(score, "set", "inclusion.png")
+    assert "## Calibration of inclusion" in page
+    assert "](inclusion.png)" in page
+    assert "5/5, 100.0 %" in page
+    title = calibration_figure(score.inclusion()).axes[0].get_title()
+    assert title == f"smooth calibration error {score.inclusion().error:.3f}"
+    assert score.to_json_dict()["inclusion_calibration"]["statements"] == 5
+    assert "Calibration of inclusion" not in blind_page.markdown(Score(CASES, (), "", "", {}, False), "set")
