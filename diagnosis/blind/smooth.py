@@ -93,7 +93,7 @@ def _binned(probabilities: Sequence[float], true: Sequence[bool]) -> tuple[Array
     p, y = np.asarray(probabilities, dtype=float), np.asarray(true, dtype=float)
     at = np.rint(p * (_POINTS - 1)).astype(int)
     counts = np.bincount(at, minlength=_POINTS).astype(float)
-    return counts, np.bincount(at, weights=y - p, minlength=_POINTS)
+    return counts, np.bincount(at, weights=y - p, minlength=_POINTS).astype(float)
 
 
 def _kernel(grid: Array, width: float) -> Array:

@@ -78,8 +78,8 @@ def make(
     at random. It has up to four effects that matter, or one outside the vocabulary,
     in the textbook form or another, each sized to 1–100 times the noise power. No
     two of them imitate each other. Small effects beside them need not be found.
-    The same seed gives the same campaigns. This takes five minutes plus a second
-    for each campaign.
+    The same seed gives the same campaigns. Sizing the effects takes several minutes,
+    hardly more for many campaigns than for few.
 
     [bold]Exit status[/bold]
       0 made, 2 bad input, 130 interrupted; no incomplete set is left.
