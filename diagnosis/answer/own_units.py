@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from diagnosis.fitting.similarity import Similarity
-from diagnosis.result import Confirmation, Diagnosis, NoiseSummary, ParameterEstimate
+from diagnosis.result import Candidate, Confirmation, Diagnosis, NoiseSummary, ParameterEstimate
+from tunnel_sim.effects import effect_class
 
 _NEXT_RUN = {"spring_stiffness": "N m/rad", "duration": "s"}
 
@@ -28,7 +29,7 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
 
     return replace(
         answer,
-        candidates=tuple(replace(c, parameters=own(c.parameters)) for c in answer.candidates),
+        candidates=tuple(replace(c, parameters=_parameters(c, similarity)) for c in answer.candidates),
         coefficients=replace(
             answer.coefficients,
             before=own(answer.coefficients.before),
@@ -38,6 +39,23 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
         confirmation=_confirmation(answer.confirmation, similarity),
         next_run=None if answer.next_run is None else _next_run(answer.next_run, similarity),
     )
+
+
+def _parameters(candidate: Candidate, similarity: Similarity) -> dict[str, ParameterEstimate]:
+    """The parameters of a candidate; another power of the rate than the textbook's is another power of time."""
+    given = candidate.parameters
+    found = {}
+    for name, value in given.items():
+        effect, _, parameter = name.rpartition(".")
+        kind = effect_class(effect or candidate.effect)
+        infos = {info.name: info for info in kind.parameters()}
+        exponent = infos[parameter].rate_exponent
+        free = given.get(name.removesuffix(parameter) + exponent) if exponent else None
+        beyond = 0.0 if free is None else free.value - infos[exponent].default
+        factor = similarity.time**-beyond
+        std = None if value.std is None else value.std * factor
+        found[name] = own_estimate(replace(value, value=value.value * factor, std=std), similarity)
+    return found
 
 
 def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> ParameterEstimate:

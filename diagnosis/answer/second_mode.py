@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.policy import SECOND_MODE_LEFT
 from identification.decay.first_guess import starting_frequency, thinned_reading
@@ -41,8 +40,8 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
         campaign: the runs.
 
     Returns:
-        A sentence for each run in which two decaying oscillations are farther apart than the sum of their half-power
-        widths and halve what one leaves.
+        A sentence for each run in which two decaying oscillations are farther apart than the sum of their
+        half-power widths and halve what one leaves.
     """
     return tuple(words for run in campaign.runs if (words := _second_mode(run.id, run.record)))
 
@@ -63,7 +62,7 @@ def fit_modes(values: Array, interval: float, count: int) -> Modes | None:
     hankel = hankel - hankel.mean(axis=1, keepdims=True)
     left = np.linalg.svd(hankel, full_matrices=False)[0][:, : 2 * count]
     poles = np.linalg.eigvals(np.linalg.pinv(left[:-1]) @ left[1:]).astype(np.complex128)
-    exponents: NDArray[np.complex128] = np.log(poles[np.abs(poles) > 0.0]) / interval
+    exponents = np.asarray(np.log(poles[np.abs(poles) > 0.0]) / interval, np.complex128)
     upper = exponents[exponents.imag > 0.0]
     if upper.size != count:
         return None

@@ -18,6 +18,7 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import Circumstances, ParameterInfo, Trial
 from tunnel_sim.vocabulary.record import Array
 
+_STILL = 0.02  # of the largest swing, below which a run or a stretch of it counts as at rest
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
@@ -32,6 +33,9 @@ def nominal_start(data: Data) -> Point:
         the releases from the first samples.
     """
     omega2 = np.array([(2.0 * np.pi * _frequency(run)) ** 2 for run in data.runs])
+    swing = np.array([float(np.std(run.reading)) for run in data.runs])
+    moving = (swing > _STILL * swing.max()).astype(np.float64)  # a body at rest has no frequency
+    typical = float(np.median(omega2[moving > 0.0]))
     own = [float(np.mean(run.reading)) for run in data.runs]
     common = float(np.median(own))
     zeros = own if data.own_zeros else [common] * len(own)
@@ -39,21 +43,19 @@ def nominal_start(data: Data) -> Point:
     release, zero = (release, ()) if data.own_zeros else (release[:, :2], (common,))
     if data.normalised:
         return Point(
-            np.array(
-                [float(np.median(omega2)), 0.01 * float(np.sqrt(np.median(omega2))), *_still(data), *zero]
-            ),
+            np.array([typical, 0.01 * float(np.sqrt(typical)), *_still(data), *zero]),
             release,
         )
     spring = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
     pressure = np.array([data.air_moment(run) for run in data.runs])
     # Kr = Izz ω² + pressure Cnβ, with equal relative errors
-    design = np.column_stack([omega2, pressure]) / spring[:, None]
+    design = np.column_stack([omega2, pressure]) / spring[:, None] * moving[:, None]
     if not data.wind_on:
         design = design[:, :1]
-    solution = np.linalg.lstsq(design, np.ones(len(spring)), rcond=None)[0]
-    inertia = float(solution[0]) if solution[0] > 0.0 else float(np.median(spring / omega2))
+    solution = np.linalg.lstsq(design, moving, rcond=None)[0]
+    inertia = float(solution[0]) if solution[0] > 0.0 else float(np.median((spring / omega2)[moving > 0.0]))
     air = (float(solution[1]), 0.0) if data.wind_on else ()
-    damping = 0.01 * inertia * float(np.sqrt(np.median(omega2)))
+    damping = 0.01 * inertia * float(np.sqrt(typical))
     return Point(np.array([inertia, damping, *air, *zero]), release)
 
 

@@ -27,8 +27,9 @@ def examine(campaign: Campaign) -> Examined:
 
     Repeated records are counted once. Rounded time stamps are replaced by the clock behind them. Samples before
     the release, and most of a long rest beside the centre, are cut off. Wind-on runs in a limit cycle are cut to
-    their linear growth, or left out. Runs whose zeros differ get one each. Motion that grows with the wind off, and
-    springs or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies are noted.
+    their linear growth, or left out. Runs whose zeros differ get one each. Motion that grows with the wind off,
+    and springs or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies are
+    noted.
 
     Args:
         campaign: measured or simulated runs.

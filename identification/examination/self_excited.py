@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import f as variance_ratio
 
 from identification.decay.damped_oscillation import envelope_amplitude
@@ -115,7 +116,7 @@ def windows_of(record: Record) -> Windows | None:
     return Windows(*np.array(found).T)
 
 
-def _window(reading: Reading, part: Array, frequency: float) -> tuple[float, float, float] | None:
+def _window(reading: Reading, part: NDArray[np.intp], frequency: float) -> tuple[float, float, float] | None:
     time, yaw = reading.time[part], reading.yaw[part]
     length = float(time[-1] - time[0])
     found = pencil_decay(yaw, length / (time.size - 1), 2.0 * np.pi * frequency)
@@ -197,7 +198,8 @@ def _steady_remark(run: Run, windows: Windows) -> Remark:
         (run.id,),
         f"steady oscillation with the wind on, self-excited or forced: {significant(amplitude, 2)} rad at "
         f"{significant(frequency, 3)} Hz for {cycles:.0f} cycles (its amplitude changes by "
-        f"{100.0 * slope / frequency:+.1g} ± {100.0 * std / frequency:.1g} % per cycle), which has no damping ratio",
+        f"{100.0 * slope / frequency:+.1g} ± {100.0 * std / frequency:.1g} % per cycle), "
+        f"which has no damping ratio",
         "record its growth from rest, or a decay at a lower wind speed",
         {"kind": "steady", "settled_rad": amplitude, **windows.figures()},
     )

@@ -54,6 +54,7 @@ class ParameterInfo:
         form: whether it generalises the effect's form; its default gives the textbook form.
         fit_lower: least value a fit may take, in the unit.
         fit_upper: greatest value a fit may take, in the unit.
+        rate_exponent: name of the parameter that is the power of the rate which it multiplies; empty: none.
         beside_spring: whether only a spring of stated stiffness beside the effect makes it known; else it is held.
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
@@ -70,6 +71,7 @@ class ParameterInfo:
     form: bool
     fit_lower: float
     fit_upper: float
+    rate_exponent: str
     beside_spring: bool
     chosen_spring: bool
     per_pressure: bool
@@ -87,6 +89,7 @@ def parameter(
     form: bool = False,
     fit_lower: float | None = None,
     fit_upper: float | None = None,
+    rate_exponent: str = "",
     beside_spring: bool = False,
     chosen_spring: bool = False,
     per_pressure: bool = False,
@@ -102,6 +105,7 @@ def parameter(
         "form": form,
         "fit_lower": lower if fit_lower is None else fit_lower,
         "fit_upper": upper if fit_upper is None else fit_upper,
+        "rate_exponent": rate_exponent,
         "beside_spring": beside_spring,
         "chosen_spring": chosen_spring,
         "per_pressure": per_pressure,

@@ -34,6 +34,7 @@ class QuadraticDamping(Effect):
         lower=-1e4,
         upper=1e4,
         fit_lower=0.0,
+        rate_exponent="exponent",
     )
 
     exponent: float = exponent("n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0)
