@@ -57,13 +57,16 @@ EXPECTED: Mapping[str, Expected] = {
         (SINE, DRY, QUADRATIC), "Energy balance: dry friction and a quadratic part; gravity's sine."
     ),
     "tartaruga-growth": _expected(
-        ("unknown",), "Self-excitation that saturates; the frequency rises by a third.", words="self-excited: grows"
+        ("unknown",),
+        "Self-excitation that saturates; the frequency rises by a third.",
+        words="self-excited: grows",
     ),
     "tartaruga-lco": _expected(
         ("unknown",), "A steady limit cycle: it has no damping ratio.", words="steady oscillation"
     ),
     "cart-thesis-1": _expected(
-        (SINE, DRY, QUADRATIC), "Energy balance: dry friction 61 %, quadratic damping 37 % of the loss; gravity's sine."
+        (SINE, DRY, QUADRATIC),
+        "Energy balance: dry friction 61 %, quadratic damping 37 % of the loss; gravity's sine.",
     ),
     "pasco-raw": _expected((DRY,), "Dry friction alone, between springs."),
     "phy180-raw": _expected(
@@ -125,9 +128,15 @@ def section(name: str, document: Mapping[str, Any] | str, images: Path) -> tuple
         f"{best['probability']:.2f} | {right} |"
     )
     caution = [text for text in document["cautions"] if expected.words and expected.words in text]
-    parts = [f"## {name}", f"The source: {expected.why}\n", f"The diagnosis ({right}): {document['verdict']}\n"]
+    parts = [
+        f"## {name}",
+        f"The source: {expected.why}\n",
+        f"The diagnosis ({right}): {document['verdict']}\n",
+    ]
     parts += [f"It adds: {text}\n" for text in caution]
-    parts += [f"- `{key}`: {_value(given)}" for key, given in list(best["parameters"].items())[:_KEY_PARAMETERS]]
+    parts += [
+        f"- `{key}`: {_value(given)}" for key, given in list(best["parameters"].items())[:_KEY_PARAMETERS]
+    ]
     figure = waterfall_figure(document)
     if figure is not None:
         path = images / f"real-records-{name}.png"
@@ -185,7 +194,9 @@ def main() -> None:
         row, text = section(name, _answer(campaign), images)
         mark = "" if name in MEASURED_CAMPAIGNS else "*"
         parts.append((row.replace(f"(#{name})", f"(#{name}){mark}", 1), text))
-        PAGE.write_text(page(parts), encoding="utf-8")  # after each record, since a diagnosis may take minutes
+        PAGE.write_text(
+            page(parts), encoding="utf-8"
+        )  # after each record, since a diagnosis may take minutes
         print(row, flush=True)
 
 

@@ -167,7 +167,11 @@ def _settled_from(windows: Windows) -> int | None:
     if windows.time.size - first < LEAST_GROWTH_WINDOWS:
         return None
     slope, std = _slope(windows.time[first:], windows.amplitude[first:])
-    return first if slope + MISFIT_DEVIATIONS * std < float(windows.growth_rate[:first].max(initial=0.0)) else None
+    return (
+        first
+        if slope + MISFIT_DEVIATIONS * std < float(windows.growth_rate[:first].max(initial=0.0))
+        else None
+    )
 
 
 def _growing_part(windows: Windows, limit: float) -> slice:
@@ -207,7 +211,9 @@ def _growth_remark(run: Run, windows: Windows, part: slice | None, settled: int 
     at = float(amplitude[int(np.argmax(windows.growth_rate[:settled]))])
     last = _last(amplitude)
     said = f"at up to {grown:.2g} 1/s" if rate is None else f"at {rate:.2g} ± {std:.1g} 1/s"
-    end = f"reaches {significant(last, 2)} rad" if settled is None else f"settles at {significant(last, 2)} rad"
+    end = (
+        f"reaches {significant(last, 2)} rad" if settled is None else f"settles at {significant(last, 2)} rad"
+    )
     if rate is not None and grown > rate + MISFIT_DEVIATIONS * (std or 0.0):
         said += f" (at most {grown:.2g} 1/s, at {significant(at, 2)} rad)"
     outcome, consequence = _consequence(settled, part)
