@@ -41,8 +41,8 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
         campaign: the runs.
 
     Returns:
-        A sentence for each run in which two decaying oscillations are farther apart than the sum of their half-power
-        widths and halve what one leaves.
+        A sentence for each run in which two decaying oscillations are farther apart than the sum of their
+        half-power widths and halve what one leaves.
     """
     return tuple(words for run in campaign.runs if (words := _second_mode(run.id, run.record)))
 
