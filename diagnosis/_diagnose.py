@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from diagnosis.answer.assemble import assemble
-from diagnosis.answer.limit_cycles import limit_cycle_answer
+from diagnosis.answer.limit_cycles import limit_cycle_answer, refused_limit_cycles
 from diagnosis.answer.own_units import in_own_units
 from diagnosis.answer.second_mode import second_modes
 from diagnosis.detection.comparable import comparable_runs
@@ -46,7 +46,12 @@ def diagnose(
         # Their sizes are those of angles, and their ranges too.
         kinds = [kind for kind in kinds if kind.channel != "sensor"]
         left_out = (*left_out, f"Effects of the sensor are not tried on {campaign.sensor.quantity}s.")
-    study = investigate(campaign, () if found.limit_cycles else kinds, progress)
+    try:
+        study = investigate(campaign, () if found.limit_cycles else kinds, progress)
+    except TunnelError as error:
+        if not found.limit_cycles:
+            raise
+        raise refused_limit_cycles(found.remarks) from error
     if progress is not None:
         progress("where, and how far it closes")
     where, maps = localise(study)

@@ -103,7 +103,7 @@ def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: 
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
     """The study with sets of effects, random moments and outsiders fitted and weighed."""
     fitted = [kind for kind in kinds if kind.fitted]
-    if is_gross(found.nominal):
+    if fitted and is_gross(found.nominal):
         return _weigh_in_stretches(found, fitted, clock)
     with clock.step("effects"):
         found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress)))

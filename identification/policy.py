@@ -111,7 +111,8 @@ LEAST_STEADY_CYCLES = 20.0
 than the wind alone adds to any rig. Judgement."""
 
 STEADY_CHANGE = 0.1
-"""Greatest change of the amplitude's logarithm along a steady record, upper end of its interval. Judgement."""
+"""Greatest change of the amplitude's logarithm along a steady record, at the upper end of its interval.
+Judgement."""
 
 SETTLED_SHARE = 0.9
 """Share of the last amplitude from which a growing motion counts as settled: windows scatter by a few per cent.

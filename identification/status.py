@@ -23,7 +23,9 @@ class Status(Enum):
     REPEATED_RUN = (
         "the same samples as another run, so counted once: remove the run, or correct its file name"
     )
-    LIMIT_CYCLE = "a limit cycle has no damping ratio: record its growth from rest, or a decay at less wind"
+    LIMIT_CYCLE = (
+        "a limit cycle, which has no damping ratio: record its growth, or a decay at a lower wind speed"
+    )
     MODEL_DEPARTS = "the model does not explain the data, so the intervals are widened: run the diagnosis"
     NOISE_DISAGREES = (
         "the records contradict noise_std, so the residual's is used: correct or remove noise_std"

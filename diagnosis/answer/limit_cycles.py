@@ -8,6 +8,7 @@ from dataclasses import replace
 from diagnosis.result import Candidate, Coefficients, Diagnosis, Where
 from identification.examination.self_excited import in_limit_cycle
 from identification.remark import Remark
+from tunnel_sim.vocabulary.errors import TunnelError
 
 _NOTE = "no damping ratio and no derivative is stated, since no run is a free decay"
 
@@ -22,12 +23,11 @@ def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnos
     Returns:
         The answer ``unknown``, without coefficients, place or rest.
     """
-    found = [f"{r.runs[0]}: {r.what}" for r in remarks if in_limit_cycle(r.figures)]
     excess = nominal.gap.excess_before
     return replace(
         nominal,
         causes=("unknown",),
-        verdict=f"No run is a free decay, so no cause is named. {'. '.join(found)}.",
+        verdict=f"No run is a free decay, so no cause is named. {_recognised(remarks)}.",
         where=Where(None, None, tuple(run.id for run in nominal.gap.runs)),
         candidates=(Candidate("unknown", 1.0, excess, 0.0),),
         coefficients=Coefficients({}, {}, _NOTE),
@@ -35,3 +35,21 @@ def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnos
         blind_spots=(),
         rest=None,
     )
+
+
+def refused_limit_cycles(remarks: Sequence[Remark]) -> TunnelError:
+    """The refusal where not even the nominal model can be fitted to runs in a limit cycle.
+
+    Args:
+        remarks: of the examination.
+
+    Returns:
+        The error, which says what was recognised.
+    """
+    return TunnelError(
+        f"no run is a free decay: {_recognised(remarks)}", remedy="add decays at a lower wind speed"
+    )
+
+
+def _recognised(remarks: Sequence[Remark]) -> str:
+    return ". ".join(f"{r.runs[0]}: {r.what}" for r in remarks if in_limit_cycle(r.figures))

@@ -199,7 +199,7 @@ def _steady_remark(run: Run, windows: Windows) -> Remark:
         f"steady oscillation with the wind on, self-excited or forced: {significant(amplitude, 2)} rad at "
         f"{significant(frequency, 3)} Hz for {cycles:.0f} cycles (its amplitude changes by "
         f"{100.0 * slope / frequency:+.1g} ± {100.0 * std / frequency:.1g} % per cycle), "
-        f"which has no damping ratio",
+        "which has no damping ratio",
         "record its growth from rest, or a decay at a lower wind speed",
         {"kind": "steady", "settled_rad": amplitude, **windows.figures()},
     )
