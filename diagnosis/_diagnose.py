@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from diagnosis.answer.assemble import assemble
 from diagnosis.answer.limit_cycles import limit_cycle_answer, refused_limit_cycles
+from diagnosis.answer.other_modes import second_modes
 from diagnosis.answer.own_units import in_own_units
-from diagnosis.answer.second_mode import second_modes
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.limit_cycles import diagnosable
 from diagnosis.detection.noise_remarks import noise_remarks

@@ -84,7 +84,7 @@ class Case:
         coefficients: true ``cn_beta`` and ``cn_r``, 1/rad.
         answer: the diagnosis' document.
         small: effects that act but need not be found, sorted.
-        time_scale: time over that of the standard rig.
+        time_scale: time over that of the standard rig, a ratio.
         few_runs: whether the protocol has few springs and speeds.
         coloured: whether the sensor's noise is coloured.
         stamps: ``even``, ``rounded`` or ``jittered``.

@@ -45,8 +45,8 @@ class Colour:
         level: natural logarithm of the power over that of the white noise assumed before, shape (n,).
         std: of the levels, shape (n,).
         slope: assumed of the level against the logarithm of frequency below the first band: that of the lowest
-            bands, made steeper by what chance may hide, between 0 and that of a random walk, −2.
-        slope_std: standard deviation of the slope of the lowest bands.
+            bands, made steeper by what chance may hide, between 0 and that of a random walk, −2; dimensionless.
+        slope_std: standard deviation of the slope of the lowest bands, dimensionless.
     """
 
     frequency: Array

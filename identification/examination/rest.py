@@ -17,6 +17,7 @@ from identification.remark import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
+_SQUARABLE = 1e100  # of the reading's unit: squares of larger readings overflow
 _RESTING = 0.01  # of the largest excursion: the body rests while the reading stays as near its last place
 _KEPT = 3.0  # cycles of rest: they show that the motion ended, and where
 _SETTLED = 0.25  # of the distance from the centre: a reading that moves more at rest drifts
@@ -40,6 +41,8 @@ def without_rest(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
 def _without_rest(run: Run, sensor: SensorProperties) -> tuple[Run, Remark | None]:
     record, resolution = run.record, sensor.resolution or 0.0
     time, yaw = record.time_s, record.yaw_rad
+    if not float(np.abs(yaw).max()) < _SQUARABLE:
+        return run, None  # refused later, for what it is
     last = float(np.median(yaw[-max(yaw.size // 20, 1) :]))
     near = max(_RESTING * float(np.abs(yaw - last).max()), resolution, 5.0 * reading_noise(record, sensor))
     moving = np.flatnonzero(np.abs(yaw - last) > near)

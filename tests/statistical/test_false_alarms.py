@@ -35,7 +35,7 @@ def judged(data):
     """All tests of a campaign."""
     noise = campaign_noise(data)
     nominal = fit_nominal(prepare(data, noise.variance))
-    return gap.test_gap(nominal, noise, noise_trend(data), coarse_step=False)
+    return gap.test_gap(nominal, noise, noise_trend(data), coarse_step=False, errors=None)
 
 
 @pytest.mark.slow

@@ -56,6 +56,7 @@ def campaign(
         )
         for i, (spring, speed) in enumerate(CONDITIONS)
     )
+    effects = tuple(effect for effect in effects if effect is not None)
     kinds = tuple(type(effect) for effect in effects)
     problem = Problem(Data(runs, 0.036, 0.625, 0.225, False, INERTIA), kinds)
     values = [getattr(e, info.name) for e in effects for info in e.parameters() if not info.form]

@@ -40,7 +40,7 @@ def test_white_noise_is_left_as_it_is():
 
 
 def test_a_run_scales_a_sinusoid_by_its_response():
-    run = RunData("r1", np.zeros(4000), 4, 4e-3, 1e-6, None, 0.0, 0.0, 16.0, FILTERS[1])
+    run = RunData("r1", np.zeros(4000), 4, 4e-3, 1e-6, None, 0.0, 0.0, 16.0, whitening=FILTERS[1])
     wave = np.exp(2j * np.pi * 3.0 * run.interval * np.arange(4000))
     scaled = run.scaled(wave.real) + 1j * run.scaled(wave.imag)
     assert scaled[100:] / wave[100:] == pytest.approx(run.response(3.0) / 1e-3, rel=1e-9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +10,9 @@ import numpy as np
 import pytest
 
 from tunnel_lab.cli import main
+
+PROGRESS = re.compile(r"\d+\.\d s: \w")
+"""A step of a command on standard error where no terminal shows it."""
 
 Outcome = tuple[int, str, str]
 Tunnel = Callable[..., Outcome]

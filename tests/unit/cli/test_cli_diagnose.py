@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from tests.reference.free_decays import Setting, campaign
+from tests.unit.cli.conftest import PROGRESS
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.campaign_io import write_campaign
@@ -56,7 +57,8 @@ def test_a_planted_effect_is_named_in_words_and_in_the_json(
 ) -> None:
     file = tmp_path / "answer.json"
     status, out, err = tunnel("diagnose", dry, "--effects", f"{CAUSE},quadratic_damping", "--json", file)
-    assert (status, err) == (0, "")
+    assert status == 0
+    assert all(PROGRESS.match(line) for line in err.splitlines())
     document = json.loads(file.read_text(encoding="utf-8"))
     assert document["causes"] == [CAUSE]
     assert out.startswith(document["verdict"])
@@ -86,7 +88,8 @@ def test_the_report_is_one_page(tunnel: Tunnel, dry: Path, tmp_path: Path) -> No
 
 def test_no_gap_is_an_answer_and_no_failure(tunnel: Tunnel, gap_free: Path) -> None:
     status, out, err = tunnel("diagnose", gap_free, "--json", "-")
-    assert (status, err) == (0, "")
+    assert status == 0
+    assert all(PROGRESS.match(line) for line in err.splitlines())
     document = json.loads(out)
     assert document["causes"] == []
     assert document["candidates"][0]["effect"] == "none"
