@@ -80,6 +80,7 @@ def test_diagnosis_of_limit_cycles_alone_is_unknown_and_says_so(start: float) ->
     assert not answer.coefficients.after
 
 
+@pytest.mark.slow
 def test_diagnosis_leaves_the_limit_cycle_out() -> None:
     decays = [run("k40-v0", 40.0, 0.0), run("k60-v0", 60.0, 0.0)]
     answer = diagnose(campaign([*decays, excited(SETTLED)]))
@@ -98,6 +99,7 @@ def test_a_linear_growth_keeps_its_run_and_is_noted() -> None:
     assert not in_limit_cycle(remark.figures)
 
 
+@pytest.mark.slow
 def test_decays_and_buffeted_runs_are_not_called_self_excited() -> None:
     rng = np.random.default_rng(7)
     for seed in range(20):

@@ -112,6 +112,7 @@ def test_the_file_in_the_help_is_read(tmp_path: Path, capsys: pytest.CaptureFixt
     assert read_sweep(tmp_path / "help.toml").size == 2 * 3 * 3 * 10
 
 
+@pytest.mark.slow
 def test_the_summary_of_a_sweep(
     sweep: Sweep, here, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -250,6 +251,7 @@ def test_what_runs_cannot_give_is_no_failure(here, tmp_path: Path) -> None:
     assert all(line.score.failures.count == 0 for line in lines)
 
 
+@pytest.mark.slow
 def test_damaged_times_are_named_and_can_be_removed(
     sweep: Sweep, here, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
