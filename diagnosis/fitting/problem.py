@@ -12,7 +12,7 @@ import numpy as np
 
 from diagnosis.fitting.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
-from tunnel_sim.effects.base import ParameterInfo
+from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector

@@ -15,7 +15,8 @@ from diagnosis.fitting.spectra import Line, mains_line, shedding_line
 from diagnosis.policy import GROSS_MISFIT
 from identification.decay.spectrum import highest_peak
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.base import Circumstances, ParameterInfo, Trial
+from tunnel_sim.effects.base import Circumstances, Trial
+from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.record import Array
 
 _STILL = 0.02  # of the largest swing, below which a run or a stretch of it counts as at rest

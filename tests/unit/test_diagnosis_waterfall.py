@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.held_out import FOLDS, fit_seen, predict_held_out
+from diagnosis.answer.held_out_stretches import predict_stretches, turns_of
 from diagnosis.answer.inclusion import inclusion
 from diagnosis.answer.reported import Base
-from diagnosis.answer.stretches import predict_stretches, turns_of
 from diagnosis.answer.subsets import Subsets
 from diagnosis.answer.waterfall import waterfall
 from diagnosis.attribution.decide import Weighed

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from importlib import import_module
 from pkgutil import iter_modules
 
-from tunnel_sim.effects.base import Effect, ParameterInfo, make_effect
+from tunnel_sim.effects.base import Effect, make_effect
 from tunnel_sim.effects.chain import EffectChain
+from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
 

@@ -6,11 +6,12 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
 
+from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import SensorModel
@@ -18,9 +19,6 @@ from tunnel_sim.vocabulary.record import Array
 
 REFERENCE_SPEED = 20.0
 """Wind speed at which a speed-dependent form equals the textbook form, m/s."""
-
-LEAST_EXPONENT = 0.25
-"""Smallest exponent: below it a term is nearly a jump, which the integration steps do not resolve."""
 
 SPRING_TOLERANCE = 1e-6
 """Relative difference below which two stiffnesses belong to the same spring."""
@@ -36,94 +34,6 @@ Condition = Literal["always", "wind_on"]
 
 #: What a run draws at random for an effect: nothing, a phase in rad, or random numbers, shape (n,).
 Drawn: TypeAlias = float | Array | None
-
-
-@dataclass(frozen=True)
-class ParameterInfo:
-    """One parameter of an effect.
-
-    Args:
-        name: field name, also in TOML and JSON.
-        symbol: as in the effect's equation.
-        unit: SI, angles in rad.
-        meaning: one clause.
-        scale: a typical value for this rig, for steps and starting values.
-        lower: least value allowed, in the unit.
-        upper: greatest value allowed, in the unit.
-        default: value where none is given, in the unit; zero for the severity.
-        form: whether it generalises the effect's form; its default gives the textbook form.
-        fit_lower: least value a fit may take, in the unit.
-        fit_upper: greatest value a fit may take, in the unit.
-        rate_exponent: name of the parameter that is the power of the rate which it multiplies; empty: none.
-        beside_spring: whether only a spring of stated stiffness beside the effect makes it known; else it is held.
-        chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
-        per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
-    """
-
-    name: str
-    symbol: str
-    unit: str
-    meaning: str
-    scale: float
-    lower: float
-    upper: float
-    default: float
-    form: bool
-    fit_lower: float
-    fit_upper: float
-    rate_exponent: str
-    beside_spring: bool
-    chosen_spring: bool
-    per_pressure: bool
-
-
-def parameter(
-    symbol: str,
-    unit: str,
-    meaning: str,
-    *,
-    scale: float,
-    lower: float = -math.inf,
-    upper: float = math.inf,
-    default: float = 0.0,
-    form: bool = False,
-    fit_lower: float | None = None,
-    fit_upper: float | None = None,
-    rate_exponent: str = "",
-    beside_spring: bool = False,
-    chosen_spring: bool = False,
-    per_pressure: bool = False,
-) -> Any:
-    """A dataclass field that is an effect's parameter; arguments as in `ParameterInfo`."""
-    metadata = {
-        "symbol": symbol,
-        "unit": unit,
-        "meaning": meaning,
-        "scale": scale,
-        "lower": lower,
-        "upper": upper,
-        "form": form,
-        "fit_lower": lower if fit_lower is None else fit_lower,
-        "fit_upper": upper if fit_upper is None else fit_upper,
-        "rate_exponent": rate_exponent,
-        "beside_spring": beside_spring,
-        "chosen_spring": chosen_spring,
-        "per_pressure": per_pressure,
-    }
-    return field(default=default, metadata=metadata)
-
-
-def exponent(symbol: str, meaning: str, textbook: float) -> Any:
-    """A form parameter that is the exponent of a term; its default is the textbook's.
-
-    Args:
-        symbol: as in the effect's equation.
-        meaning: one clause.
-        textbook: exponent of the textbook form, dimensionless.
-    """
-    return parameter(
-        symbol, "1", meaning, scale=1.0, lower=LEAST_EXPONENT, upper=9.0, default=textbook, form=True
-    )
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from math import exp, pi, sqrt
 
 import numpy as np
 
-from tunnel_sim.effects.base import Drawn, Effect, parameter
+from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings, Series
 from tunnel_sim.vocabulary.record import Array
 

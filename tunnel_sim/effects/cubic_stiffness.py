@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Effect, exponent, parameter
+from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.parameters import exponent, parameter
 
 
 @dataclass(frozen=True)

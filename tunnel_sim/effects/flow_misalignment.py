@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect, parameter, with_law
+from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect, with_law
+from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings
 
 

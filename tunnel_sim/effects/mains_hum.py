@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Drawn, Effect, parameter
+from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 

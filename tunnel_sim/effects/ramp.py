@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tunnel_sim.effects.base import parameter
+from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.vocabulary.record import Array
 
 EQUATION = "(1 − e^(−k t/T))/(1 − e^(−k))"

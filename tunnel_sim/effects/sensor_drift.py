@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Drawn, Effect, parameter
+from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.effects.ramp import EQUATION, ramp, settling
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Effect, parameter
+from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.vocabulary.plan import SensorModel
 
 

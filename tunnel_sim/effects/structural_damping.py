@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import log, pi, sqrt
 
-from tunnel_sim.effects.base import Effect, WindOnRun, parameter
+from tunnel_sim.effects.base import Effect, WindOnRun
+from tunnel_sim.effects.parameters import parameter
 
 
 @dataclass(frozen=True)

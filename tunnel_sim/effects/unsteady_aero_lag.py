@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Circumstances, Effect, Trial, WindOnRun, parameter
+from tunnel_sim.effects.base import Circumstances, Effect, Trial, WindOnRun
+from tunnel_sim.effects.parameters import parameter
 
 #: Uncertainty of Cnr as a share of the first-order effect a·Cnβ, chosen from the errors in the tuning sets.
 _UNSEEN_SHARE = 0.2

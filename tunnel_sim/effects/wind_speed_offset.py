@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect, parameter
+from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect
+from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings, Series
 
 
