@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.attribution.decide import Weighed, weigh
-from diagnosis.attribution.grow import grow, grow_in_stretches, prune
+from diagnosis.attribution.grow import InStretches, grow, grow_in_stretches, prune
 from diagnosis.attribution.hypothesis import Hypothesis, polish
 from diagnosis.attribution.outsiders import weigh_outsiders
 from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
@@ -124,22 +124,28 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
 
 
 def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
-    """The study where the nominal model misses the motion itself: sets are weighed by their fits to stretches.
-
-    The answer and its parts are fitted to the whole runs in the end.
-    """
-    data = found.nominal.problem.data
+    """The study where the nominal model misses the motion itself: sets are weighed by their fits to stretches."""
     with clock.step("effects"):
-        grown = grow_in_stretches(data, fit_nominal, kinds, clock.progress)
+        grown = grow_in_stretches(found.nominal.problem.data, fit_nominal, kinds, clock.progress)
     found = replace(found, hypotheses=grown.hypotheses, outsider=weigh_outsiders(grown.nominal))
     found = _pruned(found, grown.nominal, clock)
-    weighed = _weighed(found, grown.nominal)
     with clock.step("polishing"):
-        polished = _polished(found.hypotheses, weighed[0], ())
+        return _with_whole_runs(found, grown)
+
+
+def _with_whole_runs(found: Study, grown: InStretches) -> Study:
+    """The study with the answer and its parts fitted to the whole runs; a set that cannot be is no answer."""
+    data = found.nominal.problem.data
+    while True:
+        weighed = _weighed(found, grown.nominal)
         answer = set(weighed[0].effects)
+        polished = _polished(found.hypotheses, weighed[0], ())
         whole = [grown.whole(h, data) if answer.issuperset(h.names) else h for h in polished]
-    kept = tuple(h for h in whole if h is not None)
-    return replace(found, hypotheses=kept, weighed=tuple(weighed))
+        kept = replace(found, hypotheses=tuple(h for h in whole if h is not None), weighed=tuple(weighed))
+        if weighed[0].effects == ("unknown",) or kept.hypothesis(weighed[0].effects) is not None:
+            return kept
+        left = tuple(h for h in found.hypotheses if h.names != weighed[0].effects)
+        found = replace(found, hypotheses=left)
 
 
 def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:

@@ -9,7 +9,7 @@ from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import linear_coefficients
 from diagnosis.policy import UNDETERMINED_FACTOR
 from diagnosis.result import ParameterEstimate
-from tunnel_sim.effects.base import ParameterInfo
+from tunnel_sim.effects.parameters import ParameterInfo
 
 
 def meant_parameter(found: ParameterEstimate, info: ParameterInfo) -> ParameterEstimate:

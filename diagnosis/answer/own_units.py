@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from diagnosis.fitting.similarity import Similarity
-from diagnosis.result import Candidate, Confirmation, Diagnosis, NoiseSummary, ParameterEstimate
+from diagnosis.result import Confirmation, Diagnosis, NoiseSummary, ParameterEstimate
 from tunnel_sim.effects import effect_class
 
 _NEXT_RUN = {"spring_stiffness": "N m/rad", "duration": "s"}
@@ -17,7 +17,8 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
     """The answer with the parameters of the measured rig; what remains (`Rest`) has its units already.
 
     Args:
-        answer: for the similar campaign; its maps and places are in the measured campaign's units already.
+        answer: for the similar campaign; its candidates, maps and places are in the measured campaign's units
+            already.
         similarity: how that was made.
 
     Returns:
@@ -29,7 +30,6 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
 
     return replace(
         answer,
-        candidates=tuple(replace(c, parameters=_parameters(c, similarity)) for c in answer.candidates),
         coefficients=replace(
             answer.coefficients,
             before=own(answer.coefficients.before),
@@ -41,20 +41,30 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
     )
 
 
-def _parameters(candidate: Candidate, similarity: Similarity) -> dict[str, ParameterEstimate]:
-    """The parameters of a candidate; another power of the rate than the textbook's is another power of time."""
-    given = candidate.parameters
+def own_parameters(
+    given: Mapping[str, ParameterEstimate], similarity: Similarity
+) -> dict[str, ParameterEstimate]:
+    """Parameters of effects in the measured campaign's units.
+
+    Args:
+        given: by ``effect.parameter``, for the similar campaign.
+        similarity: how that was made.
+
+    Returns:
+        The same quantities. The coefficient of another power of the rate than the textbook's changes with that
+        power of time.
+    """
     found = {}
     for name, value in given.items():
-        effect, _, parameter = name.rpartition(".")
-        kind = effect_class(effect or candidate.effect)
-        infos = {info.name: info for info in kind.parameters()}
+        effect, _, parameter = name.partition(".")
+        infos = {info.name: info for info in effect_class(effect).parameters()}
         exponent = infos[parameter].rate_exponent
-        free = given.get(name.removesuffix(parameter) + exponent) if exponent else None
+        free = given.get(f"{effect}.{exponent}")
         beyond = 0.0 if free is None else free.value - infos[exponent].default
+        own = own_estimate(value, similarity)
         factor = similarity.time**-beyond
-        std = None if value.std is None else value.std * factor
-        found[name] = own_estimate(replace(value, value=value.value * factor, std=std), similarity)
+        std = None if own.std is None else own.std * factor
+        found[name] = replace(own, value=own.value * factor, std=std)
     return found
 
 

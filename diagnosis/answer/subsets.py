@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from functools import partial
 
 import numpy as np
 
+from diagnosis.attribution.hypothesis import restricted
 from diagnosis.fitting.least_squares import Fit, FitError, fit
-from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.starting_points import starting_points
 from diagnosis.study import Study
 from tunnel_sim.effects import Effect
@@ -79,32 +78,3 @@ def _fitted(attempt: Callable[[], Fit]) -> Fit | None:
         found = attempt()
         return found if np.isfinite(found.total) else None
     return None
-
-
-def restricted(whole: Fit, names: Names) -> Fit:
-    """A fit with some effects taken out and everything else as it was; its residuals are still those of the whole.
-
-    Args:
-        whole: with more effects.
-        names: of the effects to keep.
-
-    Returns:
-        A start, with its sensitivities, for the fit of the smaller problem.
-    """
-    large = whole.problem
-    problem = Problem(
-        large.data,
-        tuple(kind for kind in large.effects if kind.name in names),
-        tuple((name, value) for name, value in large.fixed if name.split(".")[0] in names),
-        tuple(name for name in large.free_forms if name in names),
-    )
-    common = [large.names.index(name) for name in problem.names]
-    first = whole.point.release.shape[1] - len(large.phased)  # of the phases and instants
-    own = [*range(first), *(first + large.phased.index(name) for name in problem.phased)]
-    return dataclasses.replace(
-        whole,
-        problem=problem,
-        point=Point(whole.point.common[common], whole.point.release[:, own]),
-        covariance=whole.covariance[np.ix_(common, common)],
-        jacobian=[(c[:, common], r[:, own]) for c, r in whole.jacobian],
-    )

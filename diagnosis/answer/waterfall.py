@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from diagnosis.answer.held_out import HeldOut, predict_held_out
+from diagnosis.answer.held_out_stretches import Turns, predict_stretches, turns_of
 from diagnosis.answer.reported import Base
-from diagnosis.answer.stretches import Turns, predict_stretches, turns_of
 from diagnosis.answer.subsets import Names, Subsets
 from diagnosis.attribution.random_moments import RandomAnswer
 from diagnosis.closure import Step, Waterfall
@@ -105,7 +105,7 @@ class _Models:
     def _predicted(self, fitted: Fit) -> dict[str, Array]:
         seen = dict(zip(self._ids, fitted.residuals, strict=True))
         found = seen | self._held_out(fitted).residuals | predict_stretches(fitted, self._turns)
-        still = {run.id: run.reading / np.sqrt(run.noise_variance) for run in fitted.problem.data.runs}
+        still = {run.id: run.scaled(run.reading) for run in fitted.problem.data.runs}
         # a prediction that grows without bound is as good as none
         return {run: r if np.all(np.isfinite(r)) else still[run] for run, r in found.items()}
 

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.attribution.decide import evidence
-from diagnosis.attribution.hypothesis import Hypothesis, is_plausible, with_forms
+from diagnosis.attribution.hypothesis import Hypothesis, is_plausible, restricted, with_forms
 from diagnosis.fitting.least_squares import Fit, FitError, fit
-from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
 from diagnosis.fitting.stretches import Stretches, fit_longer, in_stretches, long_stretch
@@ -200,18 +199,8 @@ def without(whole: Fit, kind: type[Effect]) -> Fit:
     Raises:
         FitError: when the model cannot be integrated.
     """
-    problem = whole.problem
-    smaller = Problem(
-        problem.data,
-        tuple(other for other in problem.effects if other is not kind),
-        tuple((name, value) for name, value in problem.fixed if not name.startswith(f"{kind.name}.")),
-        tuple(name for name in problem.free_forms if name != kind.name),
-    )
-    values = dict(zip(problem.names, whole.point.common.tolist(), strict=True))
-    own = [True] * (whole.point.release.shape[1] - len(problem.phased))
-    own += [name != kind.name for name in problem.phased]
-    start = Point(np.array([values[name] for name in smaller.names]), whole.point.release[:, own])
-    return fit(smaller, start)
+    start = restricted(whole, {other.name for other in whole.problem.effects} - {kind.name})
+    return fit(start.problem, start.point)
 
 
 def _children(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.spectra import resonance
 from diagnosis.policy import FORM_SHARE, FREED_FROM, FREED_HYPOTHESES
-from tunnel_sim.effects.base import ParameterInfo
+from tunnel_sim.effects.parameters import ParameterInfo
 
 _POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
 
@@ -52,6 +53,35 @@ def is_plausible(fitted: Fit) -> bool:
     effects = fitted.problem.effects_at(fitted.point.common)
     motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]
     return all(effect.plausible(omega) for effect in effects for omega in motions)
+
+
+def restricted(whole: Fit, names: Collection[str]) -> Fit:
+    """A fit with some effects taken out and everything else as it was; its residuals are still those of the whole.
+
+    Args:
+        whole: with more effects.
+        names: of the effects to keep.
+
+    Returns:
+        A start, with its sensitivities, for the fit of the smaller problem.
+    """
+    large = whole.problem
+    problem = Problem(
+        large.data,
+        tuple(kind for kind in large.effects if kind.name in names),
+        tuple((name, value) for name, value in large.fixed if name.split(".")[0] in names),
+        tuple(name for name in large.free_forms if name in names),
+    )
+    common = [large.names.index(name) for name in problem.names]
+    first = whole.point.release.shape[1] - len(large.phased)  # of the phases and instants
+    own = [*range(first), *(first + large.phased.index(name) for name in problem.phased)]
+    return dataclasses.replace(
+        whole,
+        problem=problem,
+        point=Point(whole.point.common[common], whole.point.release[:, own]),
+        covariance=whole.covariance[np.ix_(common, common)],
+        jacobian=[(c[:, common], r[:, own]) for c, r in whole.jacobian],
+    )
 
 
 def with_forms(found: Sequence[Hypothesis], base: Fit, count: int = FREED_HYPOTHESES) -> list[Hypothesis]:

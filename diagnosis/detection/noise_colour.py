@@ -44,9 +44,10 @@ class Colour:
         frequency: centres of bands, Hz, ascending, shape (n,).
         level: natural logarithm of the power over that of the white noise assumed before, shape (n,).
         std: of the levels, shape (n,).
-        slope: assumed of the level against the logarithm of frequency below the first band: that of the lowest
-            bands, made steeper by what chance may hide, between 0 and that of a random walk, −2; dimensionless.
-        slope_std: standard deviation of the slope of the lowest bands, dimensionless.
+        slope: of the level against the logarithm of frequency in the lowest bands, between 0 and that of a random
+            walk, −2; dimensionless.
+        slope_std: its standard deviation, dimensionless.
+        steep: slope assumed below the first band: the same, made steeper by what chance may hide; dimensionless.
     """
 
     frequency: Array
@@ -54,9 +55,10 @@ class Colour:
     std: Array
     slope: float
     slope_std: float
+    steep: float
 
     def at(self, frequency: Array) -> Array:
-        """The level at some frequencies.
+        """The level at some frequencies, as high below the first band as chance allows.
 
         Args:
             frequency: Hz, above zero, any shape.
@@ -64,9 +66,12 @@ class Colour:
         Returns:
             Natural logarithm of the power ratio, of the frequency's shape.
         """
+        return self._extended(frequency, self.steep)
+
+    def _extended(self, frequency: Array, slope: float) -> Array:
         place, places = np.log(frequency), np.log(self.frequency)
         below = np.minimum(place - places[0], 0.0)
-        return np.asarray(np.interp(place, places, self.level) + self.slope * below)
+        return np.asarray(np.interp(place, places, self.level) + slope * below)
 
     def mean(self, count: int, interval: float) -> float:
         """The mean power over the frequencies of a record.
@@ -78,7 +83,8 @@ class Colour:
         Returns:
             The power ratio.
         """
-        return float(np.mean(np.exp(self.at(np.asarray(np.fft.rfftfreq(count, interval)[1:], np.float64)))))
+        frequency = np.asarray(np.fft.rfftfreq(count, interval)[1:], np.float64)
+        return float(np.mean(np.exp(self._extended(frequency, self.slope))))
 
     def spread(self, frequency: Array) -> float:
         """How well the mean power over some frequencies is known.
@@ -130,9 +136,10 @@ def noise_colour(nominal: Fit, beyond: float = 0.0) -> Colour | None:
     if _flat(level, std):
         return None
     centres = np.sqrt(edges[1:] * edges[:-1])[steady]
+    slope, slope_std = _slope(np.log(centres), level, std)
     # where a gap hides the lowest bands, making the slope steeper would take the gap for noise
-    slope, slope_std = _slope(np.log(centres), level, std, CHANCE_STDS if steady[0] else 0.0)
-    return Colour(centres, level, std, slope, slope_std)
+    steep = slope - CHANCE_STDS * slope_std if steady[0] else slope
+    return Colour(centres, level, std, _red(slope), slope_std, _red(steep))
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,14 +217,18 @@ def _flat(level: Array, std: Array) -> bool:
     return float(weight @ (level - mean) ** 2) < float(chi2.isf(COLOUR_FALSE_ALARM_RATE, level.size - 1))
 
 
-def _slope(place: Array, level: Array, std: Array, stds: float) -> tuple[float, float]:
-    """Slope to assume below the lowest bands, theirs made steeper by standard deviations, and the size of one."""
+def _slope(place: Array, level: Array, std: Array) -> tuple[float, float]:
+    """Slope of the lowest bands, and its standard deviation."""
     use = slice(0, _SLOPE_BANDS)
     weight = 1.0 / std[use] ** 2
     centred = place[use] - float(weight @ place[use] / weight.sum())
     power = float(weight @ centred**2)
-    slope, deviation = float((weight * centred) @ level[use]) / power, float(np.sqrt(1.0 / power))
-    return float(np.clip(slope - stds * deviation, -2.0, 0.0)), deviation
+    return float((weight * centred) @ level[use]) / power, float(np.sqrt(1.0 / power))
+
+
+def _red(slope: float) -> float:
+    """A slope between that of white noise and that of a random walk."""
+    return float(np.clip(slope, -2.0, 0.0))
 
 
 def whitened(data: Data, colour: Colour) -> Data:
