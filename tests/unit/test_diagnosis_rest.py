@@ -34,6 +34,7 @@ def base(data):
     return nominal(data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cn_beta", "cn_r"])
 def test_noise_moves_no_coefficient_by_much_more_than_its_deviation(name):
     moves = []
