@@ -173,7 +173,7 @@ class RunEstimate:
         initial_rate: at the first sample, rad/s.
         sensor_zero: from this run alone, rad.
         aerodynamic_stiffness: Ka, N m/rad, from the whole campaign; wind-on runs only.
-        aerodynamic_damping: Ca, N m s/rad, likewise.
+        aerodynamic_damping: Ca, N m s/rad, from the whole campaign; wind-on runs only.
         process_noise: spectral intensity of a random moment over the inertia, rad²/s³; None where the method
             does not estimate it, or the run shows none.
         noise: the noise level behind the standard deviations; None where the method does not use it.
@@ -317,9 +317,6 @@ class Estimate:
 
         Args:
             data: the document; further keys, such as those of the budget, are ignored.
-
-        Returns:
-            The estimate.
 
         Raises:
             TunnelError: when it is not an estimate: a key is missing, or a value has the wrong type or is not

@@ -47,7 +47,7 @@ class RunDecay:
     Args:
         estimate: the run's result, or the status of its failure.
         decay: decay rate and stiffness; None where the run could not be identified.
-        covariance: of (a, k), shape (2, 2), in 1/s and 1/s²; None likewise.
+        covariance: of (a, k), shape (2, 2), in 1/s and 1/s²; None where decay is.
     """
 
     estimate: RunEstimate
@@ -69,8 +69,6 @@ def combined_estimate(
     of Birge, Phys. Rev. 40 (1932) 207–227, doi 10.1103/PhysRev.40.207.
 
     Args:
-        campaign: the runs' conditions.
-        name: of the estimator.
         found: one per run, in the campaign's order.
         together: a method's own combination of the runs, which starts from that of least squares.
 
@@ -121,13 +119,9 @@ def campaign_estimate(
     """Fill in an estimate from the shared parameters.
 
     Args:
-        campaign: what is identified.
         estimate: with its runs.
-        runs: those that the design links.
-        design: links of those runs.
         parameters: φ, shape (p,).
         covariance: of φ, shape (p, p).
-        statuses: found so far.
 
     Returns:
         The estimate with coefficients, the air of its runs and the wind-off line.
@@ -159,7 +153,6 @@ def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> se
     """The statuses of a campaign that follow from its runs.
 
     Args:
-        campaign: their conditions.
         estimates: one per run, in the campaign's order.
 
     Returns:
@@ -200,7 +193,6 @@ def limits(design: Design, parameters: Array) -> set[Status]:
     """The statuses of a campaign whose conditions do not separate parameters, or contradict them.
 
     Args:
-        design: of the campaign.
         parameters: φ as found, shape (p,).
 
     Returns:
@@ -224,7 +216,6 @@ def quantities(found: Derivatives, covariance: Array, *, has_size: bool) -> dict
     """The coefficients as fields of an `Estimate`, with their covariance.
 
     Args:
-        found: values by name.
         covariance: of the values, shape (p, p).
         has_size: whether the rig states A and l. Without them the coefficients still multiply A·l and A·l²,
             and only Ka and Ca per run are given.
@@ -250,10 +241,7 @@ def air_of_runs(
     """The air's stiffness and damping in every wind-on run.
 
     Args:
-        design: with the runs' loads.
-        found: values by name.
         covariance: of the values, shape (p, p).
-        runs: those that the design links.
 
     Returns:
         By run: keyword arguments of `RunEstimate`.
@@ -277,10 +265,6 @@ def air_of_runs(
 
 def wind_off(estimates: Sequence[RunEstimate], runs: Sequence[Run]) -> dict[str, Any]:
     """Izz and intercept of the line of Kr against ωn² of the wind-off runs (paper, eq. 1).
-
-    Args:
-        estimates: one per run.
-        runs: their conditions.
 
     Returns:
         Keyword arguments of `Estimate`; none without wind-off runs.

@@ -157,7 +157,6 @@ def combine(design: Design, decays: Array, informations: Sequence[Array]) -> tup
     """The shared parameters that fit the runs' own decays best, by generalised least squares.
 
     Args:
-        design: links of the runs.
         decays: (a, k) per run, shape (r, 2), 1/s and 1/s².
         informations: inverse covariance of each (a, k), shape (2, 2).
 

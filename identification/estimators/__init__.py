@@ -40,7 +40,6 @@ class Entry:
 
     Args:
         name: in the registry, in JSON and on the command line.
-        module: it lives in.
         factory: the class in it; called without arguments it has its default settings.
         summary: one line for the help of the command line: the method and its purpose.
     """
@@ -110,9 +109,6 @@ def make_estimator(name: str) -> Estimator:
 
     Args:
         name: one of `ALL_ESTIMATORS`.
-
-    Returns:
-        The estimator.
 
     Raises:
         TunnelError: when there is no such estimator; the error names the closest one.

@@ -105,10 +105,6 @@ class WindowReading:
 def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None:
     """Put a window through both networks.
 
-    Args:
-        window: three cycles.
-        networks: trained.
-
     Returns:
         The result; None where the window is not similar to a damped oscillation.
     """
@@ -125,11 +121,6 @@ def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None
 
 def read_windows(run: Run, sensor: SensorProperties, networks: Networks) -> tuple[list[WindowReading], float]:
     """Put a run's windows through both networks, one after the other.
-
-    Args:
-        run: the run.
-        sensor: what is stated of the noise.
-        networks: trained.
 
     Returns:
         The readings, and how many cycles the record holds from its first crossing on; 0 where nothing oscillates.

@@ -137,7 +137,6 @@ def _influences(runs: Sequence[RunFit], links: Sequence[Array], jacobian: Array,
     """The contribution of each run's residual to parameters fitted to all runs.
 
     Args:
-        runs: of the joint fit.
         links: one (2, p) matrix per run.
         jacobian: of the wanted parameters to φ, shape (q, p).
         own_zeros: whether each run has its own zero, or all one.

@@ -52,8 +52,7 @@ def coefficient_label(name: str, unit: str) -> str:
     """A coefficient's symbol and unit.
 
     Args:
-        name: of a document.
-        unit: likewise.
+        unit: of a document.
 
     Returns:
         Text such as ``Cnβ [1/rad]``.

@@ -210,7 +210,6 @@ def mean_figure(values: Array, unit: str) -> Quantity:
 
     Args:
         values: shape (n,), n ≥ 2, in the unit.
-        unit: of the values.
     """
     return Quantity(float(values.mean()), float(values.std(ddof=1)) / sqrt(values.size), unit)
 
@@ -220,7 +219,6 @@ def root_mean_square(values: Array, unit: str) -> Quantity:
 
     Args:
         values: shape (n,), n ≥ 2, in the unit.
-        unit: of the values.
     """
     scale = float(np.abs(values).max()) or 1.0  # squares of tiny numbers must not underflow
     squares = mean_figure((values / scale) ** 2, "1")

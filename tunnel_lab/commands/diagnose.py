@@ -101,11 +101,7 @@ def diagnose_with_progress(campaign: Campaign, kinds: tuple[type[Effect], ...]) 
     """Diagnose, with step and effect on standard error where that is a terminal.
 
     Args:
-        campaign: the runs.
         kinds: effects to answer with.
-
-    Returns:
-        The diagnosis.
     """
     from diagnosis import diagnose
 

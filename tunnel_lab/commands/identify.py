@@ -136,14 +136,8 @@ def budgeted(
     """The estimate with combined standard uncertainties, and their budget.
 
     Args:
-        campaign: what was identified.
-        estimate: its estimate.
         chosen: the estimator that made it, which is called again with changed campaigns.
         uncertainties: file of the inputs' uncertainties; None takes them as exact.
-        models: further estimators for the choice of model.
-
-    Returns:
-        The widened estimate and the budget.
 
     Raises:
         TunnelError: when the file is wrong, or there is no coefficient to budget.
@@ -175,11 +169,7 @@ def budgeted(
 
 
 def show_budget(budget: Budget) -> None:
-    """Print a budget and what dominates.
-
-    Args:
-        budget: of the estimate that was shown.
-    """
+    """Print a budget and what dominates."""
     from tunnel_lab.terminal import budget_table, tables
 
     tables.say("")
@@ -193,7 +183,6 @@ def with_weights(name: str, weights: Path | None) -> str | Estimator:
     """The estimator's name, or the network estimator with the given weights.
 
     Args:
-        name: of a known estimator.
         weights: a file written by ``tunnel train``; None for the packaged weights.
 
     Raises:

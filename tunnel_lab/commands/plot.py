@@ -61,7 +61,6 @@ def spread(campaign: Campaign, count: int = 4) -> tuple[Run, ...]:
     """A few runs that differ in spring and wind, to keep a plot readable.
 
     Args:
-        campaign: any.
         count: at most this many runs (a count).
 
     Returns:

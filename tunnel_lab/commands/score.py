@@ -133,9 +133,6 @@ def chosen(names: list[str] | None) -> tuple[str, ...]:
     Args:
         names: as typed; a word may hold several, separated by commas. None takes all.
 
-    Returns:
-        Names of the registry, each once.
-
     Raises:
         TunnelError: when one is unknown, with the closest name.
     """

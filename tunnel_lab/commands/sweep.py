@@ -95,8 +95,6 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
     """Run a sweep, or the rest of it.
 
     Args:
-        file: the sweep file.
-        out: folder of its results.
         workers: number of processes or, with a scheduler started here, of its workers.
         scheduler: address, ``local``, or None for processes of this machine.
 
@@ -146,9 +144,6 @@ def _work(workers: int | None, scheduler: str | None, sweep: Sweep) -> Work:
 
 def show_summary(folder: Path) -> None:
     """Tabulate and draw the finished part of a sweep.
-
-    Args:
-        folder: of a sweep.
 
     Raises:
         TunnelError: when it holds no sweep, or nothing is finished.

@@ -22,7 +22,6 @@ def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figur
 
     Args:
         document: the diagnosis as JSON's types; without ``maps`` those that need them are left out.
-        campaign: the records.
 
     Returns:
         Figures by name, in the order of the report.
@@ -46,7 +45,6 @@ def save_diagnosis_figures(document: Document, campaign: Campaign, folder: Path)
 
     Args:
         document: the diagnosis as JSON's types.
-        campaign: the records.
         folder: where they go; made where it is missing.
 
     Returns:

@@ -32,9 +32,6 @@ SHOWN = 8
 def candidates_figure(document: Document) -> Figure:
     """The answers by probability.
 
-    Args:
-        document: a diagnosis.
-
     Returns:
         A bar for each of the first eight answers, with its probability.
     """
@@ -63,9 +60,6 @@ def _percent(value: float) -> str:
 
 def closure_figure(document: Document) -> Figure:
     """Excess of every run before and after the causes are added, on a logarithmic scale above the noise.
-
-    Args:
-        document: a diagnosis.
 
     Returns:
         A pair of points per run; the second is filled where the run was held out of the fit.
@@ -103,7 +97,6 @@ def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
 
     Args:
         document: a diagnosis with its maps.
-        campaign: the records.
 
     Returns:
         A column per run: the reading above, the residual before and after below; None without traces.
@@ -139,9 +132,6 @@ def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
 
 def coefficients_figure(document: Document) -> Figure | None:
     """The coefficients before and after, with 95 % intervals.
-
-    Args:
-        document: a diagnosis.
 
     Returns:
         A panel per coefficient that the runs determine; None where there is none.

@@ -26,9 +26,6 @@ def figure(height: float, width: float = WIDTH) -> Figure:
     Args:
         height: inches.
         width: inches.
-
-    Returns:
-        The figure.
     """
     from matplotlib.figure import Figure
 

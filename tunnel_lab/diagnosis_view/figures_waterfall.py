@@ -32,9 +32,6 @@ _LEAST_NOISE = 1e-3  # noise powers: where the document has no maps, and so no n
 def waterfall_figure(document: Document) -> Figure | None:
     """What is left of the gap as the causes are added one after another.
 
-    Args:
-        document: a diagnosis.
-
     Returns:
         A bar for the nominal gap; for each cause one from what was left before it to what it leaves; and one for
         the rest, on a logarithmic scale. None where no cause is named.

@@ -36,11 +36,7 @@ def write_report(document: Document, campaign: Campaign, path: Path) -> Path:
 
     Args:
         document: the diagnosis as JSON's types (``Diagnosis.to_json_dict``), with its ``maps`` where there are any.
-        campaign: the records.
         path: the HTML file; replaced when it exists, written completely or not at all.
-
-    Returns:
-        The same path.
 
     Raises:
         TunnelError: when the page cannot be drawn or the file cannot be written.
@@ -53,7 +49,6 @@ def render_report(document: Document, campaign: Campaign) -> str:
 
     Args:
         document: as for `write_report`.
-        campaign: the records.
 
     Returns:
         HTML that needs no other file and no network; the same for the same document.

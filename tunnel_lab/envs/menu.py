@@ -149,7 +149,6 @@ class Costs:
         """Rig time of a run.
 
         Args:
-            choice: the run.
             last: the run before it; None for the first run, which needs a change of spring and speed.
 
         Returns:
@@ -164,9 +163,6 @@ def stated_run(choice: Choice, name: str, record: Record, air_density: float) ->
     """A run as a campaign states it.
 
     Args:
-        choice: its conditions.
-        name: its id.
-        record: what the sensor read.
         air_density: ρ, kg/m³.
     """
     wind_on = choice.wind_speed > 0.0

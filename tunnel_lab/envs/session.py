@@ -39,8 +39,6 @@ class Conditions:
     Args:
         rig: geometry, springs, air.
         sensor: noise, rate and resolution; its zero is not used, because each episode has its own.
-        menu: the choices.
-        costs: rig time of a run.
         effects: the vocabulary of the diagnosis; empty where the campaign only identifies.
     """
 
@@ -87,7 +85,6 @@ class Knowledge:
     Args:
         conditions: rig, sensor, menu and costs.
         prior: the belief before the first run.
-        belief: now.
         choices: the runs requested so far, including lost ones.
         costs: rig time of each, s.
         runs: the runs made.
@@ -128,11 +125,7 @@ class Knowledge:
 
 
 def first_knowledge(conditions: Conditions) -> Knowledge:
-    """Before the first run: the prior is the distribution the truth is drawn from.
-
-    Args:
-        conditions: of the environment.
-    """
+    """Before the first run: the prior is the distribution the truth is drawn from."""
     prior = prior_belief(MEAN, STD)
     return Knowledge(conditions, prior, prior)
 
@@ -141,8 +134,6 @@ class Session:
     """The rig in one episode.
 
     Args:
-        conditions: of the environment.
-        truth: hidden from the operator.
         rng: parent of the generators of the runs, so that the noise of a run depends on its number only.
     """
 
@@ -156,7 +147,6 @@ class Session:
 
         Args:
             known: before the run.
-            choice: the run.
 
         Returns:
             The knowledge after it. A run whose motion grows without bound is lost: it costs time without result.
@@ -226,9 +216,6 @@ def _reason(status: Status) -> str:
 def answers(effects: Sequence[str]) -> tuple[str, ...]:
     """The answers that a diagnosis gives probabilities for, in order.
 
-    Args:
-        effects: the vocabulary.
-
     Returns:
         ``none``, each effect alone, ``several`` (two at once), ``unknown``.
     """
@@ -237,9 +224,6 @@ def answers(effects: Sequence[str]) -> tuple[str, ...]:
 
 def probabilities(known: Knowledge) -> Array:
     """The diagnosis' probabilities of `answers`.
-
-    Args:
-        known: any.
 
     Returns:
         Shape (effects + 3,), summing to 1. They are equal before the first diagnosis. While no gap is detected,
@@ -260,9 +244,6 @@ def probabilities(known: Knowledge) -> Array:
 
 def diagnostic_information(known: Knowledge) -> float:
     """ln(answers) minus the entropy of the probabilities, nats.
-
-    Args:
-        known: any.
 
     Returns:
         0 while no gap is detected: its absence does not show which effect acts.

@@ -17,9 +17,6 @@ def calibration_figure(found: SmoothCalibration) -> Figure:
 
     Args:
         found: calibration of the probabilities.
-
-    Returns:
-        A figure with the curve, its interval and the diagonal.
     """
     figure = _figure(5.0, 4.6)
     axes = figure.add_subplot()

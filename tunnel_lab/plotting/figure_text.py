@@ -8,9 +8,6 @@ def figure_text(text: str) -> str:
 
     Dollar signs would begin a formula, and a legend leaves out what begins with an underscore.
 
-    Args:
-        text: one line.
-
     Returns:
         The text with its dollar signs escaped, and with a blank before a leading underscore.
     """

@@ -41,11 +41,7 @@ def save(figure: Figure, path: Path) -> Path:
     """Write a figure as a PNG, completely or not at all.
 
     Args:
-        figure: the figure.
         path: the file; replaced when it exists.
-
-    Returns:
-        The same path.
 
     Raises:
         TunnelError: when the file cannot be written.
@@ -55,9 +51,6 @@ def save(figure: Figure, path: Path) -> Path:
 
 def run_label(run: Run) -> str:
     """The conditions of a run in a few words, for a figure.
-
-    Args:
-        run: any run.
 
     Returns:
         Text such as ``r02 · 16.12 N m/rad · 15 m/s``.
@@ -74,9 +67,6 @@ def run_label(run: Run) -> str:
 
 def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
     """Angle against time, one panel for each run.
-
-    Args:
-        campaign: measured or simulated.
 
     Returns:
         Figures of up to twelve panels, in the campaign's order.
@@ -107,11 +97,7 @@ def wind_off_on_figure(off: Run, on: Run) -> Figure:
     """One run with the wind off above one with the wind on, on the same axes.
 
     Args:
-        off: the wind-off run.
         on: the wind-on run, preferably with the same spring.
-
-    Returns:
-        A figure of two panels.
     """
     figure = _figure(8.0, 5.0)
     first: Axes | None = None
@@ -197,7 +183,6 @@ def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> F
     """Estimates of each estimator against the injected values.
 
     Args:
-        estimates: of one simulated campaign, one per estimator.
         truth: injected values by name, all nonzero, each in the unit of the estimate's quantity of that
             name.
 

@@ -59,7 +59,6 @@ class Case:
         severity: excess that it was sized for, as a ratio to the noise power; 0 for no effect.
         reached: excess after the reference simulator's own nominal refit, in noise powers (a ratio).
         realisation: number of the realisation, from 0.
-        campaign: input of the estimators.
         bound: Cramér–Rao bound of the nominal model by quantity, SI.
     """
 
@@ -111,7 +110,6 @@ def make_cases(
     Args:
         seed: of everything random.
         realisations: number of campaigns for each effect and severity.
-        effects: names.
         severities: excess to leave after the nominal refit, in noise powers.
         duration: of every run, s.
         tell_steps: show the progress of sizing on standard error.
@@ -193,7 +191,6 @@ def break_down(
 
     Args:
         cases: of `make_cases`.
-        estimators: names in the registry.
         seed: the cases were made with.
         jobs: number of processes; 0 works in this one.
         parts: folder for finished work, so that an interrupted score can be continued; None for none.
@@ -235,9 +232,6 @@ class Bias:
         effect: its name, or ``no effect``.
         severity: excess that it was sized for, as a ratio to the noise power; 0 for no effect.
         reached: mean excess over the realisations, in noise powers (a ratio).
-        estimator: its name.
-        quantity: by name.
-        score: over the realisations.
         departs: share of the realisations in which the estimator reported that the model departs.
     """
 

@@ -35,7 +35,6 @@ def breakdown_tables(found: Sequence[Bias], quantity: str) -> list[Table]:
 
     Args:
         found: of `tunnel_lab.scoring.breakdown.biases`.
-        quantity: by name.
 
     Returns:
         Tables with a row for each effect and severity.

@@ -23,9 +23,6 @@ _SHOWN = ("zeta", "omega_n", "cn_beta", "cn_r")
 def score_figure(results: Results) -> Figure:
     """RMSE over the bound above, coverage of 95 % intervals below, cell by cell, with 95 % intervals.
 
-    Args:
-        results: a finished score.
-
     Returns:
         A column of two panels for each of ζ, ωn, Cnβ and Cnr that was scored; cells in the grid's order, one
         colour and marker for each estimator.

@@ -37,7 +37,6 @@ class Results:
     """A finished score.
 
     Args:
-        grid: of the score.
         estimators: names, in the order given.
         rows: one per trial, estimator and quantity; see `tunnel_lab.scoring.work`.
     """
@@ -59,7 +58,6 @@ class Results:
         """Median time an estimator took for one record, ms.
 
         Args:
-            estimator: its name.
             cells: indices of the cells to include.
         """
         from statistics import median
@@ -99,10 +97,6 @@ def write_trials(path: Path, results: Results) -> Path:
 
     Args:
         path: the file; replaced when it exists.
-        results: to write.
-
-    Returns:
-        The same path.
     """
     import polars as pl
 
@@ -113,9 +107,6 @@ def write_trials(path: Path, results: Results) -> Path:
 
 def trials_frame(results: Results) -> pl.DataFrame:
     """A row for every trial, estimator and quantity.
-
-    Args:
-        results: to show.
 
     Returns:
         Columns as in the rows; ``cell`` is the index of the grid's cell.
@@ -128,9 +119,6 @@ def trials_frame(results: Results) -> pl.DataFrame:
 
 def read_trials(path: Path) -> Results:
     """Read what `write_trials` wrote.
-
-    Args:
-        path: the file.
 
     Returns:
         The results, estimators in the order of their first rows.

@@ -34,7 +34,6 @@ def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
     """One table for each kind of cell, with all cells of that kind pooled.
 
     Args:
-        results: a finished score.
         times: whether to show the time for a record too.
 
     Returns:
@@ -89,9 +88,6 @@ def _summary(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
 
 def cell_tables(results: Results) -> list[Table]:
     """One table for each cell.
-
-    Args:
-        results: a finished score.
 
     Returns:
         Tables with a section for each estimator and a row for each quantity.
@@ -169,9 +165,6 @@ def verdict_lines(verdict: Verdict) -> list[str]:
 
     Args:
         verdict: of a check.
-
-    Returns:
-        One to three lines.
     """
     tests = f"{len(verdict.findings)} tests, false-alarm rate {100 * verdict.false_alarm_rate:g} % of all together"
     worse = verdict.worse

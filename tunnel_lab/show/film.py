@@ -43,9 +43,6 @@ _SHADOW, _SAMPLES = (
 def checked_camera(name: str) -> str:
     """Check the name of a camera.
 
-    Args:
-        name: as typed.
-
     Raises:
         TunnelError: when the rig has no such camera.
     """
@@ -92,8 +89,6 @@ def write_film(
     """Write a run as MP4 (H.264), completely or not at all.
 
     Args:
-        request: which run.
-        look: how.
         path: the file; replaced when it exists.
         progress: called with (frames done, frames in all).
 
@@ -107,13 +102,11 @@ def write_still(request: Request, look: Look, path: Path, at: float) -> None:
     """Write one frame of the film as PNG, completely or not at all.
 
     Args:
-        request: which run.
-        look: how.
         path: the file; replaced when it exists.
         at: s from the release.
 
     Raises:
-        TunnelError: likewise; also when the run is shorter.
+        TunnelError: as `write_film`; also when the run is shorter.
     """
     duration = shown_run(request).settings.duration
     if not 0.0 <= at <= duration:
@@ -191,8 +184,6 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
     """Pictures of the run; needs OpenGL in this process.
 
     Args:
-        run: what is shown.
-        look: how.
         times: ascending, shape (frames,), s from the release.
 
     Yields:

@@ -40,7 +40,6 @@ def render_rig(path: Path, *, width: int = 1280, height: int = 800, camera: str 
     """Draw the rig with its model at a release angle as a PNG.
 
     Args:
-        path: the PNG to write, completely or not at all.
         width: of the picture, pixels.
         height: of the picture, pixels.
         camera: name of a camera of ``mjcf/rig.xml``.

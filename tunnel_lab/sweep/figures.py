@@ -30,9 +30,6 @@ _WIDE = 10.0  # ratio of the largest to the least value from which an axis is dr
 def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
     """Lines grouped by figure.
 
-    Args:
-        lines: of a summary.
-
     Returns:
         Lines by file name without its suffix, such as ``error-by-noise-std`` or ``error-by-coulomb-friction``.
     """
@@ -130,14 +127,7 @@ def _is_logarithmic(lines: Sequence[Line]) -> bool:
 
 
 def overall_table(lines: Iterable[Line]) -> Table:
-    """Bias, RMSE, coverage and failures of each estimator and quantity over all cases.
-
-    Args:
-        lines: of a summary.
-
-    Returns:
-        A table with a section for each estimator.
-    """
+    """Bias, RMSE, coverage and failures of each estimator and quantity over all cases."""
     kept = [line for line in lines if line.axis == OVERALL]
     said = "without effects" if all(line.effect == "none" for line in kept) else "effects pooled"
     result = table(
@@ -162,9 +152,6 @@ def axis_table(lines: Sequence[Line]) -> Table:
 
     Args:
         lines: of one axis, and of one effect where that is severity.
-
-    Returns:
-        A table with a section for each value on the axis.
     """
     one = lines[0]
     label = one.effect.replace("_", " ") if one.axis == SEVERITY else AXES[one.axis][0]
@@ -183,9 +170,6 @@ def axis_table(lines: Sequence[Line]) -> Table:
 
 def pace_table(found: Sequence[Pace]) -> Table:
     """Times of the steps.
-
-    Args:
-        found: of a sweep.
 
     Returns:
         A table with a row for each step.

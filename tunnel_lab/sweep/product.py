@@ -39,9 +39,6 @@ class Case:
     Args:
         index: in the order of the product, from 0.
         replicate: number of the repetition with other noise, from 0.
-        rig_name: as the sweep file names it.
-        rig: the rig itself.
-        conditions: name of the conditions.
         duration: of every run, s.
         plan: the campaign with its seed.
         document: the same as a campaign description, ready to be written as TOML.
@@ -62,7 +59,6 @@ class Sweep:
     """A sweep file with its rigs, which together determine the results.
 
     Args:
-        document: the file.
         rigs: sections of each rig's description, in the order of the file.
     """
 
@@ -78,12 +74,6 @@ class Sweep:
     @classmethod
     def from_json(cls, text: str) -> Sweep:
         """The inverse of `to_json`.
-
-        Args:
-            text: of one sweep.
-
-        Returns:
-            The sweep, its rigs parsed.
 
         Raises:
             TunnelError: when it is not a sweep, or too large.
@@ -220,11 +210,7 @@ def _effects(entry: Mapping[str, Any]) -> list[list[dict[str, Any]]]:
 
 
 def axis_lengths(document: SweepDocument) -> dict[str, int]:
-    """Number of values of every axis by its name, counted from the lengths of the lists.
-
-    Args:
-        document: the sweep file.
-    """
+    """Number of values of every axis by its name, counted from the lengths of the lists."""
     effects = (1 if one.name == NO_EFFECT else _points(one.parameters) for one in document.effects)
     return {
         "rig": len(document.rig),
@@ -237,10 +223,6 @@ def axis_lengths(document: SweepDocument) -> dict[str, int]:
 
 def check_sweep_size(document: SweepDocument, where: str) -> None:
     """Refuse a sweep that is too large before it is expanded.
-
-    Args:
-        document: the sweep file.
-        where: the file, for messages.
 
     Raises:
         TunnelError: too many values of an axis, cases, shards, runs or samples, with their number and the limit.

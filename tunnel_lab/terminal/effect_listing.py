@@ -68,9 +68,6 @@ def summary(kind: type[Effect]) -> str:
 def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
     """The full description of effects, in JSON's types.
 
-    Args:
-        kinds: effects.
-
     Returns:
         ``{"schema_version", "effects": [...]}`` in the order given.
     """
@@ -94,14 +91,7 @@ def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
 
 
 def listing(kinds: Sequence[type[Effect]]) -> Table:
-    """Effects with equation and parameters, one row each.
-
-    Args:
-        kinds: effects.
-
-    Returns:
-        A table for the terminal.
-    """
+    """Effects with equation and parameters, one row each."""
     from rich.text import Text
 
     from tunnel_lab.terminal.tables import table
@@ -118,14 +108,7 @@ def listing(kinds: Sequence[type[Effect]]) -> Table:
 
 
 def parameter_table(kind: type[Effect]) -> Table:
-    """The parameters of one effect.
-
-    Args:
-        kind: the effect.
-
-    Returns:
-        A table for the terminal.
-    """
+    """The parameters of one effect."""
     from rich.text import Text
 
     from tunnel_lab.terminal.tables import table
@@ -139,14 +122,7 @@ def parameter_table(kind: type[Effect]) -> Table:
 
 
 def lines(kind: type[Effect]) -> list[str]:
-    """The description of one effect without its parameters.
-
-    Args:
-        kind: the effect.
-
-    Returns:
-        Lines for the terminal.
-    """
+    """The description of one effect without its parameters."""
     drawn = ["drawn:      a random moment, different in every run"] if kind.random == "broad_band" else []
     return [
         f"{kind.name}: {summary(kind)}",
@@ -162,14 +138,7 @@ def lines(kind: type[Effect]) -> list[str]:
 
 
 def example(kind: type[Effect]) -> str:
-    """The option of ``tunnel simulate`` that injects an effect of typical size.
-
-    Args:
-        kind: the effect.
-
-    Returns:
-        The option with its value.
-    """
+    """The option of ``tunnel simulate`` that injects an effect of typical size."""
     values = ",".join(f"{info.name}={_typical(info):g}" for info in kind.parameters())
     return f"--effect {kind.name}:{values}"
 
@@ -180,14 +149,7 @@ def _typical(info: ParameterInfo) -> float:
 
 
 def markdown(kinds: Sequence[type[Effect]]) -> str:
-    """The reference page.
-
-    Args:
-        kinds: effects.
-
-    Returns:
-        Markdown: an overview, then a section for each effect.
-    """
+    """The reference page."""
     overview = ["| effect | channel | condition | equation |", "|---|---|---|---|"]
     overview += [
         f"| [`{kind.name}`](#{kind.name}) | {kind.channel} | {kind.condition} | {_cell(kind.equation)} |"

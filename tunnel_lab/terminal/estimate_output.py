@@ -15,8 +15,6 @@ def show_estimate(campaign: Campaign, estimate: Estimate, *, windows: bool) -> N
     """Print an estimate.
 
     Args:
-        campaign: what was identified.
-        estimate: its estimate.
         windows: whether to print the windows of every run too.
     """
     tables.show_tables(tables.coefficients_table(estimate), tables.runs_table(campaign, estimate))

@@ -22,9 +22,6 @@ EffectOption = Annotated[
 def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
     """Names from repeated options, from lists with commas, or from both.
 
-    Args:
-        words: as typed.
-
     Returns:
         Names without blanks, in the order given.
     """
@@ -33,9 +30,6 @@ def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
 
 def known_estimator(name: str) -> None:
     """Refuse an unknown estimator.
-
-    Args:
-        name: as typed.
 
     Raises:
         TunnelError: when there is no such estimator; it suggests the closest name.

@@ -13,7 +13,6 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[[int, int, str
     """A progress bar on standard error, where that is a terminal; elsewhere nothing is printed.
 
     Args:
-        what: description of the work.
         total: number of items, where it is known beforehand.
 
     Yields:

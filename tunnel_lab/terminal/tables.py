@@ -36,9 +36,6 @@ def console(*, stderr: bool = False) -> Console:
 
     Args:
         stderr: print to standard error, where progress and status lines go.
-
-    Returns:
-        The console.
     """
     return _Console(stderr=stderr, highlight=False, markup=False, emoji=False)
 
@@ -47,7 +44,6 @@ def say(line: str, *, stderr: bool = False) -> None:
     """Print one line unchanged: no markup and no wrapping, so that paths can be copied.
 
     Args:
-        line: the text.
         stderr: print to standard error.
     """
     console(stderr=stderr).print(line, soft_wrap=True)
@@ -73,9 +69,6 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
         title: above it.
         columns: headings, units included.
         right: those headings whose columns are aligned to the right.
-
-    Returns:
-        The table.
     """
     result = Table(
         title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_edge=False
@@ -87,14 +80,7 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
 
 
 def rich_table(plain: TextTable) -> Table:
-    """A plain table in the house's style.
-
-    Args:
-        plain: the table.
-
-    Returns:
-        The same with rules and colours.
-    """
+    """A plain table in the house's style."""
     result = table(plain.title, *plain.columns, right=plain.right)
     for row in plain.rows:
         result.add_row(*map(Text, row))
@@ -103,9 +89,6 @@ def rich_table(plain: TextTable) -> Table:
 
 def coefficients_table(estimate: Estimate) -> Table:
     """The coefficients that were identified.
-
-    Args:
-        estimate: of any campaign.
 
     Returns:
         A table; without rows when the campaign gives normalised form only.
@@ -117,7 +100,6 @@ def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Ta
     """Estimates beside the injected values.
 
     Args:
-        estimates: of one simulated campaign, one per estimator.
         truth: injected values by name, each in the unit of the estimate's quantity of that name.
 
     Returns:
@@ -151,7 +133,6 @@ def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
     """Natural frequency and damping ratio of every run.
 
     Args:
-        campaign: what was identified.
         estimate: its estimate, runs in the same order.
 
     Returns:
@@ -177,9 +158,6 @@ def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
 def windows_table(run: RunEstimate) -> Table:
     """Estimates of consecutive windows of a run, as in the paper's Table III.
 
-    Args:
-        run: an estimate of one run.
-
     Returns:
         A table with a row for each window, the largest amplitude first.
     """
@@ -202,9 +180,6 @@ def windows_table(run: RunEstimate) -> Table:
 
 def status_lines(estimate: Estimate) -> list[str]:
     """The statuses of the estimate and its runs, each once.
-
-    Args:
-        estimate: of any campaign.
 
     Returns:
         A line for each status other than "identified", with the runs it concerns and the remedy.

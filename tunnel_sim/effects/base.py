@@ -353,9 +353,6 @@ def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:
         kind: the effect's class.
         parameters: by name, in their units.
 
-    Returns:
-        The effect.
-
     Raises:
         TunnelError: when a name is unknown or a value out of range.
     """
@@ -372,7 +369,6 @@ def moment_scale(info: ParameterInfo, campaign: Circumstances) -> float:
     """Factor on a parameter's typical value: in normalised form moments are divided by about 0.1 kg m².
 
     Args:
-        info: the parameter.
         campaign: says whether runs are normalised.
 
     Returns:

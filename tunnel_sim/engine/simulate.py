@@ -28,11 +28,7 @@ def simulate_motion(model: Model, sample_rate: float) -> Motion:
     """Integrate one run with ``mj_step``.
 
     Args:
-        model: the rig in this run.
         sample_rate: Hz.
-
-    Returns:
-        The motion from the release onwards.
 
     Raises:
         TunnelError: when the motion grows without bound.
@@ -59,16 +55,6 @@ def simulate(
 ) -> Record:
     """Simulate one run as the sensor sees it.
 
-    Args:
-        rig: geometry, mass and sensor.
-        settings: the physics of the run as stated.
-        sensor: the potentiometer.
-        rng: source of the noise and of the random parts of effects.
-        effects: effects to add to the stated physics.
-
-    Returns:
-        The record.
-
     Raises:
         TunnelError: when the motion grows without bound or the settings are refused.
     """
@@ -91,10 +77,6 @@ def simulate_batch(
 
     Args:
         rig: geometry, mass and sensor, common to the runs.
-        settings: the stated physics of every run.
-        sensor: the potentiometer, common to the runs.
-        rngs: one generator per run.
-        effects: effects to add to the stated physics, in all runs.
         nthread: number of threads; 0 uses all processors. The result does not depend on it, and is bit-identical
             to that of a loop over `simulate`.
         progress: called with (runs done, runs in all).
@@ -129,8 +111,6 @@ def simulate_motions(
     """Integrate many runs on a thread pool, bit-identical to `simulate_motion`.
 
     Args:
-        rig: geometry and mass, common to the runs.
-        settings: the physics of every run.
         sample_rate: Hz.
         nthread: number of threads; 0 uses all processors.
         progress: called with (runs done, runs in all).

@@ -40,7 +40,6 @@ class Models:
     """Models by layout, each compiled once.
 
     Args:
-        rig: the rig of all models.
         sample_rate: Hz.
     """
 
@@ -70,7 +69,6 @@ class OneRun:
     """A single run with its own model.
 
     Args:
-        models: compiled models.
         samples: in one control period.
     """
 
@@ -166,7 +164,6 @@ class ManyRuns:
     """Many runs on ``mujoco.batch``, one batch per layout.
 
     Args:
-        models: compiled models.
         samples: number of samples in one control period.
         count: number of runs.
         nthread: number of threads; 0 uses all processors. The result does not depend on it.

@@ -52,12 +52,10 @@ class EpisodeState:
     """The complete state of an episode in progress; continuing from it gives bit-identical results.
 
     Args:
-        plan: of the run.
         physics: the plan's run with its effects, as integrated.
         mujoco: ``mj_getState`` of ``mjSTATE_INTEGRATION``, including the plugin's state, shape (n,).
         arrays: readings so far, sensitivities and information, by name.
         sensor: the run's effects on the reading.
-        rng: source of the noise.
     """
 
     plan: RunPlan
@@ -71,9 +69,6 @@ class EpisodeState:
 def observation_space(config: FreeDecayConfig) -> spaces.Box:
     """The space of one environment's observations.
 
-    Args:
-        config: of the environment.
-
     Returns:
         Readings (rad), then time (s) and wind speed (m/s).
     """
@@ -86,9 +81,6 @@ class Episodes:
     """Parallel episodes of one configuration.
 
     Args:
-        config: of the environment.
-        rig: of all runs.
-        engine: integrates the runs.
         count: number of episodes.
     """
 
@@ -118,10 +110,6 @@ class Episodes:
         Args:
             row: index of the episode.
             options: of ``reset``.
-            rng: generator of this and later episodes.
-
-        Returns:
-            First observation, and info.
 
         Raises:
             EnvError: when an option is refused.
@@ -259,9 +247,6 @@ class Episodes:
 
         Args:
             row: index of the episode.
-
-        Returns:
-            The state, a copy.
         """
         plan, physics = self._plan(row), self._physics[row]
         assert physics is not None

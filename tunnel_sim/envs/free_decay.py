@@ -127,9 +127,6 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
     def record(self) -> Record:
         """The record so far, for example of a run ended by ``TimeLimit``.
 
-        Returns:
-            The record.
-
         Raises:
             EnvError: before the first step.
         """
@@ -137,9 +134,6 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
 
     def get_state(self) -> EpisodeState:
         """The complete state of the episode in progress, including the states of MuJoCo and the plugin.
-
-        Returns:
-            The state, a copy.
 
         Raises:
             EnvError: when no episode has begun.

@@ -178,9 +178,6 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
 
         Args:
             index: of the run.
-
-        Returns:
-            The state.
         """
         return self._episodes.get_state(index)
 

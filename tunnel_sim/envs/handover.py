@@ -25,8 +25,6 @@ def campaign_of(runs: Iterable[Run], env: _HasRig, *, name: str = "episodes") ->
 
     Args:
         runs: ``info["run"]`` of each, in the plain preset.
-        env: the environment they come from, unwrapped.
-        name: of the campaign.
 
     Returns:
         The campaign. It states the rig's nominal inertia and the configured sensor, and contains no trace of the

@@ -63,9 +63,6 @@ class Prior:
         Args:
             changes: standard deviations by name, in the units above.
 
-        Returns:
-            The prior.
-
         Raises:
             EnvError: when a name is unknown or a number out of range.
         """
@@ -84,9 +81,6 @@ class Prior:
 
     def scales(self, run: NominalRun) -> Array:
         """The standard deviations in the units of the unknowns.
-
-        Args:
-            run: gives Izz and Cr, to which the shares refer.
 
         Returns:
             Shape (7,), in the order of `UNKNOWNS`.
@@ -120,7 +114,6 @@ class Information:
 
         Args:
             row: index of the run.
-            run: its nominal model.
         """
         self._sensitivities.start(row, run)
         self._scale[row] = self._prior.scales(run)
@@ -163,9 +156,6 @@ class Information:
 
         Args:
             row: index of the run.
-
-        Returns:
-            Arrays by name.
         """
         own = {"scale": self._scale[row], "scaled": self.scaled[row], "known": self.known[row]}
         return {name: np.array(value) for name, value in own.items()} | self._sensitivities.snapshot(row)
@@ -175,7 +165,6 @@ class Information:
 
         Args:
             row: index of the run.
-            run: its nominal model.
             state: from `snapshot`.
         """
         self._sensitivities.restore(row, run, state)

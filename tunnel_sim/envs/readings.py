@@ -18,7 +18,6 @@ class Readings:
     """The potentiometer readings of many runs.
 
     Args:
-        config: of the environment.
         count: number of runs.
     """
 
@@ -39,7 +38,6 @@ class Readings:
         Args:
             row: index of the run.
             chain: the run's effects on the reading.
-            rng: source of its noise.
         """
         self._chains[row], self._rngs[row] = chain, rng
         self._sensor[:, row, 0] = chain.sensor.zero, chain.sensor.noise_std, chain.sensor.resolution
@@ -105,9 +103,6 @@ class Readings:
             row: index of the run.
             steps: number of control periods so far.
 
-        Returns:
-            The record.
-
         Raises:
             EnvError: before the second reading.
         """
@@ -121,9 +116,6 @@ class Readings:
 
         Args:
             row: index of the run.
-
-        Returns:
-            Readings, effects and generator of the noise.
         """
         return self._values[row].copy(), self._chain(row).copied(), copy.deepcopy(self._rngs[row])
 

@@ -16,7 +16,6 @@ class RunningSensor:
 
     Args:
         chain: the run's effects.
-        sensor: the potentiometer as stated.
     """
 
     def __init__(self, chain: EffectChain, sensor: SensorModel) -> None:

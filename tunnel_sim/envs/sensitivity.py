@@ -86,7 +86,6 @@ class Sensitivities:
 
         Args:
             row: index of the run.
-            run: its nominal model.
         """
         self._runs[:, row] = run.coefficients()
         self._x[:, row] = 0.0

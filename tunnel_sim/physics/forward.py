@@ -58,9 +58,6 @@ def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motio
         settings: the run's physics, with the timestep to use.
         sample_rate: Hz.
 
-    Returns:
-        The motion from the release onwards.
-
     Raises:
         ValueError: when the motion grows without bound.
     """

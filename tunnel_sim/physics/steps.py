@@ -74,9 +74,6 @@ def fit_substeps(run: RunSettings, interval: float) -> int:
     Args:
         run: the run's physics, effects included.
         interval: between block means, s.
-
-    Returns:
-        One or more.
     """
     body = sqrt(run.spring_stiffness / run.yaw_inertia)
     longest = min(_FIT_STEP, _FIT_BODY_TURN / min(max(body, 1e-9), _FIT_MOST_TURN / interval))
@@ -92,9 +89,6 @@ def report_substeps(run: RunSettings, interval: float) -> int:
     Args:
         run: the run's physics, effects included.
         interval: between block means, s.
-
-    Returns:
-        One or more.
     """
     longest = REPORT_STEP
     if run.rod_twist is not None:
@@ -140,7 +134,6 @@ def follow_fastest(rig: Rig, run: RunSettings) -> RunSettings:
     """The run with steps short enough for its fastest motion; unchanged where they already are.
 
     Args:
-        rig: gives the reference sizes.
         run: the run's physics, effects included.
 
     Returns:
@@ -160,7 +153,6 @@ def check_stable(rig: Rig, run: RunSettings) -> None:
     """Refuse steps with which the integration would diverge.
 
     Args:
-        rig: gives the reference sizes.
         run: the run's physics.
 
     Raises:
@@ -177,7 +169,6 @@ def body_rate(rig: Rig, run: RunSettings) -> float:
     Terms that are nonlinear in the angle count with their slope at the release.
 
     Args:
-        rig: gives the reference sizes.
         run: the run's physics.
 
     Returns:

@@ -94,10 +94,7 @@ class Campaign:
 
     Args:
         name: short name, also of the folder.
-        rig: what is stated about the rig.
-        sensor: what is stated about the sensor.
         runs: at least one run, with unique ids.
-        description: free text.
     """
 
     name: str
