@@ -18,14 +18,14 @@ from identification.decay.decay_fit import Reading, RunFit
 from identification.decay.residual_noise import stated_noise
 from identification.decay.run_fit import identify_run
 from identification.status import Status
-from tunnel_lab.envs.menu import Choice, Costs, Menu, stated_run
+from tunnel_lab.envs.menu import Choice, Costs, Menu
 from tunnel_lab.envs.truth import MEAN, STD, RigTruth
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.simulate import simulate
-from tunnel_sim.engine.virtual_campaign import run_settings
+from tunnel_sim.engine.virtual_campaign import run_settings, stated_run
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import Condition, SensorModel
+from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -50,16 +50,13 @@ class Conditions:
 
     @property
     def rig_properties(self) -> RigProperties:
-        """The rig properties that a campaign states; the inertia is the nominal one."""
-        body = self.rig.body
-        return RigProperties(self.rig.dynamics.yaw_inertia, body.frontal_area, body.length, body.width)
+        """The rig properties that a campaign states."""
+        return RigProperties.of(self.rig)
 
     @property
     def sensor_properties(self) -> SensorProperties:
         """The sensor properties that a campaign states."""
-        return SensorProperties(
-            self.sensor.sample_rate, self.sensor.resolution or None, self.sensor.noise_std
-        )
+        return SensorProperties.of(self.sensor)
 
     @property
     def noise_std(self) -> float:
@@ -75,7 +72,8 @@ class Conditions:
 
     def link(self, choice: Choice) -> Array:
         """How the run's decay depends on the shared parameters, shape (2, 4); see `run_link`."""
-        return run_link(stated_run(choice, "next", _EMPTY, self.rig.air.density), self.rig_properties)
+        condition = choice.condition("next", self.rig.air.density)
+        return run_link(stated_run(condition, _EMPTY), self.rig_properties)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,14 +165,7 @@ class Session:
 
     def _run(self, choice: Choice, name: str, rng: np.random.Generator) -> Run:
         rig = self._conditions.rig
-        condition = Condition(
-            name,
-            choice.spring_stiffness,
-            choice.wind_speed,
-            rig.air.density,
-            choice.release_angle,
-            choice.duration,
-        )
+        condition = choice.condition(name, rig.air.density)
         record = simulate(
             rig,
             run_settings(self.truth.coefficients, condition),
@@ -182,7 +173,7 @@ class Session:
             rng,
             effects=self.truth.effects,
         )
-        return stated_run(choice, name, record, rig.air.density)
+        return stated_run(condition, record)
 
 
 def _identified(known: Knowledge, choice: Choice) -> Knowledge:

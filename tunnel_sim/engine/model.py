@@ -76,10 +76,6 @@ class Model:
             raise _refusal(error) from error
         return Model(mj, self.rig, settings, self.spec)
 
-    def to_xml(self) -> str:
-        """The complete MJCF with all numbers."""
-        return str(self.spec.to_xml())
-
     def release_state(self) -> mujoco.MjData:
         """The state at the release, where the body has been held at its angle until now.
 

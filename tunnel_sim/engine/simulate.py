@@ -63,43 +63,6 @@ def simulate(
     return read_motion(motion, sensor, rng, chain)
 
 
-def simulate_batch(
-    rig: Rig,
-    settings: Sequence[RunSettings],
-    sensor: SensorModel,
-    rngs: Sequence[np.random.Generator],
-    *,
-    effects: Sequence[Effect] = (),
-    nthread: int = 0,
-    progress: Progress | None = None,
-) -> list[Record]:
-    """Simulate many runs on a thread pool.
-
-    Args:
-        rig: geometry, mass and sensor, common to the runs.
-        nthread: number of threads; 0 uses all processors. The result does not depend on it, and is bit-identical
-            to that of a loop over `simulate`.
-        progress: called with (runs done, runs in all).
-
-    Returns:
-        One record per run, in order.
-
-    Raises:
-        TunnelError: when the motion of a run grows without bound or its settings are refused.
-    """
-    if len(rngs) != len(settings):
-        raise TunnelError(
-            f"{len(settings)} runs but {len(rngs)} random generators", remedy="give one generator per run"
-        )
-    chains = [EffectChain.draw(run, effects, rng) for run, rng in zip(settings, rngs, strict=True)]
-    true = [chain.physics() for chain in chains]
-    motions = simulate_motions(rig, true, sensor.sample_rate, nthread=nthread, progress=progress)
-    return [
-        read_motion(motion, sensor, rng, chain)
-        for motion, rng, chain in zip(motions, rngs, chains, strict=True)
-    ]
-
-
 def simulate_motions(
     rig: Rig,
     settings: Sequence[RunSettings],

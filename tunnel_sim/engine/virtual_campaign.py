@@ -117,17 +117,8 @@ def _campaign(plan: CampaignPlan, rig: Rig, motions: Sequence[Motion], drawn: _D
     return Campaign(
         name=plan.name,
         description=plan.description,
-        rig=RigProperties(
-            yaw_inertia=rig.dynamics.yaw_inertia,
-            frontal_area=rig.body.frontal_area,
-            reference_length=rig.body.length,
-            width=rig.body.width,
-        ),
-        sensor=SensorProperties(
-            sample_rate=plan.sensor.sample_rate,
-            resolution=plan.sensor.resolution or None,
-            noise_std=plan.sensor.noise_std or None,
-        ),
+        rig=RigProperties.of(rig),
+        sensor=SensorProperties.of(plan.sensor),
         runs=runs,
     )
 
