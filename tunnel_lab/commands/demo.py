@@ -176,8 +176,10 @@ def draw(
         Why there is no picture of the rig; empty where there is one.
     """
     from tunnel_lab.plotting import plots
-    from tunnel_lab.show.rendering import render_rig
+    from tunnel_lab.show.film import Look, write_still
+    from tunnel_lab.show.request import Request
     from tunnel_lab.terminal.tables import console
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     off, on = wind_off_on_pair(campaign)
     plots.save(plots.wind_off_on_figure(off, on), folder / "traces.png")
@@ -185,7 +187,11 @@ def draw(
     plots.save(plots.windows_figure(measured), folder / "windows.png")
     plots.save(plots.truth_figure(estimates, truth_of(plan)), folder / "estimates.png")
     with console(stderr=True).status("rendering the rig"):
-        return render_rig(folder / "rig.png")
+        try:
+            write_still(Request(), Look(height=800, trace=False), folder / "rig.png", 0.0)
+        except TunnelError as error:
+            return str(error)
+    return ""
 
 
 def wind_off_on_pair(campaign: Campaign) -> tuple[Run, Run]:

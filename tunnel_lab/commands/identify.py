@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tunnel_lab.terminal.estimator_help import command_with_estimators
+from tunnel_lab.terminal.estimator_help import with_estimators
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 NAME = "identify"
-COMMAND = command_with_estimators()
 FEW_RUNS = 3
 """For up to this many runs the windows are shown by default."""
 
@@ -126,6 +125,9 @@ def run(
         raise typer.Exit(1)
 
 
+run.__doc__ = with_estimators(run.__doc__)
+
+
 def budgeted(
     campaign: Campaign,
     estimate: Estimate,
@@ -195,6 +197,6 @@ def with_weights(name: str, weights: Path | None) -> str | Estimator:
     if name != "neural_network":
         remedy = "add --estimator neural_network, or leave it out"
         raise TunnelError(f"{name} has no weights", where="--weights", remedy=remedy)
-    from identification.estimators.neural import NeuralNetwork
+    from identification.estimators.neural_network import NeuralNetwork
 
     return NeuralNetwork(weights)
