@@ -117,7 +117,7 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
     from tunnel_sim.files.writing import write_json
 
     with bar("simulating runs", len(plan.conditions)) as tell:
-        campaign = simulate_campaign(plan, progress=lambda done, total: tell(done, total, ""))
+        campaign = simulate_campaign(plan, progress=tell)
     write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
     estimates = []
     for name in SHOWN:

@@ -116,7 +116,7 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
     sweep = read_sweep(file)
     work = _work(workers, scheduler, sweep)
     with bar("cases", sweep.size) as tell:
-        outcome = run_sweep(sweep, out, work, lambda done, total: tell(done, total, ""))
+        outcome = run_sweep(sweep, out, work, tell)
     if outcome.found:
         say(f"{outcome.found} of {sweep.shards} shards were finished before")
     estimates = sweep.size * len(sweep.document.estimators)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -140,6 +141,20 @@ def read_trials(path: Path) -> Results:
         rows = tuple(frame.to_dicts())
         _check_rows(rows, grid)
     return Results(grid, tuple(dict.fromkeys(row["estimator"] for row in rows)), rows)
+
+
+def packaged_baseline() -> Results:
+    """The trials of all estimators on the packaged grid, which ``tunnel score --check packaged`` compares with."""
+    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-baseline.parquet") as path:
+        return read_trials(path)
+
+
+def packaged_breakdown() -> pl.DataFrame:
+    """Results of ``tunnel score --breakdown``; columns as in its Parquet file."""
+    import polars as pl
+
+    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-breakdown.parquet") as path:
+        return pl.read_parquet(path)
 
 
 def _check_rows(rows: Sequence[Row], grid: Grid) -> None:

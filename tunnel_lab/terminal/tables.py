@@ -14,6 +14,8 @@ from identification.printing import estimate_tables as printing
 from identification.printing.numbers import SYMBOLS, concise, in_stds, significant, unit, with_std
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from identification.estimate import Estimate, Quantity, RunEstimate, Status
     from identification.printing.table import TextTable
     from tunnel_sim.vocabulary.campaign import Campaign
@@ -47,6 +49,12 @@ def say(line: str, *, stderr: bool = False) -> None:
         stderr: print to standard error.
     """
     console(stderr=stderr).print(line, soft_wrap=True)
+
+
+def say_written(*paths: Path | None) -> None:
+    """Name the files that were written; None is left out."""
+    for path in filter(None, paths):
+        say(f"Written: {path}")
 
 
 def show_tables(*tables: Table) -> None:
