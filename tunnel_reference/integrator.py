@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +49,7 @@ def _group_terms(
     terms: Sequence[Sequence[Term]], offsets: Sequence[int], runs: Sequence[int]
 ) -> list[_Group]:
     """Merge equal laws of all campaigns into groups, ordered by phase, then by first appearance."""
-    found: dict[tuple[int, Any, int], list[tuple[Term, NDArray[np.intp]]]] = {}
+    found: dict[tuple[int, object, int], list[tuple[Term, NDArray[np.intp]]]] = {}
     for number, campaign_terms in enumerate(terms):
         rows = np.arange(offsets[number], offsets[number] + runs[number])
         for term in campaign_terms:

@@ -66,7 +66,7 @@ class Hilbert(RunByRun):
         if seen is None or decay.stiffness <= 0.0:
             return Status.NOT_CONVERGED
         windows = () if covariance is None else _backbone(seen, noise_std, self.cycles_per_window)
-        return described(run, reading, decay, covariance, noise_std, sensor, windows)
+        return described(run, decay, covariance, noise_std, sensor, windows)
 
 
 def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array] | None:

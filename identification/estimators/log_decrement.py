@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.decay.damped_oscillation import Decay
-from identification.decay.decay_fit import Reading
 from identification.decay.first_guess import starting_frequency
 from identification.decay.peaks import PEAK_HALF_WIDTH, follow_peaks
 from identification.decay.residual_noise import reading_noise
@@ -44,7 +43,6 @@ class LogDecrement(RunByRun):
         frequency = starting_frequency(run.record)
         if frequency is None:
             return Status.NO_OSCILLATION
-        reading = Reading.from_record(run.record)
         noise_std = reading_noise(run.record, sensor)
         half_width = PEAK_HALF_WIDTH / frequency
         share = noise_std / np.sqrt(2.0 * half_width * run.record.sample_rate)
@@ -52,7 +50,7 @@ class LogDecrement(RunByRun):
         found = _decay_of_peaks(times, heights, share, half_width)
         if found is None:
             return Status.NO_OSCILLATION if times.size < _LEAST_PEAKS else Status.NOT_CONVERGED
-        return described(run, reading, *found, noise_std, sensor)
+        return described(run, *found, noise_std, sensor)
 
 
 def _decay_of_peaks(

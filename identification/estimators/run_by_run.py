@@ -92,7 +92,6 @@ class Paired(ABC):
 
 def described(
     run: Run,
-    reading: Reading,
     decay: Decay,
     covariance: Array | None,
     noise_std: float,
@@ -102,10 +101,10 @@ def described(
     """The result of a method that does not judge the model: the least-squares residual does.
 
     Args:
-        reading: all of the record.
         covariance: of (a, k) as the method gives it, shape (2, 2), in 1/s and 1/s²; None where it gives none.
         noise_std: of one sample of the reading, rad.
     """
+    reading = Reading.from_record(run.record)
     projected = project_run(reading, decay)
     if projected is None:
         return Status.NOT_CONVERGED

@@ -32,6 +32,9 @@ MULTIPLES = (1.0, 2.0, 3.0)
 Channel = Literal["stiffness", "damping", "forcing", "sensor", "calibration"]
 Condition = Literal["always", "wind_on"]
 
+#: Parameters of the moment law by name.
+Law: TypeAlias = Mapping[str, float]
+
 #: What a run draws at random for an effect: nothing, a phase in rad, or random numbers, shape (n,).
 Drawn: TypeAlias = float | Array | None
 
@@ -260,7 +263,7 @@ class Effect:
             remedy="draw it with EffectChain.draw, or leave the effect out",
         )
 
-    def law(self) -> Mapping[str, float]:
+    def law(self) -> Law:
         """The effect's parameters in the moment law, by name, for an effect that is a term of the law."""
         return {}
 

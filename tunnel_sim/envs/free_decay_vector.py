@@ -30,9 +30,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         render_mode: ``rgb_array`` or None.
         max_episode_steps: number of steps after which runs are truncated; None: at their end only.
         nthread: number of threads; 0 uses all processors. The result does not depend on it.
-        width: of a picture, pixels.
-        height: of a picture, pixels.
-        camera: name of a camera of ``mjcf/rig.xml``.
+        width, height, camera: as in `FreeDecayEnv`.
         **arguments: fields of `FreeDecayConfig`.
 
     Raises:
