@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from tunnel_reference.conditions import Array
 
 Params = Mapping[str, Array]
-Rows = NDArray[np.intp] | slice
+Places = NDArray[np.intp]
+Rows = Places | slice
 
 
 class Phase(IntEnum):
