@@ -242,11 +242,7 @@ def integrate(
 
     Args:
         conditions: one per campaign; all with or all without a flexible rod, equal sample rates.
-        terms: the terms of each campaign.
         substeps: RK4 steps per sample.
-
-    Returns:
-        One motion per campaign.
 
     Raises:
         ValueError: when rigid and flexible rods, or sample rates, are mixed.

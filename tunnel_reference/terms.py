@@ -71,8 +71,6 @@ class Term:
     """A law bound to the runs of one campaign.
 
     Args:
-        law: the law.
-        phase: when it acts.
         params: arrays whose first axis is the campaign's runs.
         memory: initial states of the law, shape (states, runs); None where it has none.
     """

@@ -119,12 +119,8 @@ def campaign_estimate(
     """Fill in an estimate from the shared parameters.
 
     Args:
-        estimate: with its runs.
         parameters: φ, shape (p,).
         covariance: of φ, shape (p, p).
-
-    Returns:
-        The estimate with coefficients, the air of its runs and the wind-off line.
     """
     found = derivatives(design, parameters)
     own = found.jacobian @ covariance @ found.jacobian.T
@@ -194,9 +190,6 @@ def limits(design: Design, parameters: Array) -> set[Status]:
 
     Args:
         parameters: φ as found, shape (p,).
-
-    Returns:
-        The statuses, if any.
     """
     statuses = set()
     if not np.any(design.stiffness_loads > 0.0):

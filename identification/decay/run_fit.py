@@ -63,9 +63,6 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     Args:
         run: the run; its wind and spring are not used.
         cycles_per_window: periods in each of its windows; where None three, or one in a short record.
-
-    Returns:
-        The fit and the run's estimate.
     """
     reading = Reading.from_record(run.record)
     start = starting_decay(run.record)

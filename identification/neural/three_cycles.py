@@ -77,7 +77,6 @@ class Propagation:
         """Errors of ζ and t3 per standard deviation of each sample's noise.
 
         Args:
-            shape: the window's.
             gradient: of ζ by the network's inputs, shape (100,).
 
         Returns:

@@ -34,7 +34,6 @@ class Section:
     """A table with a title.
 
     Args:
-        title: above it.
         headings: of the columns.
         rows: cells as text.
         note: a line below it.

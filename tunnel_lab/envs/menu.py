@@ -42,7 +42,6 @@ class Choice:
         """The run as a plan describes it.
 
         Args:
-            name: its id.
             air_density: ρ, kg/m³.
         """
         return Condition(

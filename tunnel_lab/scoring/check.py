@@ -32,7 +32,6 @@ class Verdict:
     """What a check found.
 
     Args:
-        findings: every test that was made.
         false_alarm_rate: probability that any finding of unchanged estimators is called worse.
         identical: whether all estimates are the baseline's to the last bit.
         added: estimators that are not in the baseline; they were not checked.

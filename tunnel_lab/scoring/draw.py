@@ -51,7 +51,6 @@ def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
     """Make one trial.
 
     Args:
-        seed: of the grid.
         number: of the trial in its cell, from 0.
 
     Returns:

@@ -140,7 +140,6 @@ class Grid:
     """What to score on.
 
     Args:
-        seed: of every record.
         trials: number of records, or campaigns, in each cell.
         trials_of: the same for estimators that get fewer, by name.
         cells: at least one, all different.

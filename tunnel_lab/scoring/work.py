@@ -60,11 +60,7 @@ def units_of(grid: Grid) -> tuple[Unit, ...]:
 
 
 def score_unit(grid: Grid, estimators: Sequence[str], unit: Unit) -> list[Row]:
-    """Every estimator on the unit's trials.
-
-    Returns:
-        A row for each trial, estimator and quantity, in this order.
-    """
+    """Every estimator on the unit's trials."""
     from tunnel_lab.scoring.draw import draw_trial
 
     cell = grid.cells[unit.cell]

@@ -64,7 +64,6 @@ def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
     Args:
         width: pixels.
         height: pixels.
-        title: above the axes.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -26,7 +26,6 @@ def view_in_browser(run: ShownRun, *, port: int, open_browser: bool, seconds: fl
 
     Args:
         port: TCP port (index); 0 takes the first free one from 8080 on.
-        open_browser: open a tab, where there is a display.
         seconds: time until it stops, s; None runs until interrupted.
 
     Raises:

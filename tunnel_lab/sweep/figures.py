@@ -169,11 +169,7 @@ def axis_table(lines: Sequence[Line]) -> Table:
 
 
 def pace_table(found: Sequence[Pace]) -> Table:
-    """Times of the steps.
-
-    Returns:
-        A table with a row for each step.
-    """
+    """Times of the steps."""
     result = table("Time per run", "step", "median [ms]", "quartiles [ms]", right=("median [ms]",))
     for one in found:
         middle, low, high = (significant(1e3 * value, 3) for value in (one.middle, one.low, one.high))

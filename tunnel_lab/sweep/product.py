@@ -126,9 +126,6 @@ class Sweep:
 
         Args:
             index: from 0.
-
-        Yields:
-            Its cases, in the order of the product.
         """
         start = index * self.cases_per_shard
         for place in range(start, min(start + self.cases_per_shard, self.size)):
@@ -178,7 +175,6 @@ def case_seed(seed: int, physics: Mapping[str, Any], replicate: int) -> int:
     """The seed of a case: it depends on the contents of the case, not on its place in the product.
 
     Args:
-        seed: of the sweep.
         physics: everything that the records of the case depend on besides the noise, as plain values.
         replicate: number of the repetition, from 0.
 

@@ -47,7 +47,6 @@ class Finished:
     """A finished shard, ready to be written.
 
     Args:
-        index: of the shard.
         results: a Parquet file's bytes; they do not depend on where or when the shard is done.
         records: those of the records; None where they are not stored.
         timings: those of the times, which differ every time.
@@ -68,7 +67,6 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
 
     Args:
         sweep: as `Sweep.to_json` gives it.
-        index: of the shard.
         nthread: threads that simulate; the result is the same to the bit whatever their number.
     """
     plan = _sweep(sweep)

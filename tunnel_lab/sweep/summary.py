@@ -187,9 +187,6 @@ def paces(store: Store) -> Sequence[Pace]:
     Args:
         store: at least one shard finished.
 
-    Returns:
-        One for each step, in the order of the work.
-
     Raises:
         TunnelError: when the timings are damaged.
     """

@@ -29,11 +29,7 @@ EffectOption = Annotated[
 
 
 def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
-    """Names from repeated options, from lists with commas, or from both.
-
-    Returns:
-        Names without blanks, in the order given.
-    """
+    """Names from repeated options, from lists with commas, or from both."""
     return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())
 
 

@@ -43,11 +43,7 @@ def console(*, stderr: bool = False) -> Console:
 
 
 def say(line: str, *, stderr: bool = False) -> None:
-    """Print one line unchanged: no markup and no wrapping, so that paths can be copied.
-
-    Args:
-        stderr: print to standard error.
-    """
+    """Print one line unchanged: no markup and no wrapping, so that paths can be copied."""
     console(stderr=stderr).print(line, soft_wrap=True)
 
 
@@ -74,7 +70,6 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
     """An empty table in the common style.
 
     Args:
-        title: above it.
         columns: headings, units included.
         right: those headings whose columns are aligned to the right.
     """
@@ -109,9 +104,6 @@ def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Ta
 
     Args:
         truth: injected values by name, each in the unit of the estimate's quantity of that name.
-
-    Returns:
-        A table with a section for each estimator and a row for each quantity.
     """
     from identification.estimate import UNITS
 
@@ -142,9 +134,6 @@ def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
 
     Args:
         estimate: its estimate, runs in the same order.
-
-    Returns:
-        A table with a row for each run.
     """
     result = table(
         f"Runs of {campaign.name}",

@@ -32,7 +32,6 @@ class Model:
     """A compiled model of the rig in one run.
 
     Args:
-        settings: the run's physics.
         spec: the complete MJCF specification; ``spec.to_xml()`` writes it.
     """
 
@@ -119,11 +118,7 @@ def _refusal(error: Exception) -> TunnelError:
 
 
 def build_spec(rig: Rig, settings: RunSettings) -> mujoco.MjSpec:
-    """The complete MJCF specification of one run.
-
-    Args:
-        settings: the run's physics.
-    """
+    """The complete MJCF specification of one run."""
     load_plugin()
     with resources.as_file(resources.files("mjcf") / "rig.xml") as path:
         spec = mujoco.MjSpec.from_file(str(path))

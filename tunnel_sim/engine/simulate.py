@@ -78,9 +78,6 @@ def simulate_motions(
         nthread: number of threads; 0 uses all processors.
         progress: called with (runs done, runs in all).
 
-    Returns:
-        One motion per run, in order.
-
     Raises:
         TunnelError: when the motion of a run grows without bound, its settings are refused, or its fastest motion
             requires too many steps.

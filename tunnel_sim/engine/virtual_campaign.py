@@ -128,9 +128,6 @@ def run_settings(truth: Truth, condition: Condition, *, timestep: float = 1e-3) 
 
     Args:
         timestep: integration step, s.
-
-    Returns:
-        The run without effects.
     """
     return RunSettings(
         spring_stiffness=condition.spring_stiffness,

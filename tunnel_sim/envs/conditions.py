@@ -60,9 +60,6 @@ class RunPlan:
 
         Args:
             record: the sensor's reading.
-
-        Returns:
-            The run, without the truth.
         """
         return stated_run(self.condition, record)
 

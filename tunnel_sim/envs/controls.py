@@ -96,7 +96,6 @@ def check_plain(actions: np.ndarray[Any, Any], count: int) -> None:
 
     Args:
         actions: as given to ``step``.
-        count: number of runs.
 
     Raises:
         EnvError: when an action is not 0, or there are too many or too few.

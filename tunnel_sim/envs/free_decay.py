@@ -143,9 +143,6 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
     def set_state(self, state: EpisodeState) -> None:
         """Continue from a saved state of this environment, or of one with the same configuration.
 
-        Args:
-            state: from `get_state`.
-
         Raises:
             EnvError: when the state belongs to a different configuration.
         """

@@ -172,18 +172,13 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return observations, rewards, terminated, truncated, infos
 
     def get_state(self, index: int) -> EpisodeState:
-        """The state of one run, also for `FreeDecayEnv.set_state`.
-
-        Args:
-            index: of the run.
-        """
+        """The state of one run, also for `FreeDecayEnv.set_state`."""
         return self._episodes.get_state(index)
 
     def set_state(self, index: int, state: EpisodeState) -> None:
         """Put one run into a state.
 
         Args:
-            index: of the run.
             state: from an environment of the same configuration.
 
         Raises:
@@ -193,9 +188,6 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
 
     def information(self, index: int) -> Array:
         """The Fisher information of one run so far.
-
-        Args:
-            index: of the run.
 
         Returns:
             Shape (7, 7), as `FreeDecayEnv.information`.

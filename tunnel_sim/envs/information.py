@@ -90,10 +90,9 @@ class Prior:
 
 
 class Information:
-    """The Fisher information of many runs in progress.
+    """The Fisher information of many runs in progress; ``row`` is the index of a run.
 
     Args:
-        count: number of runs.
         samples: number of samples in one step.
         interval: between samples, s.
         variance: of a reading, rad².
@@ -110,11 +109,7 @@ class Information:
         self.known = np.zeros(count)
 
     def start(self, row: int, run: NominalRun) -> None:
-        """Start a run.
-
-        Args:
-            row: index of the run.
-        """
+        """Start a run."""
         self._sensitivities.start(row, run)
         self._scale[row] = self._prior.scales(run)
         self.scaled[row] = np.eye(len(UNKNOWNS))
@@ -141,9 +136,6 @@ class Information:
     def matrix(self, row: int) -> Array:
         """The Fisher information of one run, including its prior.
 
-        Args:
-            row: index of the run.
-
         Returns:
             Shape (7, 7), in the order of `UNKNOWNS` and in the inverse products of their units; infinite where
             the prior is exact.
@@ -152,21 +144,12 @@ class Information:
             return np.asarray(self.scaled[row] / np.outer(self._scale[row], self._scale[row]))
 
     def snapshot(self, row: int) -> dict[str, Array]:
-        """Copies of the state of a run in progress.
-
-        Args:
-            row: index of the run.
-        """
+        """Copies of the state of a run in progress."""
         own = {"scale": self._scale[row], "scaled": self.scaled[row], "known": self.known[row]}
         return {name: np.array(value) for name, value in own.items()} | self._sensitivities.snapshot(row)
 
     def restore(self, row: int, run: NominalRun, state: Mapping[str, Array]) -> None:
-        """Restore a run from a snapshot.
-
-        Args:
-            row: index of the run.
-            state: from `snapshot`.
-        """
+        """Restore a run from a snapshot."""
         self._sensitivities.restore(row, run, state)
         self._scale[row], self.scaled[row], self.known[row] = (
             state["scale"],

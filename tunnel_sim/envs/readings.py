@@ -15,11 +15,7 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 
 class Readings:
-    """The potentiometer readings of many runs.
-
-    Args:
-        count: number of runs.
-    """
+    """The potentiometer readings of many runs; ``row`` is the index of a run."""
 
     def __init__(self, config: FreeDecayConfig, count: int) -> None:
         self._samples = config.samples_per_step
@@ -36,7 +32,6 @@ class Readings:
         """Start a run.
 
         Args:
-            row: index of the run.
             chain: the run's effects on the reading.
         """
         self._chains[row], self._rngs[row] = chain, rng
@@ -47,7 +42,6 @@ class Readings:
         """Readings of the control period before the release, with noise that is not drawn from the run's generator.
 
         Args:
-            row: index of the run.
             angle: at which the rod's upper end is held, rad.
 
         Returns:
@@ -100,7 +94,6 @@ class Readings:
         """The record of a run so far.
 
         Args:
-            row: index of the run.
             steps: number of control periods so far.
 
         Raises:
@@ -112,11 +105,7 @@ class Readings:
         return Record(self._times[:count], self._values[row, :count])
 
     def snapshot(self, row: int) -> tuple[Array, RunningSensor, np.random.Generator]:
-        """Copies of the state of a run.
-
-        Args:
-            row: index of the run.
-        """
+        """Copies of the state of a run."""
         return self._values[row].copy(), self._chain(row).copied(), copy.deepcopy(self._rngs[row])
 
     def restore(
@@ -125,7 +114,6 @@ class Readings:
         """Restore a run from a snapshot.
 
         Args:
-            row: index of the run.
             values: readings from `snapshot`, shape (n,), rad.
             chain: effects from `snapshot`.
             rng: generator from `snapshot`.

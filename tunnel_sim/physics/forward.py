@@ -74,9 +74,6 @@ def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motio
 def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array]]:
     """A run's conditions in the form that the compiled code takes.
 
-    Args:
-        settings: the run's physics.
-
     Returns:
         Array of shape (1,) and `run_dtype`, at the release (see ``Model.release_state``), and the arrays it
         points to, which the caller must keep alive.

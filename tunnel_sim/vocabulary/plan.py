@@ -85,7 +85,6 @@ class CampaignPlan:
     """Everything a simulated campaign depends on, apart from the rig.
 
     Args:
-        seed: of the random numbers.
         conditions: the runs, at least one, with unique ids.
         effects: effects added to the nominal model.
     """
