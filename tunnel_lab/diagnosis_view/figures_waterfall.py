@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnosis.printing import held_out_excess
 from tunnel_lab.diagnosis_view import figures_common as common
+from tunnel_lab.plotting.common import figure, grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +34,7 @@ def waterfall_figure(document: common.Document) -> Figure | None:
     noise = _SIGMAS * _noise(document)
     floor = 0.1 * noise
     left = np.array([step["excess"] for step in steps], np.float64)
-    fig = common.figure(1.5 + 0.42 * (left.size + 1))
+    fig = figure(common.WIDTH, 1.5 + 0.42 * (left.size + 1))
     axes = fig.add_subplot()
     axes.set_xscale("log")
     axes.axvspan(floor, noise, color="0.92", linewidth=0, label="noise (3σ)")
@@ -45,7 +46,7 @@ def waterfall_figure(document: common.Document) -> Figure | None:
     axes.invert_yaxis()
     axes.set_xlabel("excess: mean squared residual over noise variance, minus one")
     fig.legend(loc="outside upper left", ncols=2, fontsize=8, frameon=False)
-    common.quiet(axes)
+    grid(axes)
     return fig
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from identification.printing.numbers import SYMBOLS, concise, significant, unit
+from tunnel_lab.plotting.common import figure, grid
 from tunnel_lab.plotting.plots import COLOURS, MARKERS
 from tunnel_lab.sweep.summary import AXES, OVERALL, SEVERITY, Line, Pace
 from tunnel_lab.terminal.tables import table
@@ -50,25 +51,23 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
     Returns:
         The figure, with 95 % intervals from the number of trials; None where no quantity has a panel.
     """
-    from matplotlib.figure import Figure
-
     quantities = [name for name in DRAWN if any(line.quantity == name and line.score.rmse for line in lines)]
     if not quantities:
         return None
     estimators = list(dict.fromkeys(line.estimator for line in lines))
-    figure = Figure(figsize=(max(6.4, 3.1 * len(quantities) + 0.6), 6.2), layout="constrained")
+    fig = figure(max(6.4, 3.1 * len(quantities) + 0.6), 6.2)
     for column, name in enumerate(quantities, 1):
         mine = [line for line in lines if line.quantity == name and line.score.rmse and line.score.bias]
-        top = figure.add_subplot(2, len(quantities), column)
-        bottom = figure.add_subplot(2, len(quantities), len(quantities) + column, sharex=top)
+        top = fig.add_subplot(2, len(quantities), column)
+        bottom = fig.add_subplot(2, len(quantities), len(quantities) + column, sharex=top)
         for place, estimator in enumerate(estimators):
             shown = [line for line in mine if line.estimator == estimator]
             _errorbars(top, shown, [line.score.rmse for line in shown], place, len(estimators))
             _errorbars(bottom, shown, [line.score.bias for line in shown], place, len(estimators))
         _dress(top, bottom, mine, name, first=column == 1)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)), fontsize=9)
-    return figure
+    handles, labels = fig.axes[0].get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)), fontsize=9)
+    return fig
 
 
 def _errorbars(
@@ -116,9 +115,7 @@ def _dress(top: Axes, bottom: Axes, lines: Sequence[Line], name: str, *, first: 
         top.set_ylabel(f"RMSE [{per}]")
         bottom.set_ylabel(f"bias, estimate − truth [{per}]")
     for axes in (top, bottom):
-        axes.grid(visible=True, color="0.88", linewidth=0.6)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+        grid(axes)
 
 
 def _is_logarithmic(lines: Sequence[Line]) -> bool:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
+
+from identification.printing.numbers import unit_mark
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -46,18 +47,6 @@ Real effects never have exactly these forms: each name stands for a family. For 
 about them see [what no free decay can show](../theory/what-no-free-decay-can-show.md).
 
 """
-
-
-def pretty_unit(unit: str) -> str:
-    """A unit as printed.
-
-    Args:
-        unit: as in the registry, such as ``1/rad2``; the unit of a parameter.
-
-    Returns:
-        The same with raised digits, such as ``1/rad²``.
-    """
-    return re.sub(r"(?<=[a-z])2", "²", unit)
 
 
 def summary(kind: type[Effect]) -> str:
@@ -101,7 +90,7 @@ def listing(kinds: Sequence[type[Effect]]) -> Table:
     for column in result.columns[:3]:  # names are to be copied, so never folded
         column.no_wrap = True
     for kind in kinds:
-        parameters = [f"{info.name} {info.symbol} [{pretty_unit(info.unit)}]" for info in kind.parameters()]
+        parameters = [f"{info.name} {info.symbol} [{unit_mark(info.unit)}]" for info in kind.parameters()]
         cells = (kind.name, kind.channel, kind.condition, "\n".join([kind.equation, *parameters]))
         result.add_row(*map(Text, cells), end_section=True)
     return result
@@ -117,7 +106,7 @@ def parameter_table(kind: type[Effect]) -> Table:
     result = table("Parameters", "name", "symbol", "unit", "meaning", *right, right=right)
     for info in kind.parameters():
         numbers = (f"{value:g}" for value in (info.scale, info.lower, info.upper, info.default))
-        result.add_row(*map(Text, (info.name, info.symbol, pretty_unit(info.unit), info.meaning, *numbers)))
+        result.add_row(*map(Text, (info.name, info.symbol, unit_mark(info.unit), info.meaning, *numbers)))
     return result
 
 
@@ -161,7 +150,7 @@ def markdown(kinds: Sequence[type[Effect]]) -> str:
 
 def _section(kind: type[Effect]) -> str:
     rows = [
-        f"| `{info.name}` | {info.symbol} | {pretty_unit(info.unit)} | {_cell(info.meaning)} | {info.scale:g} "
+        f"| `{info.name}` | {info.symbol} | {unit_mark(info.unit)} | {_cell(info.meaning)} | {info.scale:g} "
         f"| {info.lower:g} | {info.upper:g} | {info.default:g} |"
         for info in kind.parameters()
     ]
