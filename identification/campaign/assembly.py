@@ -103,36 +103,35 @@ def combined_estimate(
     ratio = _birge_ratio(design, parameters, decays, informations)
     if together is not None:
         parameters, covariance = together(design, [place for place, *_ in pairs], parameters, covariance)
-    covariance = covariance * ratio
-    return campaign_estimate(campaign, estimate, runs, design, parameters, covariance, statuses)
+    values = derivatives(design, parameters)
+    own = values.jacobian @ (covariance * ratio) @ values.jacobian.T
+    if values.names and not determined(own):
+        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
+    return filled(campaign, estimate, runs, design, values, own, statuses | limits(design, parameters))
 
 
-def campaign_estimate(
+def filled(
     campaign: Campaign,
     estimate: Estimate,
     runs: Sequence[Run],
     design: Design,
-    parameters: Array,
+    found: Derivatives,
     covariance: Array,
     statuses: set[Status],
 ) -> Estimate:
-    """Fill in an estimate from the shared parameters.
+    """The estimate with coefficients, the air of its runs and the wind-off line.
 
     Args:
-        parameters: φ, shape (p,).
-        covariance: of φ, shape (p, p).
+        runs: those that the design links.
+        covariance: of the values found, shape (p, p).
     """
-    found = derivatives(design, parameters)
-    own = found.jacobian @ covariance @ found.jacobian.T
-    if found.names and not determined(own):
-        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
-    air = air_of_runs(design, found, own, runs)
+    air = air_of_runs(design, found, covariance, runs)
     return replace(
         estimate,
-        statuses=by_gravity(statuses | limits(design, parameters)),
+        statuses=by_gravity(statuses),
         runs=tuple(replace(run, **air.get(run.id, {})) for run in estimate.runs),
         **wind_off(estimate.runs, campaign.runs),
-        **quantities(found, own, has_size=design.has_size),
+        **quantities(found, covariance, has_size=design.has_size),
     )
 
 

@@ -11,6 +11,7 @@ from diagnosis.printing import inclusion_line
 from identification.printing.numbers import p_text, significant
 from tunnel_lab.diagnosis_view import view
 from tunnel_lab.diagnosis_view.figures import diagnosis_figures
+from tunnel_lab.diagnosis_view.figures_common import plain
 from tunnel_lab.diagnosis_view.svg import inline_svg
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -86,9 +87,9 @@ def _context(document: Document, campaign: Campaign) -> dict[str, Any]:
         "candidates": candidates,
         "more": more,
         "causes": view.cause_paragraphs(document),
-        "inclusion": view.plain(inclusion_line(document)),
+        "inclusion": plain(inclusion_line(document)),
         "steps": view.step_rows(document),
-        "rivals": [view.plain(name) for name in document["ambiguous_with"]],
+        "rivals": [plain(name) for name in document["ambiguous_with"]],
         "next_run": view.next_run_rows(document),
         "runs": view.run_rows(document, campaign),
         "coefficients": view.coefficient_rows(document),
@@ -135,7 +136,7 @@ def _flat(values: Document) -> list[tuple[str, str]]:
     """Provenance as rows: nested tables become one row each."""
     return [
         (
-            view.plain(str(key)).capitalize(),
+            plain(str(key)).capitalize(),
             ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, Mapping) else str(value),
         )
         for key, value in values.items()

@@ -17,6 +17,7 @@ from identification.printing.numbers import (
     unit_mark,
     with_std,
 )
+from tunnel_lab.diagnosis_view.figures_common import plain
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -105,11 +106,6 @@ def excess(value: float) -> str:
 def _minus(text: str) -> str:
     """A minus sign in place of a leading hyphen."""
     return "−" + text[1:] if text.startswith("-") else text
-
-
-def plain(name: str) -> str:
-    """An effect's name as words: underscores become spaces."""
-    return name.replace("_", " ")
 
 
 def interval(values: list[float] | None, unit: str) -> str:
