@@ -1,9 +1,9 @@
 """The estimators, one per file, and their registry.
 
 To add one, write a frozen dataclass with the members of `Estimator`, whose fields are its settings, and add a line
-to `SUMMARIES`. The file has the estimator's name and the class the same in capitals: ``output_error.OutputError``.
-It is imported when the estimator is made, so a heavy import such as torch waits until then. The conformance suite
-runs over all of them.
+to `SUMMARIES`. The file has the estimator's name, and the class has that name in CamelCase, as in
+``output_error.OutputError``. It is imported when the estimator is made, so a heavy import such as torch waits until
+then. The conformance suite runs over all of them.
 """
 
 from __future__ import annotations
