@@ -22,16 +22,8 @@ else:
     __getattr__, __dir__ = lazy_names(
         __name__,
         {
-            "._diagnose": ("diagnose", "vocabulary"),
-            ".result": (
-                "Candidate",
-                "Coefficients",
-                "Diagnosis",
-                "GapSummary",
-                "ParameterEstimate",
-                "RunGap",
-                "Where",
-            ),
+            "._diagnose": "diagnose vocabulary",
+            ".result": "Candidate Coefficients Diagnosis GapSummary ParameterEstimate RunGap Where",
         },
     )
 

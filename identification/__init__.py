@@ -24,18 +24,12 @@ else:
     __getattr__, __dir__ = lazy_names(
         __name__,
         {
-            "._identify": ("identify",),
-            ".datasets": (
-                "MEASURED_CAMPAIGNS",
-                "measured_campaign",
-                "paper_derivatives",
-                "paper_springs",
-                "paper_windows",
-            ),
-            ".estimate": ("Estimate", "NoiseLevel", "Quantity", "RunEstimate", "WindowEstimate"),
-            ".estimators": ("ALL_ESTIMATORS", "Estimator", "make_estimator"),
-            ".remark": ("Remark",),
-            ".status": ("Status",),
+            "._identify": "identify",
+            ".datasets": "MEASURED_CAMPAIGNS measured_campaign paper_derivatives paper_springs paper_windows",
+            ".estimate": "Estimate NoiseLevel Quantity RunEstimate WindowEstimate",
+            ".estimators": "ALL_ESTIMATORS Estimator make_estimator",
+            ".remark": "Remark",
+            ".status": "Status",
         },
     )
 

@@ -76,11 +76,7 @@ class DerivativeRow:
 
 
 def paper_springs() -> tuple[SpringRow, ...]:
-    """Table II: the ten torsion springs and the frequencies measured with the wind off.
-
-    Returns:
-        Ten rows, from the softest spring to the stiffest.
-    """
+    """Table II: the ten torsion springs and the frequencies measured with the wind off."""
     return tuple(
         SpringRow(int(row["spring"]), float(row["stiffness_N_m_per_rad"]), float(row["frequency_Hz"]))
         for row in _table("table2-springs.csv")
@@ -101,11 +97,7 @@ def paper_windows() -> tuple[WindowRow, ...]:
 
 
 def paper_derivatives() -> tuple[DerivativeRow, ...]:
-    """Table IV: the yaw-moment derivatives by both of the paper's methods.
-
-    Returns:
-        Two rows: neural network, conventional.
-    """
+    """Table IV: the yaw-moment derivatives by both of the paper's methods."""
     return tuple(
         DerivativeRow(row["method"], float(row["cn_beta"]), float(row["cn_r"]))
         for row in _table("table4-derivatives.csv")

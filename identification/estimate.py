@@ -6,14 +6,15 @@ why and what to do.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite
-from typing import Any
+from functools import cache
+from typing import Annotated, Any
 
 import numpy as np
 import polars as pl
+from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter
 
 from identification.printing.estimate_tables import estimate_parts
 from identification.printing.frames import long_frame, wide_frame
@@ -22,7 +23,6 @@ from identification.remark import Remark
 from identification.status import Status as Status
 from identification.status import by_gravity as by_gravity
 from tunnel_sim.files.reading import as_described, check_shape
-from tunnel_sim.vocabulary.errors import one_line
 from tunnel_sim.vocabulary.record import Array
 
 PARAMETERS = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
@@ -32,6 +32,13 @@ UNITS: Mapping[str, str] = {
     "yaw_inertia": "kg m2",
     "mechanical_damping": "N m s/rad",
 }
+
+_FINITE = ConfigDict(allow_inf_nan=False)
+
+Statuses = Annotated[
+    tuple[Annotated[Status, BeforeValidator(lambda name: Status[name.upper()])], ...], Field(min_length=1)
+]
+"""In JSON the names of the statuses, in small letters."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,8 @@ class Quantity:
             otherwise it is value ± 1.96 std.
     """
 
+    __pydantic_config__ = _FINITE
+
     value: float
     std: float
     unit: str
@@ -55,17 +64,6 @@ class Quantity:
         """``{"value", "std", "unit"}``, and ``"interval"`` where there is one."""
         data = {"value": self.value, "std": self.std, "unit": self.unit}
         return data if self.interval is None else data | {"interval": list(self.interval)}
-
-    @classmethod
-    def from_json_dict(cls, data: Mapping[str, Any]) -> Quantity:
-        """The inverse of `to_json_dict`; raises `TunnelError` for a malformed document."""
-        with _taken_apart("quantity"):
-            interval = data.get("interval")
-            ends = None
-            if interval is not None:
-                low, high = interval
-                ends = (_number(low), _number(high))
-            return cls(_number(data["value"]), _number(data["std"]), _text(data["unit"]), ends)
 
 
 @dataclass(frozen=True)
@@ -82,6 +80,8 @@ class NoiseLevel:
         disagrees: whether the residual's white part contradicts the stated noise.
     """
 
+    __pydantic_config__ = _FINITE
+
     std: float
     source: str
     residual_std: float
@@ -91,20 +91,7 @@ class NoiseLevel:
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
-    @classmethod
-    def from_json_dict(cls, data: Mapping[str, Any]) -> NoiseLevel:
-        """The inverse of `to_json_dict`; raises `TunnelError` for a malformed document."""
-        with _taken_apart("noise level"):
-            return cls(
-                std=_number(data["std"]),
-                source=_text(data["source"]),
-                residual_std=_number(data["residual_std"]),
-                slow_ratio=_number(data["slow_ratio"]),
-                departs=_flag(data["departs"]),
-                disagrees=_flag(data["disagrees"]),
-            )
+        return _fields_json(self)
 
 
 @dataclass(frozen=True)
@@ -120,6 +107,8 @@ class WindowEstimate:
         cycles: number of periods; three, or one in a short record.
     """
 
+    __pydantic_config__ = _FINITE
+
     start_s: float
     duration_s: float
     amplitude: Quantity
@@ -129,23 +118,7 @@ class WindowEstimate:
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name."""
-        return {
-            "start_s": self.start_s,
-            "duration_s": self.duration_s,
-            "amplitude": self.amplitude.to_json_dict(),
-            "omega_n": self.omega_n.to_json_dict(),
-            "zeta": self.zeta.to_json_dict(),
-            "cycles": self.cycles,
-        }
-
-    @classmethod
-    def from_json_dict(cls, data: Mapping[str, Any]) -> WindowEstimate:
-        """The inverse of `to_json_dict`; raises `TunnelError` for a malformed document."""
-        with _taken_apart("window"):
-            names = ("amplitude", "omega_n", "zeta")
-            quantities = {name: Quantity.from_json_dict(data[name]) for name in names}
-            start, duration = _number(data["start_s"]), _number(data["duration_s"])
-            return cls(start, duration, cycles=int(_number(data["cycles"])), **quantities)
+        return _fields_json(self)
 
 
 _RUN_QUANTITIES = (
@@ -173,15 +146,17 @@ class RunEstimate:
         initial_rate: at the first sample, rad/s.
         sensor_zero: from this run alone, rad.
         aerodynamic_stiffness: Ka, N m/rad, from the whole campaign; wind-on runs only.
-        aerodynamic_damping: Ca, N m s/rad, likewise.
+        aerodynamic_damping: Ca, N m s/rad, from the whole campaign; wind-on runs only.
         process_noise: spectral intensity of a random moment over the inertia, rad²/s³; None where the method
             does not estimate it, or the run shows none.
         noise: the noise level behind the standard deviations; None where the method does not use it.
         windows: consecutive windows of three cycles.
     """
 
+    __pydantic_config__ = _FINITE
+
     id: str
-    statuses: tuple[Status, ...] = (Status.OK,)
+    statuses: Statuses = (Status.OK,)
     omega_n: Quantity | None = None
     zeta: Quantity | None = None
     initial_angle: Quantity | None = None
@@ -200,25 +175,7 @@ class RunEstimate:
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name; None where there is no value."""
-        return {
-            "id": self.id,
-            **_statuses_json(self.statuses),
-            **_quantities_json(self, _RUN_QUANTITIES),
-            "noise": self.noise.to_json_dict() if self.noise else None,
-            "windows": [window.to_json_dict() for window in self.windows],
-        }
-
-    @classmethod
-    def from_json_dict(cls, data: Mapping[str, Any]) -> RunEstimate:
-        """The inverse of `to_json_dict`; raises `TunnelError` for a malformed document."""
-        with _taken_apart("run"):
-            return cls(
-                id=_text(data["id"]),
-                statuses=_statuses_from_json(data),
-                noise=None if data["noise"] is None else NoiseLevel.from_json_dict(data["noise"]),
-                windows=tuple(WindowEstimate.from_json_dict(window) for window in data["windows"]),
-                **_quantities_from_json(data, _RUN_QUANTITIES),
-            )
+        return {"id": self.id, **_statuses_json(self.statuses), **_fields_json(self, "statuses")}
 
 
 _CAMPAIGN_QUANTITIES = (*PARAMETERS, "sensor_zero", "wind_off_inertia", "wind_off_intercept")
@@ -246,10 +203,12 @@ class Estimate:
         remarks: of the examination before the estimation, on runs left out, cut or to look at.
     """
 
+    __pydantic_config__ = _FINITE
+
     campaign: str
     estimator: str
     runs: tuple[RunEstimate, ...]
-    statuses: tuple[Status, ...] = (Status.OK,)
+    statuses: Statuses = (Status.OK,)
     cn_beta: Quantity | None = None
     cn_r: Quantity | None = None
     yaw_inertia: Quantity | None = None
@@ -303,12 +262,9 @@ class Estimate:
             "campaign": self.campaign,
             "estimator": self.estimator,
             **_statuses_json(self.statuses),
-            "remarks": [remark.to_json_dict() for remark in self.remarks],
-            **_quantities_json(self, _CAMPAIGN_QUANTITIES),
-            "parameters": list(self.parameters),
-            "covariance": [list(row) for row in self.covariance],
-            "noise": self.noise.to_json_dict() if self.noise else None,
-            "runs": [run.to_json_dict() for run in self.runs],
+            "remarks": _json(self.remarks),
+            **_fields_json(self, "statuses", "remarks", "runs"),
+            "runs": _json(self.runs),
         }
 
     @classmethod
@@ -318,26 +274,22 @@ class Estimate:
         Args:
             data: the document; further keys, such as those of the budget, are ignored.
 
-        Returns:
-            The estimate.
-
         Raises:
             TunnelError: when it is not an estimate: a key is missing, or a value has the wrong type or is not
             finite.
         """
-        check_shape(data, _WHERE, _REMEDY)
-        with _taken_apart("estimate"):
-            return cls(
-                campaign=_text(data["campaign"]),
-                estimator=_text(data["estimator"]),
-                runs=tuple(RunEstimate.from_json_dict(run) for run in data["runs"]),
-                statuses=_statuses_from_json(data),
-                parameters=tuple(_text(name) for name in data["parameters"]),
-                covariance=_covariance(data["covariance"], len(data["parameters"])),
-                noise=None if data["noise"] is None else NoiseLevel.from_json_dict(data["noise"]),
-                remarks=tuple(Remark.from_json_dict(remark) for remark in data.get("remarks", ())),
-                **_quantities_from_json(data, _CAMPAIGN_QUANTITIES),
-            )
+        where, remedy = "the estimate as JSON", "write it again with tunnel identify --json"
+        check_shape(data, where, remedy)
+        with as_described("is not an estimate", where, remedy):
+            found = _adapter().validate_json(json.dumps(data), strict=True)
+            if [len(row) for row in found.covariance] != [len(found.parameters)] * len(found.parameters):
+                raise ValueError("the covariance does not match the parameters")
+            return found
+
+
+@cache
+def _adapter() -> TypeAdapter[Estimate]:
+    return TypeAdapter(Estimate)
 
 
 def _statuses_json(statuses: tuple[Status, ...]) -> dict[str, Any]:
@@ -348,52 +300,12 @@ def _statuses_json(statuses: tuple[Status, ...]) -> dict[str, Any]:
     }
 
 
-def _statuses_from_json(data: Mapping[str, Any]) -> tuple[Status, ...]:
-    statuses = tuple(Status[_text(name).upper()] for name in data["statuses"])
-    if not statuses:
-        raise ValueError("no status")
-    return statuses
+def _fields_json(owner: Any, *without: str) -> dict[str, Any]:
+    """A dataclass's fields by name, in JSON's types."""
+    return {name: _json(getattr(owner, name)) for name in owner.__dataclass_fields__ if name not in without}
 
 
-def _covariance(rows: Sequence[Sequence[float]], size: int) -> tuple[tuple[float, ...], ...]:
-    """Rows of a covariance, shape (size, size)."""
-    found = tuple(tuple(_number(value) for value in row) for row in rows)
-    if [len(row) for row in found] != [size] * size:
-        raise ValueError("the covariance does not match the parameters")
-    return found
-
-
-_WHERE = "the estimate as JSON"
-_REMEDY = "write it again with tunnel identify --json"
-
-
-def _taken_apart(kind: str) -> AbstractContextManager[None]:
-    """Turn the errors that a malformed document causes into one `TunnelError`."""
-    return as_described(f"is no {kind}", _WHERE, _REMEDY)
-
-
-def _number(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        raise ValueError(f"{one_line(repr(value), 20)} is not a finite number")
-    return float(value)
-
-
-def _text(value: object) -> str:
-    if not isinstance(value, str):
-        raise TypeError(f"{one_line(repr(value), 20)} is not text")
-    return value
-
-
-def _flag(value: object) -> bool:
-    if not isinstance(value, bool | np.bool):
-        raise TypeError(f"{one_line(repr(value), 20)} is neither true nor false")
-    return bool(value)
-
-
-def _quantities_json(owner: object, names: tuple[str, ...]) -> dict[str, Any]:
-    quantities: dict[str, Quantity | None] = {name: getattr(owner, name) for name in names}
-    return {name: None if value is None else value.to_json_dict() for name, value in quantities.items()}
-
-
-def _quantities_from_json(data: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Quantity | None]:
-    return {name: None if data.get(name) is None else Quantity.from_json_dict(data[name]) for name in names}
+def _json(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_json(one) for one in value]
+    return value.to_json_dict() if hasattr(value, "to_json_dict") else value

@@ -27,8 +27,6 @@ class Remark:
     Args:
         outcome: whether the campaign is refused, the runs are left out or cut, or nothing is done.
         runs: ids of the runs it concerns.
-        what: what was found, as a clause.
-        remedy: what to do about it.
         figures: numbers behind it, by name, in JSON's types; units in their names.
     """
 

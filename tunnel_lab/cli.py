@@ -112,7 +112,7 @@ COMMANDS = (
 """Every command that is one function, in the order of the help."""
 
 for _command in COMMANDS:
-    app.command(_command.NAME, cls=getattr(_command, "COMMAND", None))(_command.run)
+    app.command(_command.NAME)(_command.run)
 app.add_typer(blind.app, name=blind.NAME)
 
 

@@ -24,8 +24,6 @@ def moving(law: Law, phase: Phase, make: ParamMaker, *, states: int = 0, at_rele
     """Bind a law of the motion.
 
     Args:
-        law: the law.
-        phase: when it acts.
         make: gives the parameters by run from severity parameter, secondary parameters and conditions.
         states: number of states per run.
         at_release: whether the states start at the release angle; otherwise at zero.

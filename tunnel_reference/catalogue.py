@@ -37,8 +37,6 @@ class Form:
 
     Args:
         family: public name of the effect, or ``unknown``.
-        name: of the form.
-        group: how far it is from the textbook.
         symbol: of its severity parameter, with unit.
         start: a typical magnitude of the severity parameter.
         bind: (severity parameter, secondary parameters, conditions) → changed conditions and term.

@@ -27,7 +27,6 @@ class EffectDraw:
     """One effect of one campaign.
 
     Args:
-        form: the form of the effect.
         extra: its secondary parameters.
         sign: sign of its severity parameter.
         target: required excess of this effect alone, after refitting the nominal model.
@@ -51,10 +50,8 @@ class CampaignDraw:
 
     Args:
         kind: one of ``KINDS``.
-        conditions: runs and truth.
         effects: those that matter, then small ones.
         seed: of the sensor's noise.
-        mixture: it was drawn from.
     """
 
     kind: str
@@ -89,7 +86,6 @@ def draw_campaign(
     Args:
         rng: source of all random numbers.
         kind: one of ``KINDS``.
-        mixture: of forms.
         families: of the first effects that matter; the others are drawn.
 
     Raises:

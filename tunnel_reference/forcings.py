@@ -30,7 +30,6 @@ def turbulence(kind: str, conditions: Conditions, *, seed: int, scale: float) ->
         kind: ``band`` (flat up to ``scale`` Hz), ``dryden`` or ``von_karman`` (integral length ``scale`` m),
             ``octave`` (a band of one octave about ``scale`` Hz).
         conditions: speeds and duration.
-        seed: of the series.
         scale: Hz or m, depending on ``kind``.
     """
     n = 2 ** int(np.ceil(np.log2(_length(conditions))))

@@ -11,13 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tunnel_reference.conditions import Array, Conditions
-from tunnel_reference.terms import Law, Motion, Phase, Rows, Stage, Term
+from tunnel_reference.terms import Law, Motion, Phase, Places, Rows, Stage, Term
 
 
 @dataclass(eq=False)
@@ -32,7 +30,7 @@ class _Group:
     start: int = 0
 
 
-def _as_rows(indices: NDArray[np.intp]) -> Rows:
+def _as_rows(indices: Places) -> Rows:
     """A slice where the indices are consecutive, because a view is faster than indexing."""
     first, last = int(indices[0]), int(indices[-1])
     return slice(first, last + 1) if last - first + 1 == indices.size else indices
@@ -50,7 +48,7 @@ def _group_terms(
     terms: Sequence[Sequence[Term]], offsets: Sequence[int], runs: Sequence[int]
 ) -> list[_Group]:
     """Merge equal laws of all campaigns into groups, ordered by phase, then by first appearance."""
-    found: dict[tuple[int, Any, int], list[tuple[Term, NDArray[np.intp]]]] = {}
+    found: dict[tuple[int, Law, int], list[tuple[Term, Places]]] = {}
     for number, campaign_terms in enumerate(terms):
         rows = np.arange(offsets[number], offsets[number] + runs[number])
         for term in campaign_terms:
@@ -204,7 +202,7 @@ class _Batch:
         if resting.size:
             self._leave_rest(resting)
 
-    def _cross(self, rows: NDArray[np.intp], before: Array, slope: Array, h: float) -> None:
+    def _cross(self, rows: Places, before: Array, slope: Array, h: float) -> None:
         """After the crossing, friction acts the other way, or sticks."""
         angle_at = rows + (2 if self.flexible else 0) * self.size
         rate_at = angle_at + self.size
@@ -229,7 +227,7 @@ class _Batch:
         self.sign[rows] = turned
         self.moving[rows] = np.where(stick, 0.0, 1.0)
 
-    def _leave_rest(self, rows: NDArray[np.intp]) -> None:
+    def _leave_rest(self, rows: Places) -> None:
         """Rows at rest slip once the other moments exceed the level."""
         net = self.stage.top[rows]
         go = np.abs(net) > self.stage.level[rows]
@@ -244,7 +242,6 @@ def integrate(
 
     Args:
         conditions: one per campaign; all with or all without a flexible rod, equal sample rates.
-        terms: the terms of each campaign.
         substeps: RK4 steps per sample.
 
     Returns:

@@ -44,10 +44,8 @@ def draw_set(count: int, seed: int, shares: dict[str, float], mixture: Mixture) 
     """Draw a set in which all families occur about equally often.
 
     Args:
-        count: number of campaigns.
         seed: of all random numbers; the same arguments give the same set.
         shares: relative frequency of each kind.
-        mixture: of the forms.
     """
     root = np.random.SeedSequence(seed)
     order_seed, *seeds = root.spawn(count + 1)

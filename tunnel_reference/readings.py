@@ -35,7 +35,6 @@ class Reading:
     Args:
         value: shape (samples, runs), rad.
         motion: of the rod's upper end.
-        conditions: of the campaign.
         rng: for laws with random numbers.
     """
 
@@ -54,8 +53,6 @@ class ReadingTerm:
     """A sensor law with its parameters by run.
 
     Args:
-        law: the law.
-        order: when it acts.
         params: arrays of shape (runs,).
     """
 
@@ -72,7 +69,6 @@ def read_motion(
     Args:
         conditions: the campaign's noise, zero and resolution.
         motion: of the rod's upper end.
-        terms: sensor laws.
         rng: the noise is drawn before the laws draw, so that it does not depend on the effects.
 
     Returns:

@@ -27,7 +27,6 @@ def size_separably(draws: Sequence[CampaignDraw], *, progress: bool = False) -> 
     """Scale the effects of campaigns; draw those again in which an effect does not matter or cannot be told apart.
 
     Args:
-        draws: drawn campaigns.
         progress: whether to report progress on standard error.
 
     Returns:
@@ -55,9 +54,6 @@ def _separable(draw: CampaignDraw) -> bool:
 
 def own_excesses(draws: Sequence[CampaignDraw]) -> list[CampaignDraw]:
     """Set the own excess of every known effect that matters.
-
-    Args:
-        draws: sized campaigns.
 
     Returns:
         The campaigns; those outside the known families and without effects are unchanged.

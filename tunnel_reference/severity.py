@@ -33,7 +33,6 @@ class Simulated:
     """A simulated campaign.
 
     Args:
-        draw: the campaign as drawn.
         readings: shape (samples, runs), rad.
         excess: after refitting the nominal model.
         run_excess: excess by run, shape (runs,).
@@ -71,7 +70,6 @@ def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> lis
     """Integrate campaigns in as few batches as possible.
 
     Args:
-        draws: the campaigns to simulate.
         fine: 10 steps per sample (20 with a flexible rod); otherwise 1 (10), for scaling effects.
     """
     bound = [bind_effects(d) for d in draws]
@@ -155,11 +153,7 @@ def size_effects(draws: Sequence[CampaignDraw], *, progress: bool = False) -> li
     """Scale every effect to its target excess, each alone in the conditions of its campaign.
 
     Args:
-        draws: drawn campaigns.
         progress: whether to report progress on standard error.
-
-    Returns:
-        The campaigns with severity parameters set.
     """
     searches = [
         _Search(number, slot, replace(draw, effects=(effect,)))

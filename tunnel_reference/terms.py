@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from tunnel_reference.conditions import Array
 
 Params = Mapping[str, Array]
-Rows = NDArray[np.intp] | slice
+Places = NDArray[np.intp]
+Rows = Places | slice
 
 
 class Phase(IntEnum):
@@ -70,8 +71,6 @@ class Term:
     """A law bound to the runs of one campaign.
 
     Args:
-        law: the law.
-        phase: when it acts.
         params: arrays whose first axis is the campaign's runs.
         memory: initial states of the law, shape (states, runs); None where it has none.
     """

@@ -22,7 +22,6 @@ def in_processes(
 
     Args:
         work: what to do; it and its results must be picklable.
-        items: what to do it to.
         jobs: number of processes; 0 works in this one.
 
     Yields:

@@ -47,9 +47,6 @@ class Row:
     """One episode.
 
     Args:
-        preset: of the environment.
-        policy: a name of `POLICIES`.
-        seed: of the episode.
         runs: made until the goal, or until the episode was cut off; number of them.
         rig_time_s: likewise, s.
         reached: whether the goal was reached.
@@ -73,13 +70,7 @@ class Row:
 
 
 def play(preset: str, policy: str, seed: int) -> Row:
-    """Play one episode.
-
-    Args:
-        preset: of the environment.
-        policy: a name of `POLICIES`.
-        seed: of the episode.
-    """
+    """Play one episode."""
     env = CampaignEnv(preset=preset, expose_truth=True, **ARGUMENTS[preset])
     info = run_campaign(env, POLICIES[policy], seed=seed)
     known, truth = env.known, info["truth"]
@@ -109,11 +100,7 @@ def _answer(known: Knowledge) -> str:
 
 
 def to_csv(rows: Sequence[Row]) -> str:
-    """Rows as CSV with a header.
-
-    Args:
-        rows: any.
-    """
+    """Rows as CSV with a header."""
     stream = io.StringIO()
     writer = csv.DictWriter(stream, [field.name for field in fields(Row)], lineterminator="\n")
     writer.writeheader()
@@ -122,11 +109,7 @@ def to_csv(rows: Sequence[Row]) -> str:
 
 
 def from_csv(text: str) -> list[Row]:
-    """The inverse of `to_csv`.
-
-    Args:
-        text: of the file.
-    """
+    """The inverse of `to_csv`."""
     kinds: dict[str, Any] = {"seed": int, "runs": int, "rig_time_s": float}
     kinds |= {"cn_beta_error": float, "cn_r_error": float}
     flags = ("reached", "on_first", "right")
@@ -142,9 +125,6 @@ def median_interval(values: Array) -> tuple[float, float, float]:
 
     Args:
         values: shape (n,).
-
-    Returns:
-        Median, lower and upper end, in the unit of the values.
     """
     ordered = np.sort(values)
     # Of n values, those of ranks k+1 and n−k enclose the median unless at most k lie on one side of it.
@@ -157,12 +137,7 @@ def median_interval(values: Array) -> tuple[float, float, float]:
 
 
 def table(rows: Sequence[Row], preset: str) -> str:
-    """The comparison as a table in Markdown.
-
-    Args:
-        rows: of all presets.
-        preset: which to show.
-    """
+    """The comparison as a table in Markdown."""
     first, second = CONTESTS[preset]
     lines = [
         "| policy | runs, median (95 %) | rig time, median (95 %) [min] | goal reached | with run one | right |",
@@ -206,12 +181,7 @@ def _share(rows: Sequence[Row], name: str) -> str:
 
 
 def fill(page: str, rows: Sequence[Row]) -> str:
-    """A page with its tables replaced: what stands between ``<!-- NAME -->`` and ``<!-- end -->``.
-
-    Args:
-        page: Markdown.
-        rows: of all presets.
-    """
+    """A page with its tables replaced: what stands between ``<!-- NAME -->`` and ``<!-- end -->``."""
     for preset in CONTESTS:
         head, mark, rest = page.partition(f"<!-- {preset} -->\n")
         _, end, tail = rest.partition("<!-- end -->")
@@ -221,9 +191,6 @@ def fill(page: str, rows: Sequence[Row]) -> str:
 
 def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
     """How Cnr's standard deviation falls with the rig time in one campaign, by policy.
-
-    Args:
-        seed: of the episode.
 
     Returns:
         By policy: rig time [s] and relative standard deviation (1), each of shape (runs + 1,).
@@ -238,12 +205,7 @@ def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """The figure of the page.
-
-    Args:
-        rows: of all presets.
-        path: the PNG, written whole or not at all.
-    """
+    """The figure of the page."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -280,9 +242,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Args:
         arguments: those of the process when None.
-
-    Returns:
-        0.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("docs", type=Path, help="the folder docs of the source tree")

@@ -23,9 +23,6 @@ def error_figure(errors: HeldOutErrors) -> Figure:
 
     Args:
         errors: in %, on responses that were not trained on.
-
-    Returns:
-        The figure.
     """
     from matplotlib.figure import Figure
 
@@ -44,10 +41,6 @@ def error_figure(errors: HeldOutErrors) -> Figure:
 
 def table3_figure(rows: Sequence[WindowRow], shown: Mapping[str, Sequence[WindowEstimate]]) -> Figure:
     """Table III beside windows of simulated runs.
-
-    Args:
-        rows: the paper's.
-        shown: windows of wind-on runs by what the rig was.
 
     Returns:
         The figure: ζ on the left, ωn on the right, against the window's number.
@@ -86,7 +79,6 @@ def response_figure(run: Run, estimates: Sequence[Estimate], *, magnified: tuple
 
     Args:
         run: the record; its id is looked up in the estimates.
-        estimates: of its campaign, a method each.
         magnified: stretch shown large, from and to, s.
 
     Returns:

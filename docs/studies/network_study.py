@@ -54,12 +54,7 @@ class HeldOutErrors:
 
 
 def fig3_errors(networks: Networks, rng: np.random.Generator) -> HeldOutErrors:
-    """Put responses over the training range through both networks, noise-free.
-
-    Args:
-        networks: trained.
-        rng: draws ζ and ωn.
-    """
+    """Put responses over the training range through both networks, noise-free."""
     zeta, omega = held_out_points(networks.spec, rng)
     found = networks.zeta(network_inputs(zeta))
     omega_found = networks.omega_n(found, cycles_time(zeta, omega))
@@ -127,10 +122,8 @@ def noise_row(
 
     Args:
         zeta: damping ratio.
-        rng: draws the noise.
         omega_n: natural frequency, rad/s.
         noise: standard deviation, rad.
-        trials: number of records.
         duration: of a record, s.
     """
     time, angle = np.arange(round(1000.0 * duration)) / 1000.0, float(np.radians(20.0))
@@ -178,9 +171,7 @@ def paper_run_plan(
     """Spring 5 with the wind off and on, released at 20°: what Table III's run may have been, an inference.
 
     Args:
-        seed: of the noise.
         noisy: noise of 0.0005 rad and 12 bits; else neither.
-        effects: what is added to the nominal model.
         wind_speed: of the second run, m/s.
     """
     plan = paper_plan()
@@ -208,15 +199,7 @@ class Closeness:
 
 
 def closeness(campaign: Campaign, truth: Truth) -> dict[str, Closeness]:
-    """Table IV and Figs 4 to 6 for one campaign of known truth.
-
-    Args:
-        campaign: with the wind off and on.
-        truth: what was injected.
-
-    Returns:
-        By method, of those that gave both coefficients.
-    """
+    """Table IV and Figs 4 to 6 for one campaign of known truth."""
     found = {}
     for method in METHODS:
         estimate = identify(campaign, method, throw=False)
@@ -234,7 +217,6 @@ def regenerated(run: Run, omega_n: float, zeta: float) -> Array:
     """The response of eq. 16, a release at rest, from ζ and ωn, scaled and shifted to the record.
 
     Args:
-        run: the record it is set against.
         omega_n: natural frequency, rad/s.
         zeta: damping ratio.
 
@@ -263,7 +245,6 @@ class Verdict:
     Args:
         rms: root mean square of each method's quantity, % of the truth or of the release angle.
         closer: number of campaigns in which the network's is smaller than the conventional method's.
-        total: number of campaigns.
     """
 
     rms: Mapping[str, float]
@@ -275,7 +256,6 @@ def verdict(rows: Sequence[Mapping[str, Closeness]], quantity: str) -> Verdict:
     """Count and average over campaigns that every method answered.
 
     Args:
-        rows: of `closeness`.
         quantity: ``cn_beta``, ``cn_r`` or ``response``.
     """
     whole = [row for row in rows if all(method in row for method in METHODS)]
@@ -292,7 +272,6 @@ def reference_campaigns(count: int, seed: int, *, softening: bool) -> list[tuple
 
     Args:
         count: number of campaigns, of conditions and truth of their own.
-        seed: of everything drawn.
         softening: with a spring that softens and a damping that grows with the amplitude, as in `SOFTENING`.
     """
     from tunnel_reference.draw import CampaignDraw, EffectDraw, draw_conditions

@@ -79,7 +79,6 @@ def judge(expected: Expected, document: Mapping[str, Any]) -> bool:
     """Whether an answer is right.
 
     Args:
-        expected: of the record.
         document: of the diagnosis.
 
     Returns:
@@ -110,12 +109,7 @@ def section(name: str, document: Mapping[str, Any] | str, images: Path) -> tuple
     """One record's part of the page.
 
     Args:
-        name: of the record.
         document: of its diagnosis, or why it was refused.
-        images: folder of the figures.
-
-    Returns:
-        Its row of the table, and its section.
     """
     expected = EXPECTED[name]
     if isinstance(document, str):
@@ -166,9 +160,6 @@ def page(parts: Sequence[tuple[str, str]]) -> str:
 
     Args:
         parts: rows and sections of the records.
-
-    Returns:
-        Markdown.
     """
     right = sum(row.endswith("right |") for row, _ in parts)
     head = (

@@ -74,7 +74,6 @@ class WindowDiagnosis:
     """What a table of windows says.
 
     Args:
-        state: the rig as assumed.
         measured: the table; of an entry with two readings their mean.
         std: scatter of every entry.
         explanations: best first.
@@ -123,11 +122,6 @@ class WindowDiagnosis:
 
         Both keep what was fitted here: severities, inertia and mechanical damping.
 
-        Args:
-            one: an explanation.
-            other: its rival.
-            state: the further run.
-
         Returns:
             Distance of the two predicted tables in standard deviations of this table's scatter, √Σ(Δ/std)².
 
@@ -155,10 +149,6 @@ def diagnose_windows(
     Args:
         table: rows in the order of time; None takes the paper's Table III.
         state: the rig in that run; None takes the inference of `rig_state`.
-        kinds: the vocabulary.
-
-    Returns:
-        The answer.
 
     Raises:
         TunnelError: when the table is too short for an estimate of its scatter.

@@ -124,9 +124,6 @@ def rig_state(spring: int = 5, wind_speed: float = 10.0, release_angle: float = 
         spring: number in Table II.
         wind_speed: m/s.
         release_angle: rad.
-
-    Returns:
-        The state, with the derivatives of Table IV (neural network).
     """
     rig, printed = load_rig(), paper_derivatives()[0]
     derivatives = AeroDerivatives(printed.cn_beta_per_rad, printed.cn_r_per_rad)
@@ -185,7 +182,6 @@ def simulate_windows(
     """Simulate a release and window its reading as the paper did.
 
     Args:
-        state: the rig.
         effects: effects to add to the linear model; none with a random part, of which one table shows one draw.
         omega_n: base natural frequency in the state ``base``, rad/s.
         zeta: base damping ratio there.
@@ -218,10 +214,8 @@ def base_dynamics(state: RigState, omega_n: float, zeta: float, rig: Rig) -> tup
     """Inertia and mechanical damping that give a base ωn and ζ with the air as printed.
 
     Args:
-        state: the rig's state.
         omega_n: rad/s, with the wind on.
         zeta: damping ratio, with the wind on.
-        rig: gives A and l.
 
     Returns:
         Izz in kg m² and Cr in N m s/rad.

@@ -47,7 +47,7 @@ class RunDecay:
     Args:
         estimate: the run's result, or the status of its failure.
         decay: decay rate and stiffness; None where the run could not be identified.
-        covariance: of (a, k), shape (2, 2), in 1/s and 1/s²; None likewise.
+        covariance: of (a, k), shape (2, 2), in 1/s and 1/s²; None where decay is.
     """
 
     estimate: RunEstimate
@@ -69,8 +69,6 @@ def combined_estimate(
     of Birge, Phys. Rev. 40 (1932) 207–227, doi 10.1103/PhysRev.40.207.
 
     Args:
-        campaign: the runs' conditions.
-        name: of the estimator.
         found: one per run, in the campaign's order.
         together: a method's own combination of the runs, which starts from that of least squares.
 
@@ -105,44 +103,35 @@ def combined_estimate(
     ratio = _birge_ratio(design, parameters, decays, informations)
     if together is not None:
         parameters, covariance = together(design, [place for place, *_ in pairs], parameters, covariance)
-    covariance = covariance * ratio
-    return campaign_estimate(campaign, estimate, runs, design, parameters, covariance, statuses)
+    values = derivatives(design, parameters)
+    own = values.jacobian @ (covariance * ratio) @ values.jacobian.T
+    if values.names and not determined(own):
+        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
+    return filled(campaign, estimate, runs, design, values, own, statuses | limits(design, parameters))
 
 
-def campaign_estimate(
+def filled(
     campaign: Campaign,
     estimate: Estimate,
     runs: Sequence[Run],
     design: Design,
-    parameters: Array,
+    found: Derivatives,
     covariance: Array,
     statuses: set[Status],
 ) -> Estimate:
-    """Fill in an estimate from the shared parameters.
+    """The estimate with coefficients, the air of its runs and the wind-off line.
 
     Args:
-        campaign: what is identified.
-        estimate: with its runs.
         runs: those that the design links.
-        design: links of those runs.
-        parameters: φ, shape (p,).
-        covariance: of φ, shape (p, p).
-        statuses: found so far.
-
-    Returns:
-        The estimate with coefficients, the air of its runs and the wind-off line.
+        covariance: of the values found, shape (p, p).
     """
-    found = derivatives(design, parameters)
-    own = found.jacobian @ covariance @ found.jacobian.T
-    if found.names and not determined(own):
-        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
-    air = air_of_runs(design, found, own, runs)
+    air = air_of_runs(design, found, covariance, runs)
     return replace(
         estimate,
-        statuses=by_gravity(statuses | limits(design, parameters)),
+        statuses=by_gravity(statuses),
         runs=tuple(replace(run, **air.get(run.id, {})) for run in estimate.runs),
         **wind_off(estimate.runs, campaign.runs),
-        **quantities(found, own, has_size=design.has_size),
+        **quantities(found, covariance, has_size=design.has_size),
     )
 
 
@@ -159,7 +148,6 @@ def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> se
     """The statuses of a campaign that follow from its runs.
 
     Args:
-        campaign: their conditions.
         estimates: one per run, in the campaign's order.
 
     Returns:
@@ -200,11 +188,7 @@ def limits(design: Design, parameters: Array) -> set[Status]:
     """The statuses of a campaign whose conditions do not separate parameters, or contradict them.
 
     Args:
-        design: of the campaign.
         parameters: φ as found, shape (p,).
-
-    Returns:
-        The statuses, if any.
     """
     statuses = set()
     if not np.any(design.stiffness_loads > 0.0):
@@ -224,7 +208,6 @@ def quantities(found: Derivatives, covariance: Array, *, has_size: bool) -> dict
     """The coefficients as fields of an `Estimate`, with their covariance.
 
     Args:
-        found: values by name.
         covariance: of the values, shape (p, p).
         has_size: whether the rig states A and l. Without them the coefficients still multiply A·l and A·l²,
             and only Ka and Ca per run are given.
@@ -250,10 +233,7 @@ def air_of_runs(
     """The air's stiffness and damping in every wind-on run.
 
     Args:
-        design: with the runs' loads.
-        found: values by name.
         covariance: of the values, shape (p, p).
-        runs: those that the design links.
 
     Returns:
         By run: keyword arguments of `RunEstimate`.
@@ -277,10 +257,6 @@ def air_of_runs(
 
 def wind_off(estimates: Sequence[RunEstimate], runs: Sequence[Run]) -> dict[str, Any]:
     """Izz and intercept of the line of Kr against ωn² of the wind-off runs (paper, eq. 1).
-
-    Args:
-        estimates: one per run.
-        runs: their conditions.
 
     Returns:
         Keyword arguments of `Estimate`; none without wind-off runs.

@@ -83,7 +83,7 @@ def prior_belief(mean: Mapping[str, float], std: Mapping[str, float]) -> Belief:
 
     Args:
         mean: by name, in the units of `identification.estimate.UNITS`.
-        std: likewise, above 0.
+        std: their standard deviations by name, in the same units, above 0.
 
     Returns:
         The belief before any run; nothing is known of the sensor's zero.
@@ -166,7 +166,6 @@ def expected_belief(
     """The belief after one more run, released at rest.
 
     Args:
-        belief: what is known now.
         link: of the run, see `run_link`, shape (2, 4).
         time: its sample times since the release, shape (n,), s.
         angle: of the release, rad.
@@ -191,10 +190,6 @@ def information_gain(before: Belief, after: Belief) -> float:
 
     It is the fall of the differential entropy of the two, the other parameters marginalised; negative where
     ``after`` is wider.
-
-    Args:
-        before: a belief.
-        after: a later one.
     """
     return 0.5 * (_log_volume(before) - _log_volume(after))
 

@@ -77,10 +77,6 @@ class Derivatives:
 def loads(run: Run, rig: RigProperties) -> tuple[float, float]:
     """The factors of Cnβ and Cnr in a run: ½ρV²·A·l [N m] and ½ρV·A·l² [N m s]; A and l as 1 where unknown.
 
-    Args:
-        run: the run's conditions.
-        rig: the rig's size.
-
     Raises:
         TunnelError: when a wind-on run states no air density, or a stated value is too large or too small for
         double
@@ -125,7 +121,6 @@ def build_design(runs: Sequence[Run], rig: RigProperties) -> Design:
 
     Args:
         runs: at least one, each with its spring_stiffness.
-        rig: the rig's size.
 
     Returns:
         The design; ``columns`` lacks g and n, or d and m, where the runs do not separate them.
@@ -157,7 +152,6 @@ def combine(design: Design, decays: Array, informations: Sequence[Array]) -> tup
     """The shared parameters that fit the runs' own decays best, by generalised least squares.
 
     Args:
-        design: links of the runs.
         decays: (a, k) per run, shape (r, 2), 1/s and 1/s².
         informations: inverse covariance of each (a, k), shape (2, 2).
 
@@ -177,7 +171,6 @@ def derivatives(design: Design, parameters: Array) -> Derivatives:
     """Cnβ, Cnr, Izz and Cr from the shared parameters, with the Jacobian for their covariance.
 
     Args:
-        design: the campaign's design.
         parameters: φ, shape (p,).
 
     Returns:
@@ -207,7 +200,6 @@ def positive_inertia(design: Design, parameters: Array) -> bool:
     """Whether the design gives Izz at all, and a positive one.
 
     Args:
-        design: the campaign's design.
         parameters: φ, shape (p,).
     """
     return "g" in design.columns and bool(parameters[design.columns["g"]] > 0.0)

@@ -130,8 +130,6 @@ def paired_estimate(
     """The campaign's coefficients from its runs, each wind-on run against the wind-off runs of its spring.
 
     Args:
-        campaign: what is identified.
-        estimate: with every run's own result.
         known: the runs that could be identified, at least one, each with what `derivatives.loads` gives.
         statuses: found so far.
 

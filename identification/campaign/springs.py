@@ -65,9 +65,6 @@ def fit_springs(
         false_alarm_rate: probability that a spring of a correct set is flagged.
         rng: draws the calibration; one of a fixed seed where None, so that the result is repeatable.
 
-    Returns:
-        The line, its residuals and the flags.
-
     Raises:
         TunnelError: with fewer than three springs, unequal lengths or values that are not positive.
     """

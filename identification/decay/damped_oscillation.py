@@ -73,7 +73,6 @@ def response_rows(time: Array, decay: Decay, *, constant: bool = False) -> Array
 
     Args:
         time: times since the initial state, shape (n,), s.
-        decay: rate and stiffness.
         constant: whether a row of ones, the sensor's zero, comes last.
 
     Returns:
@@ -108,7 +107,6 @@ def free_decay(time: Array, decay: Decay, angle: float, rate: float) -> Array:
 
     Args:
         time: times since the initial state, shape (n,), s.
-        decay: decay rate and normalised stiffness.
         angle: initial angle β₀, rad.
         rate: initial rate r₀, rad/s.
 
@@ -123,7 +121,6 @@ def sensitivity_weights(decay: Decay, angle: float, rate: float) -> Array:
     """Weights of the rows of `response_rows` in ∂β/∂a and ∂β/∂k.
 
     Args:
-        decay: decay rate and normalised stiffness.
         angle: initial angle β₀, rad.
         rate: initial rate r₀, rad/s.
 
@@ -144,7 +141,6 @@ def envelope_amplitude(decay: Decay, angle: float, rate: float) -> float:
     """Amplitude of the decaying oscillation at the time of its initial state.
 
     Args:
-        decay: decay rate and normalised stiffness.
         angle: initial angle β₀, rad.
         rate: initial rate r₀, rad/s.
 

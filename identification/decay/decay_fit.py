@@ -50,7 +50,6 @@ class RunFit:
     """One run at the optimum.
 
     Args:
-        decay: its decay rate and stiffness.
         angle: initial angle from the sensor's zero, rad.
         rate: initial rate, rad/s.
         residual: reading less model, shape (n,), rad.
@@ -123,7 +122,6 @@ def fit_decays(
     """Fit runs whose decay rate and stiffness are linear in shared parameters.
 
     Args:
-        readings: the runs.
         links: one (2, p) matrix Lᵢ per run: (aᵢ, kᵢ) = Lᵢ φ.
         start: φ to start from, shape (p,).
         zero: the sensor's zero where it is known, rad; estimated where None.
@@ -174,13 +172,8 @@ def fit_run(
     """Fit one run by itself: φ = (a, k).
 
     Args:
-        reading: the run or a window of it.
-        start: decay to start from.
         zero: the sensor's zero where it is known, rad.
         tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
-
-    Returns:
-        The fit of one run.
     """
     decay = np.array([start.rate, start.stiffness])
     return fit_decays([reading], [np.eye(2)], decay, zero=zero, tolerance=tolerance)
@@ -188,10 +181,6 @@ def fit_run(
 
 def project_run(reading: Reading, decay: Decay) -> tuple[RunFit, float] | None:
     """The best initial state and zero of a run for a given decay, for example one found by another method.
-
-    Args:
-        reading: the run.
-        decay: decay rate and normalised stiffness.
 
     Returns:
         The run at that decay and its sensor zero in rad; None where the decay overflows.
@@ -205,7 +194,6 @@ def projected_cost(reading: Reading, decay: Decay) -> float:
 
     Args:
         reading: angles in rad against s.
-        decay: decay rate and normalised stiffness.
 
     Returns:
         Sum of squares, rad²; infinite where the decay overflows.
@@ -218,7 +206,6 @@ def information_at(time: Array, decay: Decay, angle: float, rate: float) -> Arra
 
     Args:
         time: since the initial state, shape (n,), s.
-        decay: decay rate and stiffness.
         angle: initial angle, rad.
         rate: initial rate, rad/s.
 

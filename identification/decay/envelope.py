@@ -50,7 +50,6 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
     """Envelope and phase of a record.
 
     Args:
-        reading: the whole record.
         rough: an approximate decay of the record, with its initial state; it must oscillate.
         zero: the sensor's, rad.
 

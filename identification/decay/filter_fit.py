@@ -30,9 +30,7 @@ class DrivenFit:
     """A driven decay at the maximum of its likelihood.
 
     Args:
-        model: decay and random moment.
         covariance: of (a, k, ln q), shape (3, 3).
-        innovations: at the maximum.
         drop: of −2 ln L against no random moment at all, dimensionless.
     """
 

@@ -23,9 +23,6 @@ def starting_decay(record: Record) -> Decay | None:
     ratios; for heavily damped ones, the fit of the twice integrated equation of motion. The candidate with the
     smallest sum of squares is taken.
 
-    Args:
-        record: the reading of one run.
-
     Returns:
         The decay; None where the record holds no motion, or no decay fits it at all.
     """
@@ -46,9 +43,6 @@ def starting_decay(record: Record) -> Decay | None:
 def starting_frequency(record: Record) -> float | None:
     """The approximate frequency of the strongest oscillation.
 
-    Args:
-        record: the reading of one run.
-
     Returns:
         Hz; None where the record holds no motion.
     """
@@ -66,7 +60,6 @@ def thinned_reading(record: Record, frequency: float) -> Reading:
     """Block means of a record, at least twenty per cycle; they decay at the same rate.
 
     Args:
-        record: the reading of one run.
         frequency: of its oscillation, Hz.
 
     Returns:

@@ -31,11 +31,9 @@ def shared_moments(
     """Mean and covariance of φ, with a flat prior on it.
 
     Args:
-        posteriors: of the runs' (a, k).
         links: one (2, p) matrix per run: (a, k) = L φ.
         centre: of the normal approximation, shape (p,).
         covariance: of the same, shape (p, p).
-        rng: draws the sample.
 
     Returns:
         Mean, shape (p,), and covariance, shape (p, p).

@@ -33,7 +33,6 @@ class Driven:
     """A decay and the random moment that drives it.
 
     Args:
-        decay: decay rate and stiffness.
         intensity: q, spectral intensity of the moment per inertia, rad²/s³; 0 where there is none.
         corner: fb, Hz, of the moment's spectrum; None where it is white.
     """
@@ -71,7 +70,6 @@ def innovations(values: Array, interval: float, model: Driven, noise_variance: f
     Args:
         values: readings or block means, shape (n,), rad.
         interval: between them, s.
-        model: decay and random moment.
         noise_variance: R, of one value, rad².
 
     Returns:

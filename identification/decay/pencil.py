@@ -36,7 +36,6 @@ class PencilDecay:
     """A decay and its sensitivity to the noise.
 
     Args:
-        decay: decay rate and stiffness.
         weights: first-order change of (a, k) per rad of each value, shape (2, n).
     """
 

@@ -123,7 +123,6 @@ def posterior_of(
         thin: the run, or block means of it.
         start: of the grid, near the posterior's peak.
         covariance: a guess at that of (a, k), shape (2, 2).
-        knowledge: of the noise.
 
     Returns:
         The posterior; None where the record is too short to bound the decay.

@@ -15,9 +15,6 @@ _ROUNDING = 1e-12  # of the largest reading: a few thousand rounding errors, in 
 def holds_motion(record: Record) -> bool:
     """Whether a record has enough samples, and a reading that changes by more than rounding.
 
-    Args:
-        record: the reading of one run.
-
     Returns:
         False for a record of fewer than eight samples, for a constant one, and for one whose numbers are so large
         or small that their squares cannot be summed.

@@ -25,7 +25,6 @@ class ResidualCheck:
     """The verdict of the least-squares residual of a run.
 
     Args:
-        noise: its level and the verdict on the model.
         covariance: of (a, k) by least squares, widened where the model departs, shape (2, 2), in 1/s and 1/s².
     """
 
@@ -48,11 +47,6 @@ class ResidualCheck:
 
 def residual_check(run: Run, decay: Decay, sensor: SensorProperties) -> ResidualCheck | None:
     """Fit a run by least squares, starting from a method's decay, and test the residual.
-
-    Args:
-        run: the run.
-        decay: what the method found.
-        sensor: what is stated of the noise.
 
     Returns:
         The verdict; None where the least squares do not converge to a decay that the record determines.

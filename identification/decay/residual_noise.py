@@ -56,11 +56,7 @@ def eighth_of_a_cycle(omega_n: float, sample_interval: float) -> int:
 
 
 def stated_noise(sensor: SensorProperties) -> float | None:
-    """√(noise_std² + resolution²/12), rad; None where noise_std is not stated.
-
-    Args:
-        sensor: what the campaign states.
-    """
+    """√(noise_std² + resolution²/12), rad; None where noise_std is not stated."""
     if sensor.noise_std is None:
         return None
     return float(np.hypot(sensor.noise_std, (sensor.resolution or 0.0) / np.sqrt(12.0)))
@@ -70,10 +66,6 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
     """The noise level behind the standard deviations, checked against the residuals.
 
     The stated noise is used where the residuals agree with it; otherwise the level of the residuals is used.
-
-    Args:
-        residuals: of the runs fitted together.
-        sensor: what the campaign states.
 
     Returns:
         The level, with the verdicts on the model (``departs``) and on the statement (``disagrees``).

@@ -46,9 +46,8 @@ class FittedRun:
     """A run and its fit.
 
     Args:
-        reading: what was fitted.
         fit: None where the run could not be identified; the estimate's status says why.
-        noise: what the fit's residual says of the noise; None likewise.
+        noise: what the fit's residual says of the noise; None where the fit is.
         estimate: the run's own result.
     """
 
@@ -63,11 +62,7 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
 
     Args:
         run: the run; its wind and spring are not used.
-        sensor: what is stated of the noise.
         cycles_per_window: periods in each of its windows; where None three, or one in a short record.
-
-    Returns:
-        The fit and the run's estimate.
     """
     reading = Reading.from_record(run.record)
     start = starting_decay(run.record)
@@ -93,11 +88,6 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
 def fit_from(run: Run, reading: Reading, start: Decay) -> DecayFit | None:
     """The least-squares fit of a run by itself.
 
-    Args:
-        run: the run.
-        reading: all of its record.
-        start: decay to start from.
-
     Returns:
         The fit; None where it does not converge to a decay of positive stiffness.
     """
@@ -122,13 +112,8 @@ def residuals_of(
     """The residuals of fitted runs, with what is needed to test them.
 
     Args:
-        readings: of the runs.
-        runs: their fits.
         zero: the sensor's, rad.
         unknowns: number of parameters fitted to each run's own data.
-
-    Returns:
-        One per run.
     """
     return [
         Residual(
@@ -146,9 +131,6 @@ def residuals_of(
 def decay_covariance_of(fitted: RunFit) -> Array:
     """Covariance of (a, k) per noise variance, at the optimum of the least squares.
 
-    Args:
-        fitted: the run.
-
     Returns:
         Shape (2, 2); times the noise variance in rad² it is in 1/s and 1/s².
     """
@@ -161,10 +143,7 @@ def judge(
     """The noise level from the residual of one run's fit, and whether the run shows a decay at all.
 
     Args:
-        reading: what was fitted.
-        fitted: the run at its decay.
         zero: its sensor zero, rad.
-        sensor: what is stated of the noise.
 
     Returns:
         The noise level, and the status of the failure, None if there is none.
@@ -193,9 +172,6 @@ def describe_run(
     and that of the decay.
 
     Args:
-        run: its conditions.
-        reading: the whole run.
-        fitted: the run at its decay.
         zero: its sensor zero, rad.
         covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
         noise_variance: of one sample of the reading, rad².

@@ -39,9 +39,6 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
             start a fit of many cycles.
         falling: whether the window falls from the start of the record, instead of rising first: it then sees a
             decay that ends long before the record does.
-
-    Returns:
-        The peak.
     """
     if not holds_motion(record):
         return SpectralPeak(0.0, 0.0)

@@ -12,9 +12,6 @@ from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 def even_reading(reading: Reading) -> Reading:
     """A reading on a uniform raster, for methods that work by the place of a sample and not by its time.
 
-    Args:
-        reading: at any times.
-
     Returns:
         As `tunnel_sim.vocabulary.record.evenly_spaced`; the reading itself where its times are uniform.
     """
@@ -26,7 +23,6 @@ def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[R
     """Thin a reading to means of equal blocks.
 
     Args:
-        reading: the whole record.
         frequency: of its oscillation, Hz.
         per_cycle: least number of blocks per period; the record itself gives eight at the least.
 

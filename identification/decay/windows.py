@@ -45,10 +45,7 @@ def fit_windows(
     describe even roughly is skipped.
 
     Args:
-        reading: the whole run.
-        run: its decay.
         zero: its sensor zero, rad.
-        noise: its noise level.
         cycles: periods in a window; where None three, or one where the record is too short for four such.
 
     Returns:

@@ -1,13 +1,14 @@
 """The estimators, one per file, and their registry.
 
-To add one, write a frozen dataclass in its own file, whose fields are its settings and which has the members of
-`Estimator`, and add an entry below. An entry is only data, so a heavy import such as torch waits until the
-estimator is used. The conformance suite runs over all entries.
+To add one, write a frozen dataclass with the members of `Estimator`, whose fields are its settings, and add a line
+to `SUMMARIES`. The file has the estimator's name, and the class has that name in CamelCase, as in
+``output_error.OutputError``. It is imported when the estimator is made, so a heavy import such as torch waits until
+then. The conformance suite runs over all of them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 
@@ -34,75 +35,21 @@ class Estimator(Protocol):
         """
 
 
-@dataclass(frozen=True)
-class Entry:
-    """Where an estimator is found.
+SUMMARIES: Mapping[str, str] = {
+    "output_error": "maximum likelihood over all runs at once",
+    "conventional": "the paper's: spectrum, time to half amplitude, each wind-on run paired with wind-off "
+    "runs of its spring",
+    "neural_network": "the paper's: one network for damping, one for frequency, three cycles at a time, paired "
+    "in the same way",
+    "matrix_pencil": "poles by linear algebra, run by run: the fastest, and nearly as accurate",
+    "log_decrement": "weighted regression of the logarithms of all peaks, run by run: the classical manual method",
+    "hilbert": "envelope and phase, run by run; its windows are damping and frequency against amplitude",
+    "filter_error": "maximum likelihood with a random moment on the model: for runs with buffeting",
+    "bayesian": "posterior means and 95 % intervals that are valid for records of one to three cycles",
+}
+"""Method and purpose of each estimator by name, one line for the help of the command line."""
 
-    Args:
-        name: in the registry, in JSON and on the command line.
-        module: it lives in.
-        factory: the class in it; called without arguments it has its default settings.
-        summary: one line for the help of the command line: the method and its purpose.
-    """
-
-    name: str
-    module: str
-    factory: str
-    summary: str
-
-
-ENTRIES: tuple[Entry, ...] = (
-    Entry(
-        "output_error",
-        "identification.estimators.output_error",
-        "OutputError",
-        "maximum likelihood over all runs at once",
-    ),
-    Entry(
-        "conventional",
-        "identification.estimators.conventional",
-        "Conventional",
-        "the paper's: spectrum, time to half amplitude, each wind-on run paired with wind-off runs of its spring",
-    ),
-    Entry(
-        "neural_network",
-        "identification.estimators.neural",
-        "NeuralNetwork",
-        "the paper's: one network for damping, one for frequency, three cycles at a time, paired in the same way",
-    ),
-    Entry(
-        "matrix_pencil",
-        "identification.estimators.matrix_pencil",
-        "MatrixPencil",
-        "poles by linear algebra, run by run: the fastest, and nearly as accurate",
-    ),
-    Entry(
-        "log_decrement",
-        "identification.estimators.log_decrement",
-        "LogDecrement",
-        "weighted regression of the logarithms of all peaks, run by run: the classical manual method",
-    ),
-    Entry(
-        "hilbert",
-        "identification.estimators.hilbert",
-        "Hilbert",
-        "envelope and phase, run by run; its windows are damping and frequency against amplitude",
-    ),
-    Entry(
-        "filter_error",
-        "identification.estimators.filter_error",
-        "FilterError",
-        "maximum likelihood with a random moment on the model: for runs with buffeting",
-    ),
-    Entry(
-        "bayesian",
-        "identification.estimators.bayesian",
-        "Bayesian",
-        "posterior means and 95 % intervals that are valid for records of one to three cycles",
-    ),
-)
-
-ALL_ESTIMATORS: tuple[str, ...] = tuple(entry.name for entry in ENTRIES)
+ALL_ESTIMATORS: tuple[str, ...] = tuple(SUMMARIES)
 
 
 def make_estimator(name: str) -> Estimator:
@@ -111,13 +58,12 @@ def make_estimator(name: str) -> Estimator:
     Args:
         name: one of `ALL_ESTIMATORS`.
 
-    Returns:
-        The estimator.
-
     Raises:
         TunnelError: when there is no such estimator; the error names the closest one.
     """
-    for entry in ENTRIES:
-        if entry.name == name:
-            return cast("Estimator", getattr(import_module(entry.module), entry.factory)())
-    raise TunnelError(f"no estimator {name!r}", where="identify", remedy=did_you_mean(name, ALL_ESTIMATORS))
+    if name not in SUMMARIES:
+        raise TunnelError(
+            f"no estimator {name!r}", where="identify", remedy=did_you_mean(name, ALL_ESTIMATORS)
+        )
+    kind = name.title().replace("_", "")
+    return cast("Estimator", getattr(import_module(f"{__name__}.{name}"), kind)())

@@ -11,13 +11,13 @@ doi 10.1098/rspa.1946.0056.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay, combined_estimate
-from identification.campaign.derivatives import Design, loads
+from identification.campaign.assembly import Combination, RunDecay
+from identification.campaign.derivatives import Design
 from identification.decay.damped_oscillation import Decay
 from identification.decay.decay_fit import Reading, fit_run, project_run
 from identification.decay.first_guess import starting_decay
@@ -25,15 +25,21 @@ from identification.decay.importance import shared_moments
 from identification.decay.posterior import NoiseKnowledge, Posterior, posterior_of
 from identification.decay.run_fit import decay_covariance_of, describe_run, judge
 from identification.decay.thinning import block_means
-from identification.estimate import Estimate, NoiseLevel, Quantity, Status
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from identification.estimate import NoiseLevel, Quantity, Status
+from identification.estimators.run_by_run import Found, RunByRun
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _LINEAR = 3  # initial angle and rate, zero
 
 
+@dataclass(frozen=True, eq=False)
+class _PosteriorDecay(RunDecay):
+    posterior: Posterior = field(kw_only=True)
+
+
 @dataclass(frozen=True)
-class Bayesian:
+class Bayesian(RunByRun):
     """Posterior means, deviations and intervals.
 
     Args:
@@ -41,55 +47,40 @@ class Bayesian:
         seed: of the draws that combine the runs.
     """
 
-    name: ClassVar[str] = "bayesian"
+    name = "bayesian"
     blocks_per_cycle: int = 20
     seed: int = 0
 
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign under all of them.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate, its intervals those of the posterior. A run that could not be identified is left out.
-
-        Raises:
-            TunnelError: when a wind-on run states no air density.
-        """
-        for run in campaign.runs:
-            loads(run, campaign.rig)
-        results = [self._run(run, campaign.sensor) for run in campaign.runs]
-
+    def _together(self, found: Sequence[RunDecay]) -> Combination:
         def together(
             design: Design, places: list[int], centre: Array, covariance: Array
         ) -> tuple[Array, Array]:
-            posteriors = [found for i in places if (found := results[i][1]) is not None]
+            posteriors = [one.posterior for i in places if isinstance(one := found[i], _PosteriorDecay)]
             rng = np.random.default_rng(self.seed)
             return shared_moments(posteriors, design.links, centre, covariance, rng)
 
-        return combined_estimate(campaign, self.name, [found for found, _ in results], together=together)
+        return together
 
-    def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunDecay, Posterior | None]:
+    def _run(self, run: Run, sensor: SensorProperties) -> Found:
         start = starting_decay(run.record)
         if start is None:
-            return RunDecay.failed(run, Status.NO_OSCILLATION), None
+            return Status.NO_OSCILLATION
         reading = Reading.from_record(run.record)
         fit = fit_run(reading, start)
         if not fit.runs or fit.runs[0].decay.stiffness <= 0.0:
-            return RunDecay.failed(run, Status.NOT_CONVERGED), None
+            return Status.NOT_CONVERGED
         noise, failure = judge(reading, fit.runs[0], fit.zero, sensor)
         if failure is not None:
-            return RunDecay.failed(run, failure), None
+            return failure
         variance = noise.std**2 * noise.slow_ratio
         guess = decay_covariance_of(fit.runs[0]) * variance
         found = self._posterior(reading, fit.runs[0].decay, fit.runs[0].residual, guess, noise)
         if found is None:
-            return RunDecay.failed(run, Status.NOT_CONVERGED), None
+            return Status.NOT_CONVERGED
         mean, covariance = found.moments()
         projected = project_run(reading, Decay(float(mean[0]), float(mean[1])))
         if projected is None:
-            return RunDecay.failed(run, Status.NOT_CONVERGED), None
+            return Status.NOT_CONVERGED
         described = describe_run(run, reading, *projected, covariance, variance, noise=noise)
         omega_n, zeta = found.modal()
         estimate = replace(
@@ -97,7 +88,7 @@ class Bayesian:
             omega_n=Quantity(omega_n[0], omega_n[1], "rad/s", omega_n[2:]),
             zeta=Quantity(zeta[0], zeta[1], "1", zeta[2:]),
         )
-        return RunDecay(estimate, projected[0].decay, covariance), found
+        return _PosteriorDecay(estimate, projected[0].decay, covariance, posterior=found)
 
     def _posterior(
         self, reading: Reading, decay: Decay, residual: Array, guess: Array, noise: NoiseLevel

@@ -9,50 +9,30 @@ They include scatter only, not the bias of the method.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
 from identification.campaign.assembly import departures
-from identification.campaign.derivatives import loads
-from identification.campaign.pairing import PairedRun, paired_estimate
+from identification.campaign.pairing import PairedRun
 from identification.decay.damped_oscillation import Decay
 from identification.decay.peaks import PeakDecay, peak_decay
 from identification.decay.residual_check import residual_check
 from identification.decay.spectrum import psd_peak
-from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_gravity
+from identification.estimate import NoiseLevel, Quantity, RunEstimate, Status, by_gravity
+from identification.estimators.run_by_run import Paired
 from identification.policy import LEAST_PROMINENCE
 from identification.statistics.weighted_line import decay_covariance, deviations
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
 
 @dataclass(frozen=True)
-class Conventional:
+class Conventional(Paired):
     """The paper's method; it has no settings."""
 
-    name: ClassVar[str] = "conventional"
+    name = "conventional"
 
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign by pairs of wind-on and wind-off runs.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate; the coefficients omit wind-on runs without a wind-off run of their spring.
-
-        Raises:
-            TunnelError: when a wind-on run states no air density.
-        """
-        pairs = [loads(run, campaign.rig) for run in campaign.runs]
-        seen = [_see(run, campaign.sensor) for run in campaign.runs]
-        estimate = Estimate(campaign.name, self.name, tuple(_run_estimate(s) for s in seen))
-        known = [(one, load) for one, load in zip(seen, pairs, strict=True) if one.peaks is not None]
-        if not known:
-            return replace(estimate, statuses=(Status.NO_RUN_IDENTIFIED,))
-        statuses = {Status.RUN_LEFT_OUT} if len(known) < len(seen) else set()
-        statuses |= departures([one.noise for one in seen])
-        return paired_estimate(campaign, estimate, [(_paired(one), load) for one, load in known], statuses)
+    def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunEstimate, PairedRun | None]:
+        return _described(_see(run, sensor))
 
 
 @dataclass(frozen=True)
@@ -82,9 +62,9 @@ def _see(run: Run, sensor: SensorProperties) -> _Seen:
     return _Seen(run, peak.frequency, peaks, check.noise)
 
 
-def _run_estimate(seen: _Seen) -> RunEstimate:
+def _described(seen: _Seen) -> tuple[RunEstimate, PairedRun | None]:
     if seen.peaks is None:
-        return RunEstimate(seen.run.id, (Status.NO_OSCILLATION,))
+        return RunEstimate(seen.run.id, (Status.NO_OSCILLATION,)), None
     peaks = seen.peaks
     omega_d, omega_d_std = 2.0 * np.pi * seen.frequency, 2.0 * np.pi * peaks.frequency_std
     omega = float(np.hypot(omega_d, peaks.rate))
@@ -93,20 +73,15 @@ def _run_estimate(seen: _Seen) -> RunEstimate:
     statuses = departures([seen.noise])
     if seen.run.spring_stiffness is None:
         statuses.add(Status.NO_STIFFNESS)
-    return RunEstimate(
+    omega_n = Quantity(omega, omega_std, "rad/s")
+    estimate = RunEstimate(
         id=seen.run.id,
         statuses=by_gravity(statuses),
-        omega_n=Quantity(omega, omega_std, "rad/s"),
+        omega_n=omega_n,
         zeta=Quantity(peaks.rate / omega, zeta_std, "1"),
         sensor_zero=Quantity(peaks.zero, peaks.zero_std, "rad"),
         noise=seen.noise,
     )
-
-
-def _paired(seen: _Seen) -> PairedRun:
-    # Of a run that shows an oscillation.
-    omega_n = _run_estimate(seen).omega_n
-    if seen.peaks is None or omega_n is None:
-        raise AssertionError(seen.run.id)
-    peaks = seen.peaks
-    return PairedRun(seen.run, seen.frequency, peaks.frequency_std, peaks.rate, peaks.rate_std, omega_n)
+    return estimate, PairedRun(
+        seen.run, seen.frequency, peaks.frequency_std, peaks.rate, peaks.rate_std, omega_n
+    )

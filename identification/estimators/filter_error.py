@@ -12,7 +12,6 @@ run without a random moment the result is that of output error. Sources: Maine &
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -29,7 +28,7 @@ from identification.decay.run_fit import (
 )
 from identification.decay.thinning import block_means, even_reading
 from identification.estimate import NoiseLevel, Quantity, Status
-from identification.estimators.run_by_run import RunByRun
+from identification.estimators.run_by_run import Found, RunByRun
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
 _DECIDED = 6  # parameters fitted to a run's data: decay, stiffness, intensity, initial state, zero
@@ -48,10 +47,10 @@ class FilterError(RunByRun):
         blocks_per_cycle: block means per period that the filter uses, at least.
     """
 
-    name: ClassVar[str] = "filter_error"
+    name = "filter_error"
     blocks_per_cycle: int = 24
 
-    def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
+    def _run(self, run: Run, sensor: SensorProperties) -> Found:
         bare = identify_run(run, sensor, cycles_per_window=NO_WINDOWS)
         if bare.fit is None or bare.noise is None:
             return RunDecay(bare.estimate)
@@ -78,13 +77,11 @@ class FilterError(RunByRun):
         return None if found is None or found.model.decay.stiffness <= 0.0 else (found, noise_std)
 
 
-def _with_moment(
-    run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit, noise_std: float
-) -> RunDecay:
+def _with_moment(run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit, noise_std: float) -> Found:
     decay = found.model.decay
     projected = project_run(bare.reading, decay)
     if projected is None:
-        return RunDecay.failed(run, Status.NOT_CONVERGED)
+        return Status.NOT_CONVERGED
     fitted, zero = projected
     noise = _judged(before, found, noise_std)
     covariance = found.covariance * noise.slow_ratio

@@ -14,21 +14,17 @@ doi 10.1016/j.jsv.2015.03.025.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay
 from identification.decay.damped_oscillation import Decay
 from identification.decay.decay_fit import Reading, project_run
 from identification.decay.envelope import Envelope, envelope
 from identification.decay.first_guess import starting_decay
-from identification.decay.residual_check import residual_check
 from identification.decay.residual_noise import reading_noise
-from identification.decay.run_fit import describe_run, judge
 from identification.decay.windows import CYCLES, modal_quantities
 from identification.estimate import Quantity, Status, WindowEstimate
-from identification.estimators.run_by_run import RunByRun
+from identification.estimators.run_by_run import Found, RunByRun, described
 from identification.policy import LEAST_ENVELOPE, LEAST_WINDOW_ENERGY
 from identification.statistics.weighted_line import WeightedFit, decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
@@ -46,20 +42,20 @@ class Hilbert(RunByRun):
         cycles_per_window: periods in each window of the backbone; 0 gives none.
     """
 
-    name: ClassVar[str] = "hilbert"
+    name = "hilbert"
     cycles_per_window: int = CYCLES
 
-    def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
+    def _run(self, run: Run, sensor: SensorProperties) -> Found:
         start = starting_decay(run.record)
         if start is None:
-            return RunDecay.failed(run, Status.NO_OSCILLATION)
+            return Status.NO_OSCILLATION
         reading = Reading.from_record(run.record)
         noise_std = reading_noise(run.record, sensor)
         decay, covariance, seen = start, None, None
         for _ in range(_PASSES):
             projected = project_run(reading, decay) if decay.omega_d > 0.0 else None
             if projected is None:
-                return RunDecay.failed(run, Status.NOT_CONVERGED)
+                return Status.NOT_CONVERGED
             if decay.omega_d * float(reading.time[-1]) < np.pi * _LEAST_POINTS:
                 break  # too few half cycles for a line
             seen = envelope(reading, *projected)
@@ -67,21 +63,10 @@ class Hilbert(RunByRun):
             if lines is None:
                 break
             decay, covariance = lines
-        projected = project_run(reading, decay) if decay.stiffness > 0.0 else None
-        if projected is None or seen is None:
-            return RunDecay.failed(run, Status.NOT_CONVERGED)
-        fitted, zero = projected
-        _, failure = judge(reading, fitted, zero, sensor)
-        if failure is not None or covariance is None:
-            return RunDecay.failed(run, failure or Status.NOT_CONVERGED)
-        windows = _backbone(seen, noise_std, self.cycles_per_window)
-        check = residual_check(run, decay, sensor)
-        noise = None if check is None else check.noise
-        covariance = covariance if check is None else check.widened(covariance)
-        estimate = describe_run(
-            run, reading, fitted, zero, covariance, noise_std**2, noise=noise, windows=windows
-        )
-        return RunDecay(estimate, decay, covariance)
+        if seen is None or decay.stiffness <= 0.0:
+            return Status.NOT_CONVERGED
+        windows = () if covariance is None else _backbone(seen, noise_std, self.cycles_per_window)
+        return described(run, decay, covariance, noise_std, sensor, windows)
 
 
 def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array] | None:

@@ -15,20 +15,15 @@ doi 10.1016/j.jsv.2014.01.024.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay
 from identification.decay.damped_oscillation import Decay
-from identification.decay.decay_fit import Reading, project_run
 from identification.decay.first_guess import starting_frequency
 from identification.decay.peaks import PEAK_HALF_WIDTH, follow_peaks
-from identification.decay.residual_check import residual_check
 from identification.decay.residual_noise import reading_noise
-from identification.decay.run_fit import describe_run, judge
 from identification.estimate import Status
-from identification.estimators.run_by_run import RunByRun
+from identification.estimators.run_by_run import Found, RunByRun, described
 from identification.policy import LEAST_PEAK_HEIGHT
 from identification.statistics.weighted_line import decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
@@ -42,32 +37,20 @@ _SWEEPS = 4  # of weights and zero; each adds two digits
 class LogDecrement(RunByRun):
     """Weighted regression of the logarithms of all peaks; it has no settings."""
 
-    name: ClassVar[str] = "log_decrement"
+    name = "log_decrement"
 
-    def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
+    def _run(self, run: Run, sensor: SensorProperties) -> Found:
         frequency = starting_frequency(run.record)
         if frequency is None:
-            return RunDecay.failed(run, Status.NO_OSCILLATION)
-        reading = Reading.from_record(run.record)
+            return Status.NO_OSCILLATION
         noise_std = reading_noise(run.record, sensor)
         half_width = PEAK_HALF_WIDTH / frequency
         share = noise_std / np.sqrt(2.0 * half_width * run.record.sample_rate)
         times, heights = follow_peaks(run.record, frequency)
         found = _decay_of_peaks(times, heights, share, half_width)
-        projected = None if found is None else project_run(reading, found[0])
-        if found is None or projected is None:
-            return RunDecay.failed(
-                run, Status.NO_OSCILLATION if times.size < _LEAST_PEAKS else Status.NOT_CONVERGED
-            )
-        fitted, zero = projected
-        _, failure = judge(reading, fitted, zero, sensor)
-        if failure is not None:
-            return RunDecay.failed(run, failure)
-        check = residual_check(run, found[0], sensor)
-        noise = None if check is None else check.noise
-        covariance = found[1] if check is None else check.widened(found[1])
-        estimate = describe_run(run, reading, fitted, zero, covariance, noise_std**2, noise=noise)
-        return RunDecay(estimate, found[0], covariance)
+        if found is None:
+            return Status.NO_OSCILLATION if times.size < _LEAST_PEAKS else Status.NOT_CONVERGED
+        return described(run, *found, noise_std, sensor)
 
 
 def _decay_of_peaks(

@@ -9,7 +9,6 @@ Sources: Hua & Sarkar, IEEE Trans. Acoust. Speech Signal Process. 38 (1990) 814�
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from identification.decay.pencil import PencilDecay, pencil_decay
 from identification.decay.run_fit import describe_run, judge
 from identification.decay.thinning import block_means, even_reading
 from identification.estimate import Status
-from identification.estimators.run_by_run import RunByRun
+from identification.estimators.run_by_run import Found, RunByRun
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
 _DECAY_TIMES = 8.0  # in units of 1/σ: later samples hold e^−16 of the energy, and noise
@@ -35,22 +34,22 @@ class MatrixPencil(RunByRun):
             in them falls by (π/blocks)²/6.
     """
 
-    name: ClassVar[str] = "matrix_pencil"
+    name = "matrix_pencil"
     blocks_per_cycle: int = 16
 
-    def _run(self, run: Run, sensor: SensorProperties) -> RunDecay:
+    def _run(self, run: Run, sensor: SensorProperties) -> Found:
         frequency = starting_frequency(run.record)
         if frequency is None:
-            return RunDecay.failed(run, Status.NO_OSCILLATION)
+            return Status.NO_OSCILLATION
         reading = Reading.from_record(run.record)
         found = self._pencil(reading, frequency)
         projected = None if found is None else project_run(reading, found[0].decay)
         if found is None or projected is None or found[0].decay.stiffness <= 0.0:
-            return RunDecay.failed(run, Status.NOT_CONVERGED)
+            return Status.NOT_CONVERGED
         fitted, zero = projected
         noise, failure = judge(reading, fitted, zero, sensor)
         if failure is not None:
-            return RunDecay.failed(run, failure)
+            return failure
         variance = noise.std**2 * noise.slow_ratio
         covariance = found[0].weights @ found[0].weights.T * (variance / found[1])
         estimate = describe_run(run, reading, fitted, zero, covariance, variance, noise=noise)

@@ -15,14 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.assembly import (
-    air_of_runs,
-    departures,
-    limits,
-    quantities,
-    statuses_of_runs,
-    wind_off,
-)
+from identification.campaign.assembly import departures, filled, limits, statuses_of_runs
 from identification.campaign.derivatives import Design, build_design, combine, derivatives, loads
 from identification.decay.decay_fit import DecayFit, RunFit, fit_decays
 from identification.decay.residual_noise import noise_level
@@ -111,15 +104,9 @@ def _joint_estimate(
         speaking = np.array([windy if name.startswith("cn_") else len(runs) for name in found.names])
         influences = _influences(fit.runs, design.links, found.jacobian, own_zeros)
         own = widened_covariance(own, scatter_of_runs(influences, speaking))
-    air = air_of_runs(design, found, own, runs)
+    zero = None if own_zeros else Quantity(fit.zero, float(np.sqrt(covariance[-1, -1])), "rad")
     return replace(
-        estimate,
-        statuses=by_gravity(statuses),
-        runs=tuple(replace(run, **air.get(run.id, {})) for run in estimate.runs),
-        sensor_zero=None if own_zeros else Quantity(fit.zero, float(np.sqrt(covariance[-1, -1])), "rad"),
-        noise=noise,
-        **wind_off(estimate.runs, campaign.runs),
-        **quantities(found, own, has_size=design.has_size),
+        filled(campaign, estimate, runs, design, found, own, statuses), sensor_zero=zero, noise=noise
     )
 
 
@@ -137,7 +124,6 @@ def _influences(runs: Sequence[RunFit], links: Sequence[Array], jacobian: Array,
     """The contribution of each run's residual to parameters fitted to all runs.
 
     Args:
-        runs: of the joint fit.
         links: one (2, p) matrix per run.
         jacobian: of the wanted parameters to φ, shape (q, p).
         own_zeros: whether each run has its own zero, or all one.

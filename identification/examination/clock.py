@@ -43,9 +43,6 @@ class Clock:
 def with_clocks(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """Replace rounded time stamps by the uniform clock behind them, and note uneven ones.
 
-    Args:
-        campaign: the runs.
-
     Returns:
         The campaign, itself if no stamp is replaced, and the remarks: one on the runs with rounded stamps, one on
         those whose samples are used at the uneven times given, one on those with missing samples.

@@ -31,9 +31,6 @@ def examine(campaign: Campaign) -> Examined:
     and springs or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies are
     noted.
 
-    Args:
-        campaign: measured or simulated runs.
-
     Returns:
         The campaign to identify and the remarks; the given campaign itself if nothing is wrong.
 
@@ -58,9 +55,6 @@ def examine(campaign: Campaign) -> Examined:
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """Cut every record to begin at its release.
-
-    Args:
-        campaign: the runs.
 
     Returns:
         The campaign, itself if every record begins at its release already, and a remark for each run that was cut.

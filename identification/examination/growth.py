@@ -15,9 +15,6 @@ from tunnel_sim.vocabulary.record import Array
 def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
     """Refuse wind-off runs whose oscillation grows.
 
-    Args:
-        swings: of the runs.
-
     Returns:
         One remark for all such runs, if any. A run grows if its decay rate is negative beyond chance and its swings
         become larger with time; a blow in mid-record does not look like that.

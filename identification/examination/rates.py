@@ -15,9 +15,6 @@ from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 def noted_quantity(campaign: Campaign) -> tuple[Remark, ...]:
     """Note that the readings are not angles.
 
-    Args:
-        campaign: the runs.
-
     Returns:
         One remark on all runs; none where the readings are angles.
     """
@@ -40,7 +37,6 @@ def as_angles(estimate: Estimate, sensor: SensorProperties) -> Estimate:
 
     Args:
         estimate: in which the reading was taken for an angle.
-        sensor: what it measures.
 
     Returns:
         The estimate with amplitudes of the angle and zeros in the unit of the reading. The initial state and the

@@ -40,7 +40,6 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
 
     Args:
         record: one run's reading.
-        sensor: what is stated of its noise.
 
     Returns:
         Index of the first sample of the free motion; 0 if the record starts in it, or if no oscillation is found.

@@ -11,9 +11,6 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 def without_repeats(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """Leave out runs that hold the samples of an earlier one.
 
-    Args:
-        campaign: the runs.
-
     Returns:
         The campaign with every record once, and a remark for every id that was left out. The same samples under
         different conditions are refused: one of the two statements is wrong.

@@ -96,9 +96,6 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
 def windows_of(record: Record) -> Windows | None:
     """Amplitude and frequency in windows of about three cycles.
 
-    Args:
-        record: of one run.
-
     Returns:
         The windows; None where there are fewer than twice the least number of a growth.
     """

@@ -23,7 +23,6 @@ class Swing:
     """One run's oscillation.
 
     Args:
-        run: the run.
         stiffness: k = ωn², 1/s².
         stiffness_std: its standard deviation, 1/s². It includes the change of k along the run: a frequency that
             depends on the amplitude is not known better than that.

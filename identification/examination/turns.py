@@ -11,9 +11,6 @@ from tunnel_sim.vocabulary.campaign import Campaign
 def wide_swings(campaign: Campaign) -> tuple[Remark, ...]:
     """Note runs that swing by more than half a turn to either side.
 
-    Args:
-        campaign: the runs.
-
     Returns:
         One remark on these runs; none where there are none, where the sensor does not measure an angle, or where
         the campaign states ``plausible = false``.

@@ -23,7 +23,6 @@ class Centre:
     """The centre of a run's oscillation.
 
     Args:
-        run: the run.
         zero: rad (rad/s or rad/s² where the reading is a rate or an acceleration).
         std: its standard deviation, in the same unit; it includes the change along the run.
         swing: half the largest distance of two neighbouring peaks, in the same unit.

@@ -29,7 +29,7 @@ class Hyperparameters:
 
     Args:
         alpha: α, of the squared network weights; dimensionless, for scaled quantities.
-        beta: β, of the squared errors; likewise.
+        beta: β, of the squared errors; dimensionless, for scaled quantities.
     """
 
     alpha: float
@@ -58,14 +58,10 @@ def updated(
     """One re-estimation of α and β by the evidence.
 
     Args:
-        held: the present values.
         eigenvalues: λ of JᵀJ, those that are not zero, shape (k,).
         squared_errors: E_D, in squared units of the scaled output.
         squared_weights: E_W, (1).
         samples: number N of training pairs.
-
-    Returns:
-        The new ones.
     """
     gamma = held.effective_parameters(eigenvalues)
     tiny, epsilon = np.finfo(np.float64).tiny, np.finfo(np.float64).eps
@@ -85,7 +81,6 @@ def log_evidence(
     """Logarithm of p(targets | α, β) by Laplace's approximation; exact for a network linear in its weights.
 
     Args:
-        held: α and β.
         eigenvalues: λ of JᵀJ at the optimum, those that are not zero, shape (k,).
         squared_errors: E_D there, in squared units of the scaled output.
         squared_weights: E_W there, (1).

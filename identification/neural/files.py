@@ -35,7 +35,6 @@ def weights_bytes(damping: Network, frequency: Network) -> bytes:
 
     Args:
         damping: the first.
-        frequency: the second.
     """
     tensors: dict[str, Array] = {}
     for name, network in ((DAMPING, damping), (FREQUENCY, frequency)):
@@ -56,9 +55,6 @@ def read_networks(weights: Path) -> Networks:
 
     Args:
         weights: the safetensors file; its record is the ``.json`` of the same name beside it.
-
-    Returns:
-        The networks.
 
     Raises:
         TunnelError: when a file is missing or malformed, or the two do not belong together.
@@ -90,10 +86,6 @@ def networks_of(weights: bytes, record: bytes | str, where: str) -> Networks:
     Args:
         weights: safetensors.
         record: JSON.
-        where: their name in errors.
-
-    Returns:
-        The networks.
 
     Raises:
         TunnelError: when they are malformed, or do not belong together.

@@ -62,8 +62,6 @@ class Problem:
         sizes: units per layer.
         inputs: scaled, shape (N, inputs).
         targets: scaled, shape (N,).
-        input_scaling: of the inputs.
-        output_scaling: of the targets.
     """
 
     sizes: tuple[int, ...]
@@ -104,7 +102,6 @@ def first_weights(sizes: tuple[int, ...], rng: np.random.Generator) -> Array:
 
     Args:
         sizes: units per layer.
-        rng: draws them.
     """
     parts = []
     for before, after in pairwise(sizes):
@@ -174,10 +171,6 @@ def outputs_only(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor) -> Ten
 def advance(progress: Progress, problem: Problem) -> Progress:
     """One step of Levenberg–Marquardt, after a re-estimation of α and β.
 
-    Args:
-        progress: state of the training.
-        problem: the training pairs.
-
     Returns:
         The new state; ``finished`` where no step lowers F.
     """
@@ -209,15 +202,7 @@ def advance(progress: Progress, problem: Problem) -> Progress:
 
 
 def conclude(progress: Progress, problem: Problem) -> tuple[Network, Outcome]:
-    """The trained network with its posterior, and the result of the training.
-
-    Args:
-        progress: final state of the training.
-        problem: the training pairs.
-
-    Returns:
-        Both.
-    """
+    """The trained network with its posterior, and the result of the training."""
     import torch
 
     weights = torch.from_numpy(progress.weights)

@@ -44,8 +44,6 @@ class Network:
     Args:
         sizes: units per layer, inputs first, one output.
         weights: matrix (row by row) and bias of each layer in turn, shape (n,).
-        inputs: scaling of the inputs.
-        output: scaling of the output.
         directions: eigenvectors of the data's information that stand out of the prior, shape (k, n).
         precision: posterior precision along each of them, shape (k,).
         prior_precision: of the weights along all others, 2α; dimensionless, as the scaled quantities are.

@@ -51,8 +51,6 @@ class Networks:
     Args:
         damping: 100-5-5-1, shape to ζ.
         frequency: 2-2-5-1, ζ and t3 to ωn.
-        spec: of the training data.
-        errors: on the test set.
     """
 
     damping: Network
@@ -123,7 +121,6 @@ def held_out_errors(networks: Networks, rng: np.random.Generator) -> Errors:
 
     Args:
         networks: both; the second uses the ζ of the first.
-        rng: draws the responses.
     """
     zeta, omega = held_out_points(networks.spec, rng)
     found = networks.zeta(network_inputs(zeta))

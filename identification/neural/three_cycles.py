@@ -45,7 +45,6 @@ class ThreeCycles:
         zero: of the sensor, rad.
         decay: envelope's ratio over half a cycle, (1).
         shape: the first network's inputs.
-        noise: propagation of the samples' noise to the results.
     """
 
     start_s: float
@@ -78,7 +77,6 @@ class Propagation:
         """Errors of ζ and t3 per standard deviation of each sample's noise.
 
         Args:
-            shape: the window's.
             gradient: of ζ by the network's inputs, shape (100,).
 
         Returns:
@@ -119,7 +117,6 @@ def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, .
     """The windows of a record, one after the other, until it ends or the oscillation is lost in the noise.
 
     Args:
-        record: the reading of one run.
         noise_std: standard deviation of one sample, rad, above 0.
 
     Returns:

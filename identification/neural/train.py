@@ -42,7 +42,6 @@ class TrainingSpec:
 
     Args:
         seed: of the first weights, the noise and the test set.
-        data: the responses.
         starts: number of trainings of each network, from different weights.
         damping_steps: number of Levenberg–Marquardt steps of the first network, at most.
         frequency_steps: number of those of the second.
@@ -79,7 +78,6 @@ class Trained:
     """The result of a training.
 
     Args:
-        networks: both networks with their errors.
         weights: the safetensors file.
         record: the training record.
     """
@@ -99,13 +97,9 @@ def train(
     """Train both networks.
 
     Args:
-        spec: of the training.
         resume: progress of an interrupted training of the same specification.
         tell: called after every step with the work done and a description.
         keep: called with a checkpoint after every step; an exception from it ends the training.
-
-    Returns:
-        The networks with their file and record.
     """
     checkpoint = resume or Checkpoint()
     with one_thread():
@@ -122,7 +116,6 @@ def problem_of(spec: TrainingSpec, which: str) -> Problem:
     """The scaled training pairs of a network.
 
     Args:
-        spec: of the training.
         which: ``damping`` or ``frequency``.
     """
     return Problem.of(training_pairs(spec.data, which), SIZES[which], unit_deviation=which == FREQUENCY)

@@ -78,7 +78,6 @@ def training_pairs(spec: DataSpec, which: str) -> Pairs:
     """The training set of a network.
 
     Args:
-        spec: its range and size.
         which: ``damping`` or ``frequency``.
 
     Returns:
@@ -102,10 +101,6 @@ def held_out_points(spec: DataSpec, rng: np.random.Generator) -> tuple[Array, Ar
     """Damping ratios and frequencies [rad/s] that no training set holds, shapes (test_count,).
 
     Half of them are uniform in the logarithm, so that the low ends of the range are tested too.
-
-    Args:
-        spec: the range.
-        rng: draws them.
     """
     found = []
     for low, high in (spec.zeta_range, spec.omega_range):

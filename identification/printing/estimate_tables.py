@@ -19,9 +19,6 @@ Document = Mapping[str, Any]
 def estimate_parts(document: Document) -> list[str | TextTable]:
     """What is printed of an estimate.
 
-    Args:
-        document: of an estimate.
-
     Returns:
         The coefficients, the runs, and a paragraph for each note.
     """
@@ -34,9 +31,6 @@ def estimate_parts(document: Document) -> list[str | TextTable]:
 
 def coefficients_table(document: Document) -> TextTable:
     """The campaign's coefficients that could be identified.
-
-    Args:
-        document: of an estimate.
 
     Returns:
         A table; without rows when the campaign gives normalised form only.
@@ -54,9 +48,6 @@ def coefficients_table(document: Document) -> TextTable:
 def runs_table(document: Document) -> TextTable:
     """Natural frequency and damping ratio of the first runs.
 
-    Args:
-        document: of an estimate.
-
     Returns:
         A table with a row for each run, `SHOWN_RUNS` of them at most.
     """
@@ -70,9 +61,6 @@ def runs_table(document: Document) -> TextTable:
 
 def status_lines(document: Document) -> list[str]:
     """What the estimate and its runs have to say, each thing once.
-
-    Args:
-        document: of an estimate.
 
     Returns:
         A line for each status other than "identified", with the runs it concerns and the remedy.

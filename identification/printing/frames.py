@@ -46,7 +46,6 @@ def wide_frame(
     """A row for each document, two columns for each quantity.
 
     Args:
-        rows: the documents.
         plain: keys whose values are taken as they are, with their types.
         quantities: keys of quantities, which have a value and a std, or are None.
 

@@ -51,10 +51,6 @@ def unit_mark(unit: str) -> str:
 def coefficient_label(name: str, unit: str) -> str:
     """A coefficient's symbol and unit.
 
-    Args:
-        name: of a document.
-        unit: likewise.
-
     Returns:
         Text such as ``Cnβ [1/rad]``.
     """

@@ -17,7 +17,6 @@ class TextTable:
     """A table whose cells are texts.
 
     Args:
-        title: above it.
         columns: headings, with their units.
         rows: one text for each column; lines of a cell are separated by line ends.
         right: those headings whose columns are aligned to the right.

@@ -83,9 +83,6 @@ def collect(outcomes: Iterable[Outcome]) -> Trials:
     Args:
         outcomes: of one method and one quantity.
 
-    Returns:
-        The trials, in the order given.
-
     Raises:
         ValueError: when units are mixed or an estimate is not finite.
     """
@@ -114,7 +111,6 @@ class Proportion:
     """A share, such as that of trials that failed.
 
     Args:
-        count: number of cases.
         total: number of trials, above 0.
     """
 
@@ -143,7 +139,6 @@ class Score:
     Each `Quantity` is a figure with its standard error.
 
     Args:
-        count: number of trials.
         failures: those without an estimate.
         bias: mean error, in the quantity's unit.
         relative_bias: mean of error over the size of the truth, %; None where a truth is zero.
@@ -179,9 +174,6 @@ def score(trials: Trials) -> Score:
     Args:
         trials: at least one.
 
-    Returns:
-        The figures with their standard errors.
-
     Raises:
         ValueError: when there is no trial.
     """
@@ -210,7 +202,6 @@ def mean_figure(values: Array, unit: str) -> Quantity:
 
     Args:
         values: shape (n,), n ≥ 2, in the unit.
-        unit: of the values.
     """
     return Quantity(float(values.mean()), float(values.std(ddof=1)) / sqrt(values.size), unit)
 
@@ -220,7 +211,6 @@ def root_mean_square(values: Array, unit: str) -> Quantity:
 
     Args:
         values: shape (n,), n ≥ 2, in the unit.
-        unit: of the values.
     """
     scale = float(np.abs(values).max()) or 1.0  # squares of tiny numbers must not underflow
     squares = mean_figure((values / scale) ** 2, "1")

@@ -32,7 +32,7 @@ class Change:
         aspect: ``bias`` and ``spread`` (sizes of errors) in units of the bound, or of the truth where there is no
             bound; ``outliers``, ``coverage`` and ``failures`` as shares.
         before: the baseline's figure, in these units.
-        now: the figure now, likewise.
+        now: the figure now, in these units.
         p_value: probability of a change for the worse at least this large if nothing changed; 1 where the
             figure is no worse.
     """
@@ -53,9 +53,6 @@ def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ..
     Args:
         before: the baseline's trials, one entry per cell.
         now: the same cells.
-
-    Returns:
-        One change per aspect.
 
     Raises:
         ValueError: when the cells differ in number, or a bound is known on one side only.
@@ -84,9 +81,6 @@ def holm(p_values: Sequence[float], rate: float = DIFFERENCE_RATE) -> tuple[bool
     Args:
         p_values: one per test.
         rate: probability of at least one false alarm.
-
-    Returns:
-        One verdict per test.
     """
     order = sorted(range(len(p_values)), key=p_values.__getitem__)
     verdicts = [False] * len(p_values)

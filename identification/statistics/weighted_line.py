@@ -34,9 +34,6 @@ def weighted_fit(columns: Array, target: Array, variance: Array) -> WeightedFit:
         columns: one per unknown, shape (n, p) with n above p.
         target: shape (n,).
         variance: of the target's points, shape (n,).
-
-    Returns:
-        The fit.
     """
     weights = 1.0 / variance
     normal = columns.T @ (columns * weights[:, None])

@@ -54,7 +54,6 @@ class Component:
     """One line of the budget.
 
     Args:
-        name: what is uncertain.
         kind: GUM's evaluation: ``A`` by statistics, ``B`` by other means.
         covariance: what it adds, shape (p, p), in the products of the quantities' units; a correlation may
             reduce it.
@@ -75,7 +74,7 @@ class Budget:
 
     Args:
         names: of the quantities, p of them: the estimate's parameters, and ``wind_off_inertia``.
-        units: likewise.
+        units: of the quantities.
         values: shape (p,).
         components: noise first.
     """
@@ -100,7 +99,6 @@ class Budget:
 
         Args:
             component: one of the budget's.
-            name: of the quantity.
         """
         place = self.names.index(name)
         return float(component.covariance[place, place] / self.covariance[place, place])
@@ -134,15 +132,9 @@ def make_budget(
     """The budget of a campaign's coefficients.
 
     Args:
-        campaign: what was identified.
-        estimate: its estimate.
         identify: the estimator that made it; it is called again with changed campaigns.
-        inputs: how well the stated inputs are known.
         others: other estimators, by name, whose spread counts as the choice of model.
         told: called with a description of each step.
-
-    Returns:
-        The budget.
 
     Raises:
         TunnelError: when the estimate has no coefficients.
@@ -173,7 +165,6 @@ def with_budget(estimate: Estimate, budget: Budget) -> Estimate:
 
     Args:
         estimate: the budget's.
-        budget: of it.
 
     Returns:
         The same values; standard deviations and covariance are the budget's.

@@ -68,9 +68,6 @@ def damped_sinusoid_bound(
         noise_std: S, rad.
         offset_known: whether the offset is known.
 
-    Returns:
-        The bound.
-
     Raises:
         ValueError: for an amplitude or frequency that is not positive, or |ζ| of 1 or more.
     """
@@ -159,9 +156,6 @@ def campaign_bound(
         noise_std: of the reading, quantisation included (add resolution²/12 to the variance), rad.
         initial_states: angle [rad] and rate [rad/s] at each run's first sample; where None, the runs' nominal
             release angles at rest.
-
-    Returns:
-        The bound of the parameters that the campaign separates.
 
     Raises:
         TunnelError: when a run states no spring stiffness, the rig states no size although the wind is on, or a

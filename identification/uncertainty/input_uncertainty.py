@@ -118,9 +118,6 @@ def load_uncertainties(path: Path) -> InputUncertainties:
     Args:
         path: the TOML file.
 
-    Returns:
-        What it states.
-
     Raises:
         TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
     """

@@ -61,7 +61,6 @@ def side_scatter(
     """Scatter of wind-off and of wind-on runs.
 
     Args:
-        campaign: the runs' conditions.
         estimates: one per run, with ωn and ζ where they were identified.
         individual: relative standard uncertainties of inputs with separate errors by run or by spring.
 
@@ -143,15 +142,7 @@ def _input_covariance(
 
 
 def error_groups(runs: Sequence[Run], name: str) -> list[list[int]]:
-    """Which runs share one individual error: those of a spring, or a single wind-on run.
-
-    Args:
-        runs: of the campaign.
-        name: of the input.
-
-    Returns:
-        Places of the runs, group by group.
-    """
+    """Which runs share one individual error: those of a spring, or a single wind-on run."""
     if name != "spring_stiffness":
         return [[i] for i, run in enumerate(runs) if run.wind_on]
     springs: dict[float, list[int]] = {}
@@ -165,7 +156,6 @@ def scaled(run: Run, name: str, factor: float) -> Run:
     """A run with one stated input changed.
 
     Args:
-        run: as stated.
         name: ``spring_stiffness``, ``wind_speed`` or ``air_density``.
         factor: what the input is multiplied by (1).
     """

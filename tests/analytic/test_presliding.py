@@ -13,11 +13,10 @@ from tests.reference.effect_cases import settings
 from tests.reference.effect_oracle import Setting, reading
 from tunnel_sim.effects import effect_from
 from tunnel_sim.engine.model import Model, build_model
-from tunnel_sim.engine.simulate import simulate_batch, simulate_motion
+from tunnel_sim.engine.simulate import simulate_motion, simulate_motions
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.moment_law import state_names
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.plan import SensorModel
 
 SAMPLE_RATE = 500.0
 
@@ -125,17 +124,12 @@ def test_a_range_too_short_for_the_step_stays_stable(reach: float, step: float) 
 
 
 def test_threads_and_batches_give_the_same_bits() -> None:
-    sensor = SensorModel()
-    effects = (effect_from("coulomb_friction", {"friction_moment": 0.03, "presliding": 0.004}),)
+    friction = effect_from("coulomb_friction", {"friction_moment": 0.03, "presliding": 0.004})
     runs = [replace(settings(Setting(spring=k)), duration=0.5) for k in (16.12, 44.84, 67.98)]
-    records = [
-        simulate_batch(
-            RIG, runs, sensor, [np.random.default_rng(i) for i in range(3)], effects=effects, nthread=n
-        )
-        for n in (1, 2, 3)
-    ]
-    for others in records[1:]:
-        assert all(np.array_equal(a.yaw_rad, b.yaw_rad) for a, b in zip(records[0], others, strict=True))
+    true = [friction.on_run(run, run, None) for run in runs]
+    first, *rest = (simulate_motions(RIG, true, 1000.0, nthread=n) for n in (1, 2, 3))
+    for others in rest:
+        assert all(np.array_equal(a.angle, b.angle) for a, b in zip(first, others, strict=True))
 
 
 @pytest.mark.parametrize("reverse", [False, True])

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+from test_env_pages import rows
 from test_readme import assert_same
 from test_tutorials import printed, steps
 
@@ -14,13 +15,6 @@ DOCS = Path(__file__).parents[2] / "docs"
 PAGE = DOCS / "reference" / "envs" / "campaign.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 PAGES = (PAGE, DOCS / "campaign-design.md", DOCS / "how-to" / "watch-the-rig.md")
-
-
-def rows(heading: str) -> list[list[str]]:
-    """The tables' rows of a section, without their heads."""
-    section = TEXT.partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
-    lines = [line for line in section.splitlines() if line.startswith("|")]
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if "---" not in line][1:]
 
 
 def test_the_page_has_every_section() -> None:
@@ -43,7 +37,7 @@ def test_the_arguments_are_those_of_the_code() -> None:
 
     table = {
         name: default.strip("`").replace('"', "'")
-        for names, default, _ in rows("Arguments")
+        for names, default, _ in rows(TEXT, "Arguments")
         for name in re.findall(r"`(\w+)`", names)
     }
     parameters = inspect.signature(CampaignEnv.__init__).parameters.values()
@@ -53,11 +47,13 @@ def test_the_arguments_are_those_of_the_code() -> None:
 def test_the_menus_are_those_of_the_code() -> None:
     from tunnel_lab.envs.presets import PRESETS
 
-    for _, name, *shown, _ in rows("Action"):
+    for _, name, *shown, _ in rows(TEXT, "Action"):
         key = name.split("`")[1]
         for preset, values in zip(PRESETS.values(), shown, strict=True):
             assert [float(value) for value in values.split(",")] == list(getattr(preset, key))
-    words = {name: text for names, _, text in rows("Arguments") for name in re.findall(r"`(\w+)`", names)}
+    words = {
+        name: text for names, _, text in rows(TEXT, "Arguments") for name in re.findall(r"`(\w+)`", names)
+    }
     for effect, (low, high) in PRESETS["diagnosis"].severities.items():
         assert f"`{effect}` {low:g} to {high:g}" in words["severities"]
     assert words["noise_std"].endswith("0.05; 0.01 in the diagnosis preset")
@@ -68,7 +64,7 @@ def test_the_menus_are_those_of_the_code() -> None:
 def test_the_truth_is_drawn_as_the_page_says() -> None:
     from tunnel_lab.envs.truth import MEAN, STD
 
-    shown = {name.strip("`"): (float(mean), float(std)) for _, name, mean, std, _ in rows("Start")}
+    shown = {name.strip("`"): (float(mean), float(std)) for _, name, mean, std, _ in rows(TEXT, "Start")}
     assert shown.pop("sensor_zero") == (0.0, 0.004)
     assert shown == {name: (MEAN[name], STD[name]) for name in MEAN}
 

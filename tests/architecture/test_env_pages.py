@@ -15,9 +15,9 @@ PAGE = Path(__file__).parents[2] / "docs" / "reference" / "envs" / "free-decay.m
 TEXT = PAGE.read_text(encoding="utf-8")
 
 
-def rows(heading: str) -> list[list[str]]:
+def rows(text: str, heading: str) -> list[list[str]]:
     """The tables' rows of a section, without their heads."""
-    section = TEXT.partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
+    section = text.partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
     lines = [line for line in section.splitlines() if line.startswith("|")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if "---" not in line][1:]
 
@@ -48,7 +48,7 @@ def test_the_diagnosis_is_what_is_shown(tmp_path: Path) -> None:
 def test_the_arguments_are_those_of_the_code() -> None:
     from tunnel_sim.envs.config import FreeDecayConfig
 
-    table = {name.strip("`"): default.strip("`") for name, default, _ in rows("Arguments")}
+    table = {name.strip("`"): default.strip("`") for name, default, _ in rows(TEXT, "Arguments")}
     defaults = FreeDecayConfig()
     for item in fields(FreeDecayConfig):
         shown = table.pop(item.name)
@@ -63,7 +63,9 @@ def test_the_arguments_are_those_of_the_code() -> None:
 def test_the_options_are_those_of_the_code() -> None:
     from tunnel_sim.envs.conditions import OPTIONS, TRUTH
 
-    words = {word for name, meaning, *_ in rows("Start") for word in re.findall(r"`(\w+)`", name + meaning)}
+    words = {
+        word for name, meaning, *_ in rows(TEXT, "Start") for word in re.findall(r"`(\w+)`", name + meaning)
+    }
     assert set(OPTIONS) | set(TRUTH) <= words
 
 
@@ -71,7 +73,7 @@ def test_the_prior_is_that_of_the_code() -> None:
     from tunnel_sim.envs.information import Prior
 
     prior = Prior()
-    shown = {name: values for name, values, _ in rows("Reward")}
+    shown = {name: values for name, values, _ in rows(TEXT, "Reward")}
     assert (prior.cn_beta, prior.cn_r) == (0.5, 0.5)
     assert shown["`cn_beta`, `cn_r`"] == "0.5, 0.5"
     assert (prior.yaw_inertia, prior.mechanical_damping) == (1e-4, 1e-3)

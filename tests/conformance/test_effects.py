@@ -12,7 +12,8 @@ import pytest
 from tests.reference.effect_cases import VALUES, VOCABULARY, settings
 from tests.reference.effect_oracle import Setting
 from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
-from tunnel_sim.engine.simulate import simulate, simulate_batch
+from tunnel_sim.engine.sensor import read_motion
+from tunnel_sim.engine.simulate import simulate, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -151,12 +152,15 @@ def test_the_bounds_are_those_stated(kind: type[Effect]) -> None:
 @each_effect
 def test_the_same_seed_gives_the_same_bits_at_any_thread_count(kind: type[Effect]) -> None:
     effects, runs = (example(kind),), [replace(WIND_ON, duration=0.4), replace(WIND_OFF, duration=0.4)] * 2
-    one, three = (
-        simulate_batch(
-            RIG, runs, SENSOR, [np.random.default_rng([7, i]) for i in range(4)], effects=effects, nthread=n
-        )
-        for n in (1, 3)
-    )
+
+    def together(threads: int) -> list[Record]:
+        rngs = [np.random.default_rng([7, i]) for i in range(4)]
+        chains = [EffectChain.draw(run, effects, rng) for run, rng in zip(runs, rngs, strict=True)]
+        true = [chain.physics() for chain in chains]
+        motions = simulate_motions(RIG, true, SENSOR.sample_rate, nthread=threads)
+        return [read_motion(m, SENSOR, rng, c) for m, rng, c in zip(motions, rngs, chains, strict=True)]
+
+    one, three = together(1), together(3)
     loop = [record(effects, run, seed=[7, i]) for i, run in enumerate(runs)]
     for others in (three, loop):
         assert all(same(a, b) for a, b in zip(one, others, strict=True))

@@ -13,8 +13,7 @@ import pytest
 from identification.estimators import ALL_ESTIMATORS
 from tunnel_lab.scoring.check import check
 from tunnel_lab.scoring.grid import load_grid
-from tunnel_lab.scoring.packaged import packaged_baseline
-from tunnel_lab.scoring.results import Results, read_trials
+from tunnel_lab.scoring.results import Results, packaged_baseline, read_trials
 from tunnel_lab.scoring.work import score_grid
 
 HERE = Path(__file__).parent

@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from diagnosis.detection import gap
-from diagnosis.detection.sensor_noise import campaign_noise, noise_trend, reading_step
-from diagnosis.fitting.run_data import prepare
-from diagnosis.investigate import fit_nominal
 from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
+from tests.unit.gap_campaigns import judged
 
 NOISE = 4e-4
 SETTINGS = (Setting(16.12, 0.0), Setting(20.0, 0.0), Setting(16.12, 20.0), Setting(20.0, 20.0))
@@ -34,13 +31,6 @@ def decays(per_cycle, seed, *, step=None):
         duration=CYCLES[per_cycle] * CYCLE,
         rng=np.random.default_rng(seed),
     )
-
-
-def judged(data):
-    """Fit, noise and verdict."""
-    noise = campaign_noise(data)
-    fit = fit_nominal(prepare(data, noise.variance))
-    return gap.judge(fit, noise, noise_trend(data), step=reading_step(data), coarse_step=False)
 
 
 def most_alarms(trials):

@@ -8,14 +8,15 @@ import numpy as np
 
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.detection.gap import GapTest
+from diagnosis.detection.gap import GapTest, judge
 from diagnosis.detection.mains import Hum
-from diagnosis.detection.sensor_noise import NoiseTrend, campaign_noise
+from diagnosis.detection.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData, prepare
 from diagnosis.fitting.similarity import Similarity
 from diagnosis.fitting.starting_points import nominal_start
+from diagnosis.investigate import fit_nominal
 from diagnosis.study import COARSE_STEP, HUM, Study
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
@@ -124,3 +125,10 @@ def studied(data: Campaign, nominal: Fit, causes: tuple[str, ...] = (), best: Fi
         hypotheses=() if best is None else (Hypothesis(fitted, best),),
         weighed=(Weighed(fitted, 0.0, 1.0),) if fitted else (),
     )
+
+
+def judged(data: Campaign) -> GapTest:
+    """Fit, noise and verdict."""
+    noise = campaign_noise(data)
+    fitted = fit_nominal(prepare(data, noise.variance))
+    return judge(fitted, noise, noise_trend(data), step=reading_step(data), coarse_step=False)

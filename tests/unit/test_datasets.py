@@ -3,19 +3,13 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from identification.datasets import (
-    MEASURED_CAMPAIGNS,
-    measured_campaign,
-    paper_derivatives,
-    paper_springs,
-    paper_windows,
-)
+from identification import datasets
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def test_table_2_is_the_paper_s() -> None:
-    rows = paper_springs()
+    rows = datasets.paper_springs()
     assert [row.number for row in rows] == list(range(1, 11))
     assert (rows[4].stiffness_n_m_per_rad, rows[4].frequency_hz) == (16.12, 2.0333)
     # The gradient the reading of the paper gives (kg m²), and its intercept (N m/rad).
@@ -26,11 +20,13 @@ def test_table_2_is_the_paper_s() -> None:
 
 
 def test_table_2_agrees_with_the_rig() -> None:
-    assert {row.number: row.stiffness_n_m_per_rad for row in paper_springs()} == dict(load_rig().springs)
+    assert {row.number: row.stiffness_n_m_per_rad for row in datasets.paper_springs()} == dict(
+        load_rig().springs
+    )
 
 
 def test_table_3_is_the_paper_s_with_its_garbled_windows_marked() -> None:
-    rows = paper_windows()
+    rows = datasets.paper_windows()
     assert [row.number for row in rows] == list(range(1, 9))
     assert [row.zeta for row in rows] == [0.0091, 0.0086, 0.0079, 0.0074, 0.0059, 0.0056, 0.0065, 0.0065]
     assert (rows[0].omega_n_rad_per_s, rows[7].omega_n_rad_per_s) == (12.4332, 12.6331)
@@ -41,7 +37,7 @@ def test_table_3_is_the_paper_s_with_its_garbled_windows_marked() -> None:
 
 
 def test_table_4_is_the_paper_s() -> None:
-    assert {row.method: (row.cn_beta_per_rad, row.cn_r_per_rad) for row in paper_derivatives()} == {
+    assert {row.method: (row.cn_beta_per_rad, row.cn_r_per_rad) for row in datasets.paper_derivatives()} == {
         "neural network": (0.4719, -0.1033),
         "conventional": (0.49519, -0.11397),
     }
@@ -55,7 +51,7 @@ def test_table_4_is_the_paper_s() -> None:
     ],
 )
 def test_measured_campaigns_read(name: str, runs: int, rate: float, release_deg: list[float]) -> None:
-    campaign = measured_campaign(name)
+    campaign = datasets.measured_campaign(name)
     assert campaign.name == name
     assert len(campaign.runs) == runs
     for run, release in zip(campaign.runs, release_deg, strict=True):
@@ -67,10 +63,10 @@ def test_measured_campaigns_read(name: str, runs: int, rate: float, release_deg:
 
 def test_an_unknown_campaign_is_named() -> None:
     with pytest.raises(TunnelError, match="did you mean 'rotary-pendulum'"):
-        measured_campaign("rotary_pendulum")
+        datasets.measured_campaign("rotary_pendulum")
 
 
-@pytest.mark.parametrize("folder", [f"measured/{name}" for name in MEASURED_CAMPAIGNS] + ["paper"])
+@pytest.mark.parametrize("folder", [f"measured/{name}" for name in datasets.MEASURED_CAMPAIGNS] + ["paper"])
 def test_every_dataset_says_where_it_comes_from(folder: str) -> None:
     data = resources.files("identification") / "data" / folder
     source = (data / "SOURCE.md").read_text(encoding="utf-8")
@@ -85,4 +81,4 @@ def test_every_dataset_says_where_it_comes_from(folder: str) -> None:
 
 def test_every_packaged_campaign_is_listed() -> None:
     folders = (resources.files("identification") / "data" / "measured").iterdir()
-    assert sorted(f.name for f in folders if f.is_dir()) == sorted(MEASURED_CAMPAIGNS)
+    assert sorted(f.name for f in folders if f.is_dir()) == sorted(datasets.MEASURED_CAMPAIGNS)

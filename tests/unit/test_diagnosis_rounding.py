@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from diagnosis.detection import gap
 from diagnosis.detection.rounding import rounding_errors, with_rounding
-from diagnosis.detection.sensor_noise import campaign_noise, lattice_step, noise_trend, reading_step
+from diagnosis.detection.sensor_noise import campaign_noise, lattice_step, reading_step
 from diagnosis.fitting.run_data import prepare
 from diagnosis.investigate import fit_nominal
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
+from tests.unit.gap_campaigns import judged
 
 DEGREE = np.pi / 180.0
 SETTINGS = (Setting(16.12, 0.0), Setting(20.0, 0.0), Setting(16.12, 20.0), Setting(20.0, 20.0))
@@ -17,22 +17,8 @@ SETTINGS = (Setting(16.12, 0.0), Setting(20.0, 0.0), Setting(16.12, 20.0), Setti
 
 def decays(rate, step, *, noise=1e-6, duration=6.0, seed=1):
     """Four runs of the nominal model in closed form, at about 2 Hz, with next to no noise before rounding."""
-    return free_decays.campaign(
-        SETTINGS,
-        noise=noise,
-        stated_noise=None,
-        resolution=step,
-        rate=rate,
-        duration=duration,
-        rng=np.random.default_rng(seed),
-    )
-
-
-def judged(data):
-    """Fit, noise and verdict."""
-    noise = campaign_noise(data)
-    fit = fit_nominal(prepare(data, noise.variance))
-    return gap.judge(fit, noise, noise_trend(data), step=reading_step(data), coarse_step=False)
+    how = {"noise": noise, "stated_noise": None, "resolution": step, "rate": rate, "duration": duration}
+    return free_decays.campaign(SETTINGS, **how, rng=np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identification import Status, identify
-from identification.estimators.neural import NeuralNetwork, read_window
+from identification.estimators.neural_network import NeuralNetwork, read_window
 from identification.neural.files import shipped_networks
 from identification.neural.three_cycles import find_windows
 from tests.reference.free_decays import damped_cosine

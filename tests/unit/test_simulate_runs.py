@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tunnel_sim.engine.model import build_model, numerics
-from tunnel_sim.engine.simulate import simulate, simulate_batch, simulate_motion, simulate_motions
+from tunnel_sim.engine.simulate import simulate, simulate_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.moment_law import parameter_names
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
@@ -50,23 +50,10 @@ def _log_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its log into the working directory
 
 
-def _generators(seed: int, count: int) -> list[np.random.Generator]:
-    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(count)]
-
-
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_batch_equals_the_loop_to_the_bit(threads: int) -> None:
-    batch = simulate_batch(RIG, MIXED, SENSOR, _generators(1, len(MIXED)), nthread=threads)
-    generators = _generators(1, len(MIXED))
-    for one, settings, rng in zip(batch, MIXED, generators, strict=True):
-        alone = simulate(RIG, settings, SENSOR, rng)
-        assert np.array_equal(one.time_s, alone.time_s)
-        assert np.array_equal(one.yaw_rad, alone.yaw_rad)
-
-
-def test_batch_has_the_motion_of_the_loop_to_the_bit() -> None:
-    # apart from the sensor, whose quantisation could hide a difference
-    for motion, settings in zip(simulate_motions(RIG, MIXED, 500.0), MIXED, strict=True):
+    motions = simulate_motions(RIG, MIXED, 500.0, nthread=threads)
+    for motion, settings in zip(motions, MIXED, strict=True):
         alone = simulate_motion(build_model(RIG, settings), 500.0)
         assert np.array_equal(motion.angle, alone.angle)
         assert np.array_equal(motion.rate, alone.rate)
@@ -115,7 +102,7 @@ def test_term_at_zero_beside_others_changes_nothing(name: str) -> None:
 
 def test_written_mjcf_runs_as_the_model() -> None:
     model = build_model(RIG, replace(PLAIN, rod_twist=TWIST))
-    read = mujoco.MjModel.from_xml_string(model.to_xml())
+    read = mujoco.MjModel.from_xml_string(model.spec.to_xml())
     assert np.array_equal(read.jnt_stiffness, model.mj.jnt_stiffness)
     assert read.body_inertia == pytest.approx(model.mj.body_inertia, rel=1e-5)
     data = mujoco.MjData(read)
@@ -216,11 +203,6 @@ def test_parameter_out_of_range_is_refused_by_name_in_loop_and_batch() -> None:
 def test_unknown_series_is_refused() -> None:
     with pytest.raises(TunnelError, match="did you mean 'wind_speed'"):
         build_model(RIG, replace(PLAIN, series={"windspeed": WIND}))
-
-
-def test_generators_must_match_the_runs() -> None:
-    with pytest.raises(TunnelError, match="2 runs but 1 random generators"):
-        simulate_batch(RIG, [PLAIN, PLAIN], SENSOR, _generators(1, 1))
 
 
 def test_sample_interval_must_be_whole_steps() -> None:

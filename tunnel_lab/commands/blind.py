@@ -86,17 +86,16 @@ def make(
     """
     from diagnosis.blind import DEFAULT_SHARES, Mixture, make_blind, parse_shares
     from diagnosis.blind.files import SEAL, read_document
+    from tunnel_lab.terminal.options import refuse_unwritable_files
     from tunnel_lab.terminal.progress import bar
-    from tunnel_lab.terminal.tables import say
-    from tunnel_sim.files.writing import refuse_unwritable
+    from tunnel_lab.terminal.tables import console, say
 
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
-    if key is not None:
-        refuse_unwritable(key)
+    refuse_unwritable_files(key)
     with bar("writing campaigns", count) as tell:
         where = make_blind(
             out, count=count, seed=seed, shares=shares, mixture=Mixture(textbook, rare, variety, small), key=key,
-            progress=lambda done, total: tell(done, total, ""), tell_steps=_terminal(),
+            progress=tell, tell_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
     say(f"Written: {out} ({count} campaigns), key {where}")
     say(f"Key sha256 {read_document(out / SEAL, '')['key_sha256']}, in {out / SEAL}")
@@ -161,14 +160,13 @@ def score(
     from diagnosis import vocabulary
     from diagnosis.blind import score_set
     from tunnel_lab.diagnosis_view import blind_page
-    from tunnel_lab.terminal.tables import say
-    from tunnel_sim.files.writing import refuse_unwritable, write_json, write_whole
+    from tunnel_lab.terminal.options import refuse_unwritable_files
+    from tunnel_lab.terminal.tables import say_written
+    from tunnel_sim.files.writing import write_json, write_whole
 
     names = split_names(exclude)
     vocabulary(exclude=names)
-    for path in (markdown, json, figure):
-        if path is not None:
-            refuse_unwritable(path)
+    refuse_unwritable_files(markdown, json, figure)
     found = score_set(folder, excluded=names, key=key)
     if figure is not None:
         _draw(found, figure)
@@ -178,9 +176,7 @@ def score(
     if json is not None:
         write_json(json, found.to_json_dict())
     _show(found)
-    for path in (markdown, json, figure):
-        if path is not None:
-            say(f"Written: {path}")
+    say_written(markdown, json, figure)
 
 
 def _show(found: Score) -> None:
@@ -207,10 +203,3 @@ def _draw(found: Score, path: Path) -> None:
     if calibration is None:
         raise TunnelError("no answer states inclusion", where="--figure", remedy="diagnose the set again")
     save(calibration_figure(calibration), path)
-
-
-def _terminal() -> bool:
-    """Whether standard error is a terminal."""
-    from tunnel_lab.terminal.tables import console
-
-    return console(stderr=True).is_terminal

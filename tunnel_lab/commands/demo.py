@@ -71,9 +71,6 @@ def run(
 def truth_of(plan: CampaignPlan) -> dict[str, float]:
     """What a plan injects, by the names of an estimate's quantities.
 
-    Args:
-        plan: of a simulated campaign.
-
     Returns:
         Cnβ and Cnr in 1/rad, Izz in kg m², Cr in N m s/rad.
     """
@@ -88,10 +85,6 @@ def truth_of(plan: CampaignPlan) -> dict[str, float]:
 
 def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
     """The checks that fail: estimates that are missing, or too far from the truth for their standard deviation.
-
-    Args:
-        estimates: one per estimator.
-        plan: of the campaign they identified.
 
     Returns:
         A clause for each; the distance is checked for the maximum-likelihood estimator only, whose
@@ -114,11 +107,7 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
     """Simulate, identify by the paper's two methods and the default one, and write all of it.
 
     Args:
-        plan: of the campaign.
         folder: where ``campaign`` and the estimates go.
-
-    Returns:
-        The campaign and one estimate per estimator.
     """
     from identification import identify
     from tunnel_lab.terminal.progress import bar
@@ -128,7 +117,7 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
     from tunnel_sim.files.writing import write_json
 
     with bar("simulating runs", len(plan.conditions)) as tell:
-        campaign = simulate_campaign(plan, progress=lambda done, total: tell(done, total, ""))
+        campaign = simulate_campaign(plan, progress=tell)
     write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
     estimates = []
     for name in SHOWN:
@@ -140,13 +129,7 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
 
 
 def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: CampaignPlan) -> None:
-    """Print the comparison with the truth.
-
-    Args:
-        campaign: the simulated one.
-        estimates: of it, one per estimator.
-        plan: of it.
-    """
+    """Print the comparison with the truth."""
     from tunnel_lab.terminal.tables import say, show_tables, status_lines, truth_table
 
     say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")
@@ -161,9 +144,6 @@ def measured_part(folder: Path) -> tuple[Campaign, Estimate]:
 
     Args:
         folder: where the estimate goes.
-
-    Returns:
-        The campaign and its estimate.
     """
     from identification import identify
     from identification.datasets import measured_campaign
@@ -176,12 +156,7 @@ def measured_part(folder: Path) -> tuple[Campaign, Estimate]:
 
 
 def show_measured(campaign: Campaign, estimate: Estimate) -> None:
-    """Print a measured campaign's estimate with its windows.
-
-    Args:
-        campaign: the runs.
-        estimate: of it.
-    """
+    """Print a measured campaign's estimate with its windows."""
     from tunnel_lab.terminal.estimate_output import show_estimate
     from tunnel_lab.terminal.tables import say
 
@@ -196,17 +171,15 @@ def draw(
 
     Args:
         folder: where they go.
-        campaign: the simulated one.
-        estimates: of it, one per estimator.
-        plan: of it.
-        measured: estimate of the measured campaign.
 
     Returns:
         Why there is no picture of the rig; empty where there is one.
     """
     from tunnel_lab.plotting import plots
-    from tunnel_lab.show.rendering import render_rig
+    from tunnel_lab.show.film import Look, write_still
+    from tunnel_lab.show.request import Request
     from tunnel_lab.terminal.tables import console
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     off, on = wind_off_on_pair(campaign)
     plots.save(plots.wind_off_on_figure(off, on), folder / "traces.png")
@@ -214,7 +187,11 @@ def draw(
     plots.save(plots.windows_figure(measured), folder / "windows.png")
     plots.save(plots.truth_figure(estimates, truth_of(plan)), folder / "estimates.png")
     with console(stderr=True).status("rendering the rig"):
-        return render_rig(folder / "rig.png")
+        try:
+            write_still(Request(), Look(height=800, trace=False), folder / "rig.png", 0.0)
+        except TunnelError as error:
+            return str(error)
+    return ""
 
 
 def wind_off_on_pair(campaign: Campaign) -> tuple[Run, Run]:
@@ -222,9 +199,6 @@ def wind_off_on_pair(campaign: Campaign) -> tuple[Run, Run]:
 
     Args:
         campaign: with the wind off and on for one spring at least.
-
-    Returns:
-        The wind-off and the wind-on run.
 
     Raises:
         TunnelError: when no spring has both.

@@ -67,17 +67,15 @@ def run(
       written completely or not at all.
     """
     from diagnosis import vocabulary
-    from tunnel_lab.terminal.options import split_names
-    from tunnel_lab.terminal.tables import say
+    from tunnel_lab.terminal.options import refuse_unwritable_files, split_names
+    from tunnel_lab.terminal.tables import say_written
     from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.json_text import json_text
-    from tunnel_sim.files.writing import refuse_unwritable, write_json
+    from tunnel_sim.files.writing import write_json
 
     kinds = vocabulary(split_names(effects), split_names(exclude))
     to_stdout = json is not None and str(json) == "-"
-    for path in (None if to_stdout else json, report):
-        if path is not None:
-            refuse_unwritable(path)
+    refuse_unwritable_files(None if to_stdout else json, report)
     data = read_campaign(campaign)
     document = diagnose_with_progress(data, kinds).to_json_dict()
     # Files first: the reader of a pipe may close it early.
@@ -92,20 +90,14 @@ def run(
         typer.echo(json_text(document), nl=False)
         return
     show(document)
-    for path in (json, report):
-        if path is not None:
-            say(f"Written: {path}")
+    say_written(json, report)
 
 
 def diagnose_with_progress(campaign: Campaign, kinds: tuple[type[Effect], ...]) -> Diagnosis:
     """Diagnose, with step and effect on standard error where that is a terminal.
 
     Args:
-        campaign: the runs.
         kinds: effects to answer with.
-
-    Returns:
-        The diagnosis.
     """
     from diagnosis import diagnose
 

@@ -38,20 +38,18 @@ def run(
       0 shown, 2 bad input.
     """
     from tunnel_lab.terminal import effect_listing, tables
+    from tunnel_lab.terminal.options import refuse_unwritable_files
     from tunnel_sim.effects import ALL_EFFECTS, effect_class
-    from tunnel_sim.files.writing import refuse_unwritable, write_json, write_whole
+    from tunnel_sim.files.writing import write_json, write_whole
 
     kinds = ALL_EFFECTS if name is None else (effect_class(name),)
-    for path in (json, markdown):
-        if path is not None:
-            refuse_unwritable(path)
+    refuse_unwritable_files(json, markdown)
     written = []
     if json is not None:
         written.append(write_json(json, effect_listing.document(kinds)))
     if markdown is not None:
         written.append(write_whole(markdown, effect_listing.markdown(kinds).encode()))
-    for path in written:
-        tables.say(f"Written: {path}")
+    tables.say_written(*written)
     if written:
         return
     if name is None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tunnel_lab.terminal.estimator_help import command_with_estimators
+from tunnel_lab.terminal.estimator_help import with_estimators
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 NAME = "identify"
-COMMAND = command_with_estimators()
 FEW_RUNS = 3
 """For up to this many runs the windows are shown by default."""
 
@@ -126,6 +125,9 @@ def run(
         raise typer.Exit(1)
 
 
+run.__doc__ = with_estimators(run.__doc__)
+
+
 def budgeted(
     campaign: Campaign,
     estimate: Estimate,
@@ -136,14 +138,8 @@ def budgeted(
     """The estimate with combined standard uncertainties, and their budget.
 
     Args:
-        campaign: what was identified.
-        estimate: its estimate.
         chosen: the estimator that made it, which is called again with changed campaigns.
         uncertainties: file of the inputs' uncertainties; None takes them as exact.
-        models: further estimators for the choice of model.
-
-    Returns:
-        The widened estimate and the budget.
 
     Raises:
         TunnelError: when the file is wrong, or there is no coefficient to budget.
@@ -175,11 +171,7 @@ def budgeted(
 
 
 def show_budget(budget: Budget) -> None:
-    """Print a budget and what dominates.
-
-    Args:
-        budget: of the estimate that was shown.
-    """
+    """Print a budget and what dominates."""
     from tunnel_lab.terminal import budget_table, tables
 
     tables.say("")
@@ -193,7 +185,6 @@ def with_weights(name: str, weights: Path | None) -> str | Estimator:
     """The estimator's name, or the network estimator with the given weights.
 
     Args:
-        name: of a known estimator.
         weights: a file written by ``tunnel train``; None for the packaged weights.
 
     Raises:
@@ -206,6 +197,6 @@ def with_weights(name: str, weights: Path | None) -> str | Estimator:
     if name != "neural_network":
         remedy = "add --estimator neural_network, or leave it out"
         raise TunnelError(f"{name} has no weights", where="--weights", remedy=remedy)
-    from identification.estimators.neural import NeuralNetwork
+    from identification.estimators.neural_network import NeuralNetwork
 
     return NeuralNetwork(weights)

@@ -36,7 +36,7 @@ def run(
     """
     from identification import identify
     from tunnel_lab.plotting import plots
-    from tunnel_lab.terminal.tables import say
+    from tunnel_lab.terminal.tables import say, say_written
     from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.writing import output_folder
 
@@ -50,8 +50,7 @@ def run(
     estimate = identify(data, "output_error", throw=False)
     if any(found.windows for found in estimate.runs):
         written.append(plots.save(plots.windows_figure(estimate), folder / "windows.png"))
-    for path in written:
-        say(f"Written: {path}")
+    say_written(*written)
     if estimate.status.failed:
         say(f"Note: {estimate.status.value}", stderr=True)
         raise typer.Exit(1)
@@ -61,7 +60,6 @@ def spread(campaign: Campaign, count: int = 4) -> tuple[Run, ...]:
     """A few runs that differ in spring and wind, to keep a plot readable.
 
     Args:
-        campaign: any.
         count: at most this many runs (a count).
 
     Returns:

@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tunnel_lab.terminal.options import (
-    PLAN_HELP,
-    RUN_HELP,
-    AngleOption,
-    EffectOption,
-    SpringOption,
-    WindOption,
-)
+from tunnel_lab.terminal import options
 
 if TYPE_CHECKING:
     from tunnel_lab.show.film import Look
@@ -25,17 +18,17 @@ _DEFAULT = (Path("tunnel-output/rig.mp4"), Path("tunnel-output/rig.png"))
 
 
 def run(
-    plan: Annotated[Path | None, typer.Argument(help=PLAN_HELP)] = None,
+    plan: options.PlanArgument = None,
     out: Annotated[
         list[Path] | None,
         typer.Option("--out", "-o", metavar="FILE", help="An .mp4 or .png file. May be repeated."),
     ] = None,
-    run_id: Annotated[str | None, typer.Option("--run", metavar="ID", help=RUN_HELP)] = None,
-    spring: SpringOption = None,
-    wind: WindOption = None,
-    angle: AngleOption = None,
+    run_id: options.RunOption = None,
+    spring: options.SpringOption = None,
+    wind: options.WindOption = None,
+    angle: options.AngleOption = None,
     duration: Annotated[float | None, typer.Option("--duration", help="Duration of the run, s.")] = None,
-    effect: EffectOption = None,
+    effect: options.EffectOption = None,
     seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed of the noise.")] = None,
     at: Annotated[float, typer.Option("--at", help="Time of the picture, s from the release.")] = 2.0,
     fps: Annotated[int, typer.Option("--fps", min=1, max=120, help="Frames per second of the film.")] = 25,
@@ -62,7 +55,7 @@ def run(
     """
     from tunnel_lab.show.film import Look, checked_camera, write_still
     from tunnel_lab.show.request import Request, shown_run
-    from tunnel_lab.terminal.tables import say
+    from tunnel_lab.terminal.tables import say_written
 
     targets = _targets(out)
     look = Look(*_pixels(size), fps=fps, speed=speed, camera=checked_camera(camera))
@@ -82,8 +75,7 @@ def run(
             write_still(request, look, path, min(at, length) if out is None else at)
         else:
             _film(request, look, path)
-    for path in targets:
-        say(f"Written: {path}")
+    say_written(*targets)
 
 
 def _film(request: Request, look: Look, path: Path) -> None:
@@ -92,7 +84,7 @@ def _film(request: Request, look: Look, path: Path) -> None:
     from tunnel_lab.terminal.progress import bar
 
     with bar("drawing frames") as tell:
-        write_film(request, look, path, lambda done, total: tell(done, total, ""))
+        write_film(request, look, path, tell)
 
 
 def _targets(out: list[Path] | None) -> list[Path]:

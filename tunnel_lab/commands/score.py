@@ -93,7 +93,8 @@ def run(
     from tunnel_lab.scoring import check as checking
     from tunnel_lab.scoring import tables
     from tunnel_lab.scoring.results import Results, write_trials
-    from tunnel_lab.terminal.tables import say, show_tables
+    from tunnel_lab.terminal.options import refuse_unwritable_files
+    from tunnel_lab.terminal.tables import say, say_written, show_tables
 
     names = chosen(estimators)
     if breakdown:
@@ -104,7 +105,7 @@ def run(
     baseline = None if check is None else _baseline(check, names, everything=not estimators)
     wanted = _grid(grid, baseline, trials, seed)
     _refuse_occupied(out, overwrite)
-    _refuse_unwritable(write_baseline)
+    refuse_unwritable_files(write_baseline)
     results = Results(wanted, names, tuple(_rows(wanted, names, jobs, out)))
     written = [] if out is None else _keep(out, results)
     if write_baseline is not None:
@@ -115,8 +116,7 @@ def run(
     say(tables.ABOUT)
     for name, kinds in results.raised().items():
         say(f"Note: {name} raised {', '.join(kinds)}; counted as failures")
-    for path in written:
-        say(f"Written: {path}")
+    say_written(*written)
     if baseline is not None:
         verdict = checking.check(baseline, results)
         say("")
@@ -133,9 +133,6 @@ def chosen(names: list[str] | None) -> tuple[str, ...]:
     Args:
         names: as typed; a word may hold several, separated by commas. None takes all.
 
-    Returns:
-        Names of the registry, each once.
-
     Raises:
         TunnelError: when one is unknown, with the closest name.
     """
@@ -151,8 +148,7 @@ def chosen(names: list[str] | None) -> tuple[str, ...]:
 
 
 def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results:
-    from tunnel_lab.scoring.packaged import packaged_baseline
-    from tunnel_lab.scoring.results import read_trials
+    from tunnel_lab.scoring.results import packaged_baseline, read_trials
     from tunnel_sim.vocabulary.errors import TunnelError
 
     baseline = packaged_baseline() if text == PACKAGED else read_trials(Path(text))
@@ -183,7 +179,7 @@ def _rows(grid: Grid, names: tuple[str, ...], jobs: int, out: Path | None) -> li
 
     parts = None if out is None else out / "parts"
     with bar("scoring") as tell:
-        return score_grid(grid, names, jobs=jobs, parts=parts, progress=lambda n, all_: tell(n, all_, ""))
+        return score_grid(grid, names, jobs=jobs, parts=parts, progress=tell)
 
 
 def _keep(out: Path, results: Results) -> list[Path]:
@@ -217,13 +213,6 @@ def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
         raise TunnelError("exists already", where=str(out), remedy="name another --out or add --overwrite")
 
 
-def _refuse_unwritable(path: Path | None) -> None:
-    from tunnel_sim.files.writing import refuse_unwritable
-
-    if path is not None:
-        refuse_unwritable(path)
-
-
 def _refuse_of_the_grid(given: dict[str, object]) -> None:
     """Refuse options that do not apply to the breakdown, which has its own conditions."""
     from tunnel_sim.vocabulary.errors import TunnelError
@@ -243,16 +232,14 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
     from tunnel_lab.scoring import breakdown_view as view
     from tunnel_lab.scoring.results import parquet
     from tunnel_lab.terminal.progress import bar
-    from tunnel_lab.terminal.tables import console, say, show_tables
+    from tunnel_lab.terminal.tables import console, say, say_written, show_tables
     from tunnel_sim.files.writing import write_whole
 
     terminal = console(stderr=True).is_terminal
     cases = work.make_cases(seed, realisations=trials or work.REALISATIONS, tell_steps=terminal)
     parts = None if out is None else out / "parts"
     with bar("scoring") as tell:
-        rows = work.break_down(
-            cases, names, seed, jobs=jobs, parts=parts, progress=lambda n, all_: tell(n, all_, "")
-        )
+        rows = work.break_down(cases, names, seed, jobs=jobs, parts=parts, progress=tell)
     found = work.biases(rows)
     written = []
     if out is not None:
@@ -261,5 +248,4 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
         shutil.rmtree(out / "parts", ignore_errors=True)
     show_tables(*(one for quantity in view.SHOWN for one in view.breakdown_tables(found, quantity)))
     say(view.ABOUT)
-    for path in written:
-        say(f"Written: {path}")
+    say_written(*written)

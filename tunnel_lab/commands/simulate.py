@@ -80,7 +80,7 @@ def run(
     plan_effects(loaded)  # refuses what cannot be injected before anything is simulated
     refuse_occupied(out, overwrite=overwrite)
     with bar("simulating runs", len(loaded.conditions)) as tell:
-        campaign = simulate_campaign(loaded, progress=lambda done, total: tell(done, total, ""))
+        campaign = simulate_campaign(loaded, progress=tell)
     folder = write_campaign(
         campaign, out, run_format=format.value, truth=truth_document(loaded), overwrite=overwrite
     )

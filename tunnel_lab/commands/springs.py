@@ -42,11 +42,7 @@ def run(
 
 
 def paper_table() -> SpringTable:
-    """The paper's Table II.
-
-    Returns:
-        Ten springs.
-    """
+    """The paper's Table II."""
     from identification.datasets import paper_springs
     from tunnel_lab.terminal.spring_table import SpringTable
 
@@ -62,7 +58,6 @@ def show(springs: SpringTable, source: str) -> None:
     """Fit and print.
 
     Args:
-        springs: the table.
         source: where it comes from, for the heading.
 
     Raises:

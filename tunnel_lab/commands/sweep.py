@@ -95,8 +95,6 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
     """Run a sweep, or the rest of it.
 
     Args:
-        file: the sweep file.
-        out: folder of its results.
         workers: number of processes or, with a scheduler started here, of its workers.
         scheduler: address, ``local``, or None for processes of this machine.
 
@@ -118,7 +116,7 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
     sweep = read_sweep(file)
     work = _work(workers, scheduler, sweep)
     with bar("cases", sweep.size) as tell:
-        outcome = run_sweep(sweep, out, work, lambda done, total: tell(done, total, ""))
+        outcome = run_sweep(sweep, out, work, tell)
     if outcome.found:
         say(f"{outcome.found} of {sweep.shards} shards were finished before")
     estimates = sweep.size * len(sweep.document.estimators)
@@ -146,9 +144,6 @@ def _work(workers: int | None, scheduler: str | None, sweep: Sweep) -> Work:
 
 def show_summary(folder: Path) -> None:
     """Tabulate and draw the finished part of a sweep.
-
-    Args:
-        folder: of a sweep.
 
     Raises:
         TunnelError: when it holds no sweep, or nothing is finished.

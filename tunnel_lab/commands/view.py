@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tunnel_lab.terminal.options import (
-    PLAN_HELP,
-    RUN_HELP,
-    AngleOption,
-    EffectOption,
-    SpringOption,
-    WindOption,
-)
+from tunnel_lab.terminal import options
 
 NAME = "view"
 
 
 def run(
-    plan: Annotated[Path | None, typer.Argument(help=PLAN_HELP)] = None,
-    run_id: Annotated[str | None, typer.Option("--run", metavar="ID", help=RUN_HELP)] = None,
-    spring: SpringOption = None,
-    wind: WindOption = None,
-    angle: AngleOption = None,
-    effect: EffectOption = None,
+    plan: options.PlanArgument = None,
+    run_id: options.RunOption = None,
+    spring: options.SpringOption = None,
+    wind: options.WindOption = None,
+    angle: options.AngleOption = None,
+    effect: options.EffectOption = None,
     duration: Annotated[
         float | None, typer.Option("--duration", help="Time until the next release, s.")
     ] = None,

@@ -34,7 +34,6 @@ class Section:
     """A table with a title.
 
     Args:
-        title: above it.
         headings: of the columns.
         rows: cells as text.
         note: a line below it.
@@ -48,9 +47,6 @@ class Section:
 
 def sections(score: Score) -> list[Section]:
     """The sections of a score, in order.
-
-    Args:
-        score: of a set.
 
     Returns:
         Sections; those without rows are left out.
@@ -73,14 +69,7 @@ def as_table(section: Section) -> Table:
 
 
 def origin_lines(score: Score) -> list[str]:
-    """The scored set, and the hashes that seal it.
-
-    Args:
-        score: of a set.
-
-    Returns:
-        Lines.
-    """
+    """The scored set, and the hashes that seal it."""
     lines = [f"{len(score.cases)} campaigns"]
     if score.excluded:
         lines.append(f"Withheld from the vocabulary: {', '.join(score.excluded)}")
@@ -96,8 +85,6 @@ def markdown(score: Score, folder: str, figure: str = "") -> str:
     """The page.
 
     Args:
-        score: of a set.
-        folder: of the set, as typed.
         figure: address of the figure of the calibration of inclusion, relative to the page; none when empty.
 
     Returns:

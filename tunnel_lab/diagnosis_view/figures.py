@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tunnel_lab.diagnosis_view import figures_answer as answer
 from tunnel_lab.diagnosis_view import figures_where as where
 from tunnel_lab.diagnosis_view.figures_common import Document
 from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
-from tunnel_lab.plotting.plots import save
-from tunnel_sim.files.writing import output_folder
 from tunnel_sim.vocabulary.campaign import Campaign
 
 if TYPE_CHECKING:
@@ -22,7 +19,6 @@ def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figur
 
     Args:
         document: the diagnosis as JSON's types; without ``maps`` those that need them are left out.
-        campaign: the records.
 
     Returns:
         Figures by name, in the order of the report.
@@ -39,22 +35,3 @@ def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figur
         found["residuals"] = answer.traces_figure(document, campaign)
     found["coefficients"] = answer.coefficients_figure(document)
     return {name: figure for name, figure in found.items() if figure is not None}
-
-
-def save_diagnosis_figures(document: Document, campaign: Campaign, folder: Path) -> tuple[Path, ...]:
-    """Write all figures of a diagnosis as PNG files.
-
-    Args:
-        document: the diagnosis as JSON's types.
-        campaign: the records.
-        folder: where they go; made where it is missing.
-
-    Returns:
-        The files, ``<folder>/<name>.png``.
-
-    Raises:
-        TunnelError: when a file cannot be written.
-    """
-    output_folder(folder)
-    figures = diagnosis_figures(document, campaign)
-    return tuple(save(figure, folder / f"{name}.png") for name, figure in figures.items())

@@ -12,13 +12,12 @@ from tunnel_lab.diagnosis_view.figures_common import (
     AFTER,
     BEFORE,
     QUIET,
+    WIDTH,
     Document,
     array,
-    figure,
     plain,
-    quiet,
 )
-from tunnel_lab.plotting.figure_text import figure_text
+from tunnel_lab.plotting.common import figure, figure_text, grid
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,14 +31,11 @@ SHOWN = 8
 def candidates_figure(document: Document) -> Figure:
     """The answers by probability.
 
-    Args:
-        document: a diagnosis.
-
     Returns:
         A bar for each of the first eight answers, with its probability.
     """
     shown = document["candidates"][:SHOWN]
-    fig = figure(0.8 + 0.34 * len(shown))
+    fig = figure(WIDTH, 0.8 + 0.34 * len(shown))
     axes = fig.add_subplot()
     values = [candidate["probability"] for candidate in shown]
     colours = [ACCENT if index == 0 else "0.72" for index in range(len(shown))]
@@ -51,7 +47,7 @@ def candidates_figure(document: Document) -> Figure:
     axes.set_xlim(0.0, 1.12)
     axes.set_xticks(np.linspace(0.0, 1.0, 6), [f"{v:.0%}" for v in np.linspace(0.0, 1.0, 6)])
     axes.set_xlabel("probability")
-    quiet(axes)
+    grid(axes)
     return fig
 
 
@@ -64,14 +60,11 @@ def _percent(value: float) -> str:
 def closure_figure(document: Document) -> Figure:
     """Excess of every run before and after the causes are added, on a logarithmic scale above the noise.
 
-    Args:
-        document: a diagnosis.
-
     Returns:
         A pair of points per run; the second is filled where the run was held out of the fit.
     """
     runs = document["gap"]["runs"]
-    fig = figure(1.3 + 0.24 * max(len(runs), 4))
+    fig = figure(WIDTH, 1.3 + 0.24 * max(len(runs), 4))
     axes = fig.add_subplot()
     rows = np.arange(len(runs))
     before = np.array([run["before"] for run in runs])
@@ -94,7 +87,7 @@ def closure_figure(document: Document) -> Figure:
     axes.invert_yaxis()
     axes.set_xlabel("excess: mean squared residual over noise variance, minus one")
     fig.legend(loc="outside upper left", ncols=4, fontsize=8, frameon=False)
-    quiet(axes)
+    grid(axes)
     return fig
 
 
@@ -103,7 +96,6 @@ def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
 
     Args:
         document: a diagnosis with its maps.
-        campaign: the records.
 
     Returns:
         A column per run: the reading above, the residual before and after below; None without traces.
@@ -113,7 +105,7 @@ def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
     traces = [trace for trace in traces if trace["id"] in records]
     if not traces:
         return None
-    fig = figure(4.4)
+    fig = figure(WIDTH, 4.4)
     panels = fig.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.2))
     for column, trace in enumerate(traces):
         top, bottom = panels[0, column], panels[1, column]
@@ -130,8 +122,8 @@ def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
         bottom.set_title("residual [10⁻³ rad]", fontsize=10, loc="left")
         bottom.set_xlabel("time since the start of the record [s]")
         bottom.margins(x=0.01)
-        quiet(top)
-        quiet(bottom)
+        grid(top)
+        grid(bottom)
     handles, labels = panels[1, 0].get_legend_handles_labels()
     fig.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
     return fig
@@ -139,9 +131,6 @@ def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
 
 def coefficients_figure(document: Document) -> Figure | None:
     """The coefficients before and after, with 95 % intervals.
-
-    Args:
-        document: a diagnosis.
 
     Returns:
         A panel per coefficient that the runs determine; None where there is none.
@@ -154,7 +143,7 @@ def coefficients_figure(document: Document) -> Figure | None:
     ]
     if not names:
         return None
-    fig = figure(1.7)
+    fig = figure(WIDTH, 1.7)
     for place, name in enumerate(names, 1):
         axes = fig.add_subplot(1, len(names), place)
         for row, (values, colour, marker) in enumerate(((before, BEFORE, "s"), (after, AFTER, "o"))):
@@ -167,5 +156,5 @@ def coefficients_figure(document: Document) -> Figure | None:
         axes.set_ylim(1.6, -0.6)
         axes.set_xlabel(coefficient_label(name, before[name]["unit"]))
         axes.locator_params(axis="x", nbins=5)
-        quiet(axes)
+        grid(axes)
     return fig

@@ -7,39 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.plotting.figure_text import figure_text
+from tunnel_lab.plotting.common import figure_text
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Document = Mapping[str, Any]
 BEFORE, AFTER, ACCENT, QUIET = "#D55E00", "#0072B2", "#009E73", "0.55"
 WIDTH = 9.0  # inches
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
-
-
-def figure(height: float, width: float = WIDTH) -> Figure:
-    """An empty figure; made without pyplot, so that no global state is touched.
-
-    Args:
-        height: inches.
-        width: inches.
-
-    Returns:
-        The figure.
-    """
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
-def quiet(axes: Axes) -> None:
-    """A quiet grid behind the data."""
-    axes.grid(visible=True, color="0.9", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def array(values: Sequence[float | None]) -> Array:

@@ -11,13 +11,13 @@ from tunnel_lab.diagnosis_view.figures_common import (
     BEFORE,
     MARKERS,
     QUIET,
+    WIDTH,
     Document,
     array,
-    figure,
-    quiet,
     run_label,
     shade,
 )
+from tunnel_lab.plotting.common import figure, grid
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def runs_figure(document: Document) -> Figure:
 
     maps = document["maps"]
     runs = maps["runs"]
-    fig = figure(1.2 + 0.27 * max(len(runs), 4))
+    fig = figure(WIDTH, 1.2 + 0.27 * max(len(runs), 4))
     grid, bars = fig.subplots(1, 2, sharey=True, width_ratios=(3.2, 1.0))
     edges = array(maps["time"]["edges_s"])
     cells = np.stack([array(row) for row in maps["time"]["by_run"]])
@@ -70,7 +70,7 @@ def runs_figure(document: Document) -> Figure:
     bars.set_xlabel("excess of the run")
     bars.set_title("whole run", fontsize=10, loc="left")
     bars.tick_params(labelleft=False)
-    quiet(bars)
+    grid(bars)
     return fig
 
 
@@ -91,7 +91,7 @@ def profiles_figure(document: Document) -> Figure:
         Three panels; the shaded intervals hold four fifths of the gap.
     """
     maps, where = document["maps"], document["where"]
-    fig = figure(5.4)
+    fig = figure(WIDTH, 5.4)
     axes = fig.subplot_mosaic([["time", "amplitude"], ["frequency", "frequency"]])
     _profile(axes["time"], maps["time"], "edges_s", where["time_s"])
     _moment(axes["time"], maps["time"])
@@ -110,7 +110,7 @@ def _profile(axes: Axes, values: Document, edges: str, interval: list[float] | N
     axes.set_xlim(0.0, float(bounds[-1]))
     axes.set_ylim(min(-4.0 * float(np.nanmedian(std)), 1.05 * float(np.nanmin(mean))), None)
     axes.set_ylabel("excess (noise variances)")
-    quiet(axes)
+    grid(axes)
 
 
 def _moment(axes: Axes, values: Document) -> None:
@@ -155,7 +155,7 @@ def _spectrum(axes: Axes, values: Document, interval: list[float] | None) -> Non
     axes.set_xlabel("frequency [Hz]; dark bar: the runs' own frequencies")
     axes.set_ylabel("residual power over noise")
     axes.legend(loc="upper right", fontsize=8, frameon=False)
-    quiet(axes)
+    grid(axes)
 
 
 def backbone_figure(document: Document) -> Figure:
@@ -175,7 +175,7 @@ def backbone_figure(document: Document) -> Figure:
     # the runs that show the gap first, in the campaign's order, and then the rest for comparison
     chosen = (named + [curve for curve in curves if curve not in named])[:_MOST_CURVES]
     labels = {run["id"]: run_label(run) for run in maps["runs"]}
-    fig = figure(4.6)
+    fig = figure(WIDTH, 4.6)
     frequency, damping = fig.subplots(1, 2)
     palette = colormaps["viridis"](np.linspace(0.0, 0.92, max(len(chosen), 1)))
     for index, curve in enumerate(chosen):
@@ -191,7 +191,7 @@ def backbone_figure(document: Document) -> Figure:
         axes.axhline(0.0, color="black", linewidth=1.0)
         axes.set_xlabel("amplitude [rad]")
         axes.set_ylabel(name)
-        quiet(axes)
+        grid(axes)
     if chosen:
         fig.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     return fig
@@ -224,7 +224,7 @@ def phase_plane_figure(document: Document) -> Figure | None:
     moment = np.stack([array(row) for row in plane["moment"]])
     std = np.stack([array(row) for row in plane["std"]])
     unit, factor = _readable(plane, np.abs(moment))
-    fig = figure(4.0)
+    fig = figure(WIDTH, 4.0)
     field, angle, rate = fig.subplots(1, 3, width_ratios=(1.25, 1.0, 1.0))
     clear = np.where(np.abs(moment) > _SIGMAS * std, moment * factor, np.nan)
     reach = float(np.nanquantile(np.abs(moment), 0.98)) * factor if np.isfinite(moment).any() else 1.0
@@ -244,7 +244,7 @@ def phase_plane_figure(document: Document) -> Figure | None:
         axes.plot(centre, mean, color=BEFORE, marker="o", ms=3)
         axes.set_xlabel(label)
         axes.set_title(f"mean over all {'rates' if name == 'by_angle' else 'angles'} [{unit}]", fontsize=9)
-        quiet(axes)
+        grid(axes)
     return fig
 
 

@@ -11,6 +11,7 @@ from diagnosis.printing import inclusion_line
 from identification.printing.numbers import p_text, significant
 from tunnel_lab.diagnosis_view import view
 from tunnel_lab.diagnosis_view.figures import diagnosis_figures
+from tunnel_lab.diagnosis_view.figures_common import plain
 from tunnel_lab.diagnosis_view.svg import inline_svg
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -36,11 +37,7 @@ def write_report(document: Document, campaign: Campaign, path: Path) -> Path:
 
     Args:
         document: the diagnosis as JSON's types (``Diagnosis.to_json_dict``), with its ``maps`` where there are any.
-        campaign: the records.
         path: the HTML file; replaced when it exists, written completely or not at all.
-
-    Returns:
-        The same path.
 
     Raises:
         TunnelError: when the page cannot be drawn or the file cannot be written.
@@ -53,7 +50,6 @@ def render_report(document: Document, campaign: Campaign) -> str:
 
     Args:
         document: as for `write_report`.
-        campaign: the records.
 
     Returns:
         HTML that needs no other file and no network; the same for the same document.
@@ -91,9 +87,9 @@ def _context(document: Document, campaign: Campaign) -> dict[str, Any]:
         "candidates": candidates,
         "more": more,
         "causes": view.cause_paragraphs(document),
-        "inclusion": view.plain(inclusion_line(document)),
+        "inclusion": plain(inclusion_line(document)),
         "steps": view.step_rows(document),
-        "rivals": [view.plain(name) for name in document["ambiguous_with"]],
+        "rivals": [plain(name) for name in document["ambiguous_with"]],
         "next_run": view.next_run_rows(document),
         "runs": view.run_rows(document, campaign),
         "coefficients": view.coefficient_rows(document),
@@ -140,7 +136,7 @@ def _flat(values: Document) -> list[tuple[str, str]]:
     """Provenance as rows: nested tables become one row each."""
     return [
         (
-            view.plain(str(key)).capitalize(),
+            plain(str(key)).capitalize(),
             ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, Mapping) else str(value),
         )
         for key, value in values.items()

@@ -27,7 +27,6 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
     Args:
         figure: drawn by matplotlib; its text stays text, in the page's own fonts.
         name: unique in the page; every id in the element begins with it.
-        description: the text alternative.
 
     Returns:
         The element; it is always the same for the same figure and has no address outside the page.

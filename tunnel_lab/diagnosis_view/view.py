@@ -17,6 +17,7 @@ from identification.printing.numbers import (
     unit_mark,
     with_std,
 )
+from tunnel_lab.diagnosis_view.figures_common import plain
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -28,13 +29,7 @@ _CONDITIONS = {"always": "with or without wind", "wind_on": "only with the wind 
 
 @dataclass(frozen=True)
 class Fact:
-    """A figure at the head of the page.
-
-    Args:
-        label: what it is.
-        value: formatted.
-        note: a few words more.
-    """
+    """A figure at the head of the page."""
 
     label: str
     value: str
@@ -43,9 +38,6 @@ class Fact:
 
 def headline(document: Document) -> tuple[str, str]:
     """The answer in a few words, and its kind for the page's colour.
-
-    Args:
-        document: the diagnosis.
 
     Returns:
         Words, and one of ``none``, ``unknown``, ``open``, ``found``.
@@ -63,9 +55,6 @@ def headline(document: Document) -> tuple[str, str]:
 
 def facts(document: Document) -> list[Fact]:
     """The figures at the head of the page.
-
-    Args:
-        document: the diagnosis.
 
     Returns:
         Facts in the order shown.
@@ -119,17 +108,11 @@ def _minus(text: str) -> str:
     return "−" + text[1:] if text.startswith("-") else text
 
 
-def plain(name: str) -> str:
-    """An effect's name as words: underscores become spaces."""
-    return name.replace("_", " ")
-
-
 def interval(values: list[float] | None, unit: str) -> str:
     """An interval in words.
 
     Args:
         values: its ends, or None.
-        unit: of both.
 
     Returns:
         Text such as ``0.00 to 4.20 s``; a dash where there is none.
@@ -140,14 +123,7 @@ def interval(values: list[float] | None, unit: str) -> str:
 
 
 def place_rows(document: Document) -> list[tuple[str, str]]:
-    """Where the gap is, field by field.
-
-    Args:
-        document: the diagnosis.
-
-    Returns:
-        Labels and values.
-    """
+    """Where the gap is, field by field."""
     where = document["where"]
     return [
         ("Runs that show it", ", ".join(where["runs"]) or "–"),
@@ -161,9 +137,6 @@ def place_rows(document: Document) -> list[tuple[str, str]]:
 
 def candidate_rows(document: Document) -> tuple[list[dict[str, Any]], int]:
     """The answers considered.
-
-    Args:
-        document: the diagnosis.
 
     Returns:
         The probable ones (at least three), formatted, and the number of the others.
@@ -185,9 +158,6 @@ def candidate_rows(document: Document) -> tuple[list[dict[str, Any]], int]:
 
 def step_rows(document: Document) -> list[dict[str, str]]:
     """The gap as the causes are added.
-
-    Args:
-        document: the diagnosis.
 
     Returns:
         What is added, what is left, and what is left without it alone; none where no cause is named.
@@ -226,9 +196,6 @@ def estimate(values: Document) -> str:
 def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
     """What the vocabulary says of every cause and its rivals.
 
-    Args:
-        document: the diagnosis.
-
     Returns:
         Name, equation, signature, channel, condition and references of each.
     """
@@ -252,9 +219,6 @@ def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
 
 def coefficient_rows(document: Document) -> list[dict[str, str]]:
     """The coefficients before and after.
-
-    Args:
-        document: the diagnosis.
 
     Returns:
         Symbol, both estimates and the 95 % interval after.
@@ -281,10 +245,6 @@ def _interval95(values: Document) -> str:
 def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
     """Every run with its conditions and excess before and after.
 
-    Args:
-        document: the diagnosis.
-        campaign: the records.
-
     Returns:
         Formatted rows in the campaign's order.
     """
@@ -310,9 +270,6 @@ def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
 def next_run_rows(document: Document) -> list[tuple[str, str]]:
     """The run expected to distinguish the rivals.
 
-    Args:
-        document: the diagnosis.
-
     Returns:
         Labels and values; empty where none is proposed.
     """
@@ -333,9 +290,6 @@ def next_run_rows(document: Document) -> list[tuple[str, str]]:
 
 def line_rows(document: Document) -> list[dict[str, str]]:
     """Narrow lines in the residuals.
-
-    Args:
-        document: the diagnosis.
 
     Returns:
         Run, frequency, amplitude and share, formatted.

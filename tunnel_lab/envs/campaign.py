@@ -52,7 +52,6 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             its unit; the diagnosis preset only.
         targets: relative standard deviations (fractions) of Cnβ and Cnr at which an identification ends.
         probability: of one effect (a probability) at which a diagnosis ends.
-        costs: rig time of a run.
         seconds_per_nat: rig time that a nat is worth, s.
         max_runs: number of runs after which the episode is truncated.
         rig: path of a rig description; None takes the packaged rig.
@@ -134,9 +133,6 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             seed: of the truth and all noise; None continues with the present generator.
             options: ``truth`` (coefficients by name, SI) and ``effects`` (parameters by effect) in place of
                 what is drawn.
-
-        Returns:
-            Observation and info.
 
         Raises:
             TunnelError: for an unknown option, coefficient or effect, or a number out of range.
@@ -236,7 +232,6 @@ def reached(known: Knowledge, targets: tuple[float, float], probability: float) 
     """Whether a campaign has reached its goal.
 
     Args:
-        known: what the runs have shown.
         targets: relative standard deviations of Cnβ and Cnr (fractions), where there is no vocabulary.
         probability: of one effect alone (a probability), where there is a vocabulary.
     """

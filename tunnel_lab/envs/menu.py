@@ -9,9 +9,8 @@ from math import degrees, isfinite, radians
 
 import numpy as np
 
-from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.plan import Condition
 from tunnel_sim.vocabulary.rig import Rig
 
 
@@ -38,6 +37,16 @@ class Choice:
         """Such as ``spring 3, 10 m/s, 10°, 20 s``."""
         wind = f"{self.wind_speed:g} m/s" if self.wind_speed > 0.0 else "wind off"
         return f"spring {self.spring}, {wind}, {degrees(self.release_angle):.3g}°, {self.duration:g} s"
+
+    def condition(self, name: str, air_density: float) -> Condition:
+        """The run as a plan describes it.
+
+        Args:
+            air_density: ρ, kg/m³.
+        """
+        return Condition(
+            name, self.spring_stiffness, self.wind_speed, air_density, self.release_angle, self.duration
+        )
 
 
 @dataclass(frozen=True)
@@ -149,7 +158,6 @@ class Costs:
         """Rig time of a run.
 
         Args:
-            choice: the run.
             last: the run before it; None for the first run, which needs a change of spring and speed.
 
         Returns:
@@ -158,23 +166,3 @@ class Costs:
         spring = last is None or choice.spring != last.spring
         speed = last is None or choice.wind_speed != last.wind_speed
         return self.setup + choice.duration + spring * self.spring_change + speed * self.speed_change
-
-
-def stated_run(choice: Choice, name: str, record: Record, air_density: float) -> Run:
-    """A run as a campaign states it.
-
-    Args:
-        choice: its conditions.
-        name: its id.
-        record: what the sensor read.
-        air_density: ρ, kg/m³.
-    """
-    wind_on = choice.wind_speed > 0.0
-    return Run(
-        id=name,
-        record=record,
-        wind_speed=choice.wind_speed,
-        spring_stiffness=choice.spring_stiffness,
-        air_density=air_density if wind_on else None,
-        release_angle=choice.release_angle,
-    )

@@ -19,11 +19,7 @@ _DPI = 100
 
 
 def line_of(known: Knowledge) -> str:
-    """The last run and the estimate after it, in one line.
-
-    Args:
-        known: any.
-    """
+    """The last run and the estimate after it, in one line."""
     if known.last is None:
         return "new campaign"
     belief = known.belief
@@ -43,7 +39,6 @@ def picture(known: Knowledge, targets: tuple[float, float], probability: float) 
     """The last record beside the standard deviations, or the probabilities, so far.
 
     Args:
-        known: any.
         targets: relative standard deviations of Cnβ and Cnr, fractions.
         probability: that ends a diagnosis (a probability).
 
@@ -107,11 +102,7 @@ def _draw_probabilities(axes: Axes, known: Knowledge, probability: float) -> Non
 
 
 def beliefs(known: Knowledge) -> list[Belief]:
-    """The belief before the first run and after each informative run.
-
-    Args:
-        known: any.
-    """
+    """The belief before the first run and after each informative run."""
     noise = known.conditions.noise_std
     history = [known.prior]
     for count in range(1, len(known.fits) + 1):

@@ -30,9 +30,6 @@ def scripted(known: Knowledge) -> Action:
 
     Args:
         known: the number of runs so far.
-
-    Returns:
-        The action.
     """
     springs, speeds, _, _ = known.conditions.menu.shape
     by_speed = np.argsort(known.conditions.menu.wind_speeds, kind="stable")
@@ -45,9 +42,6 @@ def greedy(known: Knowledge) -> Action:
 
     Over the whole menu, the expected information gain (exact Fisher information at the present estimate; Izz, Cr,
     the sensor's zero and every release unknown) over the run's cost. Runs that might diverge are left out.
-
-    Args:
-        known: the belief, and the present spring and speed.
 
     Returns:
         The action; the scripted one where every run might diverge.
@@ -63,10 +57,6 @@ def greedy(known: Knowledge) -> Action:
 
 def expected_gain(known: Knowledge, choice: Choice) -> float:
     """Information that a run is expected to add about (Cnβ, Cnr).
-
-    Args:
-        known: the belief.
-        choice: the run.
 
     Returns:
         nats; 0 where the run might diverge.
@@ -89,9 +79,6 @@ def separating(known: Knowledge) -> Action:
     nats; see `diagnosis.answer.next_run.separation`) over the run's cost. If only one effect is named, its rival
     is the nominal model.
 
-    Args:
-        known: the study, and the present spring and speed.
-
     Returns:
         The action; the next one of the script while no gap is detected or no run had wind, because the fitted
         models cannot then predict other runs.
@@ -111,9 +98,6 @@ def separating(known: Knowledge) -> Action:
 
 def best_rivals(study: Study) -> tuple[Fit, Fit] | None:
     """The fits of the two most probable answers; the second is the nominal one where only one effect is fitted.
-
-    Args:
-        study: of the runs so far.
 
     Returns:
         None while no effect is fitted.
@@ -160,7 +144,6 @@ def run_campaign(
 
     Args:
         env: a ``tunnel_sim/Campaign-v0``, wrapped or not.
-        policy: the function that chooses the runs.
         seed: of truth and noise.
         options: of the reset.
 

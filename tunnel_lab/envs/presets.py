@@ -60,7 +60,7 @@ def preset_sensor(preset: Preset, noise_std: float | None, sample_rate: float | 
     Args:
         preset: one of `PRESETS`.
         noise_std: rad; None takes the preset's.
-        sample_rate: Hz; likewise.
+        sample_rate: Hz; None takes the preset's.
 
     Raises:
         TunnelError: when a number is not positive, or the rate does not divide the rig's 1000 steps per second.

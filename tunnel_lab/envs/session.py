@@ -18,14 +18,14 @@ from identification.decay.decay_fit import Reading, RunFit
 from identification.decay.residual_noise import stated_noise
 from identification.decay.run_fit import identify_run
 from identification.status import Status
-from tunnel_lab.envs.menu import Choice, Costs, Menu, stated_run
+from tunnel_lab.envs.menu import Choice, Costs, Menu
 from tunnel_lab.envs.truth import MEAN, STD, RigTruth
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.simulate import simulate
-from tunnel_sim.engine.virtual_campaign import run_settings
+from tunnel_sim.engine.virtual_campaign import run_settings, stated_run
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import Condition, SensorModel
+from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -39,8 +39,6 @@ class Conditions:
     Args:
         rig: geometry, springs, air.
         sensor: noise, rate and resolution; its zero is not used, because each episode has its own.
-        menu: the choices.
-        costs: rig time of a run.
         effects: the vocabulary of the diagnosis; empty where the campaign only identifies.
     """
 
@@ -52,16 +50,13 @@ class Conditions:
 
     @property
     def rig_properties(self) -> RigProperties:
-        """The rig properties that a campaign states; the inertia is the nominal one."""
-        body = self.rig.body
-        return RigProperties(self.rig.dynamics.yaw_inertia, body.frontal_area, body.length, body.width)
+        """The rig properties that a campaign states."""
+        return RigProperties.of(self.rig)
 
     @property
     def sensor_properties(self) -> SensorProperties:
         """The sensor properties that a campaign states."""
-        return SensorProperties(
-            self.sensor.sample_rate, self.sensor.resolution or None, self.sensor.noise_std
-        )
+        return SensorProperties.of(self.sensor)
 
     @property
     def noise_std(self) -> float:
@@ -77,7 +72,8 @@ class Conditions:
 
     def link(self, choice: Choice) -> Array:
         """How the run's decay depends on the shared parameters, shape (2, 4); see `run_link`."""
-        return run_link(stated_run(choice, "next", _EMPTY, self.rig.air.density), self.rig_properties)
+        condition = choice.condition("next", self.rig.air.density)
+        return run_link(stated_run(condition, _EMPTY), self.rig_properties)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +83,6 @@ class Knowledge:
     Args:
         conditions: rig, sensor, menu and costs.
         prior: the belief before the first run.
-        belief: now.
         choices: the runs requested so far, including lost ones.
         costs: rig time of each, s.
         runs: the runs made.
@@ -128,11 +123,7 @@ class Knowledge:
 
 
 def first_knowledge(conditions: Conditions) -> Knowledge:
-    """Before the first run: the prior is the distribution the truth is drawn from.
-
-    Args:
-        conditions: of the environment.
-    """
+    """Before the first run: the prior is the distribution the truth is drawn from."""
     prior = prior_belief(MEAN, STD)
     return Knowledge(conditions, prior, prior)
 
@@ -141,8 +132,6 @@ class Session:
     """The rig in one episode.
 
     Args:
-        conditions: of the environment.
-        truth: hidden from the operator.
         rng: parent of the generators of the runs, so that the noise of a run depends on its number only.
     """
 
@@ -156,7 +145,6 @@ class Session:
 
         Args:
             known: before the run.
-            choice: the run.
 
         Returns:
             The knowledge after it. A run whose motion grows without bound is lost: it costs time without result.
@@ -177,14 +165,7 @@ class Session:
 
     def _run(self, choice: Choice, name: str, rng: np.random.Generator) -> Run:
         rig = self._conditions.rig
-        condition = Condition(
-            name,
-            choice.spring_stiffness,
-            choice.wind_speed,
-            rig.air.density,
-            choice.release_angle,
-            choice.duration,
-        )
+        condition = choice.condition(name, rig.air.density)
         record = simulate(
             rig,
             run_settings(self.truth.coefficients, condition),
@@ -192,7 +173,7 @@ class Session:
             rng,
             effects=self.truth.effects,
         )
-        return stated_run(choice, name, record, rig.air.density)
+        return stated_run(condition, record)
 
 
 def _identified(known: Knowledge, choice: Choice) -> Knowledge:
@@ -226,9 +207,6 @@ def _reason(status: Status) -> str:
 def answers(effects: Sequence[str]) -> tuple[str, ...]:
     """The answers that a diagnosis gives probabilities for, in order.
 
-    Args:
-        effects: the vocabulary.
-
     Returns:
         ``none``, each effect alone, ``several`` (two at once), ``unknown``.
     """
@@ -237,9 +215,6 @@ def answers(effects: Sequence[str]) -> tuple[str, ...]:
 
 def probabilities(known: Knowledge) -> Array:
     """The diagnosis' probabilities of `answers`.
-
-    Args:
-        known: any.
 
     Returns:
         Shape (effects + 3,), summing to 1. They are equal before the first diagnosis. While no gap is detected,
@@ -260,9 +235,6 @@ def probabilities(known: Knowledge) -> Array:
 
 def diagnostic_information(known: Knowledge) -> float:
     """ln(answers) minus the entropy of the probabilities, nats.
-
-    Args:
-        known: any.
 
     Returns:
         0 while no gap is detected: its absence does not show which effect acts.

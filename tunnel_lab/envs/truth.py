@@ -27,7 +27,6 @@ class RigTruth:
     """The truth of an episode, which no observation contains.
 
     Args:
-        coefficients: of the nominal model.
         effects: those added to it.
         sensor_zero: rad.
     """
@@ -55,7 +54,6 @@ def draw_truth(
     Every number is always drawn, so that one option does not change the other numbers.
 
     Args:
-        rng: source.
         severities: the effects, of which one acts, each with the same probability and a severity log-uniform in
             its range (SI units); no effect acts where it is empty.
         options: ``truth``: coefficients by name, ``sensor_zero`` among them; ``effects``: parameters by effect

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tunnel_lab.plotting.plots import BLUE, _figure, _grid
+from tunnel_lab.plotting.common import figure, grid
+from tunnel_lab.plotting.plots import BLUE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,12 +18,9 @@ def calibration_figure(found: SmoothCalibration) -> Figure:
 
     Args:
         found: calibration of the probabilities.
-
-    Returns:
-        A figure with the curve, its interval and the diagonal.
     """
-    figure = _figure(5.0, 4.6)
-    axes = figure.add_subplot()
+    fig = figure(5.0, 4.6)
+    axes = fig.add_subplot()
     axes.plot([0.0, 1.0], [0.0, 1.0], color="0.4", linewidth=1.0, linestyle="--", label="calibrated")
     axes.fill_between(found.stated, found.low, found.high, color=BLUE, alpha=0.2, linewidth=0.0, label="95 %")
     axes.plot(found.stated, found.observed, color=BLUE, label=f"{found.campaigns} campaigns")
@@ -32,5 +30,5 @@ def calibration_figure(found: SmoothCalibration) -> Figure:
         title=f"smooth calibration error {found.error:.3f}",
     )  # fmt: skip
     axes.legend(loc="upper left", frameon=False)
-    _grid(axes)
-    return figure
+    grid(axes)
+    return fig

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification.printing.numbers import SYMBOLS, unit
-from tunnel_lab.plotting.figure_text import figure_text
+from tunnel_lab.plotting.common import figure, figure_text, grid
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
@@ -41,11 +41,7 @@ def save(figure: Figure, path: Path) -> Path:
     """Write a figure as a PNG, completely or not at all.
 
     Args:
-        figure: the figure.
         path: the file; replaced when it exists.
-
-    Returns:
-        The same path.
 
     Raises:
         TunnelError: when the file cannot be written.
@@ -55,9 +51,6 @@ def save(figure: Figure, path: Path) -> Path:
 
 def run_label(run: Run) -> str:
     """The conditions of a run in a few words, for a figure.
-
-    Args:
-        run: any run.
 
     Returns:
         Text such as ``r02 · 16.12 N m/rad · 15 m/s``.
@@ -75,9 +68,6 @@ def run_label(run: Run) -> str:
 def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
     """Angle against time, one panel for each run.
 
-    Args:
-        campaign: measured or simulated.
-
     Returns:
         Figures of up to twelve panels, in the campaign's order.
     """
@@ -88,43 +78,39 @@ def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
 def _trace_page(runs: Sequence[Run]) -> Figure:
     columns = 1 if len(runs) <= 3 else 2 if len(runs) <= 6 else 3
     rows = ceil(len(runs) / columns)
-    figure = _figure(4.2 * columns if columns > 1 else 8.0, 2.1 * rows + 0.6)
+    fig = figure(4.2 * columns if columns > 1 else 8.0, 2.1 * rows + 0.6)
     for place, run in enumerate(runs, 1):
-        axes = figure.add_subplot(rows, columns, place)
+        axes = fig.add_subplot(rows, columns, place)
         colour = WIND_ON if run.wind_on else WIND_OFF
         axes.plot(run.record.time_s, run.record.yaw_rad, color=colour, linewidth=0.7)
         axes.set_title(run_label(run), fontsize=9)
         axes.margins(x=0.01)
-        _grid(axes)
+        grid(axes)
         if (place - 1) % columns == 0:
             axes.set_ylabel("angle β [rad]")
         if place > len(runs) - columns:
             axes.set_xlabel("time [s]")
-    return figure
+    return fig
 
 
 def wind_off_on_figure(off: Run, on: Run) -> Figure:
     """One run with the wind off above one with the wind on, on the same axes.
 
     Args:
-        off: the wind-off run.
         on: the wind-on run, preferably with the same spring.
-
-    Returns:
-        A figure of two panels.
     """
-    figure = _figure(8.0, 5.0)
+    fig = figure(8.0, 5.0)
     first: Axes | None = None
     for place, (run, colour) in enumerate(((off, WIND_OFF), (on, WIND_ON)), 1):
-        axes = figure.add_subplot(2, 1, place, sharex=first, sharey=first)
+        axes = fig.add_subplot(2, 1, place, sharex=first, sharey=first)
         axes.plot(run.record.time_s, run.record.yaw_rad, color=colour, linewidth=0.8)
         axes.set_title(run_label(run), fontsize=10)
         axes.set_ylabel("angle β [rad]")
         axes.margins(x=0.01)
-        _grid(axes)
+        grid(axes)
         first = first or axes
     axes.set_xlabel("time since the start of the record [s]")
-    return figure
+    return fig
 
 
 def spectrum_figure(runs: Sequence[Run]) -> Figure:
@@ -138,8 +124,8 @@ def spectrum_figure(runs: Sequence[Run]) -> Figure:
     """
     from scipy.signal import periodogram
 
-    figure = _figure(8.0, 4.6)
-    axes = figure.add_subplot()
+    fig = figure(8.0, 4.6)
+    axes = fig.add_subplot()
     top = 0.0
     for run, colour in zip(runs[:RUNS_PER_PLOT], COLOURS, strict=False):
         frequency, density = _log_averaged(
@@ -152,8 +138,8 @@ def spectrum_figure(runs: Sequence[Run]) -> Figure:
     axes.set_xlabel("frequency [Hz]")
     axes.set_ylabel("power spectral density of β [rad²/Hz]")
     axes.legend(loc="upper right", fontsize=9)
-    _grid(axes)
-    return figure
+    grid(axes)
+    return fig
 
 
 def windows_figure(estimate: Estimate) -> Figure:
@@ -170,8 +156,8 @@ def windows_figure(estimate: Estimate) -> Figure:
     """
     shown = [window.omega_n.value for run in estimate.runs[:RUNS_PER_PLOT] for window in run.windows]
     one_rig = bool(shown) and max(shown) < ONE_RIG * min(shown)
-    figure = _figure(10.0, 4.4)
-    damping, frequency = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
+    fig = figure(10.0, 4.4)
+    damping, frequency = fig.add_subplot(1, 2, 1), fig.add_subplot(1, 2, 2)
     for index, run in enumerate(estimate.runs[:RUNS_PER_PLOT]):
         if not run.windows:
             continue
@@ -186,18 +172,17 @@ def windows_figure(estimate: Estimate) -> Figure:
     )
     for axes in (damping, frequency):
         axes.set_xlabel("mean amplitude of the window [rad]")
-        _grid(axes)
+        grid(axes)
     handles, labels = damping.get_legend_handles_labels()
     if handles:
-        figure.legend(handles, labels, loc="outside upper center", ncols=len(handles), fontsize=9)
-    return figure
+        fig.legend(handles, labels, loc="outside upper center", ncols=len(handles), fontsize=9)
+    return fig
 
 
 def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Figure:
     """Estimates of each estimator against the injected values.
 
     Args:
-        estimates: of one simulated campaign, one per estimator.
         truth: injected values by name, all nonzero, each in the unit of the estimate's quantity of that
             name.
 
@@ -206,10 +191,10 @@ def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> F
     """
     from identification.estimate import UNITS
 
-    figure = _figure(10.0, 3.6)
+    fig = figure(10.0, 3.6)
     names = tuple(truth)
     for place, name in enumerate(names, 1):
-        axes = figure.add_subplot(1, len(names), place)
+        axes = fig.add_subplot(1, len(names), place)
         axes.axhline(0.0, color="black", linewidth=1.0)
         for index, estimate in enumerate(estimates):
             quantity: Quantity | None = getattr(estimate, name)
@@ -231,8 +216,8 @@ def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> F
         axes.set_title(f"{SYMBOLS[name]} = {truth[name]:g} {unit(UNITS[name])}", fontsize=10)
         if place == 1:
             axes.set_ylabel("estimate − truth [% of truth]")
-        _grid(axes)
-    return figure
+        grid(axes)
+    return fig
 
 
 def _relative(quantities: Sequence[Quantity]) -> list[Quantity]:
@@ -267,17 +252,3 @@ def _intervals(
         marker=style["marker"],
         label=style["label"],
     )
-
-
-def _figure(width: float, height: float) -> Figure:
-    """An empty figure, inches; made without pyplot, so that no global state is touched."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
-def _grid(axes: Axes) -> None:
-    """A quiet grid behind the data."""
-    axes.grid(visible=True, color="0.88", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)

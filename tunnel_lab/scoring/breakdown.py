@@ -59,7 +59,6 @@ class Case:
         severity: excess that it was sized for, as a ratio to the noise power; 0 for no effect.
         reached: excess after the reference simulator's own nominal refit, in noise powers (a ratio).
         realisation: number of the realisation, from 0.
-        campaign: input of the estimators.
         bound: Cramér–Rao bound of the nominal model by quantity, SI.
     """
 
@@ -109,9 +108,7 @@ def make_cases(
     positive.
 
     Args:
-        seed: of everything random.
         realisations: number of campaigns for each effect and severity.
-        effects: names.
         severities: excess to leave after the nominal refit, in noise powers.
         duration: of every run, s.
         tell_steps: show the progress of sizing on standard error.
@@ -192,15 +189,10 @@ def break_down(
     """Every estimator on every case.
 
     Args:
-        cases: of `make_cases`.
-        estimators: names in the registry.
         seed: the cases were made with.
         jobs: number of processes; 0 works in this one.
         parts: folder for finished work, so that an interrupted score can be continued; None for none.
         progress: called with the number of finished cases and of all cases.
-
-    Returns:
-        A row for each case, estimator and quantity, in this order.
     """
     named = {case.name: case for case in cases}
     mark = fingerprint({"breakdown": sorted(named), "seed": seed}, estimators)
@@ -235,9 +227,6 @@ class Bias:
         effect: its name, or ``no effect``.
         severity: excess that it was sized for, as a ratio to the noise power; 0 for no effect.
         reached: mean excess over the realisations, in noise powers (a ratio).
-        estimator: its name.
-        quantity: by name.
-        score: over the realisations.
         departs: share of the realisations in which the estimator reported that the model departs.
     """
 
@@ -251,14 +240,7 @@ class Bias:
 
 
 def biases(rows: Sequence[Row]) -> list[Bias]:
-    """Rows summarised over realisations.
-
-    Args:
-        rows: of `break_down`.
-
-    Returns:
-        In the order of the rows.
-    """
+    """Rows summarised over realisations."""
     groups: dict[tuple[str, float, str, str], list[Row]] = {}
     for row in rows:
         key = (row["effect"], row["severity"], row["estimator"], row["quantity"])
@@ -280,9 +262,6 @@ def _outcome(row: Row) -> Outcome:
 
 def breakdown_frame(found: Sequence[Bias]) -> pl.DataFrame:
     """The map as a table.
-
-    Args:
-        found: of `biases`.
 
     Returns:
         A row for each effect, severity, estimator and quantity; units in the columns' names.

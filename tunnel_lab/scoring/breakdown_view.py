@@ -31,15 +31,7 @@ _TINY, _HUGE = 1e-3, 1e2  # % at the ends of the colours
 
 
 def breakdown_tables(found: Sequence[Bias], quantity: str) -> list[Table]:
-    """The bias of one quantity, with effects in rows and estimators in columns, three to a table.
-
-    Args:
-        found: of `tunnel_lab.scoring.breakdown.biases`.
-        quantity: by name.
-
-    Returns:
-        Tables with a row for each effect and severity.
-    """
+    """The bias of one quantity, with effects in rows and estimators in columns, three to a table."""
     mine = [one for one in found if one.quantity == quantity]
     estimators = list(dict.fromkeys(one.estimator for one in mine))
     cells = {(one.effect, one.severity, one.estimator): _cell(one) for one in mine}
@@ -72,9 +64,6 @@ def _compact(value: float) -> str:
 
 def breakdown_figure(found: Sequence[Bias]) -> Figure:
     """The bias as a colour map: in % above and in reported standard deviations below.
-
-    Args:
-        found: of `tunnel_lab.scoring.breakdown.biases`.
 
     Returns:
         Four panels, for Cnβ and Cnr, with effects in rows, estimators and severities in columns.

@@ -17,10 +17,6 @@ class Finding:
     """One aspect of one estimator in the baseline and now.
 
     Args:
-        estimator: its name.
-        where: the cell, or the pooled cells.
-        quantity: by name.
-        change: the aspect in the baseline and now.
         worse: whether it is worse beyond chance, corrected for the number of findings.
     """
 
@@ -36,7 +32,6 @@ class Verdict:
     """What a check found.
 
     Args:
-        findings: every test that was made.
         false_alarm_rate: probability that any finding of unchanged estimators is called worse.
         identical: whether all estimates are the baseline's to the last bit.
         added: estimators that are not in the baseline; they were not checked.
@@ -63,12 +58,8 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
     """Compare a score with its baseline, cell by cell and over all cells of a kind together.
 
     Args:
-        baseline: trials of the baseline.
         now: trials of the same cells, with the same seed or another.
         rate: false-alarm probability of all tests together.
-
-    Returns:
-        The verdict.
 
     Raises:
         TunnelError: when the baseline has cells that were not scored now, or has none of the estimators.

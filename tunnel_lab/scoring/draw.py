@@ -51,8 +51,6 @@ def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
     """Make one trial.
 
     Args:
-        cell: its conditions.
-        seed: of the grid.
         number: of the trial in its cell, from 0.
 
     Returns:
@@ -150,8 +148,8 @@ def _campaign(
                 release_angle=cell.amplitude,
             )
         )
-    size = RigProperties(rig.dynamics.yaw_inertia, rig.body.frontal_area, rig.body.length, rig.body.width)
-    return Campaign("trial", size, SensorProperties(cell.sample_rate, cell.resolution or None), tuple(runs))
+    stated_sensor = SensorProperties(cell.sample_rate, cell.resolution or None)
+    return Campaign("trial", RigProperties.of(rig), stated_sensor, tuple(runs))
 
 
 def _record(

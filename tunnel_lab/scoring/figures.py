@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification.scoring.accuracy import INTERVAL, NOMINAL_COVERAGE, Score, score
+from tunnel_lab.plotting.common import figure, grid
 from tunnel_lab.plotting.plots import COLOURS, MARKERS
 from tunnel_lab.scoring.grid import NO_EFFECT
 from tunnel_lab.scoring.results import Results
@@ -23,19 +24,14 @@ _SHOWN = ("zeta", "omega_n", "cn_beta", "cn_r")
 def score_figure(results: Results) -> Figure:
     """RMSE over the bound above, coverage of 95 % intervals below, cell by cell, with 95 % intervals.
 
-    Args:
-        results: a finished score.
-
     Returns:
         A column of two panels for each of ζ, ωn, Cnβ and Cnr that was scored; cells in the grid's order, one
         colour and marker for each estimator.
     """
-    from matplotlib.figure import Figure
-
     trials = results.trials()
     shown = [name for name in _SHOWN if any(name in cell.quantities for cell in results.grid.cells)]
-    figure = Figure(figsize=(1.0 + 4.2 * len(shown), 8.4), layout="constrained")
-    panels = figure.subplots(2, len(shown), squeeze=False)
+    fig = figure(1.0 + 4.2 * len(shown), 8.4)
+    panels = fig.subplots(2, len(shown), squeeze=False)
     for column, quantity in enumerate(shown):
         cells = [i for i, cell in enumerate(results.grid.cells) if quantity in cell.quantities]
         for place, name in enumerate(results.estimators):
@@ -54,8 +50,8 @@ def score_figure(results: Results) -> Figure:
     panels[0, 0].set_ylabel("RMSE over the Cramér–Rao bound")
     panels[1, 0].set_ylabel("95 % intervals that contain the truth [%]")
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 8), frameon=False)
-    return figure
+    fig.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 8), frameon=False)
+    return fig
 
 
 def _errors(axes: Axes, scores: list[Score], shift: float, place: int, name: str) -> None:
@@ -86,11 +82,9 @@ def _coverage(axes: Axes, scores: list[Score], shift: float, place: int) -> None
 def _cells(axes: Axes, labels: list[str]) -> None:
     axes.set_xticks(range(len(labels)), labels, rotation=90, fontsize=8)
     axes.set_xlim(-0.6, len(labels) - 0.4)
-    axes.grid(visible=True, axis="y", color="0.88", linewidth=0.6)
     for edge in range(len(labels) - 1):
         axes.axvline(edge + 0.5, color="0.92", linewidth=0.8)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    grid(axes, "y")
 
 
 def _short(results: Results, index: int) -> str:

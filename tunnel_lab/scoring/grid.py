@@ -140,8 +140,6 @@ class Grid:
     """What to score on.
 
     Args:
-        name: of the grid.
-        seed: of every record.
         trials: number of records, or campaigns, in each cell.
         trials_of: the same for estimators that get fewer, by name.
         cells: at least one, all different.
@@ -174,9 +172,6 @@ class Grid:
         Args:
             data: of one grid.
 
-        Returns:
-            The grid.
-
         Raises:
             TunnelError: when it is not a grid, or too large.
         """
@@ -204,11 +199,6 @@ def _is_possible(cell: Cell) -> bool:
 
 def check_trials(grid: Grid, estimators: Sequence[str], where: str) -> None:
     """Refuse more trials than a table can hold before any is drawn.
-
-    Args:
-        grid: the conditions.
-        estimators: names in the registry.
-        where: file or option, for messages.
 
     Raises:
         TunnelError: with the number of rows and the limit.

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,7 +38,6 @@ class Results:
     """A finished score.
 
     Args:
-        grid: of the score.
         estimators: names, in the order given.
         rows: one per trial, estimator and quantity; see `tunnel_lab.scoring.work`.
     """
@@ -59,7 +59,6 @@ class Results:
         """Median time an estimator took for one record, ms.
 
         Args:
-            estimator: its name.
             cells: indices of the cells to include.
         """
         from statistics import median
@@ -99,10 +98,6 @@ def write_trials(path: Path, results: Results) -> Path:
 
     Args:
         path: the file; replaced when it exists.
-        results: to write.
-
-    Returns:
-        The same path.
     """
     import polars as pl
 
@@ -113,9 +108,6 @@ def write_trials(path: Path, results: Results) -> Path:
 
 def trials_frame(results: Results) -> pl.DataFrame:
     """A row for every trial, estimator and quantity.
-
-    Args:
-        results: to show.
 
     Returns:
         Columns as in the rows; ``cell`` is the index of the grid's cell.
@@ -128,9 +120,6 @@ def trials_frame(results: Results) -> pl.DataFrame:
 
 def read_trials(path: Path) -> Results:
     """Read what `write_trials` wrote.
-
-    Args:
-        path: the file.
 
     Returns:
         The results, estimators in the order of their first rows.
@@ -152,6 +141,20 @@ def read_trials(path: Path) -> Results:
         rows = tuple(frame.to_dicts())
         _check_rows(rows, grid)
     return Results(grid, tuple(dict.fromkeys(row["estimator"] for row in rows)), rows)
+
+
+def packaged_baseline() -> Results:
+    """The trials of all estimators on the packaged grid, which ``tunnel score --check packaged`` compares with."""
+    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-baseline.parquet") as path:
+        return read_trials(path)
+
+
+def packaged_breakdown() -> pl.DataFrame:
+    """Results of ``tunnel score --breakdown``; columns as in its Parquet file."""
+    import polars as pl
+
+    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-breakdown.parquet") as path:
+        return pl.read_parquet(path)
 
 
 def _check_rows(rows: Sequence[Row], grid: Grid) -> None:

@@ -33,10 +33,6 @@ _SHOWN_WORSE = 12
 def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
     """One table for each kind of cell, with all cells of that kind pooled.
 
-    Args:
-        results: a finished score.
-        times: whether to show the time for a record too.
-
     Returns:
         Tables with a section for each estimator and a row for each quantity.
     """
@@ -90,9 +86,6 @@ def _summary(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
 def cell_tables(results: Results) -> list[Table]:
     """One table for each cell.
 
-    Args:
-        results: a finished score.
-
     Returns:
         Tables with a section for each estimator and a row for each quantity.
     """
@@ -132,9 +125,6 @@ def _share(share: Proportion | None) -> str:
 def worse_table(verdict: Verdict) -> Table:
     """The findings that are worse, the most significant first.
 
-    Args:
-        verdict: of a check.
-
     Returns:
         A table; without rows where none is worse.
     """
@@ -165,14 +155,7 @@ def _before_and_now(finding: Finding) -> tuple[str, str]:
 
 
 def verdict_lines(verdict: Verdict) -> list[str]:
-    """The result of a check in words.
-
-    Args:
-        verdict: of a check.
-
-    Returns:
-        One to three lines.
-    """
+    """The result of a check in words."""
     tests = f"{len(verdict.findings)} tests, false-alarm rate {100 * verdict.false_alarm_rate:g} % of all together"
     worse = verdict.worse
     if worse:

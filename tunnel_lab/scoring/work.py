@@ -60,16 +60,7 @@ def units_of(grid: Grid) -> tuple[Unit, ...]:
 
 
 def score_unit(grid: Grid, estimators: Sequence[str], unit: Unit) -> list[Row]:
-    """Every estimator on the unit's trials.
-
-    Args:
-        grid: the conditions.
-        estimators: names in the registry.
-        unit: which trials.
-
-    Returns:
-        A row for each trial, estimator and quantity, in this order.
-    """
+    """Every estimator on the unit's trials."""
     from tunnel_lab.scoring.draw import draw_trial
 
     cell = grid.cells[unit.cell]
@@ -99,8 +90,6 @@ def estimate_rows(
     stop the work.
 
     Args:
-        estimator: its name in the registry.
-        campaign: its input.
         truth: by quantity, SI; ζ and ωn are those of the first run.
         bound: the Cramér–Rao bound by quantity, SI; quantities without one are left out.
         about: first columns of every row.
@@ -141,9 +130,6 @@ def estimate_rows(
 def unit_of(quantity: str) -> str:
     """Unit of a scored quantity.
 
-    Args:
-        quantity: its name.
-
     Raises:
         KeyError: when no cell scores it.
     """
@@ -163,8 +149,6 @@ def score_grid(
     """Every estimator on every trial of a grid.
 
     Args:
-        grid: the conditions.
-        estimators: names in the registry.
         jobs: processes; 0 works in this one. Except for the times, the rows are the same to the bit.
         parts: folder for finished work, from which an interrupted score continues if grid, estimators and code
             are the same; None for none.
@@ -241,7 +225,6 @@ def fingerprint(document: Mapping[str, Any], estimators: Sequence[str]) -> str:
 
     Args:
         document: the conditions, in JSON's types.
-        estimators: names in the registry.
 
     Returns:
         SHA-256 in hexadecimal.

@@ -1,7 +1,8 @@
 """A film of a run: the oscillating model beside the trace of its angle.
 
-Frames are rendered off-screen as in `tunnel_lab.show.rendering`: in a child process, trying one OpenGL back end
-after another. The trace is drawn twice, faint and full; every frame shows the full one up to its time.
+Frames are rendered off-screen. This needs an OpenGL back end, which many machines lack, and a missing back end may
+end the whole process. Therefore a child process draws, trying one back end after another. The trace is drawn twice,
+faint and full; every frame shows the full one up to its time.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_lab.show.rendering import REMEDY, backends
 from tunnel_lab.show.request import Request, ShownRun, shown_run
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
@@ -34,17 +34,28 @@ BODY_SHARE = 0.52
 """Share of the width for the picture of the model."""
 FIRST_FRAME_S = 60.0
 """Time limit of a back end for its first frame, s."""
-_SHADOW, _SAMPLES = (
-    2048,
-    4,
-)  # for a film: a quarter of the time of a still, without visible difference
+_SHADOW, _SAMPLES = 2048, 4  # for a film: a quarter of the time of a still, without visible difference
+
+REMEDY = "install EGL or OSMesa (Debian and Ubuntu: libegl1 or libosmesa6) to get the picture"
+
+
+def backends() -> tuple[str, ...]:
+    """The OpenGL back ends to try, best first.
+
+    Returns:
+        Values for ``MUJOCO_GL``; only the user's own choice where that variable is set, and an empty
+        string (MuJoCo's default) where the platform has only one.
+    """
+    chosen = os.environ.get("MUJOCO_GL")
+    if chosen:
+        return (chosen,)
+    if not sys.platform.startswith("linux"):
+        return ("",)
+    return ("egl", "osmesa", "glfw") if os.environ.get("DISPLAY") else ("egl", "osmesa")
 
 
 def checked_camera(name: str) -> str:
     """Check the name of a camera.
-
-    Args:
-        name: as typed.
 
     Raises:
         TunnelError: when the rig has no such camera.
@@ -66,6 +77,7 @@ class Look:
         fps: frames per second of the film.
         speed: of the film as a ratio; 0.5 is half as fast as the run.
         camera: of ``mjcf/rig.xml``.
+        trace: whether the trace is shown beside the model.
     """
 
     width: int = 1280
@@ -73,6 +85,7 @@ class Look:
     fps: int = 25
     speed: float = 1.0
     camera: str = "overview"
+    trace: bool = True
 
     def frame_times(self, duration: float) -> NDArray[np.float64]:
         """When the frames are, in the run's own time.
@@ -92,8 +105,6 @@ def write_film(
     """Write a run as MP4 (H.264), completely or not at all.
 
     Args:
-        request: which run.
-        look: how.
         path: the file; replaced when it exists.
         progress: called with (frames done, frames in all).
 
@@ -107,13 +118,11 @@ def write_still(request: Request, look: Look, path: Path, at: float) -> None:
     """Write one frame of the film as PNG, completely or not at all.
 
     Args:
-        request: which run.
-        look: how.
         path: the file; replaced when it exists.
         at: s from the release.
 
     Raises:
-        TunnelError: likewise; also when the run is shorter.
+        TunnelError: as `write_film`; also when the run is shorter.
     """
     duration = shown_run(request).settings.duration
     if not 0.0 <= at <= duration:
@@ -191,8 +200,6 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
     """Pictures of the run; needs OpenGL in this process.
 
     Args:
-        run: what is shown.
-        look: how.
         times: ascending, shape (frames,), s from the release.
 
     Yields:
@@ -204,8 +211,8 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
     from tunnel_sim.engine.model import build_model
 
     model = build_model(run.rig, run.settings)
-    left = 2 * round(BODY_SHARE * look.width / 2)
-    trace = draw_trace(run.record(), look.width - left, look.height, run.title)
+    left = 2 * round(BODY_SHARE * look.width / 2) if look.trace else look.width
+    trace = draw_trace(run.record(), look.width - left, look.height, run.title) if look.trace else None
     _prepare(model, left, look.height)
     data = model.release_state()
     with mujoco.Renderer(model.mj, look.height, left) as renderer:
@@ -215,7 +222,8 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
                 mujoco.mj_step(model.mj, data, steps)
             mujoco.mj_forward(model.mj, data)
             renderer.update_scene(data, camera=look.camera)
-            yield np.concatenate((renderer.render(), trace.at(float(time))), axis=1)
+            picture = renderer.render()
+            yield picture if trace is None else np.concatenate((picture, trace.at(float(time))), axis=1)
 
 
 def _prepare(model: Model, width: int, height: int) -> None:

@@ -16,11 +16,7 @@ if TYPE_CHECKING:
 
 
 class LiveRun:
-    """A run of the rig with its full physics, including the plugin.
-
-    Args:
-        run: what is shown.
-    """
+    """A run of the rig with its full physics, including the plugin."""
 
     def __init__(self, run: ShownRun) -> None:
         self.run = run
@@ -62,11 +58,7 @@ class LiveRun:
 
 
 class Puppet:
-    """The same bodies without the engine plugin, for viewers that do not have it (a browser).
-
-    Args:
-        live: the run that it follows.
-    """
+    """The same bodies without the engine plugin, for viewers that do not have it (a browser)."""
 
     def __init__(self, live: LiveRun) -> None:
         spec = build_spec(live.run.rig, live.run.settings)
@@ -79,22 +71,13 @@ class Puppet:
         self.follow(live)
 
     def follow(self, live: LiveRun) -> None:
-        """Take the pose of the run.
-
-        Args:
-            live: the run.
-        """
+        """Take the pose of the run."""
         pose(self.data, live.data)
         mujoco.mj_forward(self.model, self.data)
 
 
 def pose(target: mujoco.MjData, source: mujoco.MjData) -> None:
-    """Copy time, positions and rates; the two models have the same joints.
-
-    Args:
-        target: to copy to.
-        source: to copy from.
-    """
+    """Copy time, positions and rates; the two models have the same joints."""
     target.time = source.time
     target.qpos[:] = source.qpos
     target.qvel[:] = source.qvel

@@ -63,15 +63,7 @@ class Request:
 
 @dataclass(frozen=True)
 class ShownRun:
-    """A run ready to be simulated.
-
-    Args:
-        rig: of the run.
-        chain: its conditions and its effects.
-        sensor: the potentiometer.
-        title: its conditions in a few words.
-        request: what was asked for.
-    """
+    """A run ready to be simulated."""
 
     rig: Rig
     chain: EffectChain
@@ -99,12 +91,6 @@ class ShownRun:
 
 def shown_run(request: Request) -> ShownRun:
     """Prepare a run.
-
-    Args:
-        request: plan and run, or options.
-
-    Returns:
-        The run.
 
     Raises:
         TunnelError: for a plan that cannot be read, an unknown run, spring or effect, or a number that is out

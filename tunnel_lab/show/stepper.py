@@ -38,9 +38,6 @@ class _PuppetMaster(step_control.StepControl):  # type: ignore[misc]  # mujoco i
 def puppet_master(live: LiveRun) -> Any:
     """Studio's stepper for a run.
 
-    Args:
-        live: the physics, whose pose the shown model takes.
-
     Returns:
         A plugin for ``mujoco.studio.launch_web.launch``.
     """

@@ -23,10 +23,10 @@ class Trace:
 
     Args:
         faint: all of the trace in grey, shape (height, width, 3).
-        full: in colour, likewise.
+        full: all of it in colour, of the same shape.
         time: of the samples, shape (n,), s.
         columns: of the samples, shape (n,), pixels from the left.
-        rows: likewise, pixels from the top.
+        rows: of the samples, shape (n,), pixels from the top.
         top: first row of the axes, pixels.
         bottom: last row, pixels.
     """
@@ -62,13 +62,8 @@ def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
     """Draw a record's axes once.
 
     Args:
-        record: the reading.
         width: pixels.
         height: pixels.
-        title: above the axes.
-
-    Returns:
-        The trace, ready for any time.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

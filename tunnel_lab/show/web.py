@@ -25,9 +25,7 @@ def view_in_browser(run: ShownRun, *, port: int, open_browser: bool, seconds: fl
     """Serve the run to browsers until interrupted.
 
     Args:
-        run: what is shown.
         port: TCP port (index); 0 takes the first free one from 8080 on.
-        open_browser: open a tab, where there is a display.
         seconds: time until it stops, s; None runs until interrupted.
 
     Raises:

@@ -32,11 +32,7 @@ def missing_display() -> str:
 
 
 class Controls:
-    """The keys of the window: space pauses, R releases again.
-
-    Args:
-        live: the run.
-    """
+    """The keys of the window: space pauses, R releases again."""
 
     def __init__(self, live: LiveRun) -> None:
         self._live = live
@@ -71,7 +67,6 @@ def view_in_window(run: ShownRun, *, camera: str, speed: float) -> None:
     """Open a window and show the run until it is closed.
 
     Args:
-        run: what is shown.
         camera: of ``mjcf/rig.xml``.
         speed: factor on real time (ratio).
 
@@ -117,8 +112,6 @@ def window_loop(
 
     Args:
         handle: of MuJoCo's passive viewer.
-        live: the run.
-        controls: the keys.
         speed: factor on real time (ratio).
         clock: wall time, s.
         sleep: waits for s.

@@ -24,7 +24,6 @@ class Outcome:
     """The outcome of a sweep.
 
     Args:
-        store: its folder.
         found: number of shards that were finished already.
         crashes: number of estimates that raised an exception, in the shards done now.
     """
@@ -38,9 +37,6 @@ def run_sweep(sweep: Sweep, folder: Path, work: Work, progress: Told | None = No
     """Do the rest of a sweep.
 
     Args:
-        sweep: what to do.
-        folder: of its results.
-        work: does the shards.
         progress: called with the number of finished cases and of all cases, at the start and after each shard.
 
     Returns:

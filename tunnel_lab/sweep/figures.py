@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from identification.printing.numbers import SYMBOLS, concise, significant, unit
+from tunnel_lab.plotting.common import figure, grid
 from tunnel_lab.plotting.plots import COLOURS, MARKERS
 from tunnel_lab.sweep.summary import AXES, OVERALL, SEVERITY, Line, Pace
 from tunnel_lab.terminal.tables import table
@@ -30,9 +31,6 @@ _WIDE = 10.0  # ratio of the largest to the least value from which an axis is dr
 def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
     """Lines grouped by figure.
 
-    Args:
-        lines: of a summary.
-
     Returns:
         Lines by file name without its suffix, such as ``error-by-noise-std`` or ``error-by-coulomb-friction``.
     """
@@ -53,25 +51,23 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
     Returns:
         The figure, with 95 % intervals from the number of trials; None where no quantity has a panel.
     """
-    from matplotlib.figure import Figure
-
     quantities = [name for name in DRAWN if any(line.quantity == name and line.score.rmse for line in lines)]
     if not quantities:
         return None
     estimators = list(dict.fromkeys(line.estimator for line in lines))
-    figure = Figure(figsize=(max(6.4, 3.1 * len(quantities) + 0.6), 6.2), layout="constrained")
+    fig = figure(max(6.4, 3.1 * len(quantities) + 0.6), 6.2)
     for column, name in enumerate(quantities, 1):
         mine = [line for line in lines if line.quantity == name and line.score.rmse and line.score.bias]
-        top = figure.add_subplot(2, len(quantities), column)
-        bottom = figure.add_subplot(2, len(quantities), len(quantities) + column, sharex=top)
+        top = fig.add_subplot(2, len(quantities), column)
+        bottom = fig.add_subplot(2, len(quantities), len(quantities) + column, sharex=top)
         for place, estimator in enumerate(estimators):
             shown = [line for line in mine if line.estimator == estimator]
             _errorbars(top, shown, [line.score.rmse for line in shown], place, len(estimators))
             _errorbars(bottom, shown, [line.score.bias for line in shown], place, len(estimators))
         _dress(top, bottom, mine, name, first=column == 1)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)), fontsize=9)
-    return figure
+    handles, labels = fig.axes[0].get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)), fontsize=9)
+    return fig
 
 
 def _errorbars(
@@ -119,9 +115,7 @@ def _dress(top: Axes, bottom: Axes, lines: Sequence[Line], name: str, *, first: 
         top.set_ylabel(f"RMSE [{per}]")
         bottom.set_ylabel(f"bias, estimate − truth [{per}]")
     for axes in (top, bottom):
-        axes.grid(visible=True, color="0.88", linewidth=0.6)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+        grid(axes)
 
 
 def _is_logarithmic(lines: Sequence[Line]) -> bool:
@@ -130,14 +124,7 @@ def _is_logarithmic(lines: Sequence[Line]) -> bool:
 
 
 def overall_table(lines: Iterable[Line]) -> Table:
-    """Bias, RMSE, coverage and failures of each estimator and quantity over all cases.
-
-    Args:
-        lines: of a summary.
-
-    Returns:
-        A table with a section for each estimator.
-    """
+    """Bias, RMSE, coverage and failures of each estimator and quantity over all cases."""
     kept = [line for line in lines if line.axis == OVERALL]
     said = "without effects" if all(line.effect == "none" for line in kept) else "effects pooled"
     result = table(
@@ -162,9 +149,6 @@ def axis_table(lines: Sequence[Line]) -> Table:
 
     Args:
         lines: of one axis, and of one effect where that is severity.
-
-    Returns:
-        A table with a section for each value on the axis.
     """
     one = lines[0]
     label = one.effect.replace("_", " ") if one.axis == SEVERITY else AXES[one.axis][0]
@@ -182,14 +166,7 @@ def axis_table(lines: Sequence[Line]) -> Table:
 
 
 def pace_table(found: Sequence[Pace]) -> Table:
-    """Times of the steps.
-
-    Args:
-        found: of a sweep.
-
-    Returns:
-        A table with a row for each step.
-    """
+    """Times of the steps."""
     result = table("Time per run", "step", "median [ms]", "quartiles [ms]", right=("median [ms]",))
     for one in found:
         middle, low, high = (significant(1e3 * value, 3) for value in (one.middle, one.low, one.high))

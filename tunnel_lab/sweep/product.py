@@ -39,9 +39,6 @@ class Case:
     Args:
         index: in the order of the product, from 0.
         replicate: number of the repetition with other noise, from 0.
-        rig_name: as the sweep file names it.
-        rig: the rig itself.
-        conditions: name of the conditions.
         duration: of every run, s.
         plan: the campaign with its seed.
         document: the same as a campaign description, ready to be written as TOML.
@@ -62,7 +59,6 @@ class Sweep:
     """A sweep file with its rigs, which together determine the results.
 
     Args:
-        document: the file.
         rigs: sections of each rig's description, in the order of the file.
     """
 
@@ -78,12 +74,6 @@ class Sweep:
     @classmethod
     def from_json(cls, text: str) -> Sweep:
         """The inverse of `to_json`.
-
-        Args:
-            text: of one sweep.
-
-        Returns:
-            The sweep, its rigs parsed.
 
         Raises:
             TunnelError: when it is not a sweep, or too large.
@@ -136,9 +126,6 @@ class Sweep:
 
         Args:
             index: from 0.
-
-        Yields:
-            Its cases, in the order of the product.
         """
         start = index * self.cases_per_shard
         for place in range(start, min(start + self.cases_per_shard, self.size)):
@@ -188,7 +175,6 @@ def case_seed(seed: int, physics: Mapping[str, Any], replicate: int) -> int:
     """The seed of a case: it depends on the contents of the case, not on its place in the product.
 
     Args:
-        seed: of the sweep.
         physics: everything that the records of the case depend on besides the noise, as plain values.
         replicate: number of the repetition, from 0.
 
@@ -220,11 +206,7 @@ def _effects(entry: Mapping[str, Any]) -> list[list[dict[str, Any]]]:
 
 
 def axis_lengths(document: SweepDocument) -> dict[str, int]:
-    """Number of values of every axis by its name, counted from the lengths of the lists.
-
-    Args:
-        document: the sweep file.
-    """
+    """Number of values of every axis by its name, counted from the lengths of the lists."""
     effects = (1 if one.name == NO_EFFECT else _points(one.parameters) for one in document.effects)
     return {
         "rig": len(document.rig),
@@ -237,10 +219,6 @@ def axis_lengths(document: SweepDocument) -> dict[str, int]:
 
 def check_sweep_size(document: SweepDocument, where: str) -> None:
     """Refuse a sweep that is too large before it is expanded.
-
-    Args:
-        document: the sweep file.
-        where: the file, for messages.
 
     Raises:
         TunnelError: too many values of an axis, cases, shards, runs or samples, with their number and the limit.

@@ -29,9 +29,6 @@ def read_sweep(path: Path) -> Sweep:
     Args:
         path: a TOML file; paths of rig files are relative to its folder.
 
-    Returns:
-        The sweep, its rigs read.
-
     Raises:
         TunnelError: for the first error, in one line that names file, key and remedy.
     """

@@ -81,9 +81,6 @@ TIMING_COLUMNS: Mapping[str, Any] = {
 def case_values(case: Case) -> tuple[Any, ...]:
     """The first columns of a case's rows.
 
-    Args:
-        case: any.
-
     Returns:
         Values of `CASE_COLUMNS`, in their order.
     """
@@ -116,7 +113,6 @@ class Failure:
 
     Args:
         status: `NOT_SIMULATED`, `REFUSED` or `RAISED`.
-        message: the reason.
     """
 
     status: str
@@ -129,7 +125,6 @@ def estimate_rows(
     """The rows of one estimator's answer to one case.
 
     Args:
-        case: what was simulated.
         estimator: its name; None where the case was only simulated.
         outcome: its estimate, or why there is none; None where the case was only simulated.
 

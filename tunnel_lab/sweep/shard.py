@@ -47,10 +47,9 @@ class Finished:
     """A finished shard, ready to be written.
 
     Args:
-        index: of the shard.
         results: a Parquet file's bytes; they do not depend on where or when the shard is done.
-        records: likewise; None where they are not stored.
-        timings: likewise, but different every time.
+        records: those of the records; None where they are not stored.
+        timings: those of the times, which differ every time.
         made_with: what the bits of the results depend on besides the sweep.
         crashes: number of estimates that raised an exception.
     """
@@ -68,11 +67,7 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
 
     Args:
         sweep: as `Sweep.to_json` gives it.
-        index: of the shard.
         nthread: threads that simulate; the result is the same to the bit whatever their number.
-
-    Returns:
-        The finished shard.
     """
     plan = _sweep(sweep)
     clock = _Clock()
@@ -108,11 +103,7 @@ def simulate_cases(cases: Sequence[Case], *, nthread: int = 1) -> list[Campaign 
     """Simulate cases; those of the same rig and sample rate are done together.
 
     Args:
-        cases: any.
         nthread: threads; the result is the same to the bit whatever their number.
-
-    Returns:
-        For each case a campaign, or why it could not be simulated.
     """
     groups: dict[tuple[str, float], list[int]] = {}
     for place, case in enumerate(cases):

@@ -41,7 +41,6 @@ class Store:
 
     Args:
         folder: an existing folder with the ``sweep.json`` of the sweep.
-        sweep: the sweep.
         made_with: versions that its results are made with.
     """
 
@@ -55,9 +54,6 @@ class Store:
 
     def keep(self, shard: Finished) -> None:
         """Write a finished shard.
-
-        Args:
-            shard: of this sweep.
 
         Raises:
             TunnelError: when it was made with other versions, or cannot be written.
@@ -108,9 +104,6 @@ class Store:
         Args:
             dataset: ``results`` or ``records``.
 
-        Returns:
-            The rows, not yet read.
-
         Raises:
             TunnelError: when there is none yet.
         """
@@ -155,11 +148,7 @@ def begin(sweep: Sweep, folder: Path) -> Store:
     """The folder of a sweep, which may be new.
 
     Args:
-        sweep: to store in it.
         folder: created where it is missing.
-
-    Returns:
-        The store.
 
     Raises:
         TunnelError: when the folder holds another sweep or something else, or cannot be written.
@@ -197,9 +186,6 @@ def open_store(folder: Path) -> Store:
 
     Args:
         folder: as given to `begin`.
-
-    Returns:
-        The store.
 
     Raises:
         TunnelError: when it holds no sweep, or one that is malformed or of another version of the format.

@@ -56,7 +56,6 @@ class Line:
         effect: the effect whose severity it is; otherwise the pooled effects.
         at: the value on the axis, in its unit; None for ``all``.
         at_unit: unit of the axis.
-        estimator: its name.
         quantity: its name; ``omega_n`` and ``zeta`` are those of single runs.
         score: bias, RMSE, coverage and failures, in the score's unit.
     """
@@ -187,9 +186,6 @@ def paces(store: Store) -> Sequence[Pace]:
 
     Args:
         store: at least one shard finished.
-
-    Returns:
-        One for each step, in the order of the work.
 
     Raises:
         TunnelError: when the timings are damaged.

@@ -23,9 +23,6 @@ _DOMINANT = 0.5  # of the variance: more than all others together
 def budget_table(budget: Budget) -> Table:
     """Standard uncertainties, source by source.
 
-    Args:
-        budget: of an estimate.
-
     Returns:
         A row for each source and one for all of them, in the quantities' units; a negative value is the
         reduction by a correlation.
@@ -49,14 +46,7 @@ def _cell(budget: Budget, component: Component, name: str) -> str:
 
 
 def budget_lines(budget: Budget) -> list[str]:
-    """The dominant source of each quantity, and the notes of the sources.
-
-    Args:
-        budget: of an estimate.
-
-    Returns:
-        A line for each quantity and each note.
-    """
+    """The dominant source of each quantity, and the notes of the sources."""
     lines = []
     for name in budget.names:
         if name not in PARAMETERS:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
+
+from identification.printing.numbers import unit_mark
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -48,18 +49,6 @@ about them see [what no free decay can show](../theory/what-no-free-decay-can-sh
 """
 
 
-def pretty_unit(unit: str) -> str:
-    """A unit as printed.
-
-    Args:
-        unit: as in the registry, such as ``1/rad2``; the unit of a parameter.
-
-    Returns:
-        The same with raised digits, such as ``1/rad²``.
-    """
-    return re.sub(r"(?<=[a-z])2", "²", unit)
-
-
 def summary(kind: type[Effect]) -> str:
     """What an effect is, in one sentence: the first line of its docstring."""
     return inspect.cleandoc(kind.__doc__ or "").splitlines()[0]
@@ -67,9 +56,6 @@ def summary(kind: type[Effect]) -> str:
 
 def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
     """The full description of effects, in JSON's types.
-
-    Args:
-        kinds: effects.
 
     Returns:
         ``{"schema_version", "effects": [...]}`` in the order given.
@@ -94,14 +80,7 @@ def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
 
 
 def listing(kinds: Sequence[type[Effect]]) -> Table:
-    """Effects with equation and parameters, one row each.
-
-    Args:
-        kinds: effects.
-
-    Returns:
-        A table for the terminal.
-    """
+    """Effects with equation and parameters, one row each."""
     from rich.text import Text
 
     from tunnel_lab.terminal.tables import table
@@ -111,21 +90,14 @@ def listing(kinds: Sequence[type[Effect]]) -> Table:
     for column in result.columns[:3]:  # names are to be copied, so never folded
         column.no_wrap = True
     for kind in kinds:
-        parameters = [f"{info.name} {info.symbol} [{pretty_unit(info.unit)}]" for info in kind.parameters()]
+        parameters = [f"{info.name} {info.symbol} [{unit_mark(info.unit)}]" for info in kind.parameters()]
         cells = (kind.name, kind.channel, kind.condition, "\n".join([kind.equation, *parameters]))
         result.add_row(*map(Text, cells), end_section=True)
     return result
 
 
 def parameter_table(kind: type[Effect]) -> Table:
-    """The parameters of one effect.
-
-    Args:
-        kind: the effect.
-
-    Returns:
-        A table for the terminal.
-    """
+    """The parameters of one effect."""
     from rich.text import Text
 
     from tunnel_lab.terminal.tables import table
@@ -134,19 +106,12 @@ def parameter_table(kind: type[Effect]) -> Table:
     result = table("Parameters", "name", "symbol", "unit", "meaning", *right, right=right)
     for info in kind.parameters():
         numbers = (f"{value:g}" for value in (info.scale, info.lower, info.upper, info.default))
-        result.add_row(*map(Text, (info.name, info.symbol, pretty_unit(info.unit), info.meaning, *numbers)))
+        result.add_row(*map(Text, (info.name, info.symbol, unit_mark(info.unit), info.meaning, *numbers)))
     return result
 
 
 def lines(kind: type[Effect]) -> list[str]:
-    """The description of one effect without its parameters.
-
-    Args:
-        kind: the effect.
-
-    Returns:
-        Lines for the terminal.
-    """
+    """The description of one effect without its parameters."""
     drawn = ["drawn:      a random moment, different in every run"] if kind.random == "broad_band" else []
     return [
         f"{kind.name}: {summary(kind)}",
@@ -162,14 +127,7 @@ def lines(kind: type[Effect]) -> list[str]:
 
 
 def example(kind: type[Effect]) -> str:
-    """The option of ``tunnel simulate`` that injects an effect of typical size.
-
-    Args:
-        kind: the effect.
-
-    Returns:
-        The option with its value.
-    """
+    """The option of ``tunnel simulate`` that injects an effect of typical size."""
     values = ",".join(f"{info.name}={_typical(info):g}" for info in kind.parameters())
     return f"--effect {kind.name}:{values}"
 
@@ -180,14 +138,7 @@ def _typical(info: ParameterInfo) -> float:
 
 
 def markdown(kinds: Sequence[type[Effect]]) -> str:
-    """The reference page.
-
-    Args:
-        kinds: effects.
-
-    Returns:
-        Markdown: an overview, then a section for each effect.
-    """
+    """The reference page."""
     overview = ["| effect | channel | condition | equation |", "|---|---|---|---|"]
     overview += [
         f"| [`{kind.name}`](#{kind.name}) | {kind.channel} | {kind.condition} | {_cell(kind.equation)} |"
@@ -199,7 +150,7 @@ def markdown(kinds: Sequence[type[Effect]]) -> str:
 
 def _section(kind: type[Effect]) -> str:
     rows = [
-        f"| `{info.name}` | {info.symbol} | {pretty_unit(info.unit)} | {_cell(info.meaning)} | {info.scale:g} "
+        f"| `{info.name}` | {info.symbol} | {unit_mark(info.unit)} | {_cell(info.meaning)} | {info.scale:g} "
         f"| {info.lower:g} | {info.upper:g} | {info.default:g} |"
         for info in kind.parameters()
     ]

@@ -12,13 +12,7 @@ if TYPE_CHECKING:
 
 
 def show_estimate(campaign: Campaign, estimate: Estimate, *, windows: bool) -> None:
-    """Print an estimate.
-
-    Args:
-        campaign: what was identified.
-        estimate: its estimate.
-        windows: whether to print the windows of every run too.
-    """
+    """Print an estimate."""
     tables.show_tables(tables.coefficients_table(estimate), tables.runs_table(campaign, estimate))
     if windows:
         tables.show_tables(*map(tables.windows_table, estimate.runs))

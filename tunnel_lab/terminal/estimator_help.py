@@ -2,41 +2,24 @@
 
 from __future__ import annotations
 
+import inspect
 import textwrap
 
-import typer
-from typer.core import TyperCommand
+from identification.estimators import SUMMARIES
 
-PLACE = "{estimators}"
+PLACE = "  {estimators}"
 """Placeholder of the list in a command's docstring."""
 
 _WIDTH = 78
-_INDENT = "  "
 
 
-def command_with_estimators() -> type[TyperCommand]:
-    """A command class whose help lists the estimators; the registry is read when the help is shown."""
-    return _CommandWithEstimators
-
-
-class _CommandWithEstimators(TyperCommand):
-    def format_help(self, ctx: typer.Context, formatter: object) -> None:  # type: ignore[override]  # click's own types
-        if self.help and PLACE in self.help:
-            self.help = self.help.replace(f"{_INDENT}{PLACE}", listing()).replace(PLACE, listing().lstrip())
-        super().format_help(ctx, formatter)  # type: ignore[arg-type]
-
-
-def listing() -> str:
-    """One paragraph per estimator: its name, and its summary wrapped beside it."""
-    from identification.estimators import ENTRIES
-
-    column = max(len(entry.name) for entry in ENTRIES) + 2
-    return "\n".join(
+def with_estimators(text: str | None) -> str:
+    """A command's docstring with one paragraph per estimator: its name, and its summary wrapped beside it."""
+    column = max(map(len, SUMMARIES)) + 4
+    paragraphs = [
         textwrap.fill(
-            entry.summary,
-            _WIDTH,
-            initial_indent=_INDENT + entry.name.ljust(column),
-            subsequent_indent=_INDENT + " " * column,
+            summary, _WIDTH, initial_indent=f"  {name}".ljust(column), subsequent_indent=" " * column
         )
-        for entry in ENTRIES
-    )
+        for name, summary in SUMMARIES.items()
+    ]
+    return inspect.cleandoc(text or "").replace(PLACE, "\n".join(paragraphs))

@@ -3,39 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-PLAN_HELP = "Plan of a campaign (TOML). Default: the rig with its default spring at 10 m/s."
-RUN_HELP = "Run of the plan. Default: its first."
-EFFECT_HELP = "Add an effect to the nominal model. May be repeated; tunnel effects lists them."
-
+PlanArgument = Annotated[
+    Path | None,
+    typer.Argument(help="Plan of a campaign (TOML). Default: the rig with its default spring at 10 m/s."),
+]
+RunOption = Annotated[
+    str | None, typer.Option("--run", metavar="ID", help="Run of the plan. Default: its first.")
+]
 SpringOption = Annotated[int | None, typer.Option("--spring", help="Number of the spring in Table II.")]
 WindOption = Annotated[float | None, typer.Option("--wind", help="Wind speed, m/s.")]
 AngleOption = Annotated[float | None, typer.Option("--angle", help="Release angle, degrees.")]
 EffectOption = Annotated[
-    list[str] | None, typer.Option("--effect", metavar="NAME:PARAMETER=VALUE", help=EFFECT_HELP)
+    list[str] | None,
+    typer.Option(
+        "--effect",
+        metavar="NAME:PARAMETER=VALUE",
+        help="Add an effect to the nominal model. May be repeated; tunnel effects lists them.",
+    ),
 ]
 
 
 def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
-    """Names from repeated options, from lists with commas, or from both.
-
-    Args:
-        words: as typed.
-
-    Returns:
-        Names without blanks, in the order given.
-    """
+    """Names from repeated options, from lists with commas, or from both."""
     return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())
 
 
 def known_estimator(name: str) -> None:
     """Refuse an unknown estimator.
-
-    Args:
-        name: as typed.
 
     Raises:
         TunnelError: when there is no such estimator; it suggests the closest name.
@@ -47,3 +46,15 @@ def known_estimator(name: str) -> None:
         raise TunnelError(
             f"there is no estimator {name!r}", where="--estimator", remedy=did_you_mean(name, ALL_ESTIMATORS)
         )
+
+
+def refuse_unwritable_files(*paths: Path | None) -> None:
+    """Refuse files that cannot be written before the work is done; None is left out.
+
+    Raises:
+        TunnelError: for the first of them.
+    """
+    from tunnel_sim.files.writing import refuse_unwritable
+
+    for path in filter(None, paths):
+        refuse_unwritable(path)

@@ -9,16 +9,15 @@ from tunnel_lab.terminal.tables import console
 
 
 @contextmanager
-def bar(what: str, total: int | None = None) -> Iterator[Callable[[int, int, str], None]]:
+def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
     """A progress bar on standard error, where that is a terminal; elsewhere nothing is printed.
 
     Args:
-        what: description of the work.
         total: number of items, where it is known beforehand.
 
     Yields:
-        A function to call with the number finished, the total and the name of the last item. The first call gives
-        the number finished before, which does not count for the speed.
+        A function to call with the number finished, the total and, where it has one, the name of the last item. The
+        first call gives the number finished before, which does not count for the speed.
     """
     from rich.progress import (
         BarColumn,
@@ -40,7 +39,7 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[[int, int, str
         task = progress.add_task(what, total=total)
         begun = False
 
-        def tell(done: int, count: int, name: str) -> None:
+        def tell(done: int, count: int, name: str = "") -> None:
             nonlocal begun
             if not begun:
                 progress.reset(task, completed=done, total=count)

@@ -39,9 +39,6 @@ def read_spring_table(path: Path) -> SpringTable:
         path: CSV file with the columns ``stiffness_N_m_per_rad`` (N m/rad) and ``frequency_Hz`` (Hz), and
             optionally ``spring``, its name or number.
 
-    Returns:
-        The table, in the file's order.
-
     Raises:
         TunnelError: when the file cannot be read or is too large, a column is missing or unknown, a value is not a
             number above zero, or there are fewer than three springs.

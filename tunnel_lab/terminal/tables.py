@@ -14,6 +14,8 @@ from identification.printing import estimate_tables as printing
 from identification.printing.numbers import SYMBOLS, concise, in_stds, significant, unit, with_std
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from identification.estimate import Estimate, Quantity, RunEstimate, Status
     from identification.printing.table import TextTable
     from tunnel_sim.vocabulary.campaign import Campaign
@@ -36,21 +38,19 @@ def console(*, stderr: bool = False) -> Console:
 
     Args:
         stderr: print to standard error, where progress and status lines go.
-
-    Returns:
-        The console.
     """
     return _Console(stderr=stderr, highlight=False, markup=False, emoji=False)
 
 
 def say(line: str, *, stderr: bool = False) -> None:
-    """Print one line unchanged: no markup and no wrapping, so that paths can be copied.
-
-    Args:
-        line: the text.
-        stderr: print to standard error.
-    """
+    """Print one line unchanged: no markup and no wrapping, so that paths can be copied."""
     console(stderr=stderr).print(line, soft_wrap=True)
+
+
+def say_written(*paths: Path | None) -> None:
+    """Name the files that were written; None is left out."""
+    for path in filter(None, paths):
+        say(f"Written: {path}")
 
 
 def show_tables(*tables: Table) -> None:
@@ -70,12 +70,8 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
     """An empty table in the common style.
 
     Args:
-        title: above it.
         columns: headings, units included.
         right: those headings whose columns are aligned to the right.
-
-    Returns:
-        The table.
     """
     result = Table(
         title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_edge=False
@@ -87,14 +83,7 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
 
 
 def rich_table(plain: TextTable) -> Table:
-    """A plain table in the house's style.
-
-    Args:
-        plain: the table.
-
-    Returns:
-        The same with rules and colours.
-    """
+    """A plain table in the house's style."""
     result = table(plain.title, *plain.columns, right=plain.right)
     for row in plain.rows:
         result.add_row(*map(Text, row))
@@ -103,9 +92,6 @@ def rich_table(plain: TextTable) -> Table:
 
 def coefficients_table(estimate: Estimate) -> Table:
     """The coefficients that were identified.
-
-    Args:
-        estimate: of any campaign.
 
     Returns:
         A table; without rows when the campaign gives normalised form only.
@@ -117,11 +103,7 @@ def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Ta
     """Estimates beside the injected values.
 
     Args:
-        estimates: of one simulated campaign, one per estimator.
         truth: injected values by name, each in the unit of the estimate's quantity of that name.
-
-    Returns:
-        A table with a section for each estimator and a row for each quantity.
     """
     from identification.estimate import UNITS
 
@@ -151,11 +133,7 @@ def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
     """Natural frequency and damping ratio of every run.
 
     Args:
-        campaign: what was identified.
         estimate: its estimate, runs in the same order.
-
-    Returns:
-        A table with a row for each run.
     """
     result = table(
         f"Runs of {campaign.name}",
@@ -176,9 +154,6 @@ def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
 
 def windows_table(run: RunEstimate) -> Table:
     """Estimates of consecutive windows of a run, as in the paper's Table III.
-
-    Args:
-        run: an estimate of one run.
 
     Returns:
         A table with a row for each window, the largest amplitude first.
@@ -202,9 +177,6 @@ def windows_table(run: RunEstimate) -> Table:
 
 def status_lines(estimate: Estimate) -> list[str]:
     """The statuses of the estimate and its runs, each once.
-
-    Args:
-        estimate: of any campaign.
 
     Returns:
         A line for each status other than "identified", with the runs it concerns and the remedy.

@@ -67,9 +67,6 @@ def effect_from(name: str, parameters: Mapping[str, float]) -> Effect:
         name: such as ``coulomb_friction``.
         parameters: by name, in their units; the others take their defaults.
 
-    Returns:
-        The effect.
-
     Raises:
         TunnelError: when a name is unknown or a value out of range.
     """

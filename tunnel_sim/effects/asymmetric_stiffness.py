@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.base import Effect, Law
 from tunnel_sim.effects.parameters import exponent, parameter
 
 
@@ -41,6 +40,6 @@ class AsymmetricStiffness(Effect):
 
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 2.0)
 
-    def law(self) -> Mapping[str, float]:
+    def law(self) -> Law:
         """The effect's terms of the moment law."""
         return {"stiffness_quadratic": self.coefficient, "stiffness_quadratic_exponent": self.exponent}

@@ -32,6 +32,9 @@ MULTIPLES = (1.0, 2.0, 3.0)
 Channel = Literal["stiffness", "damping", "forcing", "sensor", "calibration"]
 Condition = Literal["always", "wind_on"]
 
+#: Parameters of the moment law by name.
+Law: TypeAlias = Mapping[str, float]
+
 #: What a run draws at random for an effect: nothing, a phase in rad, or random numbers, shape (n,).
 Drawn: TypeAlias = float | Array | None
 
@@ -260,7 +263,7 @@ class Effect:
             remedy="draw it with EffectChain.draw, or leave the effect out",
         )
 
-    def law(self) -> Mapping[str, float]:
+    def law(self) -> Law:
         """The effect's parameters in the moment law, by name, for an effect that is a term of the law."""
         return {}
 
@@ -353,9 +356,6 @@ def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:
         kind: the effect's class.
         parameters: by name, in their units.
 
-    Returns:
-        The effect.
-
     Raises:
         TunnelError: when a name is unknown or a value out of range.
     """
@@ -372,7 +372,6 @@ def moment_scale(info: ParameterInfo, campaign: Circumstances) -> float:
     """Factor on a parameter's typical value: in normalised form moments are divided by about 0.1 kg m².
 
     Args:
-        info: the parameter.
         campaign: says whether runs are normalised.
 
     Returns:

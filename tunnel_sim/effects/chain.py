@@ -19,7 +19,6 @@ class EffectChain:
     """The effects that act in one run.
 
     Args:
-        stated: the run as the campaign states it.
         effects: in the order in which they act.
         drawn: the random part of each effect in this run.
     """
@@ -33,13 +32,9 @@ class EffectChain:
         """Draw the random parts of the effects in one run.
 
         Args:
-            stated: the run as the campaign states it.
             effects: in the order in which they act.
             rng: parent generator. Each effect draws from generators spawned from it, one for the motion and one
                 for the sensor, so an effect never changes what is later drawn from ``rng`` itself.
-
-        Returns:
-            The chain.
         """
         motion, sensor = rng.spawn(len(effects)), rng.spawn(len(effects))
         drawn = tuple(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.base import Effect, Law
 from tunnel_sim.effects.parameters import exponent, parameter
 
 
@@ -38,6 +37,6 @@ class CubicStiffness(Effect):
 
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 3.0)
 
-    def law(self) -> Mapping[str, float]:
+    def law(self) -> Law:
         """The effect's terms of the moment law."""
         return {"stiffness_cubic": self.coefficient, "stiffness_cubic_exponent": self.exponent}

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,7 +53,7 @@ class DroppedSamples(Effect):
         if self.is_null:
             return run
         self.drawn_number(drawn)  # an error here, before the motion is computed
-        return dataclasses.replace(run, duration=run.duration + self.lost_time + _MARGIN)
+        return replace(run, duration=run.duration + self.lost_time + _MARGIN)
 
     def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """The true time runs ahead of the stamps from the instant on."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.base import Effect, Law
 from tunnel_sim.effects.parameters import parameter
 
 
@@ -30,6 +29,6 @@ class FreePlay(Effect):
         "δ", "rad", "half width of the dead zone", scale=0.002, lower=0.0, upper=0.2
     )
 
-    def law(self) -> Mapping[str, float]:
+    def law(self) -> Law:
         """The effect's terms of the moment law."""
         return {"free_play": self.half_width}

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.base import Effect, Law
 from tunnel_sim.effects.parameters import parameter
 
 
@@ -45,6 +44,6 @@ class GravityStiffness(Effect):
         beside_spring=True,  # without a spring it is one with the sensor's zero
     )
 
-    def law(self) -> Mapping[str, float]:
+    def law(self) -> Law:
         """The effect's terms of the moment law."""
         return {"gravity_stiffness": self.stiffness, "gravity_angle": self.rest_angle}

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.base import Effect, Law
 from tunnel_sim.effects.parameters import exponent, parameter
 
 
@@ -35,6 +34,6 @@ class NonlinearYawDamping(Effect):
 
     exponent: float = exponent("p", "power of the angle in the factor (unchanged at 0.2 rad)", 2.0)
 
-    def law(self) -> Mapping[str, float]:
+    def law(self) -> Law:
         """The effect's terms of the moment law."""
         return {"damping_quadratic": self.coefficient, "damping_quadratic_exponent": self.exponent}

@@ -18,7 +18,6 @@ class ParameterInfo:
         name: field name, also in TOML and JSON.
         symbol: as in the effect's equation.
         unit: SI, angles in rad.
-        meaning: one clause.
         scale: a typical value for this rig, for steps and starting values.
         lower: least value allowed, in the unit.
         upper: greatest value allowed, in the unit.
@@ -90,7 +89,6 @@ def exponent(symbol: str, meaning: str, textbook: float) -> Any:
 
     Args:
         symbol: as in the effect's equation.
-        meaning: one clause.
         textbook: exponent of the textbook form, dimensionless.
     """
     return parameter(

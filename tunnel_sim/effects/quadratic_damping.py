@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.base import Effect, Law
 from tunnel_sim.effects.parameters import exponent, parameter
 
 
@@ -40,6 +39,6 @@ class QuadraticDamping(Effect):
 
     exponent: float = exponent("n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0)
 
-    def law(self) -> Mapping[str, float]:
+    def law(self) -> Law:
         """The effect's terms of the moment law."""
         return {"quadratic_damping": self.coefficient, "quadratic_damping_exponent": self.exponent}

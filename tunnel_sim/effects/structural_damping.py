@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log, pi, sqrt
 
-from tunnel_sim.effects.base import Effect, WindOnRun
+from tunnel_sim.effects.base import Effect, Law, WindOnRun
 from tunnel_sim.effects.parameters import parameter
 
 
@@ -53,6 +53,6 @@ class StructuralDamping(Effect):
         cn_beta_std, cn_r_std = (abs(sum(s)) / len(s) / sqrt(3.0) for s in (stiffening, loss))
         return cn_beta_std, cn_r_std
 
-    def law(self) -> Mapping[str, float]:
+    def law(self) -> Law:
         """The effect's terms of the moment law."""
         return {"loss_factor": self.loss_factor}

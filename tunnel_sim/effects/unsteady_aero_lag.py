@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Circumstances, Effect, Trial, WindOnRun
+from tunnel_sim.effects.base import Circumstances, Effect, Law, Trial, WindOnRun
 from tunnel_sim.effects.parameters import parameter
 
 #: Uncertainty of Cnr as a share of the first-order effect a·Cnβ, chosen from the errors in the tuning sets.
@@ -61,6 +61,6 @@ class UnsteadyAeroLag(Effect):
         del runs
         return 0.0, _UNSEEN_SHARE * abs(self.lag * cn_beta)
 
-    def law(self) -> Mapping[str, float]:
+    def law(self) -> Law:
         """The effect's terms of the moment law."""
         return {"aero_lag": self.lag}

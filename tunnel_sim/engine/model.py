@@ -32,9 +32,6 @@ class Model:
     """A compiled model of the rig in one run.
 
     Args:
-        mj: the compiled model.
-        rig: the rig it was built from.
-        settings: the run's physics.
         spec: the complete MJCF specification; ``spec.to_xml()`` writes it.
     """
 
@@ -78,10 +75,6 @@ class Model:
             raise _refusal(error) from error
         return Model(mj, self.rig, settings, self.spec)
 
-    def to_xml(self) -> str:
-        """The complete MJCF with all numbers."""
-        return str(self.spec.to_xml())
-
     def release_state(self) -> mujoco.MjData:
         """The state at the release, where the body has been held at its angle until now.
 
@@ -105,11 +98,7 @@ def build_model(rig: Rig, settings: RunSettings) -> Model:
     """Build and compile the model of one run.
 
     Args:
-        rig: geometry, mass and sensor.
         settings: spring, damper, inertia, air and every further term of the moment law.
-
-    Returns:
-        The model.
 
     Raises:
         TunnelError: when MuJoCo or the plugin refuses the settings, or the steps are too long for them.
@@ -129,15 +118,7 @@ def _refusal(error: Exception) -> TunnelError:
 
 
 def build_spec(rig: Rig, settings: RunSettings) -> mujoco.MjSpec:
-    """The complete MJCF specification of one run.
-
-    Args:
-        rig: geometry, mass and sensor.
-        settings: the run's physics.
-
-    Returns:
-        The specification, ready to compile or to write as XML.
-    """
+    """The complete MJCF specification of one run."""
     load_plugin()
     with resources.as_file(resources.files("mjcf") / "rig.xml") as path:
         spec = mujoco.MjSpec.from_file(str(path))
@@ -224,7 +205,6 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
 
     Args:
         rig: gives frontal area, reference length and width.
-        settings: gives the rest.
 
     Returns:
         Values by name, without those that are attributes of joint and body.
@@ -249,7 +229,6 @@ def numeric_vector(model: mujoco.MjModel, values: Mapping[str, Sequence[float]])
     """A model's ``numeric_data`` with some values changed.
 
     Args:
-        model: the compiled model.
         values: by name: a new number, or a series of the same length.
 
     Returns:

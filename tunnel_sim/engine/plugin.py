@@ -8,8 +8,6 @@ import mujoco
 
 from tunnel_sim.physics.native import native_library
 
-PLUGIN_NAME = "vwt.yaw_moment"
-
 
 @functools.cache
 def load_plugin() -> None:

@@ -65,9 +65,6 @@ def coil(radius: float, wire: float, low: float, high: float, turns: int) -> Mes
         low: height of the lower end, m.
         high: height of the upper end, m.
         turns: number of turns.
-
-    Returns:
-        A closed tube.
     """
     around, along = 8, 24 * turns + 1
     turn = np.linspace(0.0, 2 * pi * turns, along)[:, None]

@@ -18,8 +18,6 @@ def read_motion(
     Args:
         motion: of the rod's upper end.
         sensor: noise, zero and resolution; with a resolution of 0 the reading is not quantised.
-        rng: source of the noise.
-        chain: the run's effects.
 
     Returns:
         The record. The ideal converter has an unlimited range: clipping is an effect.

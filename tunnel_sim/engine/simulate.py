@@ -28,11 +28,7 @@ def simulate_motion(model: Model, sample_rate: float) -> Motion:
     """Integrate one run with ``mj_step``.
 
     Args:
-        model: the rig in this run.
         sample_rate: Hz.
-
-    Returns:
-        The motion from the release onwards.
 
     Raises:
         TunnelError: when the motion grows without bound.
@@ -59,63 +55,12 @@ def simulate(
 ) -> Record:
     """Simulate one run as the sensor sees it.
 
-    Args:
-        rig: geometry, mass and sensor.
-        settings: the physics of the run as stated.
-        sensor: the potentiometer.
-        rng: source of the noise and of the random parts of effects.
-        effects: effects to add to the stated physics.
-
-    Returns:
-        The record.
-
     Raises:
         TunnelError: when the motion grows without bound or the settings are refused.
     """
     chain = EffectChain.draw(settings, effects, rng)
     motion = simulate_motion(build_model(rig, follow_fastest(rig, chain.physics())), sensor.sample_rate)
     return read_motion(motion, sensor, rng, chain)
-
-
-def simulate_batch(
-    rig: Rig,
-    settings: Sequence[RunSettings],
-    sensor: SensorModel,
-    rngs: Sequence[np.random.Generator],
-    *,
-    effects: Sequence[Effect] = (),
-    nthread: int = 0,
-    progress: Progress | None = None,
-) -> list[Record]:
-    """Simulate many runs on a thread pool.
-
-    Args:
-        rig: geometry, mass and sensor, common to the runs.
-        settings: the stated physics of every run.
-        sensor: the potentiometer, common to the runs.
-        rngs: one generator per run.
-        effects: effects to add to the stated physics, in all runs.
-        nthread: number of threads; 0 uses all processors. The result does not depend on it, and is bit-identical
-            to that of a loop over `simulate`.
-        progress: called with (runs done, runs in all).
-
-    Returns:
-        One record per run, in order.
-
-    Raises:
-        TunnelError: when the motion of a run grows without bound or its settings are refused.
-    """
-    if len(rngs) != len(settings):
-        raise TunnelError(
-            f"{len(settings)} runs but {len(rngs)} random generators", remedy="give one generator per run"
-        )
-    chains = [EffectChain.draw(run, effects, rng) for run, rng in zip(settings, rngs, strict=True)]
-    true = [chain.physics() for chain in chains]
-    motions = simulate_motions(rig, true, sensor.sample_rate, nthread=nthread, progress=progress)
-    return [
-        read_motion(motion, sensor, rng, chain)
-        for motion, rng, chain in zip(motions, rngs, chains, strict=True)
-    ]
 
 
 def simulate_motions(
@@ -129,14 +74,9 @@ def simulate_motions(
     """Integrate many runs on a thread pool, bit-identical to `simulate_motion`.
 
     Args:
-        rig: geometry and mass, common to the runs.
-        settings: the physics of every run.
         sample_rate: Hz.
         nthread: number of threads; 0 uses all processors.
         progress: called with (runs done, runs in all).
-
-    Returns:
-        One motion per run, in order.
 
     Raises:
         TunnelError: when the motion of a run grows without bound, its settings are refused, or its fastest motion

@@ -95,12 +95,7 @@ def _draw(plan: CampaignPlan) -> _Drawn:
 
 
 def stated_run(condition: Condition, record: Record) -> Run:
-    """A run as a campaign lists it, without the truth.
-
-    Args:
-        condition: the stated conditions.
-        record: what the sensor read.
-    """
+    """A run as a campaign lists it, without the truth."""
     return Run(
         id=condition.id,
         record=record,
@@ -122,17 +117,8 @@ def _campaign(plan: CampaignPlan, rig: Rig, motions: Sequence[Motion], drawn: _D
     return Campaign(
         name=plan.name,
         description=plan.description,
-        rig=RigProperties(
-            yaw_inertia=rig.dynamics.yaw_inertia,
-            frontal_area=rig.body.frontal_area,
-            reference_length=rig.body.length,
-            width=rig.body.width,
-        ),
-        sensor=SensorProperties(
-            sample_rate=plan.sensor.sample_rate,
-            resolution=plan.sensor.resolution or None,
-            noise_std=plan.sensor.noise_std or None,
-        ),
+        rig=RigProperties.of(rig),
+        sensor=SensorProperties.of(plan.sensor),
         runs=runs,
     )
 
@@ -141,12 +127,7 @@ def run_settings(truth: Truth, condition: Condition, *, timestep: float = 1e-3) 
     """The stated physics of one run.
 
     Args:
-        truth: coefficients.
-        condition: spring, wind and release.
         timestep: integration step, s.
-
-    Returns:
-        The run without effects.
     """
     return RunSettings(
         spring_stiffness=condition.spring_stiffness,
@@ -163,9 +144,6 @@ def run_settings(truth: Truth, condition: Condition, *, timestep: float = 1e-3) 
 
 def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
     """The effects of a plan.
-
-    Args:
-        plan: names effects and parameters.
 
     Returns:
         The effects in the order of `ALL_EFFECTS`, which need not be the plan's; those between rod and sensor come
@@ -220,9 +198,6 @@ def _check_spring(effect: Effect, plan: CampaignPlan) -> None:
 
 def truth_document(plan: CampaignPlan) -> dict[str, Any]:
     """The content of ``truth.json``, which estimators and diagnosis never read.
-
-    Args:
-        plan: the plan that was simulated.
 
     Returns:
         Coefficients, sensor, active effects with their parameters, seed and versions, as plain JSON values.

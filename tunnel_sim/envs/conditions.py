@@ -42,7 +42,6 @@ class RunPlan:
 
     Args:
         condition: spring, wind, release and duration, as a campaign states them.
-        truth: true coefficients.
         sensor: the potentiometer with its true zero.
         effects: effects beyond the nominal model.
     """
@@ -61,9 +60,6 @@ class RunPlan:
 
         Args:
             record: the sensor's reading.
-
-        Returns:
-            The run, without the truth.
         """
         return stated_run(self.condition, record)
 
@@ -85,13 +81,8 @@ def plan_run(
 
     Args:
         options: of ``reset``; see docs/reference/envs/free-decay.md.
-        config: of the environment.
-        rig: defines springs, inertia and damping.
         rng: draws what the options do not give, in the order spring, wind speed, release angle, truth in the
             order of `TRUTH`, effects. Nothing is drawn for given options.
-
-    Returns:
-        The plan.
 
     Raises:
         EnvError: for the first option that is unknown or out of range.
@@ -173,9 +164,6 @@ def _stiffness(given: Mapping[str, Any], rig: Rig, rng: np.random.Generator) -> 
 
 def drawn_springs(rig: Rig) -> list[float]:
     """The stiffnesses from which episodes draw: those that exceed the aerodynamic stiffness at any drawn speed.
-
-    Args:
-        rig: gives springs, size and air.
 
     Returns:
         N m/rad; all springs where none is stiff enough.

@@ -119,12 +119,6 @@ def angle_limit(rig: Rig) -> float:
 def free_decay_config(arguments: Mapping[str, Any]) -> FreeDecayConfig:
     """The configuration of an environment from its keyword arguments.
 
-    Args:
-        arguments: as passed to ``gymnasium.make``.
-
-    Returns:
-        The configuration.
-
     Raises:
         EnvError: when a name is unknown or a value out of range.
     """

@@ -33,9 +33,6 @@ class OperatorLog:
 def action_space(config: FreeDecayConfig) -> spaces.Space[Any]:
     """The space of one environment's actions.
 
-    Args:
-        config: preset and limits.
-
     Returns:
         ``Discrete(1)`` in the plain preset; else a box of two numbers from −1 to 1.
     """
@@ -50,7 +47,6 @@ def operator_action(
     """The action of the operator preset from values in SI units.
 
     Args:
-        config: limits.
         wind_speed: set-point, m/s, from 0 to the limit.
         moment: applied yaw moment, N m, within the limit to either side.
 
@@ -69,7 +65,6 @@ def decode(config: FreeDecayConfig, actions: np.ndarray[Any, Any]) -> tuple[Arra
     """Convert the actions of many runs to SI units.
 
     Args:
-        config: limits.
         actions: shape (runs, 2), from −1 to 1.
 
     Returns:
@@ -101,7 +96,6 @@ def check_plain(actions: np.ndarray[Any, Any], count: int) -> None:
 
     Args:
         actions: as given to ``step``.
-        count: number of runs.
 
     Raises:
         EnvError: when an action is not 0, or there are too many or too few.

@@ -40,7 +40,6 @@ class Models:
     """Models by layout, each compiled once.
 
     Args:
-        rig: the rig of all models.
         sample_rate: Hz.
     """
 
@@ -51,9 +50,6 @@ class Models:
 
     def of(self, settings: RunSettings) -> tuple[tuple[object, ...], int, Model]:
         """The model of a run.
-
-        Args:
-            settings: the run's physics.
 
         Returns:
             Layout, number of steps between two samples, model.
@@ -67,10 +63,9 @@ class Models:
 
 
 class OneRun:
-    """A single run with its own model.
+    """A single run with its own model; its ``row`` is always 0.
 
     Args:
-        models: compiled models.
         samples: in one control period.
     """
 
@@ -83,10 +78,6 @@ class OneRun:
 
     def start(self, row: int, settings: RunSettings) -> float:
         """Start a run at its release.
-
-        Args:
-            row: index of the run; always 0.
-            settings: the run's physics.
 
         Returns:
             Angle of the rod's upper end, rad.
@@ -122,9 +113,6 @@ class OneRun:
     def get_state(self, row: int) -> Array:
         """MuJoCo's state of a run.
 
-        Args:
-            row: index of the run; always 0.
-
         Returns:
             The result of ``mj_getState`` for `STATE`, shape (n,).
         """
@@ -138,7 +126,6 @@ class OneRun:
         """Put a run into a state.
 
         Args:
-            row: index of the run; always 0.
             state: from `get_state`, for a run of the same layout, shape (n,).
         """
         del row
@@ -147,9 +134,6 @@ class OneRun:
 
     def pose(self, row: int) -> tuple[float, float]:
         """Angle of the rod's upper end, and of the body relative to it, rad.
-
-        Args:
-            row: index of the run; always 0.
 
         Returns:
             The two angles.
@@ -163,12 +147,10 @@ class OneRun:
 
 
 class ManyRuns:
-    """Many runs on ``mujoco.batch``, one batch per layout.
+    """Many runs on ``mujoco.batch``, one batch per layout; ``row`` is the index of a run.
 
     Args:
-        models: compiled models.
         samples: number of samples in one control period.
-        count: number of runs.
         nthread: number of threads; 0 uses all processors. The result does not depend on it.
     """
 

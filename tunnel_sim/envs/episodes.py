@@ -52,12 +52,10 @@ class EpisodeState:
     """The complete state of an episode in progress; continuing from it gives bit-identical results.
 
     Args:
-        plan: of the run.
         physics: the plan's run with its effects, as integrated.
         mujoco: ``mj_getState`` of ``mjSTATE_INTEGRATION``, including the plugin's state, shape (n,).
         arrays: readings so far, sensitivities and information, by name.
         sensor: the run's effects on the reading.
-        rng: source of the noise.
     """
 
     plan: RunPlan
@@ -71,9 +69,6 @@ class EpisodeState:
 def observation_space(config: FreeDecayConfig) -> spaces.Box:
     """The space of one environment's observations.
 
-    Args:
-        config: of the environment.
-
     Returns:
         Readings (rad), then time (s) and wind speed (m/s).
     """
@@ -83,14 +78,7 @@ def observation_space(config: FreeDecayConfig) -> spaces.Box:
 
 
 class Episodes:
-    """Parallel episodes of one configuration.
-
-    Args:
-        config: of the environment.
-        rig: of all runs.
-        engine: integrates the runs.
-        count: number of episodes.
-    """
+    """Parallel episodes of one configuration; ``row`` is the index of an episode."""
 
     def __init__(self, config: FreeDecayConfig, rig: Rig, engine: Engine, count: int) -> None:
         self._config, self._rig, self._engine, self._count = config, rig, engine, count
@@ -114,14 +102,6 @@ class Episodes:
         self, row: int, options: Mapping[str, Any] | None, rng: np.random.Generator
     ) -> tuple[Array, dict[str, Any]]:
         """Start an episode.
-
-        Args:
-            row: index of the episode.
-            options: of ``reset``.
-            rng: generator of this and later episodes.
-
-        Returns:
-            First observation, and info.
 
         Raises:
             EnvError: when an option is refused.
@@ -212,9 +192,6 @@ class Episodes:
     def outcome(self, row: int) -> dict[str, Any]:
         """The content of ``info`` at the end of an episode.
 
-        Args:
-            row: index of the episode.
-
         Returns:
             ``record``; ``run`` in the plain preset, ``operator_log`` in the other; ``truth`` where exposed.
         """
@@ -232,9 +209,6 @@ class Episodes:
 
     def record(self, row: int) -> Record:
         """The record of a run so far.
-
-        Args:
-            row: index of the episode.
 
         Returns:
             The record, complete where the run has ended.
@@ -255,14 +229,7 @@ class Episodes:
         return self._information.matrix(row)
 
     def get_state(self, row: int) -> EpisodeState:
-        """The complete state of an episode in progress.
-
-        Args:
-            row: index of the episode.
-
-        Returns:
-            The state, a copy.
-        """
+        """The complete state of an episode in progress."""
         plan, physics = self._plan(row), self._physics[row]
         assert physics is not None
         values, chain, rng = self._readings.snapshot(row)
@@ -278,10 +245,6 @@ class Episodes:
 
     def set_state(self, row: int, state: EpisodeState) -> np.random.Generator:
         """Continue an episode from a state of an environment with the same configuration.
-
-        Args:
-            row: index of the episode.
-            state: from `get_state`.
 
         Returns:
             The generator that the episode uses from now on.

@@ -19,7 +19,6 @@ def as_env_error(error: TunnelError, where: str) -> EnvError:
     """Convert an error of a lower layer to an `EnvError`.
 
     Args:
-        error: from a lower layer.
         where: used where the error itself does not say what it concerns.
     """
     return EnvError(error.what, where=error.where or where, remedy=error.remedy)

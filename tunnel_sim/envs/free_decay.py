@@ -127,9 +127,6 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
     def record(self) -> Record:
         """The record so far, for example of a run ended by ``TimeLimit``.
 
-        Returns:
-            The record.
-
         Raises:
             EnvError: before the first step.
         """
@@ -138,9 +135,6 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
     def get_state(self) -> EpisodeState:
         """The complete state of the episode in progress, including the states of MuJoCo and the plugin.
 
-        Returns:
-            The state, a copy.
-
         Raises:
             EnvError: when no episode has begun.
         """
@@ -148,9 +142,6 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
 
     def set_state(self, state: EpisodeState) -> None:
         """Continue from a saved state of this environment, or of one with the same configuration.
-
-        Args:
-            state: from `get_state`.
 
         Raises:
             EnvError: when the state belongs to a different configuration.

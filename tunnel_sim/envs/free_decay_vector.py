@@ -30,9 +30,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         render_mode: ``rgb_array`` or None.
         max_episode_steps: number of steps after which runs are truncated; None: at their end only.
         nthread: number of threads; 0 uses all processors. The result does not depend on it.
-        width: of a picture, pixels.
-        height: of a picture, pixels.
-        camera: name of a camera of ``mjcf/rig.xml``.
+        width, height, camera: as in `FreeDecayEnv`.
         **arguments: fields of `FreeDecayConfig`.
 
     Raises:
@@ -174,21 +172,13 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return observations, rewards, terminated, truncated, infos
 
     def get_state(self, index: int) -> EpisodeState:
-        """The state of one run, also for `FreeDecayEnv.set_state`.
-
-        Args:
-            index: of the run.
-
-        Returns:
-            The state.
-        """
+        """The state of one run, also for `FreeDecayEnv.set_state`."""
         return self._episodes.get_state(index)
 
     def set_state(self, index: int, state: EpisodeState) -> None:
         """Put one run into a state.
 
         Args:
-            index: of the run.
             state: from an environment of the same configuration.
 
         Raises:
@@ -198,9 +188,6 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
 
     def information(self, index: int) -> Array:
         """The Fisher information of one run so far.
-
-        Args:
-            index: of the run.
 
         Returns:
             Shape (7, 7), as `FreeDecayEnv.information`.

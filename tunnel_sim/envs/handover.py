@@ -25,8 +25,6 @@ def campaign_of(runs: Iterable[Run], env: _HasRig, *, name: str = "episodes") ->
 
     Args:
         runs: ``info["run"]`` of each, in the plain preset.
-        env: the environment they come from, unwrapped.
-        name: of the campaign.
 
     Returns:
         The campaign. It states the rig's nominal inertia and the configured sensor, and contains no trace of the
@@ -44,19 +42,5 @@ def campaign_of(runs: Iterable[Run], env: _HasRig, *, name: str = "episodes") ->
     for run in listed:
         seen[run.id] += 1
         numbered.append(replace(run, id=f"{run.id}-{seen[run.id]}") if run.id in repeated else run)
-    body = env.rig.body
-    return Campaign(
-        name=name,
-        rig=RigProperties(
-            yaw_inertia=env.rig.dynamics.yaw_inertia,
-            frontal_area=body.frontal_area,
-            reference_length=body.length,
-            width=body.width,
-        ),
-        sensor=SensorProperties(
-            sample_rate=env.config.sample_rate,
-            resolution=env.config.resolution or None,
-            noise_std=env.config.noise_std or None,
-        ),
-        runs=tuple(numbered),
-    )
+    sensor = SensorProperties.of(env.config.sensor(0.0))
+    return Campaign(name, RigProperties.of(env.rig), sensor, tuple(numbered))

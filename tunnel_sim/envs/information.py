@@ -63,9 +63,6 @@ class Prior:
         Args:
             changes: standard deviations by name, in the units above.
 
-        Returns:
-            The prior.
-
         Raises:
             EnvError: when a name is unknown or a number out of range.
         """
@@ -85,9 +82,6 @@ class Prior:
     def scales(self, run: NominalRun) -> Array:
         """The standard deviations in the units of the unknowns.
 
-        Args:
-            run: gives Izz and Cr, to which the shares refer.
-
         Returns:
             Shape (7,), in the order of `UNKNOWNS`.
         """
@@ -96,10 +90,9 @@ class Prior:
 
 
 class Information:
-    """The Fisher information of many runs in progress.
+    """The Fisher information of many runs in progress; ``row`` is the index of a run.
 
     Args:
-        count: number of runs.
         samples: number of samples in one step.
         interval: between samples, s.
         variance: of a reading, rad².
@@ -116,12 +109,7 @@ class Information:
         self.known = np.zeros(count)
 
     def start(self, row: int, run: NominalRun) -> None:
-        """Start a run.
-
-        Args:
-            row: index of the run.
-            run: its nominal model.
-        """
+        """Start a run."""
         self._sensitivities.start(row, run)
         self._scale[row] = self._prior.scales(run)
         self.scaled[row] = np.eye(len(UNKNOWNS))
@@ -148,9 +136,6 @@ class Information:
     def matrix(self, row: int) -> Array:
         """The Fisher information of one run, including its prior.
 
-        Args:
-            row: index of the run.
-
         Returns:
             Shape (7, 7), in the order of `UNKNOWNS` and in the inverse products of their units; infinite where
             the prior is exact.
@@ -159,25 +144,12 @@ class Information:
             return np.asarray(self.scaled[row] / np.outer(self._scale[row], self._scale[row]))
 
     def snapshot(self, row: int) -> dict[str, Array]:
-        """Copies of the state of a run in progress.
-
-        Args:
-            row: index of the run.
-
-        Returns:
-            Arrays by name.
-        """
+        """Copies of the state of a run in progress."""
         own = {"scale": self._scale[row], "scaled": self.scaled[row], "known": self.known[row]}
         return {name: np.array(value) for name, value in own.items()} | self._sensitivities.snapshot(row)
 
     def restore(self, row: int, run: NominalRun, state: Mapping[str, Array]) -> None:
-        """Restore a run from a snapshot.
-
-        Args:
-            row: index of the run.
-            run: its nominal model.
-            state: from `snapshot`.
-        """
+        """Restore a run from a snapshot."""
         self._sensitivities.restore(row, run, state)
         self._scale[row], self.scaled[row], self.known[row] = (
             state["scale"],

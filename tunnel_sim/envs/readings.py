@@ -15,12 +15,7 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 
 class Readings:
-    """The potentiometer readings of many runs.
-
-    Args:
-        config: of the environment.
-        count: number of runs.
-    """
+    """The potentiometer readings of many runs; ``row`` is the index of a run."""
 
     def __init__(self, config: FreeDecayConfig, count: int) -> None:
         self._samples = config.samples_per_step
@@ -37,9 +32,7 @@ class Readings:
         """Start a run.
 
         Args:
-            row: index of the run.
             chain: the run's effects on the reading.
-            rng: source of its noise.
         """
         self._chains[row], self._rngs[row] = chain, rng
         self._sensor[:, row, 0] = chain.sensor.zero, chain.sensor.noise_std, chain.sensor.resolution
@@ -49,7 +42,6 @@ class Readings:
         """Readings of the control period before the release, with noise that is not drawn from the run's generator.
 
         Args:
-            row: index of the run.
             angle: at which the rod's upper end is held, rad.
 
         Returns:
@@ -102,11 +94,7 @@ class Readings:
         """The record of a run so far.
 
         Args:
-            row: index of the run.
             steps: number of control periods so far.
-
-        Returns:
-            The record.
 
         Raises:
             EnvError: before the second reading.
@@ -117,14 +105,7 @@ class Readings:
         return Record(self._times[:count], self._values[row, :count])
 
     def snapshot(self, row: int) -> tuple[Array, RunningSensor, np.random.Generator]:
-        """Copies of the state of a run.
-
-        Args:
-            row: index of the run.
-
-        Returns:
-            Readings, effects and generator of the noise.
-        """
+        """Copies of the state of a run."""
         return self._values[row].copy(), self._chain(row).copied(), copy.deepcopy(self._rngs[row])
 
     def restore(
@@ -133,7 +114,6 @@ class Readings:
         """Restore a run from a snapshot.
 
         Args:
-            row: index of the run.
             values: readings from `snapshot`, shape (n,), rad.
             chain: effects from `snapshot`.
             rng: generator from `snapshot`.

@@ -33,7 +33,6 @@ class RigView:
     """Draws the rig.
 
     Args:
-        rig: the rig to draw.
         mode: ``human``, ``rgb_array`` or None.
         width: of a picture, pixels.
         height: of a picture, pixels.

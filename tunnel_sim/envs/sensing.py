@@ -12,12 +12,7 @@ from tunnel_sim.vocabulary.record import Array
 
 
 class RunningSensor:
-    """The effects of one run on its reading.
-
-    Args:
-        chain: the run's effects.
-        sensor: the potentiometer as stated.
-    """
+    """The effects of one run on its reading."""
 
     def __init__(self, chain: EffectChain, sensor: SensorModel) -> None:
         self._chain = chain

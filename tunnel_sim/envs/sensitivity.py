@@ -67,7 +67,6 @@ class Sensitivities:
     """Sensitivities of many runs in progress.
 
     Args:
-        count: number of runs.
         samples: number of samples in one step.
         interval: between samples, s.
     """
@@ -82,12 +81,7 @@ class Sensitivities:
         self._decay = np.zeros((2, count))
 
     def start(self, row: int, run: NominalRun) -> None:
-        """Start a run.
-
-        Args:
-            row: index of the run.
-            run: its nominal model.
-        """
+        """Start a run."""
         self._runs[:, row] = run.coefficients()
         self._x[:, row] = 0.0
         self._x[0, row, 2] = self._x[1, row, 3] = 1.0

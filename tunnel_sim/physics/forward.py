@@ -58,9 +58,6 @@ def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motio
         settings: the run's physics, with the timestep to use.
         sample_rate: Hz.
 
-    Returns:
-        The motion from the release onwards.
-
     Raises:
         ValueError: when the motion grows without bound.
     """
@@ -76,9 +73,6 @@ def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motio
 
 def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array]]:
     """A run's conditions in the form that the compiled code takes.
-
-    Args:
-        settings: the run's physics.
 
     Returns:
         Array of shape (1,) and `run_dtype`, at the release (see ``Model.release_state``), and the arrays it

@@ -74,11 +74,7 @@ def fit_substeps(run: RunSettings, interval: float) -> int:
     steps are too long for it, and its motion decays at once or grows without bound.
 
     Args:
-        run: the run's physics, effects included.
         interval: between block means, s.
-
-    Returns:
-        One or more.
     """
     body = sqrt(run.spring_stiffness / run.yaw_inertia)
     turn = _FIT_KINKED_TURN if run.parameters.get("free_play") else _FIT_BODY_TURN
@@ -118,11 +114,7 @@ def report_substeps(run: RunSettings, interval: float) -> int:
     """How many steps the prediction that is reported takes from one block mean to the next.
 
     Args:
-        run: the run's physics, effects included.
         interval: between block means, s.
-
-    Returns:
-        One or more.
     """
     longest = REPORT_STEP
     if run.rod_twist is not None:
@@ -167,10 +159,6 @@ def for_contact(run: RunSettings) -> RunSettings:
 def follow_fastest(rig: Rig, run: RunSettings) -> RunSettings:
     """The run with steps short enough for its fastest motion; unchanged where they already are.
 
-    Args:
-        rig: gives the reference sizes.
-        run: the run's physics, effects included.
-
     Returns:
         The run with its timestep divided by a whole number.
 
@@ -187,10 +175,6 @@ def follow_fastest(rig: Rig, run: RunSettings) -> RunSettings:
 def check_stable(rig: Rig, run: RunSettings) -> None:
     """Refuse steps with which the integration would diverge.
 
-    Args:
-        rig: gives the reference sizes.
-        run: the run's physics.
-
     Raises:
         TunnelError: when the steps are too long.
     """
@@ -203,10 +187,6 @@ def body_rate(rig: Rig, run: RunSettings) -> float:
     """The fastest rate of the body on its spring: the larger magnitude of the two roots, with or without wind.
 
     Terms that are nonlinear in the angle count with their slope at the release.
-
-    Args:
-        rig: gives the reference sizes.
-        run: the run's physics.
 
     Returns:
         rad/s.

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.rig import Rig
 
 Quantity = Literal["angle", "rate", "acceleration"]
 """What a sensor measures: the yaw angle, or its first or second derivative."""
@@ -30,6 +32,12 @@ class RigProperties:
     reference_length: float | None = None
     width: float | None = None
 
+    @classmethod
+    def of(cls, rig: Rig) -> RigProperties:
+        """What a campaign on a rig states; the inertia is the nominal one."""
+        body = rig.body
+        return cls(rig.dynamics.yaw_inertia, body.frontal_area, body.length, body.width)
+
 
 @dataclass(frozen=True)
 class SensorProperties:
@@ -50,6 +58,11 @@ class SensorProperties:
     plausible: bool | None = None
     quantity: Quantity | None = None
     zero: Zero | None = None
+
+    @classmethod
+    def of(cls, sensor: SensorModel) -> SensorProperties:
+        """What a campaign with a sensor states; the zero is not known."""
+        return cls(sensor.sample_rate, sensor.resolution or None, sensor.noise_std or None)
 
     @property
     def unit(self) -> str:
@@ -94,10 +107,7 @@ class Campaign:
 
     Args:
         name: short name, also of the folder.
-        rig: what is stated about the rig.
-        sensor: what is stated about the sensor.
         runs: at least one run, with unique ids.
-        description: free text.
     """
 
     name: str

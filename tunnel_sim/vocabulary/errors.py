@@ -33,7 +33,6 @@ def one_line(value: object, limit: int = 120) -> str:
     """The text of a value without line breaks or control characters.
 
     Args:
-        value: anything.
         limit: greatest length, characters; longer text is cut.
     """
     try:
@@ -51,10 +50,6 @@ def shown(path: Path) -> str:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """The remedy for an unknown name: the closest known name, or the list of all.
-
-    Args:
-        name: the name that was not found.
-        known: the names that exist.
 
     Returns:
         A clause such as ``did you mean 'output_error'?``.

@@ -73,7 +73,6 @@ class EffectSetting:
     """One effect to inject, by name; ``tunnel_sim.effects`` validates it.
 
     Args:
-        name: name of the effect.
         parameters: its parameters by name, SI units.
     """
 
@@ -86,13 +85,8 @@ class CampaignPlan:
     """Everything a simulated campaign depends on, apart from the rig.
 
     Args:
-        name: short name of the campaign.
-        seed: of the random numbers.
-        truth: coefficients of the simulation.
         conditions: the runs, at least one, with unique ids.
-        sensor: the potentiometer.
         effects: effects added to the nominal model.
-        description: free text.
     """
 
     name: str

@@ -79,7 +79,6 @@ def evenly_spaced(record: Record, *, bridged: bool = True) -> Record:
     """A record on a uniform raster, for methods that need one.
 
     Args:
-        record: any.
         bridged: whether gaps are bridged by a curve; False: by the record's mean, which adds nothing to a spectrum.
 
     Returns:

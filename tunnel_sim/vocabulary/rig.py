@@ -115,12 +115,6 @@ class Rig:
     """The whole rig.
 
     Args:
-        working_section: the tunnel.
-        body: the model.
-        rod: its support.
-        dynamics: inertia and damping.
-        air: density.
-        potentiometer: the sensor.
         springs: torsional stiffness by spring number, N m/rad (paper, Table II).
     """
 

@@ -11,7 +11,7 @@ import pytest
 
 from tests.reference.free_decays import Setting, campaign
 from tests.unit.cli.conftest import PROGRESS
-from tunnel_lab.plotting.figure_text import figure_text
+from tunnel_lab.plotting.common import figure_text
 from tunnel_lab.plotting.plots import run_label, spectrum_figure
 from tunnel_sim.files.campaign_io import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign

@@ -19,7 +19,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tunnel_lab.show.film import Look, write_film
+from tunnel_lab.show.film import Look, backends, write_film
 from tunnel_lab.show.live import History, LiveRun, Puppet
 from tunnel_lab.show.request import Request, shown_run
 from tunnel_lab.show.trace import draw_trace
@@ -87,6 +87,7 @@ def test_a_machine_that_cannot_draw_is_told_what_to_install(
     tunnel: Tunnel, tmp_path: Path, monkeypatch
 ) -> None:
     monkeypatch.setenv("MUJOCO_GL", "nonsense")
+    assert backends() == ("nonsense",)
     status, out, error = tunnel("render", "--out", tmp_path / "film.mp4", *SMALL)
     assert (status, out) == (2, "")
     assert "libosmesa6" in error

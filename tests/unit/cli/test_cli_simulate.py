@@ -12,7 +12,6 @@ import pytest
 
 from identification.estimate import Estimate, Quantity, Status
 from tunnel_lab.commands.demo import misses, truth_of
-from tunnel_lab.show.rendering import backends, render_rig
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.vocabulary.plan import CampaignPlan
 
@@ -126,22 +125,3 @@ def test_a_failed_check_ends_the_demo_with_status_one(
     written = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"campaign", "traces.png", "spectrum.png", "windows.png", "estimates.png"} <= written
     assert "rig.png" not in written
-
-
-def test_a_machine_that_cannot_draw_is_told_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("MUJOCO_GL", "nonsense")
-    assert backends() == ("nonsense",)
-    problem = render_rig(tmp_path / "rig.png")
-    assert "nonsense" in problem
-    assert "libosmesa6" in problem
-    assert "\n" not in problem
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_picture_is_whole_where_the_machine_can_draw(tmp_path: Path) -> None:
-    problem = render_rig(tmp_path / "rig.png", width=64, height=48)
-    if problem:
-        pytest.skip(problem)
-    assert (tmp_path / "rig.png").read_bytes().startswith(b"\x89PNG")

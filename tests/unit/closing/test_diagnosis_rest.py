@@ -19,19 +19,9 @@ from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.result import ParameterEstimate
 from tests.unit.gap_campaigns import campaign, nominal, studied
-from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.effects import effect_class
 
 CAUSE = "quadratic_damping"
-
-
-@pytest.fixture(scope="module")
-def data():
-    return campaign(effect_from(CAUSE, {"coefficient": 0.003}))
-
-
-@pytest.fixture(scope="module")
-def base(data):
-    return nominal(data)
 
 
 @pytest.mark.slow

@@ -16,68 +16,54 @@ Torch is not needed: the shipped weights are used in NumPy.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 from scipy.stats import chi2
 
 from identification.campaign.assembly import departures
-from identification.campaign.derivatives import loads
-from identification.campaign.pairing import PairedRun, paired_estimate
+from identification.campaign.pairing import PairedRun
 from identification.decay.damped_oscillation import Decay
 from identification.decay.readable import holds_motion
 from identification.decay.residual_check import residual_check
 from identification.decay.residual_noise import reading_noise
 from identification.decay.windows import modal_quantities
-from identification.estimate import Estimate, Quantity, RunEstimate, Status, WindowEstimate, by_gravity
+from identification.estimate import Quantity, RunEstimate, Status, WindowEstimate, by_gravity
+from identification.estimators.run_by_run import Paired
 from identification.neural.files import read_networks, shipped_networks
 from identification.neural.networks import Networks
 from identification.neural.shape import CYCLES, network_inputs, normalise, response_points
 from identification.neural.three_cycles import ThreeCycles, find_windows
 from identification.policy import GREATEST_NETWORK_DISTANCE, LEAST_FOR_SCATTER, MISFIT_RATE, SCATTER_TOLERANCE
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)
-class NeuralNetwork:
+class NeuralNetwork(Paired):
     """The paper's networks.
 
     Args:
         weights: a safetensors file written by ``tunnel train``; the packaged weights where None.
     """
 
-    name: ClassVar[str] = "neural_network"
+    name = "neural_network"
     weights: Path | None = None
 
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign by pairs of wind-on and wind-off runs.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate. A run of fewer than three cycles, or outside the training range, is left out; its status
-            says so.
+    @cached_property
+    def networks(self) -> Networks:
+        """The networks.
 
         Raises:
-            TunnelError: when a wind-on run states no air density, or the weights cannot be read.
+            TunnelError: when the weights cannot be read.
         """
-        pairs = [loads(run, campaign.rig) for run in campaign.runs]
-        networks = shipped_networks() if self.weights is None else read_networks(self.weights)
-        seen = [_identified(run, campaign.sensor, networks) for run in campaign.runs]
-        estimate = Estimate(campaign.name, self.name, tuple(found for found, _ in seen))
-        known = [(one, load) for (_, one), load in zip(seen, pairs, strict=True) if one is not None]
-        if not known:
-            return replace(estimate, statuses=(Status.NO_RUN_IDENTIFIED,))
-        statuses = {Status.RUN_LEFT_OUT} if len(known) < len(seen) else set()
-        for status in (Status.MODEL_DEPARTS, Status.NOISE_DISAGREES):
-            if any(status in found.statuses for found, _ in seen):
-                statuses.add(status)
-        return paired_estimate(campaign, estimate, known, statuses)
+        return shipped_networks() if self.weights is None else read_networks(self.weights)
+
+    def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunEstimate, PairedRun | None]:
+        return _identified(run, sensor, self.networks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +91,6 @@ class WindowReading:
 def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None:
     """Put a window through both networks.
 
-    Args:
-        window: three cycles.
-        networks: trained.
-
     Returns:
         The result; None where the window is not similar to a damped oscillation.
     """
@@ -125,11 +107,6 @@ def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None
 
 def read_windows(run: Run, sensor: SensorProperties, networks: Networks) -> tuple[list[WindowReading], float]:
     """Put a run's windows through both networks, one after the other.
-
-    Args:
-        run: the run.
-        sensor: what is stated of the noise.
-        networks: trained.
 
     Returns:
         The readings, and how many cycles the record holds from its first crossing on; 0 where nothing oscillates.

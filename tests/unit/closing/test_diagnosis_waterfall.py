@@ -22,8 +22,8 @@ from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.starting_points import starting_points
 from diagnosis.result import Candidate
-from tests.unit.gap_campaigns import NOISE, campaign, nominal, studied
-from tunnel_sim.effects import effect_class, effect_from
+from tests.unit.gap_campaigns import NOISE, nominal, studied
+from tunnel_sim.effects import effect_class
 
 CAUSE, IDLE, HUM = "quadratic_damping", "cubic_stiffness", "mains_hum"
 NO_BASE = Base(NOISE**2, 0.0, 0.0)
@@ -35,16 +35,6 @@ def added(base, *names):
         start = starting_points(base, effect_class(name))[0]
         base = fit(start.problem, start.point, base=base)
     return base
-
-
-@pytest.fixture(scope="module")
-def data():
-    return campaign(effect_from(CAUSE, {"coefficient": 0.003}))
-
-
-@pytest.fixture(scope="module")
-def base(data):
-    return nominal(data)
 
 
 @pytest.fixture(scope="module")

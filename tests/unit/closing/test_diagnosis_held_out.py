@@ -15,8 +15,8 @@ from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.starting_points import starting_points
 from diagnosis.policy import EVEN_SHARE
-from tests.unit.gap_campaigns import campaign, nominal
-from tunnel_sim.effects import effect_class, effect_from
+from tests.unit.gap_campaigns import nominal
+from tunnel_sim.effects import effect_class
 
 CAUSE = "quadratic_damping"
 
@@ -55,16 +55,6 @@ def test_every_run_of_a_full_plan_is_left_out_once():
 def test_one_run_of_each_spring_leaves_nothing_to_hold_out():
     runs = (one_run("a", 16.0, 0.0), one_run("b", 21.0, 15.0))
     assert folds(Data(runs, 1.0, 1.0, 0.0, False, None)) == []
-
-
-@pytest.fixture(scope="module")
-def data():
-    return campaign(effect_from(CAUSE, {"coefficient": 0.003}))
-
-
-@pytest.fixture(scope="module")
-def base(data):
-    return nominal(data)
 
 
 @pytest.fixture(scope="module")
