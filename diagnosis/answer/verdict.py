@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnosis.names import plain
+from identification.printing.numbers import significant
 from tunnel_sim.effects import effect_class
 
 _CHANNEL_WORDS = {
@@ -47,7 +48,7 @@ def verdict(
         )
     if tuple(causes) == ("unknown",):
         return (
-            f"There is a gap ({before:.2f} times the noise power), and no effect of the vocabulary explains it. "
+            f"There is a gap ({_times(before)} the noise power), and no effect of the vocabulary explains it. "
             f"{rest}"
         )
     several = len(causes) > 1
@@ -55,11 +56,15 @@ def verdict(
         _source(name, both_winds=both_winds) + (f" ({plain([name])})" if several else "") for name in causes
     )
     return (
-        f"The gap ({before:.2f} times the noise power) comes from {plain(causes)} "
+        f"The gap ({_times(before)} the noise power) comes from {plain(causes)} "
         f"(probability {probability:.2f}): "
         f"{sources}. With {'them' if several else 'it'} added, {100.0 * closed:.1f} % of the gap "
         f"closes {closed_on}. {rest}"
     )
+
+
+def _times(excess: float) -> str:
+    return f"{excess:.2f} times" if excess < 10.0 else f"{significant(excess, 4)} times"
 
 
 def _source(name: str, *, both_winds: bool) -> str:
