@@ -244,6 +244,9 @@ def integrate(
         conditions: one per campaign; all with or all without a flexible rod, equal sample rates.
         substeps: RK4 steps per sample.
 
+    Returns:
+        One motion per campaign; not finite where it grows without bound.
+
     Raises:
         ValueError: when rigid and flexible rods, or sample rates, are mixed.
     """
@@ -256,11 +259,12 @@ def integrate(
     h, n = interval / substeps, batch.size
     first = 2 * n if batch.flexible else 0
     angle, rate = np.empty((samples, n)), np.empty((samples, n))
-    for k in range(samples):
-        angle[k], rate[k] = batch.state[first : first + n], batch.state[first + n : first + 2 * n]
-        if k < samples - 1:
-            for j in range(substeps):
-                batch.step(k * interval + j * h, h)
+    with np.errstate(over="ignore", invalid="ignore"):  # without bound is infinite, or not a number
+        for k in range(samples):
+            angle[k], rate[k] = batch.state[first : first + n], batch.state[first + n : first + 2 * n]
+            if k < samples - 1:
+                for j in range(substeps):
+                    batch.step(k * interval + j * h, h)
     spans = [slice(int(a), int(b)) for a, b in zip(batch.offsets[:-1], batch.offsets[1:], strict=True)]
     return [
         Motion(angle[: c.samples, s], rate[: c.samples, s]) for c, s in zip(conditions, spans, strict=True)

@@ -19,7 +19,7 @@ from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.motion import Motion
 from tunnel_sim.physics.release import released_by_spring_end
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.steps import fit_substeps
+from tunnel_sim.physics.steps import compensated, fit_substeps
 from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
@@ -212,10 +212,12 @@ class _Job:
         self.chain = problem.chain(point.common, point.release[run_index], run, effects)
         physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         self.row, self.keep_alive = forward_run(physics)
-        self.law = parameter_vector(physics.law(campaign_rig(problem.data)))
         self.blocks = run.reading.size + blocks_beyond(physics, run)
         substeps = fit_substeps(physics, run.interval)
-        self.row["step"], self.row["steps"] = run.interval / substeps, substeps
+        law = physics.law(campaign_rig(problem.data))
+        law, step = compensated(law, run.wind_speed, run.interval / substeps)
+        self.row["step"], self.row["steps"] = step, substeps
+        self.law = parameter_vector(law)
 
     def reading(self, angle: Array, rate: Array) -> Array:
         """Block means of the reading from angle and rate at the blocks' ends."""

@@ -80,6 +80,7 @@ def test_decay_equals_closed_form(number: int) -> None:
     assert np.max(np.abs(motion.angle - exact)) < 1e-8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [7, 8, 9, 10])
 def test_stiffest_springs_need_half_the_step_for_the_same_error(number: int) -> None:
     # RK4's phase error grows with (omega h)^5: 26 rad/s at 1 ms leaves 1e-7 rad, at 0.5 ms 1e-8

@@ -34,8 +34,8 @@ def _with_friction(run: RunSettings, moment: float, reach: float) -> RunSettings
         (0.004, 0.02, 16.12, 20.0),
         (0.03, 0.005, 67.98, 0.0),
         (0.4, 0.001, 67.98, 0.0),
-        (0.05, 3e-4, 67.98, 0.0),  # two forward steps for one
-        (0.4, 3e-5, 16.12, 20.0),  # three, and two of MuJoCo's
+        pytest.param(0.05, 3e-4, 67.98, 0.0, marks=pytest.mark.slow),  # two forward steps for one
+        pytest.param(0.4, 3e-5, 16.12, 20.0, marks=pytest.mark.slow),  # three, and two of MuJoCo's
     ],
 )
 def test_ten_seconds_stay_far_below_the_noise(

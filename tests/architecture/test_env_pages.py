@@ -28,6 +28,7 @@ def test_the_page_has_every_section() -> None:
     assert [heading for heading in found if heading in wanted] == wanted
 
 
+@pytest.mark.slow
 def test_the_code_runs_and_prints_what_is_shown(tmp_path: Path) -> None:
     shown = [(code, text) for code, text in steps(PAGE) if "diagnosis" not in code]
     real = printed([code for code, _ in shown], tmp_path)

@@ -18,10 +18,10 @@ INDEX = ROOT / "docs" / "README.md"
 @pytest.mark.parametrize(
     ("page", "typed"),
     [
-        ("run-the-demo", ["demo"]),
+        pytest.param("run-the-demo", ["demo"], marks=pytest.mark.slow),
         ("identify-a-record", ["springs"]),
-        ("diagnose-a-campaign", ["simulate", "diagnose"]),
-        ("state-uncertainties", ["simulate", "identify"]),
+        pytest.param("diagnose-a-campaign", ["simulate", "diagnose"], marks=pytest.mark.slow),
+        pytest.param("state-uncertainties", ["simulate", "identify"], marks=pytest.mark.slow),
     ],
 )
 def test_shown_output_is_real_output(page: str, typed: list[str], tmp_path: Path) -> None:
@@ -45,6 +45,7 @@ def test_every_page_with_output_is_run() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_figures_for_choosing_are_those_of_the_packaged_score(tmp_path: Path) -> None:
     shown = steps(PAGES / "choose-an-estimator.md")
     real = printed([code for code, _ in shown], tmp_path)

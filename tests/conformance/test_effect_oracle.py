@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from _pytest.mark import ParameterSet
 
 from tests.reference import effect_oracle as oracle
 from tests.reference.effect_cases import VALUES, VOCABULARY, settings
@@ -77,9 +78,15 @@ VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
     ("spring_miscalibration", {"error": -0.1, "spring_stiffness": 16.12}, RUN),
     ("wind_speed_offset", {"offset": -1.5}, RUN),
 ]
-each_variant = pytest.mark.parametrize(
-    ("name", "values", "run"), VARIANTS, ids=[f"{n}-{next(iter(v.values())):g}" for n, v, _ in VARIANTS]
-)
+SHORT_STEPS = {"coulomb_friction-0.5", "rod_flexibility-0.0005", "rod_flexibility-1e-05"}  # take long
+
+
+def _variant(name: str, values: dict[str, float], run: Setting) -> ParameterSet:
+    case = f"{name}-{next(iter(values.values())):g}"
+    return pytest.param(name, values, run, id=case, marks=[pytest.mark.slow] * (case in SHORT_STEPS))
+
+
+each_variant = pytest.mark.parametrize(("name", "values", "run"), [_variant(*one) for one in VARIANTS])
 
 
 def simulated(effects: list[Effect], run: Setting, *, forward: bool = False, seed: int = 3) -> np.ndarray:

@@ -105,7 +105,7 @@ def test_recovers_the_truth_from_noise_free_records(name):
 
 
 @each_estimator
-@pytest.mark.parametrize("nominal", [None, 0.08, 0.13])
+@pytest.mark.parametrize("nominal", [None, 0.13])
 def test_nominal_inertia_decides_nothing(name, nominal, noisy, of_noisy):
     told = replace(noisy, rig=replace(noisy.rig, yaw_inertia=nominal))
     assert identify(told, name) == of_noisy(name)
@@ -210,7 +210,8 @@ def test_without_size_the_air_is_dimensional(name):
 def test_records_without_a_decay_fail_with_a_remedy(name, kind):
     rng = np.random.default_rng(2)
     level = 0.0 if kind == "constant" else 5e-4
-    dead = with_records(campaign(TWELVE[:2]), lambda time, _: 0.1 + level * rng.standard_normal(time.size))
+    short = campaign(TWELVE[:2], duration=3.0)
+    dead = with_records(short, lambda time, _: 0.1 + level * rng.standard_normal(time.size))
     if kind == "constant":  # one dead run twice would be one record under two springs
         dead = replace(dead, runs=dead.runs[:1])
     with pytest.raises(TunnelError, match="no run could be identified; check"):

@@ -95,6 +95,7 @@ def test_nominal_fit_recovers_a_linear_campaign():
     assert read_and_fit(draw, motion).excess == pytest.approx(0.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_effects_are_sized_to_their_target():
     form = forms_of("quadratic_damping")[0]
     draw = drawn(form, form.start)

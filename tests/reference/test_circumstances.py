@@ -85,6 +85,7 @@ def effect(family, which=0):
     return EffectDraw(form, extra, form.signs[0], 4.0, form.start)
 
 
+@pytest.mark.slow
 def test_effects_that_imitate_each_other_have_no_excess_of_their_own():
     alike = CampaignDraw("pair", RIG, (effect("coulomb_friction"), effect("coulomb_friction", 1)), 1)
     apart = CampaignDraw("pair", RIG, (effect("cubic_stiffness"), effect("coulomb_friction")), 1)

@@ -106,6 +106,7 @@ def test_smooth_laws_match_an_adaptive_solver(name):
         assert np.max(np.abs(motion.angle[:, run] - adaptive(c, run, make(c, run)))) < 1e-8
 
 
+@pytest.mark.slow
 def test_dead_zone_matches_an_adaptive_solver():
     c = rig()
     half = 0.004
@@ -120,6 +121,7 @@ def test_dead_zone_matches_an_adaptive_solver():
         assert np.max(np.abs(motion.angle[:, run] - other)) < 1e-6
 
 
+@pytest.mark.slow
 def test_lag_and_speed_drift_match_an_adaptive_solver():
     c = rig(speed=(15.0, 25.0))
     tau = 0.8 * REFERENCE_LENGTH / c.true_speed
@@ -199,6 +201,7 @@ def coulomb_exact(c, run, tc, end):
             return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tc", [0.004, 0.6])
 def test_coulomb_friction_matches_its_closed_form_to_rest(tc):
     c = rig(duration=3.0)
@@ -243,6 +246,7 @@ def test_energy_is_kept_without_damping_and_falls_by_the_friction_work():
     assert np.max(np.abs(energy[0] - energy - 0.01 * path)) < 1e-5
 
 
+@pytest.mark.slow
 def test_a_campaign_moves_the_same_alone_and_in_a_batch():
     first, second = rig(), rig(stiffness=(35.0, 20.0), duration=1.0)
     term = Term(m.quadratic_damping, Phase.MOMENT, {"coefficient": np.full(2, 0.01)})

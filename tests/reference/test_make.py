@@ -35,6 +35,7 @@ def short_runs(monkeypatch):
     monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_runs")
 def test_a_set_is_written_in_the_campaign_format_and_is_reproducible(tmp_path):
     arguments = ["--count", "3", "--seed", "5", "--kinds", "none:1,single:2"]

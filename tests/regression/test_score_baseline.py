@@ -37,11 +37,13 @@ def test_the_baselines_are_of_the_same_estimators_and_of_their_grids(baseline):
     assert baseline.grid == load_grid(HERE / "score-grid.toml")
 
 
+@pytest.mark.slow
 def test_no_estimator_got_worse(baseline, now):
     verdict = check(baseline, now)
     assert verdict.worse == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", read_trials(HERE / "score-baseline.parquet").estimators)
 def test_an_estimator_that_is_spoilt_is_caught(baseline, now, name):
     """Its ζ gets noise of four of its own standard deviations."""

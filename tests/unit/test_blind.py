@@ -188,6 +188,7 @@ def test_a_campaign_that_cannot_be_diagnosed_is_a_wrong_answer(blind, monkeypatc
     assert "do not help" in (blind / "answers" / "c0002.json").read_text()
 
 
+@pytest.mark.slow
 def test_processes_give_the_answers_of_one(blind, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     exclude = ("buffeting",)

@@ -23,6 +23,7 @@ def found(cases):
     return work.biases(work.break_down(cases, NAMES, 1, jobs=0))
 
 
+@pytest.mark.slow
 def test_effects_are_as_strong_as_they_should_be(cases):
     assert [case.effect for case in cases] == ["no effect"] * 2 + [name for name in EFFECTS for _ in "ab"]
     for case in cases:
@@ -30,11 +31,13 @@ def test_effects_are_as_strong_as_they_should_be(cases):
     assert len({case.name for case in cases}) == len(cases)
 
 
+@pytest.mark.slow
 def test_realisations_differ_in_their_noise_only(cases):
     first, second = (case.campaign.runs[0].record.yaw_rad for case in cases[2:4])
     assert np.std(first - second) == pytest.approx(work.NOISE * np.sqrt(2.0), rel=0.1)
 
 
+@pytest.mark.slow
 def test_friction_biases_damping_and_nothing_biases_none(found):
     def bias(effect, quantity, name="matrix_pencil"):
         (one,) = [b for b in found if (b.effect, b.quantity, b.estimator) == (effect, quantity, name)]
@@ -46,6 +49,7 @@ def test_friction_biases_damping_and_nothing_biases_none(found):
     assert friction.relative_bias.value > 0.0  # dry friction takes energy, as more damping would
 
 
+@pytest.mark.slow
 def test_the_map_is_a_table_and_a_figure(found):
     frame = work.breakdown_frame(found)
     assert frame.height == 3 * 2 * 4
@@ -57,6 +61,7 @@ def test_the_map_is_a_table_and_a_figure(found):
     assert pl.DataFrame(frame).columns[:2] == ["effect", "severity_noise_powers"]
 
 
+@pytest.mark.slow
 def test_an_interrupted_map_goes_on(cases, found, tmp_path, monkeypatch):
     work.break_down(cases, NAMES, 1, jobs=0, parts=tmp_path)
     (tmp_path / "sensor_drift-10-1.json").unlink()

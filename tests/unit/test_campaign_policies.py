@@ -107,6 +107,7 @@ def test_separating_prefers_the_run_that_tells_the_rivals_apart():
     assert separating(env.known) == (0, 1, 0, 0)
 
 
+@pytest.mark.slow
 def test_an_episode_is_played_to_its_end():
     env = CampaignEnv(**SMALL)
     info = run_campaign(env, greedy, seed=3)

@@ -68,6 +68,7 @@ def test_bias_in_opposite_directions_does_not_cancel():
     assert bias.p_value < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heavy", [False, True])
 def test_false_alarms_are_as_rare_as_stated(heavy):
     """At 10 %, to see any: Holm is conservative, and errors without a variance change nothing."""
@@ -94,6 +95,7 @@ def test_on_the_same_records_smaller_changes_show_and_immaterial_ones_do_not():
     assert {change.p_value for change in changes(before, rounded)} == {1.0}
 
 
+@pytest.mark.slow
 def test_false_alarms_on_the_same_records_are_as_rare_as_stated():
     """Another method, as good: each of its errors is old half and fresh half, so that pairs are exchangeable."""
     alarms = 0

@@ -236,6 +236,7 @@ def found():
     return investigate(campaign(QUADRATIC), FEW)
 
 
+@pytest.mark.slow
 def test_the_excess_is_of_samples_whatever_the_blocks():
     """Four samples to a block: its mean has four times the samples' excess."""
     coarse = campaign(QUADRATIC)
@@ -245,6 +246,7 @@ def test_the_excess_is_of_samples_whatever_the_blocks():
     assert other == pytest.approx(one, rel=0.1)
 
 
+@pytest.mark.slow
 def test_rivals_are_named_with_the_run_that_would_tell(found):
     first = found.hypothesis(("quadratic_damping",))
     second = found.hypothesis(("coulomb_friction",))

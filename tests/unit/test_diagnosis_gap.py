@@ -35,6 +35,7 @@ def verdict(fit, *, noise=NOISE, trend=STEADY, coarse_step=False, errors=None):
     return gap.test_gap(fit, noise, trend, coarse_step=coarse_step, errors=errors)
 
 
+@pytest.mark.slow
 def test_white_residuals_raise_no_more_alarms_than_stated(fitted):
     rng = np.random.default_rng(12)
     trials = 2000

@@ -201,3 +201,21 @@ def test_times_count_from_the_start_of_the_record_though_the_fit_begins_later():
     assert where.time_s[0] <= 5.5 <= where.time_s[1]
     assert maps.time.edges[-1] == pytest.approx(DURATION)
     assert all(trace.time[-1] == pytest.approx(DURATION, abs=0.05) for trace in maps.traces)
+
+
+def test_a_line_beside_the_harmonics_has_its_frequency_and_amplitude():
+    time = INTERVAL * np.arange(round(DURATION / INTERVAL))
+    data = campaign(added=5e-4 * np.sin(2.0 * np.pi * 33.3 * time))
+    where, maps = localise(studied(data, nominal(data), UNKNOWN))
+    assert where.channel == "sensor"
+    assert {line.run for line in maps.lines} == {run.id for run in data.runs}
+    for line in maps.lines:
+        assert line.frequency == pytest.approx(33.3, abs=0.1)
+        assert line.amplitude == pytest.approx(5e-4, rel=0.1)
+
+
+def test_a_centre_that_shifts_with_the_second_harmonic_is_the_springs():
+    data = campaign(effect_from("asymmetric_stiffness", {"coefficient": 0.1}))
+    where, _ = localise(studied(data, nominal(data), UNKNOWN))
+    assert where.channel == "stiffness"
+    assert "second harmonic" in where.words

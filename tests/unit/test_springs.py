@@ -32,6 +32,7 @@ def test_line_agrees_with_polyfit():
     assert fit.inertia.std == pytest.approx(np.sqrt(covariance[0, 0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [5, 10])
 def test_false_alarm_rate_holds(count):
     rng = np.random.default_rng(17)

@@ -131,7 +131,7 @@ def test_what_is_reported_takes_half_the_steps_of_a_fit_of_an_ordinary_body(
 
 def test_fits_take_shorter_steps_for_a_faster_body() -> None:
     found = [fit_substeps(replace(PLAIN, spring_stiffness=spring), 4e-3) for spring in (16.12, 67.98, 600.0)]
-    assert found == [1, 2, 6]
+    assert found == [1, 1, 3]
 
 
 @pytest.mark.parametrize("interval", [4e-3, 2e-2, 1.0])
@@ -141,7 +141,7 @@ def test_a_fit_does_not_follow_a_body_too_fast_for_any_record(interval: float) -
     slow, fast, least = (
         fit_substeps(replace(PLAIN, yaw_inertia=inertia / factor), interval) for factor in (1.0, 100.0, 1e9)
     )
-    assert interval / slow * np.pi / interval <= 0.055 * (1.0 + 1e-12)
+    assert interval / slow * np.pi / interval <= 0.11 * (1.0 + 1e-12)
     assert fast == least <= 2 * slow
 
 

@@ -45,6 +45,7 @@ def test_the_runs_of_the_closure_are_named(held_out, closed_on, after_on):
     )
 
 
+@pytest.mark.slow
 def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
     found = gap(False, False, False)
     given = document()

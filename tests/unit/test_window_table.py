@@ -87,11 +87,13 @@ def test_an_entry_with_two_readings_is_their_mean_and_less_certain() -> None:
         read_table(paper_windows()[:5])
 
 
+@pytest.mark.slow
 def test_no_cause_is_called_where_none_was_planted() -> None:
     found = diagnose_windows(noisy(columns(), 1), kinds=FEW)
     assert "none" in [e.name for e in found.tied]
 
 
+@pytest.mark.slow
 def test_a_planted_pair_is_found_again_and_its_rivals_are_not() -> None:
     planted = {"cubic_stiffness": -0.4, "quadratic_damping": 0.0038}
     effects = [
@@ -109,6 +111,7 @@ def test_a_planted_pair_is_found_again_and_its_rivals_are_not() -> None:
         found.explanation("coulomb_friction")
 
 
+@pytest.mark.slow
 def test_a_further_run_sets_apart_only_what_differs() -> None:
     effects = [effect_from("cubic_stiffness", {"coefficient": -0.4})]
     found = diagnose_windows(noisy(columns(*effects), 3), kinds=FEW)

@@ -78,6 +78,7 @@ def test_a_planted_effect_is_named_in_words_and_in_the_json(
     )
 
 
+@pytest.mark.slow
 def test_the_report_is_one_page(tunnel: Tunnel, dry: Path, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     status, out, _ = tunnel("diagnose", dry, "--effects", CAUSE, "--report", page)
@@ -148,6 +149,7 @@ def test_an_interrupted_run_leaves_no_file(
     assert list((tmp_path / "out").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_calm_campaign_without_held_out_runs_claims_neither_wind_nor_prediction(
     tunnel: Tunnel, tmp_path: Path
 ) -> None:

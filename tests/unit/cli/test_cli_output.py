@@ -36,6 +36,7 @@ def test_identify_plot_and_effects_write_before_they_print(tiny_campaign: Path, 
     assert page.exists()
 
 
+@pytest.mark.slow
 def test_score_writes_before_it_prints(tmp_path: Path) -> None:
     words = ("score", "--estimator", "hilbert", "--jobs", "0", "--trials", "2")
     status = unheard(*words, "--out", tmp_path / "s", "--write-baseline", tmp_path / "b.parquet")

@@ -82,12 +82,14 @@ def test_figures_come_with_their_sampling_errors_and_are_kept(
     assert "exists already" in err
 
 
+@pytest.mark.slow
 def test_unchanged_code_is_the_baseline_to_the_last_bit(tunnel: Tunnel, baseline: Path) -> None:
     status, out, err = tunnel("score", "--check", baseline, *HERE)
     assert (status, err) == (0, "")
     assert "to the last bit" in out
 
 
+@pytest.mark.slow
 def test_other_records_pass_within_sampling_error(tunnel: Tunnel, baseline: Path) -> None:
     status, out, _ = tunnel("score", "--check", baseline, *HERE, "--seed", "5")
     assert status == 0
@@ -101,7 +103,9 @@ PLANTED: dict[str, Callable[..., object]] = {
 }
 
 
-@pytest.mark.parametrize("seed", ["4", "5"], ids=["same records", "other records"])
+@pytest.mark.parametrize(
+    "seed", ["4", pytest.param("5", marks=pytest.mark.slow)], ids=["same records", "other records"]
+)
 @pytest.mark.parametrize("kind", PLANTED)
 def test_a_planted_regression_exits_with_one(
     tunnel: Tunnel, baseline: Path, monkeypatch: pytest.MonkeyPatch, kind: str, seed: str
@@ -112,6 +116,7 @@ def test_a_planted_regression_exits_with_one(
     assert "Worse than the baseline: matrix_pencil" in out
 
 
+@pytest.mark.slow
 def test_an_estimator_that_fails_more_often_exits_with_one(
     tunnel: Tunnel, baseline: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

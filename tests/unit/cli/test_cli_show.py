@@ -95,6 +95,7 @@ def test_a_machine_that_cannot_draw_is_told_what_to_install(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_film_and_picture_are_whole_where_the_machine_can_draw(tunnel: Tunnel, tmp_path: Path) -> None:
     film, still = tmp_path / "film.mp4", tmp_path / "still.png"
     status, out, error = tunnel(

@@ -24,6 +24,7 @@ from tunnel_sim.effects import effect_class
 CAUSE = "quadratic_damping"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cn_beta", "cn_r"])
 def test_noise_moves_no_coefficient_by_much_more_than_its_deviation(name):
     moves = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -21,13 +22,14 @@ from tunnel_sim.vocabulary.record import Array
 GROWTH, SETTLED, OMEGA = 0.4, 0.3, 20.0
 
 
+@cache
 def motion(start: float, duration: float, growth: float = GROWTH, settled: float = SETTLED) -> Array:
     def moment(_: float, state: Array) -> list[float]:
         angle, rate = state
         return [rate, 2.0 * growth * (1.0 - (2.0 * angle / settled) ** 2) * rate - OMEGA**2 * angle]
 
     time = np.arange(int(duration * RATE)) / RATE
-    solved = solve_ivp(moment, (0.0, duration), (start, 0.0), t_eval=time, rtol=1e-8, atol=1e-10)
+    solved = solve_ivp(moment, (0.0, duration), (start, 0.0), "DOP853", time, rtol=1e-8, atol=1e-10)
     return np.asarray(solved.y[0])
 
 

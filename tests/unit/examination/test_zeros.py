@@ -59,6 +59,7 @@ def test_swings_of_unequal_size_are_not_compared():
     assert with_zeros(data) == (data, ())
 
 
+@pytest.mark.slow
 def test_a_common_zero_is_called_several_as_seldom_as_stated():
     """The rate is one in a thousand: of 150 campaigns of pure chance none is expected."""
     flagged = 0

@@ -150,6 +150,7 @@ def test_other_versions_are_refused(
     assert open_store(tmp_path / "new").finished() == []
 
 
+@pytest.mark.slow
 def test_a_case_that_cannot_be_simulated_takes_no_other_with_it(tmp_path: Path, here) -> None:
     """At 60 m/s the air's moment is stronger than this spring: the motion grows without bound."""
     text = SMALL.replace("[0.0, 15.0]", "[0.0, 60.0]").replace("cn_beta = 0.495", "cn_beta = [0.1, 5.0]")
