@@ -43,22 +43,22 @@ def runs_figure(document: Document) -> Figure:
     maps = document["maps"]
     runs = maps["runs"]
     fig = figure(WIDTH, 1.2 + 0.27 * max(len(runs), 4))
-    grid, bars = fig.subplots(1, 2, sharey=True, width_ratios=(3.2, 1.0))
+    heat, bars = fig.subplots(1, 2, sharey=True, width_ratios=(3.2, 1.0))
     edges = array(maps["time"]["edges_s"])
     cells = np.stack([array(row) for row in maps["time"]["by_run"]])
     floor = _SIGMAS * _cell_noise(maps)
     top = max(float(np.nanmax(cells)), 2.0 * floor)
     shown = np.where(cells > floor, cells, np.nan)
     extent = (float(edges[0]), float(edges[-1]), len(runs) - 0.5, -0.5)
-    image = grid.imshow(
+    image = heat.imshow(
         shown, aspect="auto", extent=extent, cmap="YlOrRd", norm=LogNorm(floor, top), interpolation="nearest"
     )
     if not np.isfinite(shown).any():
-        grid.text(0.5, 0.5, "every cell within the noise", transform=grid.transAxes, ha="center", color="0.4")
-    grid.set_yticks(range(len(runs)), [run_label(run) for run in runs], fontsize=8)
-    grid.set_xlabel("time since the start of the record [s]")
-    grid.set_title("over time", fontsize=10, loc="left")
-    fig.colorbar(image, ax=grid, label="excess (noise variances)", pad=0.01, aspect=30)
+        heat.text(0.5, 0.5, "every cell within the noise", transform=heat.transAxes, ha="center", color="0.4")
+    heat.set_yticks(range(len(runs)), [run_label(run) for run in runs], fontsize=8)
+    heat.set_xlabel("time since the start of the record [s]")
+    heat.set_title("over time", fontsize=10, loc="left")
+    fig.colorbar(image, ax=heat, label="excess (noise variances)", pad=0.01, aspect=30)
     colours = [BEFORE if run["id"] in document["where"]["runs"] else "0.75" for run in runs]
     bars.barh(range(len(runs)), [max(run["excess"], 0.0) for run in runs], color=colours, height=0.7)
     threshold = _SIGMAS * max(run["std"] for run in runs)

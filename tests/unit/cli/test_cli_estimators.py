@@ -17,6 +17,6 @@ def test_help_lists_every_estimator_with_its_summary(tunnel):
 def test_a_new_entry_appears_by_itself(monkeypatch: pytest.MonkeyPatch):
     late = {"latecomer": "an estimator that came late " + 9 * "and goes on "}
     monkeypatch.setattr("tunnel_lab.terminal.estimator_help.SUMMARIES", SUMMARIES | late)
-    lines = estimator_help.with_estimators(f"Help.\n\n{estimator_help.PLACE}").splitlines()
+    lines = estimator_help.with_estimators(f"Help.\n\nEstimators\n{estimator_help.PLACE}").splitlines()
     assert any(line.split()[:2] == ["latecomer", "an"] for line in lines)
     assert max(map(len, lines)) <= 78
