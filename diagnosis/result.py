@@ -15,8 +15,8 @@ from identification.printing.table import as_html, as_text
 from identification.remark import Remark
 
 SCHEMA_VERSION = 1
-_HELD_OUT = "on runs held out of the fit"
-_FITTED = "in the fitted runs (none could be held out)"
+HELD_OUT = "on runs held out of the fit"
+FITTED = "in the fitted runs (none could be held out)"
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,8 @@ class GapSummary:
         excess_before: of the nominal model, all runs, in units of the noise variance.
         excess_after: with the causes added, on runs not used for the fit, as far as runs could be held out, in
             units of the noise variance.
-        closed: share of the gap closed on runs held out, 0 to 1; of all runs where none could be.
+        closed: share of the gap closed, 0 to 1.
+        closed_on: what that was measured on, in words: runs held out; stretches of time where no run could be.
         runs: by run.
         false_alarm_rate: of the test of detection, a fraction of the campaigns without a gap.
         p_value: of the strongest test, corrected for the number of tests.
@@ -82,15 +83,11 @@ class GapSummary:
     excess_before: float
     excess_after: float
     closed: float
+    closed_on: str
     runs: tuple[RunGap, ...]
     false_alarm_rate: float
     p_value: float
     tests: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def closed_on(self) -> str:
-        """The runs that ``closed`` was measured on, in words."""
-        return _HELD_OUT if any(run.held_out for run in self.runs) else _FITTED
 
     @property
     def after_on(self) -> str:
@@ -98,7 +95,7 @@ class GapSummary:
         count = sum(run.held_out for run in self.runs)
         if 0 < count < len(self.runs):
             return f"in all runs, {count} of {len(self.runs)} held out of the fit"
-        return self.closed_on
+        return HELD_OUT if count else FITTED
 
 
 @dataclass(frozen=True)

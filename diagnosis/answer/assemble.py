@@ -18,7 +18,7 @@ from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.own_units import own_estimate
 from diagnosis.answer.pulls import coefficient_move
 from diagnosis.answer.reference_sizes import size_note, sized_coefficients
-from diagnosis.answer.reported import excess_base, gap_summary, report_fits
+from diagnosis.answer.reported import excess_base, gap_summary, on_stretches, report_fits
 from diagnosis.answer.rest import rest
 from diagnosis.answer.verdict import blind_spots, cnr_note, verdict
 from diagnosis.answer.waterfall import waterfall
@@ -66,6 +66,7 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
     data = study.nominal.problem.data
     begun = time.perf_counter()
     steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
+    gap = on_stretches(gap, steps)
     seconds["waterfall"] = time.perf_counter() - begun
     found = _coefficients(study, chosen, nominal_out, chosen_out)
     left = rest(study, *_in_own_units(study, found.after, chosen), steps.steps[-1].excess)

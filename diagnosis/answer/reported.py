@@ -9,9 +9,10 @@ import numpy as np
 
 from diagnosis.answer.confirm import Comparison, compare, confirm
 from diagnosis.answer.held_out import HeldOut
+from diagnosis.closure import Waterfall
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.policy import GAP_FALSE_ALARM_RATE
-from diagnosis.result import Confirmation, GapSummary, RunGap
+from diagnosis.result import FITTED, HELD_OUT, Confirmation, GapSummary, RunGap
 from diagnosis.study import COARSE_STEP, Study
 from tunnel_sim.vocabulary.record import Array
 
@@ -153,11 +154,28 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
         excess_before=total_before,
         excess_after=total_after if named else total_before,
         closed=_closed(sum(before_out), sum(after_out), total_before, total_after) if named else 0.0,
+        closed_on=HELD_OUT if before_out else FITTED,
         runs=tuple(runs) if named else tuple(replace(run, after=run.before) for run in runs),
         false_alarm_rate=GAP_FALSE_ALARM_RATE,
         p_value=0.0 if study.read_off else study.test.p_value,
         tests=study.test.tests,
     )
+
+
+def on_stretches(gap: GapSummary, held_out: Waterfall) -> GapSummary:
+    """The summary with the share closed measured on stretches of time, where no whole run could be held out.
+
+    Args:
+        gap: of the fitted runs, or of runs held out.
+        held_out: excesses on what was held out.
+
+    Returns:
+        As it was where a run was held out, or no cause is named.
+    """
+    before, after = held_out.steps[0].excess, held_out.steps[-1].excess
+    if any(run.held_out for run in gap.runs) or len(held_out.steps) == 1 or before <= 0.0:
+        return gap
+    return replace(gap, closed=_closed(before, after, before, after), closed_on=held_out.held_out)
 
 
 def _excess(residual: Array) -> float:

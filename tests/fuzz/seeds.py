@@ -164,7 +164,9 @@ def answer_document() -> dict[str, Any]:
         "cn_r": result.ParameterEstimate(-0.1, 0.01, "1/rad"),
     }
     friction = {"friction_moment": result.ParameterEstimate(0.004, 1e-5, "N m")}
-    gap = result.GapSummary(True, 2.0, 0.1, 0.99, (result.RunGap("r1", 2.0, 0.1),), 1e-3, 1e-9, {"lag": 1e-9})
+    gap = result.GapSummary(
+        True, 2.0, 0.1, 0.99, result.HELD_OUT, (result.RunGap("r1", 2.0, 0.1),), 1e-3, 1e-9, {"lag": 1e-9}
+    )
     return result.Diagnosis(
         "c1", ("coulomb_friction",), "words", gap,
         result.Where("damping", "always", ("r1",), (0.0, 1.0), (0.0, 0.1)),

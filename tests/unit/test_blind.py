@@ -62,7 +62,7 @@ def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12
     }
     return result.Diagnosis(
         "c", tuple(causes), "words",
-        result.GapSummary(bool(causes), 2.0, 0.1, closed, (), 0.001, 0.5),
+        result.GapSummary(bool(causes), 2.0, 0.1, closed, result.HELD_OUT, (), 0.001, 0.5),
         result.Where(None, None), (result.Candidate(name, probability, 0.1, closed),), tuple(rivals), None,
         result.Coefficients(values, values), result.Confirmation(True, 0.0, "r01", 0.0, 1e-5),
         result.NoiseSummary(5e-4, None, "estimated", ""),

@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from diagnosis import Candidate, Coefficients, Diagnosis, GapSummary, ParameterEstimate, RunGap, Where
-from diagnosis.result import Confirmation, NoiseSummary
+from diagnosis.result import HELD_OUT, Confirmation, NoiseSummary
 from identification import Estimate, Quantity, Remark, RunEstimate, Status, WindowEstimate
 from identification.printing.table import TextTable, as_html, as_text
 from identification.remark import Outcome
@@ -113,7 +113,14 @@ def diagnosis() -> Diagnosis:
         causes=("coulomb_friction",),
         verdict="The gap comes from coulomb friction.",
         gap=GapSummary(
-            True, 19.0, 0.01, 0.99, (RunGap("a", 19.0, 0.01), RunGap("b", 18.0, 0.02, False)), 0.01, 1e-9
+            True,
+            19.0,
+            0.01,
+            0.99,
+            HELD_OUT,
+            (RunGap("a", 19.0, 0.01), RunGap("b", 18.0, 0.02, False)),
+            0.01,
+            1e-9,
         ),
         where=Where("damping", "always"),
         candidates=(

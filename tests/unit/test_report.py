@@ -11,6 +11,7 @@ from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.starting_points import starting_points
 from diagnosis.localisation.localise import localise
 from diagnosis.result import (
+    HELD_OUT,
     Candidate,
     Coefficients,
     Confirmation,
@@ -52,7 +53,7 @@ def document(data):
         causes=(CAUSE,),
         verdict="The gap comes from quadratic damping & nothing else.",
         gap=GapSummary(
-            True, base.excess, best.excess, 0.987, tuple(RunGap(i, *e) for i, e in zip(ids, excess, strict=True)),
+            True, base.excess, best.excess, 0.987, HELD_OUT, tuple(RunGap(i, *e) for i, e in zip(ids, excess, strict=True)),
             0.01, 1e-9, {"f0": 1e-9},
         ),
         where=where,

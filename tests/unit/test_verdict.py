@@ -5,16 +5,18 @@ from __future__ import annotations
 import pytest
 from diagnosis_document import campaign, document
 
+from diagnosis.answer.reported import on_stretches
 from diagnosis.answer.verdict import verdict
+from diagnosis.closure import Step, Waterfall
 from diagnosis.printing import gap_table
-from diagnosis.result import GapSummary, RunGap
+from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
 from tunnel_lab.diagnosis_view import view
 from tunnel_lab.diagnosis_view.page import render_report
 
 
 def gap(*held_out: bool) -> GapSummary:
     runs = tuple(RunGap(f"r{i}", 2.0, 0.1, held_out=held) for i, held in enumerate(held_out))
-    return GapSummary(True, 2.0, 0.1, 0.95, runs, 0.01, 1e-9)
+    return GapSummary(True, 2.0, 0.1, 0.9, HELD_OUT if any(held_out) else FITTED, runs, 0.01, 1e-9)
 
 
 def said(*causes: str, closed_on: str = "somewhere", both_winds: bool = True) -> str:
@@ -43,6 +45,18 @@ def test_the_runs_of_the_closure_are_named(held_out, closed_on, after_on):
     assert f"closes {closed_on}. What remains is small." in said(
         "coulomb_friction", closed_on=found.closed_on
     )
+
+
+def test_where_no_run_could_be_held_out_the_share_closed_is_that_of_stretches():
+    stretches = Waterfall((Step(None, 4.0), Step("coulomb_friction", 0.2)), {}, "on stretches of time")
+    found = on_stretches(gap(False, False), stretches)
+    assert found.closed == pytest.approx(0.95)
+    assert found.closed_on == "on stretches of time"
+    assert found.after_on == FITTED
+    for kept in (gap(True, False), gap(True, True)):
+        assert on_stretches(kept, stretches) is kept
+    unnamed = gap(False)
+    assert on_stretches(unnamed, Waterfall((Step(None, 4.0),), {}, "on stretches of time")) is unnamed
 
 
 @pytest.mark.slow

@@ -164,7 +164,7 @@ def test_a_calm_campaign_without_held_out_runs_claims_neither_wind_nor_predictio
     assert not any(run["held_out"] for run in document["gap"]["runs"])
     assert document["gap"]["closed_on"] in document["verdict"]
     for text in (out, document["verdict"], page.read_text(encoding="utf-8")):
-        assert "in the fitted runs (none could be held out)" in text
+        assert "on stretches of time held out of the fit" in text
         assert "on runs held out" not in text
         assert "with the wind on and off" not in text
 
