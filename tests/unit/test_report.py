@@ -53,8 +53,8 @@ def document(data):
         causes=(CAUSE,),
         verdict="The gap comes from quadratic damping & nothing else.",
         gap=GapSummary(
-            True, base.excess, best.excess, 0.987, HELD_OUT, tuple(RunGap(i, *e) for i, e in zip(ids, excess, strict=True)),
-            0.01, 1e-9, {"f0": 1e-9},
+            True, base.excess, best.excess, 0.987, HELD_OUT,
+            tuple(RunGap(i, *e) for i, e in zip(ids, excess, strict=True)), 0.01, 1e-9, {"f0": 1e-9},
         ),
         where=where,
         candidates=(
