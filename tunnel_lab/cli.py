@@ -19,6 +19,7 @@ from tunnel_lab.commands import (
     diagnose,
     effects,
     identify,
+    importing,
     plot,
     render,
     score,
@@ -72,6 +73,7 @@ def tunnel(
       tunnel demo                        the whole chain, with figures
       tunnel springs                     inertia from the paper's spring table
       tunnel simulate plan.toml --out c  simulate a campaign into folder c
+      tunnel import log.csv --out c      a campaign of a data logger's files
       tunnel identify c --json est.json  its coefficients; also of measured runs
       tunnel diagnose c                  why the model does not fit it
       tunnel plot c                      figures of it
@@ -98,6 +100,7 @@ def tunnel(
 COMMANDS = (
     demo,
     simulate,
+    importing,
     identify,
     diagnose,
     plot,

@@ -6,7 +6,7 @@ The reader never opens ``truth.json``. The writer writes the whole campaign or n
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,8 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 TRUTH_FILE = "truth.json"
 RUN_FOLDER = "runs"
+IMPORT_RECIPE, IMPORT_PICTURE = "import.toml", "import.png"
+"""What an import keeps beside the campaign."""
 
 
 def read_campaign(folder: Path | str) -> Campaign:
@@ -77,6 +79,8 @@ def write_campaign(
     run_format: str = "parquet",
     truth: Mapping[str, Any] | None = None,
     overwrite: bool = False,
+    text: Callable[[Mapping[str, Any]], str] = tomli_w.dumps,
+    beside: Mapping[str, bytes] | None = None,
 ) -> Path:
     """Write a campaign so that reading it gives the same numbers: whole, or not at all.
 
@@ -86,6 +90,8 @@ def write_campaign(
         run_format: ``parquet`` or ``csv``.
         truth: the simulated truth, written as ``truth.json``; None: no such file.
         overwrite: whether an existing folder may be replaced; it must be empty or contain only a campaign.
+        text: makes the text of ``campaign.toml`` from its tables, where comments are wanted in it.
+        beside: further files of the folder, by name.
 
     Returns:
         The folder.
@@ -117,7 +123,9 @@ def write_campaign(
             )
         if truth_text is not None:
             (partial / TRUTH_FILE).write_bytes(truth_text.encode())
-        (partial / CAMPAIGN_FILE).write_bytes(tomli_w.dumps(document).encode())
+        for name, content in (beside or {}).items():
+            (partial / name).write_bytes(content)
+        (partial / CAMPAIGN_FILE).write_bytes(text(document).encode())
     return folder
 
 
@@ -233,7 +241,8 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
             "the folder holds no campaign", where=where, remedy="choose another one, or empty it"
         )
     # Files that the writer did not create belong to somebody: replacing the folder would delete them.
-    strange = [p for p in entries if p.name not in (CAMPAIGN_FILE, TRUTH_FILE, RUN_FOLDER)]
+    own = (CAMPAIGN_FILE, TRUTH_FILE, RUN_FOLDER, IMPORT_RECIPE, IMPORT_PICTURE)
+    strange = [p for p in entries if p.name not in own]
     runs = folder / RUN_FOLDER
     if runs.is_dir() and not runs.is_symlink():
         strange += [p for p in runs.iterdir() if p.is_dir() or p.suffix.lower()[1:] not in RUN_FORMATS]
