@@ -86,7 +86,6 @@ def thinned(time: Array, reading: Array) -> tuple[Array, Array]:
     size = time.size // _POINTS
     if size < 2:
         return time, reading
-    used = size * _POINTS
-    stretches = reading[:used].reshape(_POINTS, size)
-    ends = np.stack([stretches.min(axis=1), stretches.max(axis=1)], axis=1).ravel()
-    return np.repeat(time[:used:size], 2), ends
+    starts = np.arange(0, time.size, size)
+    ends = np.stack([np.minimum.reduceat(reading, starts), np.maximum.reduceat(reading, starts)], axis=1)
+    return np.repeat(time[starts], 2), ends.ravel()

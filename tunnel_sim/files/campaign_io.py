@@ -81,6 +81,7 @@ def write_campaign(
     overwrite: bool = False,
     text: Callable[[Mapping[str, Any]], str] = tomli_w.dumps,
     beside: Mapping[str, bytes] | None = None,
+    checked: bool = False,
 ) -> Path:
     """Write a campaign so that reading it gives the same numbers: whole, or not at all.
 
@@ -92,6 +93,7 @@ def write_campaign(
         overwrite: whether an existing folder may be replaced; it must be empty or contain only a campaign.
         text: makes the text of ``campaign.toml`` from its tables, where comments are wanted in it.
         beside: further files of the folder, by name.
+        checked: whether every record has passed `checked_record`, so that this need not be done again.
 
     Returns:
         The folder.
@@ -113,7 +115,9 @@ def write_campaign(
     _check_target(folder, overwrite=overwrite)
     files = _run_files(campaign, run_format)
     document = campaign_document(campaign, files)
-    _check_campaign(campaign, document, folder)
+    parse_document(document, folder / CAMPAIGN_FILE)
+    if not checked:
+        _check_records(campaign, folder)
     truth_text = None if truth is None else json_text(truth)
     with whole_folder(folder) as partial:
         (partial / RUN_FOLDER).mkdir()
@@ -156,7 +160,7 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
                 remedy="add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml",
             )
         time_s = np.arange(reading.size) / sample_rate
-    record = _checked(time_s, reading, column, sensor, run.release_angle, where)
+    record = checked_record(time_s, reading, column, sensor, run.release_angle, where)
     return Run(
         id=run.id,
         record=record,
@@ -167,7 +171,7 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
     )
 
 
-def _checked(
+def checked_record(
     time_s: Array,
     reading: Array,
     column: str,
@@ -175,7 +179,19 @@ def _checked(
     release_angle: float | None,
     where: str,
 ) -> Record:
-    """The record of a run, unless it is refused."""
+    """The record of a run, unless it is refused.
+
+    Args:
+        time_s: sample times, shape (n,), s.
+        reading: shape (n,), rad, rad/s or rad/s².
+        column: that the readings are from, for messages.
+        sensor: what is stated of the sensor.
+        release_angle: as stated, rad.
+        where: file and run, for messages.
+
+    Raises:
+        TunnelError: times that do not increase, fewer than three cycles, or what looks like a wrong unit.
+    """
     increasing_times(time_s, sensor.sample_rate, where)
     angle, judged = sensor.derivative == 0, sensor.plausible is not False
     if judged and angle:
@@ -201,9 +217,8 @@ def _check_inside(folder: Path, path: Path, where: str) -> None:
         )
 
 
-def _check_campaign(campaign: Campaign, document: dict[str, Any], folder: Path) -> None:
-    """Refuse whatever the reader would refuse, before anything is written."""
-    parse_document(document, folder / CAMPAIGN_FILE)
+def _check_records(campaign: Campaign, folder: Path) -> None:
+    """Refuse the records that the reader would refuse, before anything is written."""
     for run in campaign.runs:
         where = run_place(folder, run.id)
         time_s, yaw = run.record.time_s, run.record.yaw_rad
@@ -211,7 +226,7 @@ def _check_campaign(campaign: Campaign, document: dict[str, Any], folder: Path) 
             raise TunnelError(
                 "the record holds NaN or an infinity", where=where, remedy="shorten the run or leave it out"
             )
-        _checked(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where)
+        checked_record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where)
 
 
 def _run_files(campaign: Campaign, run_format: str) -> dict[str, str]:

@@ -56,13 +56,10 @@ def without_overflow(values: Array, said: list[str]) -> Array:
     longest = float(np.abs(steps).max(initial=0.0))
     counts = longest >= _NEARLY * _COUNTERS[0] and bool((numbers == np.round(numbers)).all())
     for full in (*_TURNS, *(_COUNTERS if counts else ())):
+        if not _NEARLY * full < longest <= full or np.ptp(numbers) > full:
+            continue
         jumps = np.abs(steps) > _NEARLY * full
-        if (
-            longest > full
-            or not jumps.any()
-            or np.ptp(numbers) > full
-            or _MOST_JUMPS * jumps.sum() > jumps.size
-        ):
+        if _MOST_JUMPS * jumps.sum() > jumps.size:
             continue
         others = float(np.abs(steps[~jumps]).max())
         if others > _SMALL * full or (full - np.abs(steps[jumps]) > _NEAR_END * others).any():
@@ -129,7 +126,8 @@ def from_zero(time: Array) -> Array:
     if time.size < 2 or time[0] == 0.0:
         return time
     step = float(np.ptp(time)) / (time.size - 1)
-    return np.round(time - time[0], 6 - floor(log10(step)))  # a millionth of a step is kept
+    counted: Array = np.round(time - time[0], 6 - floor(log10(step)))  # a millionth of a step is kept
+    return counted
 
 
 def _without_repeats(time: Array, reading: Array, said: list[str]) -> tuple[Array, Array]:

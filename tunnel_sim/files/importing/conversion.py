@@ -66,7 +66,7 @@ def in_seconds(time: Channel, choices: ImportChoices, said: list[str]) -> Array:
         time.unit if kind_of(time.unit) else ""
     )
     if not unit:
-        steps = np.abs(np.diff(time.values[np.isfinite(time.values)]))
+        steps = np.diff(np.sort(time.values[np.isfinite(time.values)]))  # rows may be out of order
         step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
         unit = "s" if step <= _SLOWEST_STEP else "ms" if step <= 1e3 * _SLOWEST_STEP else "us"
         said.append(f"no unit of the times in the file: steps of {step:.4g} are taken as {unit}")

@@ -9,12 +9,17 @@ decay is left whole.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary.record import Array
 
 _BAND = 0.05  # of the largest excursion: a smaller one counts as rest
+_NOISES = 5.0  # standard deviations: smaller excursions are noise
+_NOISE_OF = 200_000  # samples in which the noise is looked for
+_CENTRED = 2  # times the centre is estimated
 _LONGER = 1.8  # usual half cycles: no free motion takes as long from crossing to crossing
 _SLOWER = 1.25  # times the way back: a pull at the start of a record takes longer
 _GROWN = 1.5  # times the excursion before: no free decay grows as much within half a cycle
@@ -49,15 +54,20 @@ def find_runs(time_s: Array, reading: Array) -> list[Piece]:
     """
     whole = [Piece(0, reading.size)]
     away = reading - np.median(reading)
-    largest = float(np.abs(away).max())
-    outside = np.flatnonzero(np.abs(away) > _BAND * largest)
-    if outside.size < 2:
-        return whole
-    # One excursion is a stretch of one sign outside the band around the centre.
-    change = np.flatnonzero(np.diff(np.sign(away[outside])) != 0.0)
-    starts, ends = outside[np.concatenate([[0], change + 1])], outside[np.concatenate([change, [-1]])] + 1
+    noise = _NOISES * _noise(reading[:_NOISE_OF])
+    for _ in range(_CENTRED):
+        starts, ends = _excursions(away, noise)
+        if starts.size < _LEAST_HALVES:
+            return whole
+        # A hold or a pull draws the median aside; most swings have their centre between two turning points.
+        turns = np.array(
+            [away[a + int(np.argmax(np.abs(away[a:b])))] for a, b in zip(starts, ends, strict=True)]
+        )
+        away = away - np.median(0.5 * (turns[1:] + turns[:-1]))
+    starts, ends = _excursions(away, noise)
     if starts.size < _LEAST_HALVES:
         return whole
+    clear = noise <= _BAND * float(np.abs(away).max())
     peaks = np.array([np.abs(away[a:b]).max() for a, b in zip(starts, ends, strict=True)])
     middle = 0.5 * (time_s[ends[:-1] - 1] + time_s[starts[1:]])
     crossings = np.concatenate([[time_s[0]], middle, [time_s[-1]]])
@@ -68,7 +78,7 @@ def find_runs(time_s: Array, reading: Array) -> list[Piece]:
         lengths[0] = np.inf  # pulled aside: a free swing takes no longer out than back
     found = _released(lengths, peaks, usual)
     if not found:
-        return [Piece(0, _without_long_rest(time_s, 0, int(ends[-1])))]
+        return [Piece(0, _without_long_rest(time_s, 0, int(ends[-1]), clear=clear))]
     pieces = []
     for place, (_, released) in enumerate(found):
         first = _turning_point(time_s, away, starts[released], ends[released], usual)
@@ -77,10 +87,27 @@ def find_runs(time_s: Array, reading: Array) -> list[Piece]:
             last = max(int(ends[hand - 1]), int(np.searchsorted(time_s, time_s[starts[hand]] - usual)))
             halves = hand - released
         else:
-            last, halves = _without_long_rest(time_s, first, int(ends[-1])), peaks.size - released
+            last, halves = (
+                _without_long_rest(time_s, first, int(ends[-1]), clear=clear),
+                peaks.size - released,
+            )
         if halves >= _LEAST_HALVES:
             pieces.append(Piece(first, last))
     return pieces or whole
+
+
+def _noise(reading: Array) -> float:
+    """Standard deviation of white noise, by fourth differences, in which a swing hardly shows."""
+    return float(np.median(np.abs(np.diff(reading, 4)))) / (0.6745 * sqrt(70.0)) if reading.size > 4 else 0.0
+
+
+def _excursions(away: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The stretches of one sign outside the band around the centre: first samples, and those behind the last."""
+    outside = np.flatnonzero(np.abs(away) > max(_BAND * float(np.abs(away).max()), noise))
+    change = np.flatnonzero(np.diff(np.sign(away[outside])) != 0.0)
+    if not outside.size:
+        return outside, outside
+    return outside[np.concatenate([[0], change + 1])], outside[np.concatenate([change, [-1]])] + 1
 
 
 def _released(lengths: Array, peaks: Array, usual: float) -> list[tuple[int, int]]:
@@ -113,6 +140,8 @@ def _turning_point(time_s: Array, away: Array, start: int, end: int, usual: floa
     return last if time_s[last] - time_s[near[0]] > _HELD * usual else first
 
 
-def _without_long_rest(time_s: Array, first: int, end: int) -> int:
+def _without_long_rest(time_s: Array, first: int, end: int, *, clear: bool) -> int:
     """Where a record ends that rests for longer than it moves: as much rest as motion is kept."""
+    if not clear:  # the motion goes on in the noise
+        return time_s.size
     return int(np.searchsorted(time_s, 2.0 * time_s[end - 1] - time_s[first], side="right"))

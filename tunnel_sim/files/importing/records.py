@@ -10,8 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
+from tunnel_sim.files.campaign_io import checked_record
 from tunnel_sim.files.importing.choices import RIG_KEYS, RUN_KEYS, Conditions, ImportChoices
-from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, from_zero, resolution, restarts, without_overflow
+from tunnel_sim.files.importing.cleaning import (
+    Cleaned,
+    cleaned,
+    from_zero,
+    resolution,
+    restarts,
+    without_overflow,
+)
 from tunnel_sim.files.importing.columns import Pair, find_pairs, stem
 from tunnel_sim.files.importing.conditions import ConditionTable, from_facts, from_name, name_pattern
 from tunnel_sim.files.importing.conversion import (
@@ -23,14 +31,13 @@ from tunnel_sim.files.importing.conversion import (
 )
 from tunnel_sim.files.importing.cutting import Piece, find_runs
 from tunnel_sim.files.importing.source import Channel, Source, Table, read_source
-from tunnel_sim.files.plausible import plausible_run, plausible_values
+from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import check_count
-from tunnel_sim.files.run_checks import enough_cycles
 from tunnel_sim.files.toml_input import one_line, shown, validate
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.record import Array
 
 _WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
 
@@ -288,9 +295,9 @@ def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: Cond
             remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)",
         )
     try:
-        record = Record(from_zero(time), reading)
-        cycles = enough_cycles(record, where)
-        plausible_run(record, cycles, where, angle=raw.quantity == "angle")
+        sensor = SensorProperties(quantity=raw.quantity)
+        release = stated.get("release_angle")
+        record = checked_record(from_zero(time), reading, "the reading", sensor, release, where)
     except TunnelError as error:
         return Part(name, raw, piece, None, (*said, f"left out: {error.what}"))
     run = Run(name, record, **({"wind_speed": 0.0} | stated))

@@ -166,7 +166,7 @@ def _channels(
             frame = pl.read_csv(
                 content, schema=floats, decimal_comma=dialect.decimal == ",", quote_char=None, **options
             )
-            return _kept(frame, layout), ()
+            return channels_of(frame, layout), ()
         except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
             texts = {f"column_{i + 1}": pl.String for i in range(dialect.width)}
             return _from_texts(pl.read_csv(content, schema=texts, **options), dialect, layout)
@@ -178,8 +178,13 @@ def _channels(
         ) from None
 
 
-def _kept(frame: pl.DataFrame, layout: Layout) -> tuple[Channel, ...]:
-    """The columns that hold at least one number."""
+def channels_of(frame: pl.DataFrame, layout: Layout) -> tuple[Channel, ...]:
+    """The columns that hold at least one number, with the names and units of a layout.
+
+    Args:
+        frame: of numbers, nulls where there are none.
+        layout: as many names and units.
+    """
     return tuple(
         Channel(name, column.fill_null(float("nan")).to_numpy(), unit)
         for name, unit, column in zip(layout.names, layout.units, frame.get_columns(), strict=True)
@@ -200,7 +205,7 @@ def _from_texts(
             notes.append(f"the column '{name}' holds text and is left out")
         elif lost:
             notes.append(f"{lost} texts in the column '{name}' are taken as missing")
-    return _kept(numbers, layout), tuple(notes)
+    return channels_of(numbers, layout), tuple(notes)
 
 
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:

@@ -38,7 +38,7 @@ _WORDS = {
 }
 _UNIT_OF = {word: unit for unit, words in _WORDS.items() for word in words.split()}
 _BRACKETS = re.compile(r"\s*[(\[{<]\s*([^()\[\]{}<>]*?)\s*[)\]}>]")
-_ENDING = re.compile(r"^(.*\w)\s*(?:[_,/]|\s)\s*([^\s_,/]+(?:[_/]s(?:2|\^2|²)?)?)$")
+_ENDING = re.compile(r"^(.*?\w)\s*(?:[_,/]|\s)\s*([^\s_,/]+(?:[_/]s(?:2|\^2|²)?)?)$")
 
 
 def known_unit(text: str) -> str | None:

@@ -88,6 +88,7 @@ def write_imported(
         overwrite=overwrite,
         text=lambda document: campaign_text(document, imported),
         beside=beside,
+        checked=True,
     )
 
 
