@@ -18,6 +18,7 @@ from tunnel_lab.commands import (
     demo,
     diagnose,
     effects,
+    export,
     identify,
     importing,
     plot,
@@ -29,6 +30,7 @@ from tunnel_lab.commands import (
     train,
     view,
 )
+from tunnel_lab.terminal.table_format import with_format
 from tunnel_sim.vocabulary.errors import TunnelError
 
 BAD_INPUT = 2
@@ -77,6 +79,7 @@ def tunnel(
       tunnel identify c --json est.json  its coefficients; also of measured runs
       tunnel diagnose c                  why the model does not fit it
       tunnel plot c                      figures of it
+      tunnel export c --format mat       c as MAT, CSV, Excel or HDF5
       tunnel effects                     effects that a plan can add
       tunnel blind                       blind tests of the diagnosis
       tunnel score                       errors of each estimator
@@ -104,6 +107,7 @@ COMMANDS = (
     identify,
     diagnose,
     plot,
+    export,
     springs,
     effects,
     score,
@@ -114,8 +118,11 @@ COMMANDS = (
 )
 """Every command that is one function, in the order of the help."""
 
+WITHOUT_TABLES = (simulate, plot, export, view, render)
+
 for _command in COMMANDS:
-    app.command(_command.NAME, cls=getattr(_command, "COMMAND", None))(_command.run)
+    _run = _command.run if _command in WITHOUT_TABLES else with_format(_command.run)
+    app.command(_command.NAME, cls=getattr(_command, "COMMAND", None))(_run)
 app.add_typer(blind.app, name=blind.NAME)
 
 

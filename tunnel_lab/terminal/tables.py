@@ -12,6 +12,7 @@ from rich.text import Text
 
 from identification.printing import estimate_tables as printing
 from identification.printing.numbers import SYMBOLS, concise, in_stds, significant, unit, with_std
+from tunnel_lab.terminal.table_format import TableFormat, chosen, rendered
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate, Quantity, RunEstimate, Status
@@ -48,21 +49,26 @@ def say(line: str, *, stderr: bool = False) -> None:
 
     Args:
         line: the text.
-        stderr: print to standard error.
+        stderr: print to standard error, as is done where tables are not text.
     """
-    console(stderr=stderr).print(line, soft_wrap=True)
+    console(stderr=stderr or chosen.get() is not TableFormat.TEXT).print(line, soft_wrap=True)
 
 
 def show_tables(*tables: Table) -> None:
-    """Print tables, each followed by an empty line.
+    """Print tables, each followed by an empty line, in the format of ``--format``.
 
     Args:
         tables: those without rows are left out.
     """
     out = console()
     for one in tables:
-        if one.row_count:
+        if not one.row_count:
+            continue
+        if chosen.get() is TableFormat.TEXT:
             out.print(one)
+        else:
+            out.print(rendered(one, chosen.get()), soft_wrap=True, end="")
+        if chosen.get() is not TableFormat.JSON:
             out.print()
 
 

@@ -39,6 +39,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Ru
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
+_LEAST_ROWS = 16  # a shorter table beside longer ones is one of conditions or sizes
 _WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
 
 
@@ -159,7 +160,7 @@ def read_records(
     for path in files:
         source = read_source(path, choices)
         named = from_name(pattern, path)
-        for one in source.tables:
+        for one in _records_of(source):
             raws += _raws(source, one, choices, calibration, named, several=len(files) > 1)
         sources.append(source)
     if not raws:
@@ -179,6 +180,12 @@ def read_records(
         update={k: v for k, v in known.items() if getattr(choices, k) in (None, ())}
     )
     return Imported(campaign, tuple(parts), tuple(sources), resolved, _on_campaign(campaign, table))
+
+
+def _records_of(source: Source) -> list[Table]:
+    """The tables of a file that are long enough for a record; all, where none is."""
+    long = [table for table in source.tables if table.channels[0].values.size >= _LEAST_ROWS]
+    return long or list(source.tables)
 
 
 def _raws(
