@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 import polars as pl
@@ -73,7 +73,7 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
         known = {"id": run.id, **_stated(run, _CONDITIONS), **_record(campaign, run)}
         runs[place] = tuple(known.get(key, np.empty((0, 0))) for key in keys)
     rig: Mapping[str, Any] = {"name": campaign.name, **_stated(campaign.rig, _RIG)}
-    savemat(stream, {"runs": runs, "rig": rig}, do_compression=True, oned_as="column")
+    savemat(cast(Any, stream), {"runs": runs, "rig": rig}, do_compression=True, oned_as="column")
 
 
 def _record(campaign: Campaign, run: Run) -> dict[str, Any]:

@@ -128,8 +128,9 @@ def test_the_wind_is_not_guessed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"), [("0.1 + 20*V", (0.1, 20.0)), ("20 V", (0.0, 20.0)), ("-2*V - 0.5", (-0.5, -2.0)), ("V", (0.0, 1.0))]
-)  # fmt: skip
+    ("text", "expected"),
+    [("0.1 + 20*V", (0.1, 20.0)), ("20 V", (0.0, 20.0)), ("-2*V - 0.5", (-0.5, -2.0)), ("V", (0.0, 1.0))],
+)
 def test_a_calibration_formula(text: str, expected: tuple[float, float]) -> None:
     assert read_calibration(text) == expected
 
