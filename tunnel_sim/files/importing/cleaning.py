@@ -19,6 +19,7 @@ _NEARLY = 0.75  # of a counter's range: a step between two samples as long as th
 _SMALL = 0.25  # of the range: no other step is longer
 _COARSE = 0.1  # share of samples with the stamp of the one before, above which the stamps are too coarse
 _UNEVEN = 0.01  # of a step
+_FINEST = 1e-12  # s
 _RESTARTS = 0.01  # share of steps backwards, up to which the clock restarts and the rows are not out of order
 _LEVELS_OF = 200_000  # samples of each run are looked at
 _MOST_LEVELS = 20_000
@@ -126,7 +127,9 @@ def from_zero(time: Array) -> Array:
     if time.size < 2 or time[0] == 0.0:
         return time
     step = float(np.ptp(time)) / (time.size - 1)
-    counted: Array = np.round(time - time[0], 6 - floor(log10(step)))  # a millionth of a step is kept
+    counted: Array = np.round(
+        time - time[0], 6 - floor(log10(max(step, _FINEST)))
+    )  # a millionth of a step is kept
     return counted
 
 
@@ -137,7 +140,7 @@ def _without_repeats(time: Array, reading: Array, said: list[str]) -> tuple[Arra
         return time, reading
     repeated = np.concatenate([[False], same & (np.diff(reading) == 0.0)])
     differing = np.count_nonzero(same & ~repeated[1:])
-    if differing > _COARSE * time.size:
+    if differing > _COARSE * time.size and time[0] < time[-1]:
         said.append(
             f"{differing} stamps equal the one before though the readings differ: the stamps are coarser than "
             f"the sampling, and evenly spaced times take their place"
@@ -157,6 +160,8 @@ def _about_the_clock(time: Array) -> list[str]:
     if steps.size < 2:
         return []
     usual = float(np.median(steps))
+    if not usual > 0.0:  # beyond the resolution of floating-point numbers; the run is refused later
+        return []
     gaps = steps > 1.75 * usual
     said = []
     if gaps.any():

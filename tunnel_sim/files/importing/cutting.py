@@ -76,9 +76,11 @@ def find_runs(time_s: Array, reading: Array) -> list[Piece]:
     turn = time_s[starts[0] + int(np.argmax(np.abs(away[starts[0] : ends[0]])))]
     if turn - time_s[0] > _SLOWER * (crossings[1] - turn) + (time_s[1] - time_s[0]):
         lengths[0] = np.inf  # pulled aside: a free swing takes no longer out than back
+    # Dry friction may hold the body beside the centre: a last stretch of one sign that long is a rest.
+    moved = int(starts[-1] if time_s[ends[-1] - 1] - time_s[starts[-1]] > _LONGER * usual else ends[-1])
     found = _released(lengths, peaks, usual)
     if not found:
-        return [Piece(0, _without_long_rest(time_s, 0, int(ends[-1]), clear=clear))]
+        return [Piece(0, _without_long_rest(time_s, 0, moved, clear=clear))]
     pieces = []
     for place, (_, released) in enumerate(found):
         first = _turning_point(time_s, away, starts[released], ends[released], usual)
@@ -88,7 +90,7 @@ def find_runs(time_s: Array, reading: Array) -> list[Piece]:
             halves = hand - released
         else:
             last, halves = (
-                _without_long_rest(time_s, first, int(ends[-1]), clear=clear),
+                _without_long_rest(time_s, first, moved, clear=clear),
                 peaks.size - released,
             )
         if halves >= _LEAST_HALVES:

@@ -44,10 +44,12 @@ def faults(kind: str, where: str) -> Iterator[None]:
     """
     try:
         yield
-    except (TunnelError, KeyboardInterrupt, SystemExit):
+    except TunnelError:
         raise
-    # Libraries in Rust and C raise exceptions of their own, some of which are not subclasses of Exception.
     except BaseException as error:
+        # A panic of a library in Rust is not a subclass of Exception, and has no name to import.
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+            raise
         raise TunnelError(
             f"is not {kind} that can be read ({one_line(error, 60)})",
             where=where,

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Protocol, cast
+
+import numpy as np
 
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.reading import check_count, read_regular
@@ -135,7 +137,7 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
         raise TunnelError("the file is empty", where=where, remedy="name a file that holds a record")
     _check_beginning(content, reader, where)
     tables, known = reader.read(content, where, choices)
-    tables = [table for table in tables if table.channels]
+    tables = [_computable(table) for table in tables if table.channels]
     if not tables:
         raise TunnelError(
             "no column of numbers", where=where, remedy="name a file that holds times and angles"
@@ -143,6 +145,18 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
     count = sum(table.channels[0].values.size for table in tables)
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples", where, "split the file")
     return Source(path, hashlib.sha256(content).hexdigest(), tuple(tables), known)
+
+
+def _computable(table: Table) -> Table:
+    """The table without infinities and numbers whose powers would overflow."""
+    channels, said = [], []
+    for channel in table.channels:
+        wild = np.abs(channel.values) > limits.LARGEST_NUMBER
+        if wild.any():
+            said.append(f"{int(wild.sum())} numbers beyond {limits.LARGEST_NUMBER:g} are taken as missing")
+            channel = replace(channel, values=np.where(wild, np.nan, channel.values))
+        channels.append(channel)
+    return replace(table, channels=tuple(channels), said=(*table.said, *said)) if said else table
 
 
 def _check_beginning(content: bytes, reader: Reader, where: str) -> None:
