@@ -50,7 +50,15 @@ def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | No
 
 
 def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple[float | None, str]:
-    """The interval of samples without times, s, and where it is stated; None where it is not."""
+    """The interval of samples that have no times.
+
+    Args:
+        facts: numbers of the file, by name.
+        choices: what the user has stated.
+
+    Returns:
+        The interval, s, None where nothing states it; and what states it.
+    """
     if choices.rate is not None:
         return 1.0 / choices.rate, f"{choices.rate:g} Hz as stated"
     for pattern, power in ((_RATE_FACTS, -1), (_STEP_FACTS, 1)):
@@ -61,7 +69,16 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
 
 
 def in_seconds(time: Channel, choices: ImportChoices, said: list[str]) -> Array:
-    """Times in s, shape (n,); the unit is guessed from the step where nobody states it."""
+    """Times in s.
+
+    Args:
+        time: the column, shape (n,).
+        choices: what the user has stated.
+        said: a remark is added where the unit is guessed from the step.
+
+    Returns:
+        Shape (n,).
+    """
     unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or (
         time.unit if kind_of(time.unit) else ""
     )

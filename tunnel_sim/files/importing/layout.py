@@ -20,7 +20,12 @@ _FACT = re.compile(
 
 
 def is_number(text: str, decimal: str = ".") -> bool:
-    """Whether a text is a number with the given decimal sign."""
+    """Whether a text is a number.
+
+    Args:
+        text: a cell.
+        decimal: the decimal sign.
+    """
     return _NUMBER[decimal].fullmatch(text) is not None
 
 
