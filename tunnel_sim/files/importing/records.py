@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,9 +38,10 @@ from tunnel_sim.files.toml_input import one_line, shown, validate
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, Record
 
 _LEAST_ROWS = 16  # a shorter table beside longer ones is one of conditions or sizes
+_JUDGED = 500_000  # samples in which the cycles of a long record are counted
 _WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
 
 
@@ -302,13 +304,25 @@ def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: Cond
             remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)",
         )
     try:
-        sensor = SensorProperties(quantity=raw.quantity)
-        release = stated.get("release_angle")
-        record = checked_record(from_zero(time), reading, "the reading", sensor, release, where)
+        record = _judged(from_zero(time), reading, raw.quantity, stated.get("release_angle"), where)
     except TunnelError as error:
         return Part(name, raw, piece, None, (*said, f"left out: {error.what}"))
     run = Run(name, record, **({"wind_speed": 0.0} | stated))
     return Part(name, raw, piece, run, tuple(said))
+
+
+def _judged(
+    time: Array, reading: Array, quantity: Quantity, release_angle: float | None, where: str
+) -> Record:
+    """The record, unless a campaign cannot hold it."""
+    sensor = SensorProperties(quantity=quantity)
+    stride = time.size // _JUDGED
+    if stride > 1:
+        # A long record that passes when thinned out passes as a whole, which takes seconds to find out.
+        with suppress(TunnelError):
+            checked_record(time[::stride], reading[::stride], "the reading", sensor, release_angle, where)
+            return Record(time, reading)
+    return checked_record(time, reading, "the reading", sensor, release_angle, where)
 
 
 def _on_cut(time: Array, piece: Piece) -> list[str]:
