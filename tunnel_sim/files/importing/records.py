@@ -2,36 +2,26 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from tunnel_sim.files.campaign_io import checked_record
 from tunnel_sim.files.importing.choices import RIG_KEYS, RUN_KEYS, Conditions, ImportChoices
 from tunnel_sim.files.importing.cleaning import (
-    Cleaned,
-    cleaned,
     from_zero,
     resolution,
-    restarts,
-    without_overflow,
 )
-from tunnel_sim.files.importing.columns import Pair, find_pairs, stem
-from tunnel_sim.files.importing.conditions import ConditionTable, from_facts, from_name, name_pattern
+from tunnel_sim.files.importing.columns import stem
+from tunnel_sim.files.importing.conditions import ConditionTable, from_name, name_pattern
 from tunnel_sim.files.importing.conversion import (
-    Calibration,
-    in_radians,
-    in_seconds,
     read_calibration,
-    sample_interval,
 )
 from tunnel_sim.files.importing.cutting import Piece, find_runs
-from tunnel_sim.files.importing.source import Channel, Source, Table, read_source
+from tunnel_sim.files.importing.raw_records import Raw, raw_records
+from tunnel_sim.files.importing.source import Source, read_source
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.toml_input import one_line, shown, validate
@@ -40,34 +30,8 @@ from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Ru
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
-_LEAST_ROWS = 16  # a shorter table beside longer ones is one of conditions or sizes
 _JUDGED = 500_000  # samples in which the cycles of a long record are counted
 _WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
-
-
-@dataclass(frozen=True, eq=False)
-class Raw:
-    """A record of a file, cleaned but not yet cut.
-
-    Args:
-        id: of its runs, without their number.
-        source: the file.
-        column: the reading's column.
-        cleaned: times and readings.
-        quantity: what the readings are.
-        unit: that the readings had in the file.
-        stated: conditions in the file.
-        said: how it was read, and what was changed.
-    """
-
-    id: str
-    source: Path
-    column: str
-    cleaned: Cleaned
-    quantity: Quantity
-    unit: str
-    stated: dict[str, float]
-    said: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,8 +126,7 @@ def read_records(
     for path in files:
         source = read_source(path, choices)
         named = from_name(pattern, path)
-        for one in _records_of(source):
-            raws += _raws(source, one, choices, calibration, named, several=len(files) > 1)
+        raws += raw_records(source, choices, calibration, named, several=len(files) > 1)
         sources.append(source)
     if not raws:
         raise TunnelError("no files", remedy="name at least one")
@@ -182,76 +145,6 @@ def read_records(
         update={k: v for k, v in known.items() if getattr(choices, k) in (None, ())}
     )
     return Imported(campaign, tuple(parts), tuple(sources), resolved, _on_campaign(campaign, table))
-
-
-def _records_of(source: Source) -> list[Table]:
-    """The tables of a file that are long enough for a record; all, where none is."""
-    long = [table for table in source.tables if table.channels[0].values.size >= _LEAST_ROWS]
-    return long or list(source.tables)
-
-
-def _raws(
-    source: Source,
-    table: Table,
-    choices: ImportChoices,
-    calibration: Calibration | None,
-    named: dict[str, float],
-    *,
-    several: bool,
-) -> list[Raw]:
-    """The records of a table."""
-    where = shown(source.path) + (f", {one_line(table.part)}" if table.part else "")
-    found = []
-    for pair in find_pairs(table, choices, where):
-        said = [*pair.said]
-        time = _times(pair, table, choices, said, where)
-        values = without_overflow(pair.reading.values, said)
-        reading = Channel(pair.reading.name, values, pair.reading.unit)
-        readings, quantity, unit = in_radians(reading, choices, calibration, said, where)
-        time, readings = _within(time, readings, choices, said)
-        names = [source.path.stem if several or not (table.part or pair.run) else "", table.part, pair.run]
-        name = one_line("-".join(part for part in names if part))
-        stated = from_facts(table.facts) | named
-        said += [f"{key} = {value:g} from the file" for key, value in stated.items()]
-        starts = [0, *restarts(time[np.isfinite(time)] if np.isfinite(time).all() else time), time.size]
-        if len(starts) > 2:
-            said.append(f"the clock starts anew {len(starts) - 2} times: another run each")
-        for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
-            clean = cleaned(time[a:b], readings[a:b])
-            label = name if len(starts) == 2 else f"{name}-{place}"
-            if clean.time_s.size < 2:
-                raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
-            found.append(
-                Raw(
-                    label, source.path, pair.reading.name, clean, quantity, unit, stated, (*said, *clean.said)
-                )
-            )
-    return found
-
-
-def _times(pair: Pair, table: Table, choices: ImportChoices, said: list[str], where: str) -> Array:
-    """The times of a run, s."""
-    if pair.time is not None:
-        values = without_overflow(pair.time.values, said)
-        return in_seconds(Channel(pair.time.name, values, pair.time.unit), choices, said)
-    interval, origin = sample_interval(table.facts, choices)
-    if interval is None:
-        raise TunnelError("no column of times", where=where, remedy="give --time NAME, or --rate in Hz")
-    said.append(f"times at {1.0 / interval:.6g} Hz: {origin}")
-    return np.arange(pair.reading.values.size, dtype=np.float64) * interval
-
-
-def _within(time: Array, reading: Array, choices: ImportChoices, said: list[str]) -> tuple[Array, Array]:
-    """The samples between the stated start and end."""
-    first = -np.inf if choices.start is None else choices.start
-    last = np.inf if choices.end is None else choices.end
-    if choices.start is None and choices.end is None:
-        return time, reading
-    # Stamps are decimals: a start at one of them includes it.
-    slack = 1e-9 * max(abs(first) if np.isfinite(first) else 0.0, abs(last) if np.isfinite(last) else 0.0)
-    kept = (time >= first - slack) & (time <= last + slack)
-    said.append(f"{int(kept.sum())} of {time.size} samples lie from --start to --end")
-    return time[kept], reading[kept]
 
 
 def _with_unique_ids(raws: Sequence[Raw]) -> list[tuple[str, Raw]]:
