@@ -18,7 +18,9 @@ from tunnel_lab.commands import (
     demo,
     diagnose,
     effects,
+    export,
     identify,
+    importing,
     plot,
     render,
     score,
@@ -28,6 +30,7 @@ from tunnel_lab.commands import (
     train,
     view,
 )
+from tunnel_lab.terminal.table_format import with_format
 from tunnel_sim.vocabulary.errors import TunnelError
 
 BAD_INPUT = 2
@@ -72,9 +75,11 @@ def tunnel(
       tunnel demo                        the whole chain, with figures
       tunnel springs                     inertia from the paper's spring table
       tunnel simulate plan.toml --out c  simulate a campaign into folder c
+      tunnel import log.csv --out c      a campaign of a data logger's files
       tunnel identify c --json est.json  its coefficients; also of measured runs
       tunnel diagnose c                  why the model does not fit it
       tunnel plot c                      figures of it
+      tunnel export c --format mat       c as MAT, CSV, Excel or HDF5
       tunnel effects                     effects that a plan can add
       tunnel blind                       blind tests of the diagnosis
       tunnel score                       errors of each estimator
@@ -98,9 +103,11 @@ def tunnel(
 COMMANDS = (
     demo,
     simulate,
+    importing,
     identify,
     diagnose,
     plot,
+    export,
     springs,
     effects,
     score,
@@ -111,8 +118,10 @@ COMMANDS = (
 )
 """Every command that is one function, in the order of the help."""
 
+WITHOUT_TABLES = (simulate, plot, export, view, render)
+
 for _command in COMMANDS:
-    app.command(_command.NAME)(_command.run)
+    app.command(_command.NAME)(_command.run if _command in WITHOUT_TABLES else with_format(_command.run))
 app.add_typer(blind.app, name=blind.NAME)
 
 

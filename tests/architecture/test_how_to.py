@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -22,12 +23,20 @@ INDEX = ROOT / "docs" / "README.md"
         ("identify-a-record", ["springs"]),
         pytest.param("diagnose-a-campaign", ["simulate", "diagnose"], marks=pytest.mark.slow),
         pytest.param("state-uncertainties", ["simulate", "identify"], marks=pytest.mark.slow),
+        (
+            "from-a-data-logger-to-cn-beta",
+            ["import", "identify", "simulate", "export", "import", "identify"],
+        ),
     ],
 )
 def test_shown_output_is_real_output(page: str, typed: list[str], tmp_path: Path) -> None:
     text = (PAGES / f"{page}.md").read_text(encoding="utf-8")
     (tmp_path / "plan.toml").write_text(toml_block("wind_speeds"), encoding="utf-8")
+    for original in (PAGES / "data").glob("*.mat"):
+        shutil.copy(original, tmp_path)
     for kind, known in BLOCK.findall(text):
+        if kind == "csv":
+            (tmp_path / "runs.csv").write_text(known, encoding="utf-8")
         if kind == "toml":
             (tmp_path / "known.toml").write_text(known, encoding="utf-8")
     assert [command.split()[1] for command, _ in sessions(text)] == typed
@@ -39,6 +48,7 @@ def test_every_page_with_output_is_run() -> None:
     pages = [page.stem for page in PAGES.glob("*.md") if sessions(page.read_text(encoding="utf-8"))]
     assert sorted(pages) == [
         "diagnose-a-campaign",
+        "from-a-data-logger-to-cn-beta",
         "identify-a-record",
         "run-the-demo",
         "state-uncertainties",

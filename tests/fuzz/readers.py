@@ -77,6 +77,27 @@ def run_parquet(folder: Path, rng: Rng) -> None:
     _campaign_of(folder, "r2.parquet", changed_parquet(seeds.run_frame(), rng), rng)
 
 
+def import_text(folder: Path, rng: Rng) -> None:
+    """A logger's text file changed, in one dialect or another."""
+    from tunnel_sim.files.importing.records import read_records
+
+    content = changed_csv(seeds.run_file("r1.csv"), rng)
+    if rng.random() < 0.5:
+        delimiter = (b";", b"\t", b" ", b"|")[rng.integers(4)]
+        content = content.replace(b",", delimiter)
+        content = content.replace(b".", b",") if rng.random() < 0.5 else content
+    read_records([_written(folder / "log.txt", content, rng)])
+
+
+def import_file(folder: Path, rng: Rng) -> None:
+    """A MAT, HDF5, Excel, TDMS or Parquet file changed."""
+    from tunnel_sim.files.importing.records import read_records
+
+    names = ("log.mat", "log.h5", "log.xlsx", "log.tdms", "log.parquet")
+    name = names[rng.integers(len(names))]
+    read_records([_written(folder / name, changed_bytes(seeds.logger_file(name), rng), rng)])
+
+
 def plan(folder: Path, rng: Rng) -> None:
     """A campaign description changed, and its effects made."""
     from tunnel_sim.engine.virtual_campaign import plan_effects
@@ -323,6 +344,8 @@ READERS: dict[str, tuple[Target, float]] = {
     "campaign_toml": (campaign_toml, 3.0),
     "run_csv": (run_csv, 2.0),
     "run_parquet": (run_parquet, 2.0),
+    "import_text": (import_text, 2.0),
+    "import_file": (import_file, 1.0),
     "plan": (plan, 2.0),
     "rig": (rig, 1.0),
     "spring_table": (spring_table, 1.0),

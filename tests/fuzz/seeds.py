@@ -195,3 +195,24 @@ def frame_of(content: bytes) -> pl.DataFrame:
 def run_file(name: str) -> bytes:
     """The seed run as a file of the kind its name says."""
     return run_frame().write_csv().encode() if name.endswith(".csv") else parquet(run_frame())
+
+
+@cache
+def logger_file(name: str) -> bytes:
+    """The seed run as a file of an instrument, of the kind its name says."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    from tunnel_sim.files.exporting import export_campaign
+
+    kinds = {".mat": "mat", ".h5": "hdf5", ".xlsx": "xlsx"}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        if path.suffix in kinds:
+            export_campaign(free_decays(np.random.default_rng(1)), path, kinds[path.suffix])
+        elif path.suffix == ".tdms":
+            with TdmsWriter(path) as file:
+                columns = [ChannelObject("run", column.name, column.to_numpy()) for column in run_frame()]
+                file.write_segment(columns)
+        else:
+            path.write_bytes(run_file(name))
+        return path.read_bytes()

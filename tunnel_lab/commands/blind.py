@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tunnel_lab.terminal.options import split_names
+from tunnel_lab.terminal.table_format import with_format
 
 if TYPE_CHECKING:
     from diagnosis.blind import Score
@@ -130,6 +131,7 @@ def diagnose(
 
 
 @app.command("score")
+@with_format
 def score(
     folder: Folder,
     exclude: Excluded = None,

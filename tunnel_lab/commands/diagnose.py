@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tunnel_lab.terminal.given_campaign import HELP as CAMPAIGN_HELP
+
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
     from tunnel_sim.effects import Effect
@@ -29,7 +31,7 @@ STEPS = {
 
 
 def run(
-    campaign: Annotated[Path, typer.Argument(help="Folder of the campaign: campaign.toml and its runs.")],
+    campaign: Annotated[Path, typer.Argument(help=CAMPAIGN_HELP)],
     json: Annotated[
         Path | None,
         typer.Option("--json", metavar="FILE", help="Write the answer as JSON; - for standard output."),
@@ -67,16 +69,16 @@ def run(
       written completely or not at all.
     """
     from diagnosis import vocabulary
+    from tunnel_lab.terminal.given_campaign import given_campaign
     from tunnel_lab.terminal.options import refuse_unwritable_files, split_names
     from tunnel_lab.terminal.tables import say_written
-    from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.json_text import json_text
     from tunnel_sim.files.writing import write_json
 
     kinds = vocabulary(split_names(effects), split_names(exclude))
     to_stdout = json is not None and str(json) == "-"
     refuse_unwritable_files(None if to_stdout else json, report)
-    data = read_campaign(campaign)
+    data = given_campaign(campaign)
     document = diagnose_with_progress(data, kinds).to_json_dict()
     # Files first: the reader of a pipe may close it early.
     if json is not None and not to_stdout:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tunnel_lab.terminal.estimator_help import with_estimators
+from tunnel_lab.terminal.given_campaign import HELP as CAMPAIGN_HELP
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
@@ -21,7 +22,7 @@ FEW_RUNS = 3
 
 
 def run(
-    campaign: Annotated[Path, typer.Argument(help="Folder of the campaign: campaign.toml and its runs.")],
+    campaign: Annotated[Path, typer.Argument(help=CAMPAIGN_HELP)],
     estimator: Annotated[
         str, typer.Option("--estimator", "-e", metavar="NAME", help="One of the estimators listed above.")
     ] = "output_error",
@@ -91,9 +92,9 @@ def run(
     """
     from identification import identify
     from tunnel_lab.terminal.estimate_output import show_estimate
+    from tunnel_lab.terminal.given_campaign import given_campaign
     from tunnel_lab.terminal.options import known_estimator
     from tunnel_lab.terminal.tables import say
-    from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.json_text import json_text
     from tunnel_sim.files.writing import refuse_unwritable, write_json
     from tunnel_sim.vocabulary.errors import TunnelError
@@ -104,7 +105,7 @@ def run(
         raise TunnelError("needs --budget", where="--model", remedy="add --budget, or leave it out")
     if json is not None and str(json) != "-":
         refuse_unwritable(json)
-    data = read_campaign(campaign)
+    data = given_campaign(campaign)
     chosen = with_weights(estimator, weights)
     estimate = identify(data, chosen, throw=False)
     found = None

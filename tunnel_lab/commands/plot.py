@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tunnel_lab.terminal.given_campaign import HELP as CAMPAIGN_HELP
+
 if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign, Run
 
@@ -14,7 +16,7 @@ NAME = "plot"
 
 
 def run(
-    campaign: Annotated[Path, typer.Argument(help="Folder of the campaign: campaign.toml and its runs.")],
+    campaign: Annotated[Path, typer.Argument(help=CAMPAIGN_HELP)],
     out: Annotated[
         Path,
         typer.Option("--out", "-o", metavar="FOLDER", help="Where the figures go, in a subfolder."),
@@ -36,11 +38,11 @@ def run(
     """
     from identification import identify
     from tunnel_lab.plotting import plots
+    from tunnel_lab.terminal.given_campaign import given_campaign
     from tunnel_lab.terminal.tables import say, say_written
-    from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.writing import output_folder
 
-    data = read_campaign(campaign)
+    data = given_campaign(campaign)
     folder = output_folder(out / campaign.resolve().name)
     written = [
         plots.save(page, folder / f"traces-{number}.png")

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from identification.printing import estimate_tables as printing
 from identification.printing.numbers import SYMBOLS, concise, in_stds, significant, unit, with_std
+from tunnel_lab.terminal.table_format import TableFormat, chosen, rendered
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,8 +44,12 @@ def console(*, stderr: bool = False) -> Console:
 
 
 def say(line: str, *, stderr: bool = False) -> None:
-    """Print one line unchanged: no markup and no wrapping, so that paths can be copied."""
-    console(stderr=stderr).print(line, soft_wrap=True)
+    """Print one line unchanged: no markup and no wrapping, so that paths can be copied.
+
+    Args:
+        stderr: print to standard error, as is done where tables are not text.
+    """
+    console(stderr=stderr or chosen.get() is not TableFormat.TEXT).print(line, soft_wrap=True)
 
 
 def say_written(*paths: Path | None) -> None:
@@ -54,15 +59,20 @@ def say_written(*paths: Path | None) -> None:
 
 
 def show_tables(*tables: Table) -> None:
-    """Print tables, each followed by an empty line.
+    """Print tables, each followed by an empty line, in the format of ``--format``.
 
     Args:
         tables: those without rows are left out.
     """
     out = console()
     for one in tables:
-        if one.row_count:
+        if not one.row_count:
+            continue
+        if chosen.get() is TableFormat.TEXT:
             out.print(one)
+        else:
+            out.print(rendered(one, chosen.get()), soft_wrap=True, end="")
+        if chosen.get() is not TableFormat.JSON:
             out.print()
 
 

@@ -6,7 +6,7 @@ The reader never opens ``truth.json``. The writer writes the whole campaign or n
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,8 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 TRUTH_FILE = "truth.json"
 RUN_FOLDER = "runs"
+IMPORT_RECIPE, IMPORT_PICTURE = "import.toml", "import.png"
+"""What an import keeps beside the campaign."""
 
 
 def read_campaign(folder: Path | str) -> Campaign:
@@ -77,6 +79,9 @@ def write_campaign(
     run_format: str = "parquet",
     truth: Mapping[str, Any] | None = None,
     overwrite: bool = False,
+    text: Callable[[Mapping[str, Any]], str] = tomli_w.dumps,
+    beside: Mapping[str, bytes] | None = None,
+    checked: bool = False,
 ) -> Path:
     """Write a campaign so that reading it gives the same numbers: whole, or not at all.
 
@@ -86,6 +91,9 @@ def write_campaign(
         run_format: ``parquet`` or ``csv``.
         truth: the simulated truth, written as ``truth.json``; None: no such file.
         overwrite: whether an existing folder may be replaced; it must be empty or contain only a campaign.
+        text: makes the text of ``campaign.toml`` from its tables, where comments are wanted in it.
+        beside: further files of the folder, by name.
+        checked: whether every record has passed `checked_record`, so that this need not be done again.
 
     Returns:
         The folder.
@@ -107,7 +115,9 @@ def write_campaign(
     _check_target(folder, overwrite=overwrite)
     files = _run_files(campaign, run_format)
     document = campaign_document(campaign, files)
-    _check_campaign(campaign, document, folder)
+    parse_document(document, folder / CAMPAIGN_FILE)
+    if not checked:
+        _check_records(campaign, folder)
     truth_text = None if truth is None else json_text(truth)
     with whole_folder(folder) as partial:
         (partial / RUN_FOLDER).mkdir()
@@ -117,7 +127,9 @@ def write_campaign(
             )
         if truth_text is not None:
             (partial / TRUTH_FILE).write_bytes(truth_text.encode())
-        (partial / CAMPAIGN_FILE).write_bytes(tomli_w.dumps(document).encode())
+        for name, content in (beside or {}).items():
+            (partial / name).write_bytes(content)
+        (partial / CAMPAIGN_FILE).write_bytes(text(document).encode())
     return folder
 
 
@@ -148,7 +160,7 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
                 remedy="add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml",
             )
         time_s = np.arange(reading.size) / sample_rate
-    record = _checked(time_s, reading, column, sensor, run.release_angle, where)
+    record = checked_record(time_s, reading, column, sensor, run.release_angle, where)
     return Run(
         id=run.id,
         record=record,
@@ -159,7 +171,7 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
     )
 
 
-def _checked(
+def checked_record(
     time_s: Array,
     reading: Array,
     column: str,
@@ -167,7 +179,19 @@ def _checked(
     release_angle: float | None,
     where: str,
 ) -> Record:
-    """The record of a run, unless it is refused."""
+    """The record of a run, unless it is refused.
+
+    Args:
+        time_s: sample times, shape (n,), s.
+        reading: shape (n,), rad, rad/s or rad/s².
+        column: that the readings are from, for messages.
+        sensor: what is stated of the sensor.
+        release_angle: as stated, rad.
+        where: file and run, for messages.
+
+    Raises:
+        TunnelError: times that do not increase, fewer than three cycles, or what looks like a wrong unit.
+    """
     increasing_times(time_s, sensor.sample_rate, where)
     angle, judged = sensor.derivative == 0, sensor.plausible is not False
     if judged and angle:
@@ -193,9 +217,8 @@ def _check_inside(folder: Path, path: Path, where: str) -> None:
         )
 
 
-def _check_campaign(campaign: Campaign, document: dict[str, Any], folder: Path) -> None:
-    """Refuse whatever the reader would refuse, before anything is written."""
-    parse_document(document, folder / CAMPAIGN_FILE)
+def _check_records(campaign: Campaign, folder: Path) -> None:
+    """Refuse the records that the reader would refuse, before anything is written."""
     for run in campaign.runs:
         where = run_place(folder, run.id)
         time_s, yaw = run.record.time_s, run.record.yaw_rad
@@ -203,7 +226,7 @@ def _check_campaign(campaign: Campaign, document: dict[str, Any], folder: Path) 
             raise TunnelError(
                 "the record holds NaN or an infinity", where=where, remedy="shorten the run or leave it out"
             )
-        _checked(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where)
+        checked_record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where)
 
 
 def _run_files(campaign: Campaign, run_format: str) -> dict[str, str]:
@@ -233,7 +256,8 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
             "the folder holds no campaign", where=where, remedy="choose another one, or empty it"
         )
     # Files that the writer did not create belong to somebody: replacing the folder would delete them.
-    strange = [p for p in entries if p.name not in (CAMPAIGN_FILE, TRUTH_FILE, RUN_FOLDER)]
+    own = (CAMPAIGN_FILE, TRUTH_FILE, RUN_FOLDER, IMPORT_RECIPE, IMPORT_PICTURE)
+    strange = [p for p in entries if p.name not in own]
     runs = folder / RUN_FOLDER
     if runs.is_dir() and not runs.is_symlink():
         strange += [p for p in runs.iterdir() if p.is_dir() or p.suffix.lower()[1:] not in RUN_FORMATS]

@@ -1,0 +1,169 @@
+"""Clean-up and cutting of records: nothing is changed silently, and nothing is cut from a free decay.
+
+Truth: closed-form decays, and what a hand or a logger was made to do to them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.unit.importing.import_files import RATE, decay, written
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.cleaning import cleaned, resolution, restarts, without_overflow
+from tunnel_sim.files.importing.cutting import find_runs
+from tunnel_sim.files.importing.records import read_records
+
+
+def held(angle: float, seconds: float) -> np.ndarray:
+    return np.full(round(seconds * RATE), angle)
+
+
+def pulled(to: float, seconds: float) -> np.ndarray:
+    return np.linspace(0.0, to, round(seconds * RATE))
+
+
+def uniform(reading: np.ndarray) -> np.ndarray:
+    return np.arange(reading.size) / RATE
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_free_decay_is_not_cut(seed: int) -> None:
+    rng = np.random.default_rng([7, seed])
+    time = np.arange(round(rng.uniform(8.0, 40.0) * RATE)) / RATE
+    phase, zeta = rng.uniform(0.0, 2.0 * np.pi), 10.0 ** rng.uniform(-3.0, -1.3)
+    omega = 2.0 * np.pi * rng.uniform(0.5, 4.0)
+    angle = np.exp(-zeta * omega * time) * np.cos(omega * time + phase) + rng.uniform(-0.05, 0.05)
+    angle += rng.choice([1e-4, 1e-2, 0.1]) * rng.standard_normal(time.size)
+    (piece,) = find_runs(time, angle)
+    assert piece.first == 0
+    assert piece.last == time.size or zeta * omega * time[-1] > 5.0
+
+
+def test_growing_motion_is_left_whole() -> None:
+    time = np.arange(4000) / RATE
+    angle = 0.3 * np.tanh(1e-3 * np.exp(0.5 * time)) * np.cos(12.0 * time)
+    (piece,) = find_runs(time, angle)
+    assert (piece.first, piece.last) == (0, time.size)
+
+
+@pytest.mark.parametrize("hold", [0.0, 2.0])
+def test_the_pull_of_a_hand_is_cut_off(hold: float) -> None:
+    _, free = decay()
+    before = np.concatenate([held(0.0, 1.0), pulled(0.35, 1.0), held(0.35, hold)])
+    reading = np.concatenate([before, free])
+    (piece,) = find_runs(uniform(reading), reading)
+    assert abs(piece.first - before.size) <= 4
+    assert piece.last == reading.size
+
+
+def test_runs_one_after_another_are_told_apart(tmp_path: Path) -> None:
+    parts, begins = [], []
+    for seed, amplitude in ((1, 0.35), (2, 0.3), (3, -0.35)):
+        parts += [held(0.0, 1.5), pulled(amplitude, 1.2), held(amplitude, 0.8)]
+        begins.append(sum(part.size for part in parts))
+        parts.append(decay(seed, duration=20.0, amplitude=amplitude)[1])
+    reading = np.concatenate(parts)
+    rows = "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(uniform(reading), reading, strict=True))
+    path = written(tmp_path, "day.csv", "time_s,yaw_rad\n" + rows)
+    imported = read_records([path])
+    assert [run.id for run in imported.campaign.runs] == ["day-1", "day-2", "day-3"]
+    assert [part.piece.first for part in imported.parts] == pytest.approx(begins, abs=6)
+    for part, following in zip(imported.parts, [*begins[1:], reading.size + 700], strict=True):
+        assert part.piece.last <= following - 2.0 * RATE  # the hand's pull belongs to no run
+        assert part.piece.last - part.piece.first > 18.0 * RATE
+    (whole,) = read_records([path], ImportChoices(cut=False)).campaign.runs
+    assert whole.record.time_s.size == reading.size
+
+
+def test_a_rest_longer_than_the_motion_is_shortened() -> None:
+    _, free = decay(duration=20.0)
+    reading = np.concatenate([free, held(0.0, 200.0)])
+    (piece,) = find_runs(uniform(reading), reading)
+    assert 30.0 * RATE < piece.last < 60.0 * RATE
+
+
+def test_missing_rows_disorder_and_repeats_are_said() -> None:
+    time, angle = decay()
+    reading = angle.copy()
+    reading[700] = np.nan
+    order = np.concatenate([np.arange(100, 800), np.arange(100), np.arange(790, time.size)])
+    found = cleaned(time[order] + 5.0, reading[order])
+    assert found.time_s.size == time.size - 1
+    np.testing.assert_allclose(found.time_s, np.delete(time, 700), atol=1e-12)
+    np.testing.assert_array_equal(found.reading, np.delete(angle, 700))
+    said = "; ".join(found.said)
+    for part in (
+        "1 samples without a number",
+        "sorted by time",
+        "10 repeated samples",
+        "at 5 s",
+        "1 samples are missing",
+    ):
+        assert part in said
+
+
+def test_stamps_coarser_than_the_sampling_are_spread() -> None:
+    time, angle = decay()
+    found = cleaned(np.floor(time * 50.0) / 50.0, angle)
+    assert found.time_s.size == time.size
+    assert "coarser than the sampling" in "; ".join(found.said)
+    assert np.abs(found.time_s - time).max() <= 0.02
+
+
+def test_uneven_stamps_are_kept_and_said() -> None:
+    time, angle = decay()
+    uneven = cleaned(time + 4e-4 * np.sin(np.arange(time.size)), angle)
+    assert "differ from an even clock by up to" in "; ".join(uneven.said)
+    np.testing.assert_allclose(uneven.time_s, time + 4e-4 * np.sin(np.arange(time.size)), atol=1e-8)
+
+
+@pytest.mark.parametrize("full", [2.0 * np.pi, 360.0, 65536.0])
+def test_overflow_is_taken_out(full: float) -> None:
+    angle = 0.4 * full * np.cos(np.arange(2000) / 40.0) + 0.9 * full
+    if full == 65536.0:
+        angle = np.round(angle)
+    said: list[str] = []
+    found = without_overflow(np.mod(angle, full), said)
+    np.testing.assert_allclose(found - found[0], angle - angle[0], atol=1e-9 * full)
+    assert "overflow" in said[0]
+
+
+def test_what_does_not_overflow_is_not_touched() -> None:
+    said: list[str] = []
+    reading = 3.0 * np.cos(np.arange(2000) / 40.0)
+    assert without_overflow(reading, said) is reading
+    square = np.where(np.arange(2000) // 10 % 2, 300.0, 0.0)
+    assert without_overflow(square, said) is square
+    assert said == []
+
+
+def test_a_clock_that_starts_anew_begins_another_run(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = "".join(f"{t:.3f},{y:.8f}\n" for seed in (1, 2) for t, y in zip(*decay(seed), strict=True))
+    runs = read_records([written(tmp_path, "two.csv", "time_s,yaw_rad\n" + rows)]).campaign.runs
+    assert [run.id for run in runs] == ["two-1", "two-2"]
+    np.testing.assert_allclose(runs[0].record.yaw_rad, angle, atol=1e-8)
+    shuffled = np.random.default_rng(1).permutation(time)
+    assert restarts(shuffled) == []
+
+
+def test_the_step_of_a_sensor_is_found() -> None:
+    _, angle = decay(duration=20.0)
+    step = 2.0 * np.pi / 4000.0
+    levels = step * np.round(angle / step)
+    assert resolution([levels]) == pytest.approx(step, rel=1e-6)
+    assert resolution([np.round(levels, 5)]) == pytest.approx(step, rel=1e-3)
+    assert resolution([angle]) is None
+
+
+def test_samples_outside_start_and_end_are_left_out(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(time + 10.0, angle, strict=True))
+    path = written(tmp_path, "a.csv", "time_s,yaw_rad\n" + rows)
+    (run,) = read_records([path], ImportChoices(start=10.5, end=15.0)).campaign.runs
+    inside = (time >= 0.4999) & (time <= 5.0001)
+    np.testing.assert_allclose(run.record.yaw_rad, angle[inside], atol=1e-8)
+    assert run.record.time_s[0] == 0.0

@@ -1,0 +1,154 @@
+"""Text files of many dialects become the numbers that were written.
+
+Truth: the numbers that each file was made from.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.unit.importing.import_files import Text, any_dialect, csv, decay, written
+from tunnel_sim import TunnelError
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.text import find_dialect
+from tunnel_sim.files.importing.units import known_unit, split_unit
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_dialect_is_understood(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng([20260601, seed])
+    dialect: Text = any_dialect(rng)
+    time, angle = decay(seed)
+    path = written(tmp_path, "log.txt", dialect.content(time + 3.0, angle))
+    # A file without names cannot say that a swing of ±20 is one in degrees, or that 0.35 is one in radians; the
+    # guess is right for these.
+    (run,) = read_records([path]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(run.record.yaw_rad, angle, rtol=0.0, atol=6e-8)
+
+
+@pytest.mark.parametrize(
+    ("lines", "delimiter", "decimal", "width"),
+    [
+        (["0,00;0,5", "0,01;0,4"], ";", ",", 2),
+        (["0.00;0.5", "0.01;0.4"], ";", ".", 2),
+        (["0,0 1,5", "0,1 1,4"], " ", ",", 2),
+        (["1, 2, 3", "2, 3, 4"], ",", ".", 3),
+        (["1.5\t\t2", "1.6\t3\t2"], "\t", ".", 3),
+        (["0.5", "0.6"], "\t", ".", 1),
+        (["10:00:01;0,5;ok", "10:00:02;0,25;ok"], ";", ",", 3),
+        (["1e-3|-2E+1", ".5|5."], "|", ".", 2),
+    ],
+)
+def test_the_dialect_of_some_lines(lines: list[str], delimiter: str, decimal: str, width: int) -> None:
+    found = find_dialect(lines, ImportChoices())
+    assert found is not None
+    assert (found.delimiter, found.decimal, found.width) == (delimiter, decimal, width)
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
+    [
+        ("Angle, Ch 1+2 (rad) Run #1", "Angle, Ch 1+2 Run #1", "rad"),
+        ("yaw_deg", "yaw", "deg"),
+        ("t / ms", "t", "ms"),
+        ("gyro_z [°/s]", "gyro_z", "deg/s"),
+        ("Output Current (A)", "Output Current (A)", "A"),
+        ("data[1]", "data[1]", ""),
+        ("angle", "angle", ""),
+        ("yaw_rate_rad_s", "yaw_rate", "rad/s"),
+    ],
+)
+def test_names_and_units(heading: str, name: str, unit: str) -> None:
+    assert split_unit(heading) == (name, unit)
+
+
+def test_units_have_many_spellings() -> None:
+    assert [known_unit(text) for text in ("[°]", "µs", "Degrees", "N m", "rad/s²")] == [
+        "deg", "us", "deg", None, "rad/s2",
+    ]  # fmt: skip
+
+
+def test_runs_side_by_side_have_their_own_times_and_lengths(tmp_path: Path) -> None:
+    (t1, y1), (t2, y2) = decay(1), decay(2, duration=6.0)
+    lines = [
+        "Time (s) Run #1;Angle (rad) Run #1;Volt (V) Run #1;Time (s) Run #2;Angle (rad) Run #2;Volt (V) Run #2"
+    ]
+    for i in range(t1.size):
+        second = f"{t2[i]:.3f};{y2[i]:.6f};0.1" if i < t2.size else ";;"
+        lines.append(f"{t1[i]:.3f};{y1[i]:.6f};0.1;{second}")
+    path = written(tmp_path, "two.csv", "\n".join(lines).replace(".", ","))
+    runs = read_records([path]).campaign.runs
+    assert [run.id for run in runs] == ["run-1", "run-2"]
+    for run, angle in zip(runs, (y1, y2), strict=True):
+        np.testing.assert_allclose(run.record.yaw_rad, angle, rtol=0.0, atol=6e-7)
+
+
+def test_the_rate_is_found_above_the_table(tmp_path: Path) -> None:
+    _, angle = decay()
+    rows = "\n".join(f"{i}\t{y:.8f}" for i, y in enumerate(angle))
+    path = written(
+        tmp_path, "a.lvm", f"Writer: logger\nSample rate: 0.2 kHz\n\nsample\tangle (rad)\n{rows}\n"
+    )
+    (run,) = read_records([path]).campaign.runs
+    assert run.record.sample_rate == pytest.approx(200.0)
+
+
+def test_a_rate_beside_the_angle_is_not_taken_for_it(tmp_path: Path) -> None:
+    time, angle = decay()
+    rate = np.gradient(angle, time)
+    rows = "\n".join(f"{t:.3f},{y:.8f},{v:.6f}" for t, y, v in zip(time, angle, rate, strict=True))
+    imported = read_records([written(tmp_path, "a.csv", rows)])
+    np.testing.assert_allclose(imported.campaign.runs[0].record.yaw_rad, angle, atol=1e-8)
+    assert any("'column 3' is left out: it is the rate" in line for line in imported.remarks())
+
+
+def test_texts_among_the_numbers_are_said(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = [f"{t:.3f},{y:.8f},ok" for t, y in zip(time, angle, strict=True)]
+    rows[500] = "2.500,error,ok"
+    imported = read_records(
+        [written(tmp_path, "a.csv", "time_s,yaw_rad,state\n" + "\n".join(rows) + "\nend of data\n")]
+    )
+    (run,) = imported.campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, np.delete(angle, 500), atol=1e-8)
+    said = "\n".join(imported.remarks())
+    assert "the column 'state' holds text and is left out" in said
+    assert "1 texts in the column 'yaw' are taken as missing" in said
+    assert "samples without a number left out" in said
+
+
+@pytest.mark.parametrize(
+    ("content", "what", "remedy"),
+    [
+        (b"", "the file is empty", "name a file"),
+        (b"\x89HDF\r\n\x1a\n", "it begins like an HDF5 file", "ending of its format"),
+        (b"time,angle\n0,1\0\n", "zero bytes", "ending of its format"),
+        (b"all\nwords\nhere\n", "no columns of numbers", "--delimiter"),
+        (b"a,b,c\n" + b"".join(b"%d.5,%d,%d\n" % (i, i * i % 7, i * i % 5) for i in range(99)),
+         "2 columns may be the angle: 'b', 'c'", '--angle "b"'),
+        (b"force (N),temp (K)\n" + b"".join(b"%d,%d\n" % (i % 9, i % 7) for i in range(99)),
+         "no column of angles", "--angle NAME"),
+        (b"angle (rad)\n" + b"".join(b"0.%d\n" % (i % 9) for i in range(99)), "no column of times", "--rate"),
+        (b"time (s),pot (V)\n" + b"".join(b"0.%02d,1.%d\n" % (i, i % 9) for i in range(99)),
+         "'pot' is in V", '--calibration "a + b*V"'),
+        (b"time (s),enc (counts)\n" + b"".join(b"0.%02d,%d\n" % (i, i % 9) for i in range(99)),
+         "'enc' is in counts", "--counts-per-turn"),
+        (b"time (s),yaw (rad)\n" + b"".join(b"%d,0.1\n" % i for i in range(9)), "no column of angles", "--angle"),
+    ],
+)  # fmt: skip
+def test_bad_input_says_what_to_give(tmp_path: Path, content: bytes, what: str, remedy: str) -> None:
+    with pytest.raises(TunnelError) as caught:
+        read_records([written(tmp_path, "bad.csv", content)])
+    assert what in caught.value.what
+    assert remedy in caught.value.remedy
+    assert "bad.csv" in caught.value.where
+
+
+def test_an_unknown_column_has_a_suggestion(tmp_path: Path) -> None:
+    with pytest.raises(TunnelError, match=r"no column 'yw'.*did you mean 'yaw'"):
+        read_records([csv(tmp_path)], ImportChoices(angle=("yw",)))

@@ -1,0 +1,186 @@
+"""``tunnel import``: from files as instruments write them to a campaign."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    pass
+
+NAME = "import"
+
+
+def run(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="Files of a data logger, of any format.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")
+    ] = None,
+    angle: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--angle", metavar="NAME", help="Column of the angle, by name or number. May be repeated."
+        ),
+    ] = None,
+    unit: Annotated[
+        str | None, typer.Option("--unit", help="Of the angle: rad, mrad, deg, turns, counts, V, deg/s, …")
+    ] = None,
+    time: Annotated[
+        str | None, typer.Option("--time", metavar="NAME", help="Column of the times, by name or number.")
+    ] = None,
+    time_unit: Annotated[
+        str | None, typer.Option("--time-unit", help="Of the times: s, ms, us, min, …")
+    ] = None,
+    rate: Annotated[
+        float | None, typer.Option("--rate", help="Sample rate, Hz, where there are no times.")
+    ] = None,
+    counts_per_turn: Annotated[
+        float | None, typer.Option("--counts-per-turn", help="Of an encoder, where the angle is in counts.")
+    ] = None,
+    calibration: Annotated[
+        str | None,
+        typer.Option(
+            "--calibration", metavar="'a + b*V'", help="Angle of a voltage; or a table of two columns."
+        ),
+    ] = None,
+    conditions: Annotated[
+        Path | None,
+        typer.Option("--conditions", metavar="RUNS.csv", help="Table: file or run, wind_speed, …"),
+    ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            "--name", metavar="PATTERN", help="Conditions in the files' names: S{spring}_V{wind_speed}_*"
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=NUMBER", help="A condition of all runs, or a size. May be repeated."
+        ),
+    ] = None,
+    start: Annotated[float | None, typer.Option("--start", help="Leave out what is earlier, s.")] = None,
+    end: Annotated[float | None, typer.Option("--end", help="Leave out what is later, s.")] = None,
+    cut: Annotated[
+        bool | None, typer.Option("--cut/--no-cut", help="Cut records at releases.", show_default="--cut")
+    ] = None,
+    delimiter: Annotated[
+        str | None, typer.Option("--delimiter", help="Of a text file: tab, blank, ';', ',' or '|'.")
+    ] = None,
+    decimal: Annotated[str | None, typer.Option("--decimal", help="Decimal sign of a text file.")] = None,
+    recipe: Annotated[
+        Path | None, typer.Option("--recipe", metavar="import.toml", help="Choices of an earlier import.")
+    ] = None,
+    preview: Annotated[
+        Path | None,
+        typer.Option("--preview", metavar="FILE.png", help="Draw what was read; write no campaign."),
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Write without asking.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a campaign that is already in the folder.")
+    ] = False,
+) -> None:
+    r"""Make a campaign of files as a data logger, a spreadsheet or MATLAB writes them.
+
+    Text of any dialect, Excel, MAT, TDMS, HDF5 and Parquet are read. Columns, units,
+    sample rate, runs and releases are found; what was found, and why, is printed
+    before anything is written. Options state what was found wrongly. The campaign
+    gets a picture (import.png), the choices made (import.toml, for --recipe), and
+    comments in campaign.toml on what the files do not say, such as the stiffness.
+
+    [bold]Examples[/bold]
+      tunnel import log.csv --out my-rig
+      tunnel import log.csv --preview import.png
+      tunnel import S*.csv --out my-rig --name "S{spring}_V{wind_speed}_*" --set air_density=1.2
+      tunnel import rig.mat --out my-rig --angle "data\\[1]" --unit deg
+      tunnel import next.csv --out next --recipe my-rig/import.toml --yes
+
+    [bold]Exit status[/bold]
+      0 imported, 1 declined, 2 bad input; nothing is left half written.
+    """
+    from tunnel_lab.plotting.import_figure import import_picture
+    from tunnel_lab.terminal.import_output import show_import
+    from tunnel_lab.terminal.tables import say
+    from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
+    from tunnel_sim.files.importing.records import read_records
+    from tunnel_sim.files.importing.writing import write_imported
+    from tunnel_sim.files.toml_input import validate
+    from tunnel_sim.files.writing import refuse_unwritable, write_whole
+    from tunnel_sim.vocabulary.errors import TunnelError
+
+    if (out is None) == (preview is None):
+        raise TunnelError(
+            "give either of them", where="--out, --preview", remedy="name a folder or a picture"
+        )
+    if preview is not None:
+        refuse_unwritable(preview)
+    stated = {
+        "angle": tuple(angle or ()) or None,
+        "unit": unit,
+        "time": time,
+        "time_unit": time_unit,
+        "rate": rate,
+        "counts_per_turn": counts_per_turn,
+        "calibration": calibration,
+        "name": name,
+        "start": start,
+        "end": end,
+        "cut": cut,
+        "delimiter": delimiter,
+        "decimal": decimal,
+        "conditions": settings_of(settings or []) or None,
+    }
+    kept = {} if recipe is None else read_recipe(recipe).model_dump(exclude_defaults=True)
+    given = kept | {key: value for key, value in stated.items() if value is not None}
+    choices = validate(ImportChoices, given, Path("options"))
+    imported = read_records(files, choices, conditions=conditions, name=out.resolve().name if out else "")
+    show_import(imported)
+    if preview is not None:
+        write_whole(preview, import_picture(imported))
+        say(f"Written: {preview}")
+        return
+    assert out is not None
+    confirm(out, yes=yes)
+    write_imported(imported, out, overwrite=overwrite, picture=import_picture)
+    count = len(imported.campaign.runs)
+    say(f"Written: {out} ({count} run{'s' if count > 1 else ''}, {out / 'import.png'} shows them)")
+
+
+def settings_of(words: list[str]) -> dict[str, float]:
+    """The conditions that ``--set`` states.
+
+    Args:
+        words: each of the form ``key=number``, or several of them with commas between.
+    """
+    from tunnel_sim.files.importing.choices import parse_setting
+
+    values: dict[str, float] = {}
+    for word in words:
+        values |= parse_setting(word, "--set").model_dump(exclude_none=True)
+    return values
+
+
+def confirm(out: Path, *, yes: bool) -> None:
+    """Ask whether the campaign is to be written.
+
+    Args:
+        out: its folder.
+        yes: do not ask.
+
+    Raises:
+        TunnelError: when nobody can be asked.
+        typer.Exit: with status 1 when it is declined.
+    """
+    from tunnel_sim.vocabulary.errors import TunnelError
+
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise TunnelError("nobody can be asked whether to write it", where=str(out), remedy="add --yes")
+    if not typer.confirm(f"Write {out}?", default=True):
+        raise typer.Exit(1)

@@ -1,0 +1,43 @@
+"""The campaign that a command is given: a folder, or one file of a data logger."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tunnel_sim.vocabulary.campaign import Campaign
+
+HELP = (
+    "Folder of the campaign: campaign.toml and its runs. Or one file of a data logger, as for tunnel import."
+)
+
+
+def given_campaign(path: Path) -> Campaign:
+    """Read what a command is given.
+
+    Args:
+        path: the folder of a campaign, its ``campaign.toml``, or a file of any format that ``tunnel import`` reads.
+
+    Returns:
+        The campaign. What was made of a file of a data logger is printed on standard error.
+
+    Raises:
+        TunnelError: for the first fault.
+    """
+    from tunnel_lab.terminal.tables import say
+    from tunnel_sim.files.campaign_io import read_campaign
+    from tunnel_sim.files.campaign_schema import CAMPAIGN_FILE
+    from tunnel_sim.files.importing.records import read_records
+    from tunnel_sim.vocabulary.errors import TunnelError
+
+    if not path.is_file() or path.name == CAMPAIGN_FILE:
+        return read_campaign(path)
+    try:
+        imported = read_records([path])
+    except TunnelError as error:
+        remedy = f"tunnel import takes options: {error.remedy}"
+        raise TunnelError(error.what, where=error.where, remedy=remedy) from None
+    for line in imported.remarks():
+        say(f"Note: {line}", stderr=True)
+    return imported.campaign

@@ -1,0 +1,67 @@
+"""What an import has read, as a table and notes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.text import Text
+
+from tunnel_lab.terminal import tables
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from tunnel_sim.files.importing.records import Imported, Part
+
+
+def show_import(imported: Imported) -> None:
+    """Print what was read, and how.
+
+    Args:
+        imported: of `read_records`.
+    """
+    tables.show_tables(parts_table(imported))
+    for line in imported.remarks():
+        tables.say(f"Note: {line}")
+
+
+def parts_table(imported: Imported) -> Table:
+    """The runs of an import, a row for each.
+
+    Args:
+        imported: of `read_records`.
+
+    Returns:
+        Samples, rate, the stretch of the record, the swing and the conditions.
+    """
+    unit = imported.campaign.sensor.unit
+    headings = (
+        "samples",
+        "rate\n[Hz]",
+        "from\n[s]",
+        "to\n[s]",
+        f"swing\n[{unit}]",
+        "V\n[m/s]",
+        "Kr\n[N m/rad]",
+    )
+    result = tables.table("Read", "run", "file", *headings, right=headings)
+    for part in imported.parts:
+        result.add_row(*map(Text, (part.id, part.raw.source.name, *_figures(part))))
+    return result
+
+
+def _figures(part: Part) -> tuple[str, ...]:
+    time = part.raw.cleaned.time_s[part.piece.first : part.piece.last]
+    reading = part.raw.cleaned.reading[part.piece.first : part.piece.last]
+    run = part.run
+    if run is None:
+        return (f"{time.size}", "left out", "", "", "", "", "")
+    return (
+        f"{time.size}",
+        f"{run.record.sample_rate:.4g}",
+        f"{time[0]:.2f}",
+        f"{time[-1]:.2f}",
+        f"±{0.5 * (reading.max() - reading.min()):.3g}",
+        f"{run.wind_speed:g}",
+        "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
+    )

@@ -1,0 +1,101 @@
+"""Tables as CSV, Markdown or JSON in place of text; the option ``--format`` of every command that prints tables."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Callable, Sequence
+from contextvars import ContextVar
+from enum import StrEnum
+from functools import wraps
+from inspect import Parameter, signature
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+class TableFormat(StrEnum):
+    """How tables are printed."""
+
+    TEXT = "text"
+    CSV = "csv"
+    MD = "md"
+    JSON = "json"
+
+
+HELP = "Of the tables; json: one object a line. Other lines then go to standard error."
+chosen: ContextVar[TableFormat] = ContextVar("table format", default=TableFormat.TEXT)
+"""The format of this command's tables."""
+_NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
+
+
+def with_format(run: Callable[..., None]) -> Callable[..., None]:
+    """A command with the option ``--format`` for the tables that it prints.
+
+    Args:
+        run: the command.
+    """
+
+    @wraps(run)
+    def formatted(*args: Any, table_format: TableFormat, **named: Any) -> None:
+        token = chosen.set(table_format)
+        try:
+            run(*args, **named)
+        finally:
+            chosen.reset(token)
+
+    kind = Annotated[TableFormat, typer.Option("--format", help=HELP)]
+    option = Parameter("table_format", Parameter.KEYWORD_ONLY, default=TableFormat.TEXT, annotation=kind)
+    given = signature(run, eval_str=True)  # Typer finds its own annotations only where they are not texts
+    vars(formatted)["__signature__"] = given.replace(parameters=[*given.parameters.values(), option])
+    formatted.__annotations__ = {**run.__annotations__, "table_format": kind}
+    return formatted
+
+
+def rendered(table: Table, kind: TableFormat) -> str:
+    """A table in another format.
+
+    Args:
+        table: of texts.
+        kind: not text.
+
+    Returns:
+        Lines with a final line feed. Cells are as printed; JSON has numbers where a cell is one.
+    """
+    heads = [_plain(column.header) for column in table.columns]
+    rows = list(zip(*([_plain(cell) for cell in column.cells] for column in table.columns), strict=True))
+    title = _plain(table.title or "")
+    if kind is TableFormat.JSON:
+        from tunnel_sim.files.json_text import json_line
+
+        records = [{head: _value(cell) for head, cell in zip(heads, row, strict=True)} for row in rows]
+        return json_line({"table": title, "rows": records}) + "\n"
+    return _markdown(title, heads, rows) if kind is TableFormat.MD else _csv(title, heads, rows)
+
+
+def _csv(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    stream.write(f"# {title}\n")
+    writer.writerows([heads, *rows])
+    return stream.getvalue()
+
+
+def _markdown(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    body = "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+    return f"**{title}**\n\n{body}\n"
+
+
+def _plain(cell: object) -> str:
+    return " ".join(str(cell).split())
+
+
+def _value(cell: str) -> str | float:
+    if not _NUMBER.fullmatch(cell):
+        return cell
+    return int(cell) if cell.isdecimal() else float(cell)

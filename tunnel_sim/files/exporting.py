@@ -1,0 +1,126 @@
+"""A campaign as one file for other programs: MAT, HDF5, Excel or a flat CSV table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+import numpy as np
+import polars as pl
+
+from tunnel_sim.files.importing.extras import library
+from tunnel_sim.files.run_table import COLUMNS
+from tunnel_sim.files.toml_input import shown
+from tunnel_sim.files.writing import write_encoded
+from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+
+_CONDITIONS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
+_RIG = ("yaw_inertia", "frontal_area", "reference_length", "width")
+_SHEET_ROWS = 1_048_576
+
+
+def export_campaign(campaign: Campaign, path: Path, kind: str) -> Path:
+    """Write a campaign as one file, completely or not at all.
+
+    Args:
+        campaign: what to write.
+        path: the file; replaced when it exists.
+        kind: ``mat``, ``csv``, ``xlsx`` or ``hdf5``.
+
+    Returns:
+        The same path. Units are those of the campaign format; conditions that are not stated are left out, or
+        empty.
+
+    Raises:
+        TunnelError: an unknown format, a library that is missing, a run too long for a sheet, or a file that
+            cannot be written.
+    """
+    if kind not in WRITERS:
+        raise TunnelError(f"unknown format '{kind}'", where=shown(path), remedy=did_you_mean(kind, WRITERS))
+    return write_encoded(path, lambda stream: WRITERS[kind](campaign, stream, shown(path)))
+
+
+def _column(campaign: Campaign) -> str:
+    return COLUMNS[campaign.sensor.quantity or "angle"][0]
+
+
+def _stated(values: object, keys: tuple[str, ...]) -> dict[str, float]:
+    return {key: value for key in keys if (value := getattr(values, key)) is not None}
+
+
+def _as_csv(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
+    """One row for each sample, with the run's id and conditions."""
+    frames = [
+        pl.DataFrame({"time_s": run.record.time_s, _column(campaign): run.record.yaw_rad}).select(
+            pl.lit(run.id).alias("run"),
+            *(pl.lit(getattr(run, key), dtype=pl.Float64).alias(key) for key in _CONDITIONS),
+            pl.all(),
+        )
+        for run in campaign.runs
+    ]
+    pl.concat(frames).write_csv(stream)
+
+
+def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
+    """A structure array ``runs``, and a structure ``rig``."""
+    from scipy.io import savemat
+
+    keys = ("id", *_CONDITIONS, "time_s", _column(campaign))
+    runs = np.zeros(len(campaign.runs), dtype=[(key, object) for key in keys])
+    for place, run in enumerate(campaign.runs):
+        known = {"id": run.id, **_stated(run, _CONDITIONS), **_record(campaign, run)}
+        runs[place] = tuple(known.get(key, np.empty((0, 0))) for key in keys)
+    rig: Mapping[str, Any] = {"name": campaign.name, **_stated(campaign.rig, _RIG)}
+    savemat(cast(Any, stream), {"runs": runs, "rig": rig}, do_compression=True, oned_as="column")
+
+
+def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
+    return {"time_s": run.record.time_s, _column(campaign): run.record.yaw_rad}
+
+
+def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
+    """A group for each run, with its conditions as attributes."""
+    h5py = library("h5py", "HDF5", where)
+    with h5py.File(stream, "w") as file:
+        file.attrs.update({"name": campaign.name, **_stated(campaign.rig, _RIG)})
+        for run in campaign.runs:
+            group = file.create_group(run.id.replace("/", "_"))
+            group.attrs.update(_stated(run, _CONDITIONS))
+            for name, values in _record(campaign, run).items():
+                group.create_dataset(name, data=values, compression="gzip", shuffle=True)
+
+
+def _as_xlsx(campaign: Campaign, stream: BinaryIO, where: str) -> None:
+    """A sheet of conditions, and one for each run."""
+    xlsxwriter = library("xlsxwriter", "Excel", where)
+    for run in campaign.runs:
+        if run.record.time_s.size >= _SHEET_ROWS:
+            raise TunnelError(
+                f"run '{run.id}' has {run.record.time_s.size:,} samples, more than a sheet's {_SHEET_ROWS - 1:,}",
+                where=where,
+                remedy="choose --format hdf5 or mat",
+            )
+    # Texts that look like formulas or links stay texts.
+    options = {"in_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
+    with xlsxwriter.Workbook(stream, options) as book:
+        names = [f"run {place}" for place in range(1, len(campaign.runs) + 1)]
+        sheet = book.add_worksheet("conditions")
+        sheet.write_row(0, 0, ["sheet", "run", *_CONDITIONS])
+        for row, (name, run) in enumerate(zip(names, campaign.runs, strict=True), 1):
+            sheet.write_row(row, 0, [name, run.id, *(getattr(run, key) for key in _CONDITIONS)])
+        for name, run in zip(names, campaign.runs, strict=True):
+            sheet = book.add_worksheet(name)
+            for place, (heading, values) in enumerate(_record(campaign, run).items()):
+                sheet.write(0, place, heading)
+                sheet.write_column(1, place, values.tolist())
+
+
+WRITERS: Mapping[str, Callable[[Campaign, BinaryIO, str], None]] = {
+    "mat": _as_mat,
+    "csv": _as_csv,
+    "xlsx": _as_xlsx,
+    "hdf5": _as_hdf5,
+}
+"""Writers by format."""

@@ -1,0 +1,145 @@
+"""Where the numbers of a sheet of texts begin, and what the lines above them say."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from tunnel_sim.files.importing.units import known_unit, split_unit
+
+MISSING = ("", "nan", "-nan", "#n/a", "n/a", "na", "null", "none", "-", "--", "inf", "-inf", "#num!")
+"""Texts, in lower case, that stand for a missing number."""
+_NUMBER = {
+    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"),
+    ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
+}
+_FACT = re.compile(
+    r"^\W*([A-Za-z][^\d:=,;\t]*?)\s*[:=,;\t]\s*([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*([^\s\d;,\t]\S*)?"
+)
+
+
+def is_number(text: str, decimal: str = ".") -> bool:
+    """Whether a text is a number.
+
+    Args:
+        text: a cell.
+        decimal: the decimal sign.
+    """
+    return _NUMBER[decimal].fullmatch(text) is not None
+
+
+def is_missing(text: str) -> bool:
+    """Whether a text stands for a missing number."""
+    return text.lower() in MISSING
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The head of a sheet.
+
+    Args:
+        first: index of the first row of numbers.
+        names: of the columns, without units.
+        units: of the columns, as `split_unit` gives them.
+        headed: whether the names are those of the file.
+        facts: numbers that the lines above the table state, by name; a unit of s or Hz has been applied.
+    """
+
+    first: int
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    headed: bool
+    facts: Mapping[str, float]
+
+
+def find_layout(
+    rows: Sequence[Sequence[str]], lines: Sequence[str], decimal: str, width: int
+) -> Layout | None:
+    """Find names, units and the first row of numbers.
+
+    Args:
+        rows: the first rows of the sheet, split into cells.
+        lines: the same rows as they are, for numbers stated in them.
+        decimal: the decimal sign.
+        width: number of columns (a count).
+
+    Returns:
+        The layout; None where no row holds numbers.
+    """
+    first = _first_row(rows, decimal, width)
+    if first is None:
+        return None
+    above = [
+        (index, cells)
+        for index, row in enumerate(rows[:first])
+        if (cells := _heading(row, width, lambda text: is_number(text, decimal))) is not None
+    ]
+    units: list[str] = [""] * width
+    if len(above) > 1 and _are_units(above[-1][1]):
+        units = [known_unit(cell) or cell.strip("()[]{} -") for cell in above.pop()[1]]
+    names = list(above[-1][1]) if above else []
+    split = [split_unit(name) for name in names]
+    named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
+    if len(set(named)) < len(named):  # ambiguous names: the position tells them apart
+        named = [name if named.count(name) == 1 else f"{name} #{i + 1}" for i, name in enumerate(named)]
+    return Layout(
+        first,
+        tuple(named) or tuple(f"column {i + 1}" for i in range(width)),
+        tuple(stated or own for (_, stated), own in zip(split or [("", "")] * width, units, strict=True)),
+        bool(names),
+        _facts(lines[: above[-1][0] if above else first]),
+    )
+
+
+def _first_row(rows: Sequence[Sequence[str]], decimal: str, width: int) -> int | None:
+    """The first row from which on the columns of numbers hold numbers."""
+    tail = [row for row in rows[len(rows) // 2 :] if any(cell for cell in row)]
+    numeric = [
+        column
+        for column in range(width)
+        if 2 * sum(column < len(row) and is_number(row[column], decimal) for row in tail) > len(tail)
+    ]
+    if not numeric:
+        return None
+
+    def is_data(row: Sequence[str]) -> bool:
+        cells = [row[column] if column < len(row) else "" for column in numeric]
+        filled = sum(is_number(cell, decimal) for cell in cells)
+        return filled > 0 and all(is_number(cell, decimal) or is_missing(cell) for cell in cells)
+
+    return next((i for i in range(len(rows)) if all(map(is_data, rows[i : i + 3]))), None)
+
+
+def _heading(row: Sequence[str], width: int, number: Callable[[str], bool]) -> list[str] | None:
+    """The cells of a row that may name every column; None where it may not."""
+    cells = [cell.strip().strip('"').strip() for cell in row]
+    if cells:
+        cells[0] = cells[0].lstrip("#%!*/;").strip()
+    while len(cells) > width and not cells[-1]:
+        cells.pop()
+    texts = [cell for cell in cells if cell and not number(cell)]
+    if len(cells) > width or 2 * len(texts) < width or (width > 1 and len(texts) < 2):
+        return None
+    return cells + [""] * (width - len(cells))
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    said = [cell for cell in cells if cell.strip("-")]
+    return (
+        bool(said)
+        and all(known_unit(cell) or re.fullmatch(r"[\[({].*[\])}]", cell) for cell in said)
+        and any(known_unit(cell) for cell in said)
+    )
+
+
+def _facts(lines: Sequence[str]) -> dict[str, float]:
+    """Numbers such as ``Sample rate: 1000 Hz``, in s and Hz where such a unit follows."""
+    found = {}
+    for line in lines:
+        match = _FACT.match(line)
+        if match:
+            unit = (match[3] or "").strip("()[]").lower()
+            factor = {"khz": 1e3, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}.get(unit, 1.0)
+            found[match[1].strip()] = float(match[2].replace(",", ".")) * factor
+    return found

@@ -1,0 +1,274 @@
+"""From files to the runs of a campaign."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from tunnel_sim.files.campaign_io import checked_record
+from tunnel_sim.files.importing.choices import RIG_KEYS, RUN_KEYS, Conditions, ImportChoices
+from tunnel_sim.files.importing.cleaning import (
+    from_zero,
+    resolution,
+)
+from tunnel_sim.files.importing.columns import stem
+from tunnel_sim.files.importing.conditions import ConditionTable, from_name, name_pattern
+from tunnel_sim.files.importing.conversion import (
+    read_calibration,
+)
+from tunnel_sim.files.importing.cutting import Piece, find_runs
+from tunnel_sim.files.importing.raw_records import Raw, raw_records
+from tunnel_sim.files.importing.source import Source, read_source
+from tunnel_sim.files.plausible import plausible_values
+from tunnel_sim.files.reading import check_count
+from tunnel_sim.files.toml_input import one_line, shown, validate
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array, Record
+
+_JUDGED = 500_000  # samples in which the cycles of a long record are counted
+_WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A run, or what was taken for one.
+
+    Args:
+        id: of the run.
+        raw: the record in which it lies.
+        piece: its samples.
+        run: the run; None where it is left out.
+        said: why it is left out, or what is assumed of it.
+    """
+
+    id: str
+    raw: Raw
+    piece: Piece
+    run: Run | None
+    said: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Imported:
+    """What was read from files.
+
+    Args:
+        campaign: the runs that can be used.
+        parts: these and the others, in the order of the files.
+        sources: the files.
+        choices: those of the user, and what was found instead of the others.
+        said: remarks on the campaign.
+    """
+
+    campaign: Campaign
+    parts: tuple[Part, ...]
+    sources: tuple[Source, ...]
+    choices: ImportChoices
+    said: tuple[str, ...]
+
+    def remarks(self, path: Path | None = None) -> list[str]:
+        """How the files were read and what was changed, each once with the runs that it concerns.
+
+        Args:
+            path: of the file to speak of; None: of all files.
+        """
+        sources = [source for source in self.sources if path in (None, source.path)]
+        parts = [part for part in self.parts if path in (None, part.raw.source)]
+        found = [(text, s.path.name) for s in sources for table in s.tables for text in table.said]
+        found += [(text, part.id) for part in parts for text in (*part.raw.said, *part.said)]
+        places: dict[str, list[str]] = {}
+        for text, place in found:
+            places.setdefault(text, []).append(place)
+        everywhere = len(self.parts)
+        lines = [
+            f"{'all runs' if len(names) == everywhere > 1 else _listed(names)}: {text}"
+            for text, names in places.items()
+        ]
+        return [*lines, *self.said]
+
+
+def _listed(names: Sequence[str]) -> str:
+    names = list(dict.fromkeys(names))
+    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
+
+
+def read_records(
+    files: Sequence[Path],
+    choices: ImportChoices = ImportChoices(),  # noqa: B008 - frozen
+    *,
+    conditions: Path | None = None,
+    name: str = "",
+) -> Imported:
+    """Read files as instruments write them.
+
+    Args:
+        files: one or more; each holds one run, several side by side, or several one after another.
+        choices: what is known about them; the rest is found.
+        conditions: a table of conditions of the files or runs.
+        name: of the campaign; the first file's when empty.
+
+    Returns:
+        The runs, with remarks on how they were read. Nothing is written.
+
+    Raises:
+        TunnelError: for the first fault, in one line that says what to give.
+    """
+    calibration = read_calibration(choices.calibration)
+    pattern = None if choices.name is None else name_pattern(choices.name)
+    table = None if conditions is None else ConditionTable(conditions)
+    sources: list[Source] = []
+    raws: list[Raw] = []
+    for path in files:
+        source = read_source(path, choices)
+        named = from_name(pattern, path)
+        raws += raw_records(source, choices, calibration, named, several=len(files) > 1)
+        sources.append(source)
+    if not raws:
+        raise TunnelError("no files", remedy="name at least one")
+    kinds = {raw.quantity for raw in raws}
+    if len(kinds) > 1:
+        raise TunnelError(
+            f"the runs hold {' and '.join(sorted(kinds))}",
+            remedy="import one quantity at a time, with --angle",
+        )
+    parts = _parts(_with_unique_ids(raws), choices, table)
+    count = sum(part.piece.last - part.piece.first for part in parts)
+    check_count(count, limits.CAMPAIGN_SAMPLES, "samples in all files", "", "import fewer files at a time")
+    campaign = _campaign(parts, choices, name or one_line(files[0].stem), raws[0].quantity)
+    known = {**sources[0].known, **_found(raws, choices)}
+    resolved = choices.model_copy(
+        update={k: v for k, v in known.items() if getattr(choices, k) in (None, ())}
+    )
+    return Imported(campaign, tuple(parts), tuple(sources), resolved, _on_campaign(campaign, table))
+
+
+def _with_unique_ids(raws: Sequence[Raw]) -> list[tuple[str, Raw]]:
+    names = [raw.id for raw in raws]
+    seen: dict[str, int] = {}
+    result = []
+    for raw in raws:
+        seen[raw.id] = seen.get(raw.id, 0) + 1
+        result.append((raw.id if names.count(raw.id) == 1 else f"{raw.id}-{seen[raw.id]}", raw))
+    return result
+
+
+def _parts(
+    named: Sequence[tuple[str, Raw]], choices: ImportChoices, table: ConditionTable | None
+) -> list[Part]:
+    parts = []
+    for label, raw in named:
+        time, reading = raw.cleaned.time_s, raw.cleaned.reading
+        angle = raw.quantity == "angle"
+        pieces = find_runs(time, reading) if choices.cut and angle else [Piece(0, time.size)]
+        for number, piece in enumerate(pieces, 1):
+            name = label if len(pieces) == 1 else f"{label}-{number}"
+            parts.append(_part(name, raw, piece, choices, table))
+    return parts
+
+
+def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: ConditionTable | None) -> Part:
+    time, reading = (
+        raw.cleaned.time_s[piece.first : piece.last],
+        raw.cleaned.reading[piece.first : piece.last],
+    )
+    said = _on_cut(raw.cleaned.time_s, piece)
+    given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
+    stated = raw.stated | (table.of(raw.source, name) if table is not None else {}) | given
+    where = f"{shown(raw.source)}, run '{name}'"
+    validate(Conditions, stated, raw.source)
+    plausible_values(stated, where)
+    if "wind_speed" not in stated:
+        if _WIND_ON.search(f"{raw.source.stem} {name}"):
+            raise TunnelError(
+                "the name says that the wind is on, but not how fast",
+                where=where,
+                remedy="give --set wind_speed=SPEED (m/s), --conditions or --name",
+            )
+        said.append("wind_speed is not stated: wind-off is assumed")
+    if stated.get("wind_speed", 0.0) > 0.0 and "air_density" not in stated:
+        raise TunnelError(
+            f"wind-on ({stated['wind_speed']:g} m/s) without air_density",
+            where=where,
+            remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)",
+        )
+    try:
+        record = _judged(from_zero(time), reading, raw.quantity, stated.get("release_angle"), where)
+    except TunnelError as error:
+        return Part(name, raw, piece, None, (*said, f"left out: {error.what}"))
+    run = Run(name, record, **({"wind_speed": 0.0} | stated))
+    return Part(name, raw, piece, run, tuple(said))
+
+
+def _judged(
+    time: Array, reading: Array, quantity: Quantity, release_angle: float | None, where: str
+) -> Record:
+    """The record, unless a campaign cannot hold it."""
+    sensor = SensorProperties(quantity=quantity)
+    stride = time.size // _JUDGED
+    if stride > 1:
+        # A long record that passes when thinned out passes as a whole, which takes seconds to find out.
+        with suppress(TunnelError):
+            checked_record(time[::stride], reading[::stride], "the reading", sensor, release_angle, where)
+            return Record(time, reading)
+    return checked_record(time, reading, "the reading", sensor, release_angle, where)
+
+
+def _on_cut(time: Array, piece: Piece) -> list[str]:
+    said = []
+    if piece.first:
+        said.append(f"begins at {time[piece.first]:.4g} s, where the body is released")
+    if piece.last < time.size:
+        said.append(f"ends at {time[piece.last - 1]:.4g} s, with the motion or before the next run")
+    return said
+
+
+def _campaign(parts: Sequence[Part], choices: ImportChoices, name: str, quantity: Quantity) -> Campaign:
+    runs = tuple(part.run for part in parts if part.run is not None)
+    if not runs:
+        part = parts[0]
+        raise TunnelError(
+            f"no run can be used; the first one is {part.said[-1]}",
+            where=f"{shown(part.raw.source)}, run '{part.id}'",
+            remedy="check --time, --time-unit, --rate, --angle and --unit, or keep it whole with --no-cut",
+        )
+    files = list(dict.fromkeys(part.raw.source.name for part in parts))
+    rig = choices.conditions.model_dump(include=set(RIG_KEYS))
+    plausible_values(rig, "--set")
+    return Campaign(
+        name,
+        RigProperties(**rig),
+        SensorProperties(
+            resolution=resolution([run.record.yaw_rad for run in runs]),
+            quantity=None if quantity == "angle" else quantity,
+        ),
+        runs,
+        one_line(f"Imported from {', '.join(files[:3])}{' and others' if len(files) > 3 else ''}"),
+    )
+
+
+def _found(raws: Sequence[Raw], choices: ImportChoices) -> dict[str, object]:
+    """What was found, for a recipe: names and units that all records share."""
+    units = {raw.unit for raw in raws}
+    columns = tuple(dict.fromkeys(stem(raw.column) for raw in raws))
+    counted = choices.counts_per_turn is not None or choices.calibration is not None
+    return {
+        **({"unit": units.pop()} if len(units) == 1 and not counted else {}),
+        **({"angle": columns} if len(columns) == 1 else {}),
+    }
+
+
+def _on_campaign(campaign: Campaign, table: ConditionTable | None) -> tuple[str, ...]:
+    said = []
+    step = campaign.sensor.resolution
+    if step is not None:
+        said.append(
+            f"resolution {step:.4g} {campaign.sensor.unit}: the readings lie on levels that far apart"
+        )
+    if table is not None and table.ignored:
+        said.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
+    return tuple(said)

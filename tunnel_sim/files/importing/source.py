@@ -1,0 +1,172 @@
+"""What a file holds before anybody knows what its columns mean: numbers by name."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol, cast
+
+import numpy as np
+
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.reading import check_count, read_regular
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError, shown
+from tunnel_sim.vocabulary.record import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One column of a table.
+
+    Args:
+        name: as in the file, without its unit.
+        values: shape (n,), in the unit of the file; NaN where there is no number.
+        unit: one of `units.UNITS`, another text, or empty where none is stated.
+    """
+
+    name: str
+    values: Array
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Columns of the same length.
+
+    Args:
+        channels: the columns that hold numbers, in their order.
+        part: sheet, group or structure in the file; empty where the file holds one table.
+        facts: single numbers beside the columns, by name.
+        said: how the table was read, and what was left out.
+        headed: whether the columns are named in the file.
+    """
+
+    channels: tuple[Channel, ...]
+    part: str = ""
+    facts: Mapping[str, float] = field(default_factory=dict)
+    said: tuple[str, ...] = ()
+    headed: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A file that was read.
+
+    Args:
+        path: of the file.
+        sha256: of its content.
+        tables: in the order of the file.
+        known: how it was read, for the recipe.
+    """
+
+    path: Path
+    sha256: str
+    tables: tuple[Table, ...]
+    known: Mapping[str, str] = field(default_factory=dict)
+
+
+class Reader(Protocol):
+    """A module that reads one format."""
+
+    LIMIT: int
+    """The largest file, bytes."""
+    MAGIC: tuple[bytes, ...]
+    """How such a file begins; empty where anything will do."""
+    KIND: str
+    """The name of the format, with its article."""
+
+    def read(self, content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
+        """The tables, and how they were read, for the recipe.
+
+        Args:
+            content: of the file.
+            where: its name in messages.
+            choices: what the user has stated.
+
+        Raises:
+            TunnelError: when it is not such a file, or too large.
+        """
+
+
+_ROOM = "tunnel_sim.files.importing."
+READERS: Mapping[str, str] = {
+    ".xlsx": _ROOM + "workbook",
+    ".xlsm": _ROOM + "workbook",
+    ".mat": _ROOM + "matlab",
+    ".h5": _ROOM + "hdf5",
+    ".hdf5": _ROOM + "hdf5",
+    ".hdf": _ROOM + "hdf5",
+    ".tdms": _ROOM + "tdms",
+    ".parquet": _ROOM + "parquet",
+}
+"""Modules that read a format (`Reader`), by the ending of the file's name; any other file is read as text."""
+
+_BEGINNINGS = {
+    b"PK\x03\x04": "an Excel workbook or another archive",
+    b"\x89HDF": "an HDF5 file",
+    b"MATLAB": "a MAT file",
+    b"TDSm": "a TDMS file",
+    b"PAR1": "a Parquet file",
+    b"\xd0\xcf\x11\xe0": "an old Excel workbook (.xls); save it as .xlsx",
+    b"%PDF": "a PDF document",
+    b"\x1f\x8b": "a compressed file; unpack it",
+}
+
+
+def read_source(path: Path, choices: ImportChoices) -> Source:
+    """Read a file of any known format.
+
+    Args:
+        path: the file.
+        choices: what the user has stated.
+
+    Returns:
+        Its tables. Nothing is known yet about the meaning of their columns.
+
+    Raises:
+        TunnelError: no such file, too large, or not of the format that its name says.
+    """
+    where = shown(path)
+    reader = cast("Reader", import_module(READERS.get(path.suffix.lower(), _ROOM + "text")))
+    content = read_regular(path, reader.LIMIT)
+    if not content.strip():
+        raise TunnelError("the file is empty", where=where, remedy="name a file that holds a record")
+    _check_beginning(content, reader, where)
+    tables, known = reader.read(content, where, choices)
+    tables = [_computable(table) for table in tables if table.channels]
+    if not tables:
+        raise TunnelError(
+            "no column of numbers", where=where, remedy="name a file that holds times and angles"
+        )
+    count = sum(table.channels[0].values.size for table in tables)
+    check_count(count, limits.CAMPAIGN_SAMPLES, "samples", where, "split the file")
+    return Source(path, hashlib.sha256(content).hexdigest(), tuple(tables), known)
+
+
+def _computable(table: Table) -> Table:
+    """The table without infinities and numbers whose powers would overflow."""
+    channels, said = [], []
+    for channel in table.channels:
+        wild = np.abs(channel.values) > limits.LARGEST_NUMBER
+        if wild.any():
+            said.append(f"{int(wild.sum())} numbers beyond {limits.LARGEST_NUMBER:g} are taken as missing")
+            channel = replace(channel, values=np.where(wild, np.nan, channel.values))
+        channels.append(channel)
+    return replace(table, channels=tuple(channels), said=(*table.said, *said)) if said else table
+
+
+def _check_beginning(content: bytes, reader: Reader, where: str) -> None:
+    if reader.MAGIC and content.startswith(reader.MAGIC):
+        return
+    really = next((kind for magic, kind in _BEGINNINGS.items() if content.startswith(magic)), None)
+    if really is not None or reader.MAGIC:
+        remedy = "give the file the ending of its format, or export it again"
+        raise TunnelError(
+            f"is not {reader.KIND}" + (f": it begins like {really}" if really else ""),
+            where=where,
+            remedy=remedy,
+        )

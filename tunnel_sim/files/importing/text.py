@@ -1,0 +1,237 @@
+"""Tables as text in any dialect: its delimiter, decimal sign, encoding and head are found from the content."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.layout import MISSING, Layout, find_layout, is_missing, is_number
+from tunnel_sim.files.importing.source import Channel, Table
+from tunnel_sim.files.reading import check_count, read_regular
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+
+LIMIT = limits.CSV_BYTES
+"""Largest file, bytes."""
+MAGIC: tuple[bytes, ...] = ()
+"""Text begins with anything."""
+KIND = "a table of text"
+"""As messages name it."""
+_HEAD, _MIDDLE = 2**18, 2**14  # bytes that are looked at
+_HEAD_LINES = 400
+_NAMES = {"tab": "\t", ";": ";", ",": ",", "|": "|", "blank": " "}
+_SAID = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a line is split and a number is written.
+
+    Args:
+        delimiter: one character; a blank stands for any number of blanks and tabs.
+        decimal: the decimal sign.
+        width: number of columns (a count).
+    """
+
+    delimiter: str
+    decimal: str
+    width: int
+
+    def split(self, line: str) -> list[str]:
+        """The cells of a line, without blanks and quotes around them."""
+        if self.delimiter == " ":
+            return line.split()
+        cells = re.findall(
+            rf'(?:^|{re.escape(self.delimiter)})("[^"]*"|[^{re.escape(self.delimiter)}]*)', line
+        )
+        return [cell.strip(' \t"') for cell in cells]
+
+
+def read(content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
+    """The table of a text file; arguments as in `source.Reader`."""
+    content, encoding = _as_utf8(content, where)
+    head, body = _samples(content)
+    dialect = find_dialect(body, choices)
+    if dialect is None:
+        raise TunnelError(
+            "no columns of numbers", where=where, remedy="give --delimiter and --decimal, or name a table"
+        )
+    check_count(dialect.width, limits.COLUMNS, "columns", where, "leave out columns that nobody reads")
+    check_count(
+        content.count(b"\n"), limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out"
+    )
+    layout = find_layout([dialect.split(line) for line in head], head, dialect.decimal, dialect.width)
+    if layout is None:
+        raise TunnelError(
+            f"no numbers in the first {len(head)} lines",
+            where=where,
+            remedy="cut off what stands above the table",
+        )
+    channels, notes = _channels(content, dialect, layout, where)
+    heading = "names in the line above the numbers" if layout.headed else "no names of columns"
+    said = (
+        f"text ({encoding}), {dialect.width} columns between {_SAID[dialect.delimiter]}, decimal "
+        f"{'comma' if dialect.decimal == ',' else 'point'}, numbers from line {layout.first + 1}, {heading}",
+        *notes,
+    )
+    known = {
+        "delimiter": next(name for name, sign in _NAMES.items() if sign == dialect.delimiter),
+        "decimal": dialect.decimal,
+    }
+    return [Table(channels, facts=layout.facts, said=said, headed=layout.headed)], known
+
+
+def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
+    """The dialect in which most cells of some lines are numbers; of several, the one with most columns.
+
+    Args:
+        body: lines of the table.
+        choices: delimiter and decimal sign where they are stated.
+    """
+    delimiters = _NAMES.values() if choices.delimiter is None else (_NAMES[choices.delimiter],)
+    decimals = (".", ",") if choices.decimal is None else (choices.decimal,)
+    best, score = None, (0.2, 0)
+    for delimiter in delimiters:
+        for decimal in decimals:
+            if delimiter == "," == decimal:
+                continue
+            rows = [Dialect(delimiter, decimal, 0).split(line) for line in body]
+            width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
+            cells = [cell for row in rows for cell in row if not is_missing(cell)]
+            share = sum(is_number(cell, decimal) for cell in cells) / max(len(cells), 1)
+            if (round(share, 1), width) > score:
+                best, score = Dialect(delimiter, decimal, width), (round(share, 1), width)
+    return best
+
+
+def _as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
+    """The text as UTF-8 with line feeds, and its encoding."""
+    encoding = "ASCII"
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        encoding = "UTF-16"
+    elif not content.isascii():
+        encoding = "UTF-8 with a byte-order mark" if content.startswith(b"\xef\xbb\xbf") else "UTF-8"
+    try:
+        if encoding == "UTF-16":
+            content = content.decode("utf-16").encode()
+        elif encoding != "ASCII":
+            content.decode()
+    except UnicodeDecodeError:
+        if encoding == "UTF-16":
+            raise TunnelError("not UTF-16 text", where=where, remedy="save the file as UTF-8") from None
+        content, encoding = content.decode("latin-1").encode(), "Latin-1"
+    if b"\0" in content:
+        remedy = "give the file the ending of its format (.xlsx, .mat, .tdms, .h5, .parquet)"
+        raise TunnelError("is not text: it holds zero bytes", where=where, remedy=remedy)
+    content = content.removeprefix(b"\xef\xbb\xbf")
+    return (content if b"\n" in content else content.replace(b"\r", b"\n")), encoding
+
+
+def _samples(content: bytes) -> tuple[list[str], list[str]]:
+    """The first lines, and lines of the table's body."""
+    head = content[:_HEAD].decode(errors="replace").splitlines()
+    if len(content) > _HEAD:
+        head.pop()
+    head = head[:_HEAD_LINES]
+    half = len(content) // 2
+    middle = content[half : half + _MIDDLE].decode(errors="replace").splitlines()[1:-1]
+    body = middle if len(middle) >= len(head) // 2 else head[len(head) // 2 :] or head
+    return head, [line for line in body if line.strip() and line[0] not in "#%"]
+
+
+def _channels(
+    content: bytes, dialect: Dialect, layout: Layout, where: str
+) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
+    """The columns of numbers, and remarks on what is no number."""
+    if dialect.delimiter == " ":
+        content = re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", content)
+        content = re.sub(rb"[ \t]+", b" ", content)
+    options: dict[str, Any] = {
+        "separator": dialect.delimiter,
+        "has_header": False,
+        "skip_lines": layout.first,
+        "null_values": sorted({*MISSING[1:], *map(str.upper, MISSING[1:]), "NaN", "Inf", "-Inf"}),
+        "truncate_ragged_lines": True,
+    }
+    try:
+        try:
+            floats = {f"column_{i + 1}": pl.Float64 for i in range(dialect.width)}
+            frame = pl.read_csv(
+                content, schema=floats, decimal_comma=dialect.decimal == ",", quote_char=None, **options
+            )
+            return channels_of(frame, layout), ()
+        except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
+            texts = {f"column_{i + 1}": pl.String for i in range(dialect.width)}
+            return _from_texts(pl.read_csv(content, schema=texts, **options), dialect, layout)
+    except pl.exceptions.PolarsError as error:
+        raise TunnelError(
+            f"not a table of text ({one_line(error, 60)})",
+            where=where,
+            remedy="give every line one value for each column",
+        ) from None
+
+
+def channels_of(frame: pl.DataFrame, layout: Layout) -> tuple[Channel, ...]:
+    """The columns that hold at least one number, with the names and units of a layout.
+
+    Args:
+        frame: of numbers, nulls where there are none.
+        layout: as many names and units.
+    """
+    return tuple(
+        Channel(name, column.fill_null(float("nan")).to_numpy(), unit)
+        for name, unit, column in zip(layout.names, layout.units, frame.get_columns(), strict=True)
+        if column.null_count() < column.len()
+    )
+
+
+def _from_texts(
+    frame: pl.DataFrame, dialect: Dialect, layout: Layout
+) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
+    cells = pl.all().str.strip_chars(' \t\r"')
+    cells = cells.str.replace(",", ".", literal=True) if dialect.decimal == "," else cells
+    numbers = frame.select(cells.cast(pl.Float64, strict=False))
+    notes = []
+    for name, text, number in zip(layout.names, frame.get_columns(), numbers.get_columns(), strict=True):
+        lost = number.null_count() - text.null_count()
+        if number.null_count() == text.len() and lost:
+            notes.append(f"the column '{name}' holds text and is left out")
+        elif lost:
+            notes.append(f"{lost} texts in the column '{name}' are taken as missing")
+    return channels_of(numbers, layout), tuple(notes)
+
+
+def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
+    """A small table of names and texts, such as one of conditions.
+
+    Args:
+        path: the file; its first line names the columns.
+
+    Returns:
+        The names, and the cells of every further line, one for each name.
+
+    Raises:
+        TunnelError: no such file, or lines that differ in length.
+    """
+    where = shown(path)
+    content, _ = _as_utf8(read_regular(path, limits.DOCUMENT_BYTES), where)
+    lines = [line for line in content.decode(errors="replace").splitlines() if line.strip()]
+    if len(lines) < 2:
+        raise TunnelError("no rows", where=where, remedy="give a line of names and a line for each run")
+    delimiter = max("\t;,", key=lines[0].count)
+    rows = [Dialect(delimiter, ".", 0).split(line) for line in lines]
+    wrong = next((i for i, row in enumerate(rows) if len(row) != len(rows[0])), None)
+    if wrong is not None:
+        raise TunnelError(
+            f"{len(rows[wrong])} cells in line {wrong + 1}, but {len(rows[0])} names of columns",
+            where=where,
+            remedy=f"give every line one cell for each column, between {_SAID[delimiter]}",
+        )
+    return rows[0], rows[1:]
