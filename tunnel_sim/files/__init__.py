@@ -10,6 +10,6 @@ from tunnel_sim.lazy import lazy_names
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.writing import import_records
 else:
-    __getattr__, __dir__ = lazy_names(__name__, {".importing.writing": ("import_records",)})
+    __getattr__, __dir__ = lazy_names(__name__, {".importing.writing": "import_records"})
 
 __all__ = ["import_records"]
