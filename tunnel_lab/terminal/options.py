@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -16,6 +17,27 @@ WindOption = Annotated[float | None, typer.Option("--wind", help="Wind speed, m/
 AngleOption = Annotated[float | None, typer.Option("--angle", help="Release angle, degrees.")]
 EffectOption = Annotated[
     list[str] | None, typer.Option("--effect", metavar="NAME:PARAMETER=VALUE", help=EFFECT_HELP)
+]
+
+
+def _know_effects(context: typer.Context, path: Path | None) -> Path | None:
+    """Make the effects of a file known until the command ends."""
+    if path is not None:
+        from tunnel_sim.effects.effects_file import read_effects
+        from tunnel_sim.effects.registry import answering_with
+
+        context.with_resource(answering_with(read_effects(path)))
+    return path
+
+
+EffectsFileOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--effects-file",
+        metavar="FILE.toml",
+        help="Add the effects that this file states as expressions to the vocabulary.",
+        callback=_know_effects,
+    ),
 ]
 
 
