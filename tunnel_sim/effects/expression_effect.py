@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, make_dataclass
 from typing import Any, ClassVar
 
@@ -91,6 +91,15 @@ class _Moment(ExpressionEffect):
             return run
         inputs = {name: operation for name, (_, operation) in _INPUTS.items()}
         return run.with_moment(self.formula.program(self._constants(stated), inputs))
+
+    def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float]:
+        """The moment by NumPy, without the compiled law."""
+        constants = self._constants(stated) | {"V": stated.wind_speed}
+
+        def moment(t: float, angle: float, rate: float) -> float:
+            return float(self.formula.value(constants | {"t": t, "b": angle, "r": rate}))
+
+        return moment if self._acts(stated) else lambda *_: 0.0
 
 
 class _Reading(ExpressionEffect):
