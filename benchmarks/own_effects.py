@@ -1,6 +1,6 @@
 """Speed of one law three ways, built in, as a class and as an expression, and of a law with an exponential.
 
-Run as ``python benchmarks/own_effects.py``; see README.md beside it.
+Run as ``python -m benchmarks.own_effects`` from the root; see README.md beside it.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from throughput import interleaved, row, stepping
 
+from benchmarks.throughput import interleaved, row, stepping
 from diagnosis import diagnose
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.cubic_stiffness import CubicStiffness

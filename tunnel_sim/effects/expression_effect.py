@@ -109,7 +109,7 @@ class _Reading(ExpressionEffect):
         if not self._acts(stated):
             return angle
         moving = {"y": angle, "t": time_s, "V": stated.wind_speed}
-        return np.broadcast_to(self.formula.value(self._constants(stated) | moving), angle.shape)
+        return np.broadcast_to(self.formula.value({**self._constants(stated), **moving}), angle.shape)
 
 
 def expression_effect(
@@ -220,16 +220,16 @@ def _check_values(formula: Expression, parameters: Mapping[str, Quantity], null:
     at = {name: quantity.default for name, quantity in parameters.items()}
     severity, size = next((name, quantity.scale) for name, quantity in parameters.items())
     without = tried["y"] if null == "y" else 0.0
-    if not np.all(np.abs(formula.value({**tried, **at}) - without) <= 1e-12):
-        raise TunnelError(
-            f"{formula.text!r} is not {null} at {severity} = 0",
-            remedy="write it so that the first parameter, the severity, removes the effect",
-        )
-    values = formula.value({**tried, **at, severity: size})
-    if not np.all(np.isfinite(values)):
+    at_null, beyond = (formula.value({**tried, **at, **more}) for more in ({}, {severity: size}))
+    if not np.all(np.isfinite(at_null) & np.isfinite(beyond)):
         raise TunnelError(
             f"{formula.text!r} has no finite value somewhere in the motion of a rig",
             remedy="avoid division by zero, and roots and logarithms of negative numbers",
         )
-    if np.all(np.abs(values - without) <= 1e-300):
+    if np.any(np.abs(at_null - without) > 1e-12):
+        raise TunnelError(
+            f"{formula.text!r} is not {null} at {severity} = 0",
+            remedy="write it so that the first parameter, the severity, removes the effect",
+        )
+    if np.all(np.abs(beyond - without) <= 1e-300):
         raise TunnelError(f"{formula.text!r} does nothing", remedy="correct the expression or the scale")

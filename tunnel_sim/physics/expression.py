@@ -136,7 +136,9 @@ def _refused(what: str) -> TunnelError:
 def _node(tree: ast.expr, names: frozenset[str]) -> Node:
     """The tree of an expression from Python's."""
     match tree:
-        case ast.Constant(value=value) if type(value) in (int, float) and math.isfinite(value):
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool) and math.isfinite(
+            value
+        ):
             return float(value)
         case ast.Name(id=name):
             return _named(name, names)
@@ -186,9 +188,10 @@ def _folded(node: Node, constants: Mapping[str, float]) -> Node:
     if not isinstance(node, tuple):
         return node
     operation, *parts = node[0], *(_folded(one, constants) for one in node[1:])
-    if all(isinstance(part, float) for part in parts):
+    numbers = [np.float64(part) for part in parts if isinstance(part, float)]
+    if len(numbers) == len(parts):
         with np.errstate(all="ignore"):
-            return float(_NUMERICS[operation](*map(np.float64, parts)))
+            return float(_NUMERICS[operation](*numbers))
     if operation == "power" and parts[1] in (2.0, 3.0):
         return ("square" if parts[1] == 2.0 else "cube"), parts[0]
     return operation, *parts

@@ -26,7 +26,7 @@ def effects_file(tmp_path: Path) -> Path:
     [
         (("-(b/w)^2", "-(b/w)^2*r"), "effect 'detent': exp of a quantity in 1/s"),
         (("-k*b*", "-k*r*"), "is in kg m2/s3, not in N m"),
-        (("-k*b*", "-k*beta*"), "unknown name 'beta'; did you mean"),
+        (("-k*b*", "-k*beta*"), "unknown name 'beta'; use one of Kr, V, b"),
         (('name = "gain"', 'name = "detent"'), "effect 'detent': is given twice"),
         (('channel = "sensor"', 'channel = "damping"'), "effect 'gain': channel 'damping' is not that"),
         (("y + s*y^3", "y + s*y^3 + 0.1*y"), "is not y at s = 0"),
@@ -35,7 +35,7 @@ def effects_file(tmp_path: Path) -> Path:
         (('unit = "1/rad2"', 'unit = "1/deg2"'), "unknown unit '1/deg2'"),
         (('unit = "1/rad2", ', ""), "'unit' is missing"),
         (("scale = 0.05, lower = -1", "scale = 0.05, lower = 0.5"), "parameter s: the default 0 is outside"),
-        (("parameters.s", "parameters.random"), "unknown name 's'"),
+        (("parameters.s", "parameters.random"), "cannot be named 'random'"),
         (('"gain"', '"Gain!"'), "'name' = 'Gain!'"),
         (("reading =", 'moment = "0"\nreading ='), "exactly one of moment and reading"),
         (("reading", "readings"), "unknown key 'readings'; did you mean 'reading'?"),
