@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -39,14 +38,14 @@ def answers_folder(folder: Path, excluded: Sequence[str] = (), effects_file: Pat
         effects_file: of effects added to it; None: none.
 
     Returns:
-        ``answers`` inside the set, or ``answers-without-…-with-…``.
+        ``answers`` inside the set, or ``answers-without-…-with-…``, which ends with a hash of the effects file.
     """
     without = ["without", *sorted(set(excluded))] if excluded else []
-    own = ["with", *sorted(kind.name for kind in _own_effects(effects_file))] if effects_file else []
+    names = sorted(kind.name for kind in _own_effects(effects_file))
+    own = ["with", *names, file_hash(effects_file)[:8]] if effects_file else []
     return folder / "-".join(["answers", *without, *own])
 
 
-@functools.cache
 def _own_effects(effects_file: Path | None) -> tuple[type[Effect], ...]:
     return () if effects_file is None else read_effects(effects_file)
 

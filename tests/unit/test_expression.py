@@ -100,6 +100,16 @@ def test_what_is_not_a_formula_is_refused_in_one_line(text: str) -> None:
     assert len(str(refusal.value)) < 500
 
 
+@settings(max_examples=500, deadline=None)
+@given(st.text(alphabet="brtVkw()+-*/^., 0123456789eπ'\"[]{}\n#:=<&|~@\\\x00", max_size=60))
+def test_any_text_is_a_formula_or_refused(text: str) -> None:
+    try:
+        formula = parse(text, NAMES)
+    except TunnelError:
+        return
+    assert formula.names <= NAMES
+
+
 def test_length_and_depth_are_limited() -> None:
     with pytest.raises(TunnelError, match="501 characters"):
         parse("b" + "+b" * 250, NAMES)

@@ -108,8 +108,8 @@ class _Reading(ExpressionEffect):
         del drawn
         if not self._acts(stated):
             return angle
-        moving = {"y": angle, "t": time_s, "V": stated.wind_speed}
-        return np.broadcast_to(self.formula.value({**self._constants(stated), **moving}), angle.shape)
+        moving: dict[str, float | Array] = {"y": angle, "t": time_s, "V": stated.wind_speed}
+        return np.broadcast_to(self.formula.value(moving | self._constants(stated)), angle.shape)
 
 
 def expression_effect(
@@ -187,12 +187,18 @@ def _check_names(parameters: Mapping[str, Quantity]) -> None:
             raise TunnelError(
                 f"a parameter cannot be named {name!r}", remedy="choose a name that has no other meaning"
             )
-        inside = quantity.lower <= quantity.default <= quantity.upper
-        if not inside or quantity.scale == 0.0:
+        if not all(quantity.lower <= value <= quantity.upper for value in (quantity.default, quantity.scale)):
             raise TunnelError(
-                f"parameter {name}: the default {quantity.default:g} is outside its bounds, or the scale is zero",
-                remedy="the first parameter is the severity, whose default is 0",
+                f"parameter {name}: the default {quantity.default:g} or the scale {quantity.scale:g} is not from "
+                f"{quantity.lower:g} to {quantity.upper:g}",
+                remedy="correct lower, upper, scale or default",
             )
+    severity = next(iter(parameters.values()), None)
+    if severity is None or severity.default != 0.0 or severity.scale == 0.0:
+        raise TunnelError(
+            "the first parameter is not a severity",
+            remedy="give it the default 0, which removes the effect, and a scale that is not 0",
+        )
 
 
 def _check_units(formula: Expression, units: Mapping[str, str], expected: str) -> None:

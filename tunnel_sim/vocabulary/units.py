@@ -27,7 +27,13 @@ _FORM = "write it of kg, m, s, rad, N and Hz, such as 1, rad, N m/rad, 1/rad2 or
 
 
 def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
-    """The dimension of one quantity times a power of another."""
+    """The dimension of one quantity times a power of another.
+
+    Args:
+        one: powers of kg, m and s.
+        other: powers of kg, m and s.
+        power: of the other, a number.
+    """
     kg, m, s = (a + power * b for a, b in zip(one, other, strict=True))
     return kg, m, s
 
