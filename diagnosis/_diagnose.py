@@ -16,19 +16,20 @@ from diagnosis.detection.refusal import refuse_hopeless
 from diagnosis.investigate import Progress, investigate
 from diagnosis.localisation.localise import localise
 from diagnosis.result import Diagnosis
-from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
+from tunnel_sim.effects import Effect, effect_class, known_effects
+from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def diagnose(
-    campaign: Campaign, *, kinds: Sequence[type[Effect]] = ALL_EFFECTS, progress: Progress | None = None
+    campaign: Campaign, *, kinds: Sequence[type[Effect]] | None = None, progress: Progress | None = None
 ) -> Diagnosis:
     """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
     Args:
         campaign: measured or simulated runs.
-        kinds: the effects to answer with.
+        kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
 
     Returns:
@@ -38,6 +39,12 @@ def diagnose(
         TunnelError: when the examination refuses the records, a run shows no decaying motion, or the nominal model
             cannot be fitted to them.
     """
+    kinds = known_effects() if kinds is None else kinds
+    with answering_with(kinds):
+        return _diagnose(campaign, kinds, progress)
+
+
+def _diagnose(campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progress | None) -> Diagnosis:
     found = diagnosable(campaign)
     if not found.limit_cycles:
         refuse_hopeless(found.campaign)
@@ -77,8 +84,10 @@ def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tupl
     Raises:
         TunnelError: when a name is unknown, or nothing is left.
     """
-    wanted = {effect_class(name) for name in include} if include else set(ALL_EFFECTS)
-    kinds = tuple(kind for kind in ALL_EFFECTS if kind in wanted - {effect_class(name) for name in exclude})
+    wanted = {effect_class(name) for name in include} if include else set(known_effects())
+    kinds = tuple(
+        kind for kind in known_effects() if kind in wanted - {effect_class(name) for name in exclude}
+    )
     if not kinds:
         raise TunnelError("no effect is left to answer with", remedy="exclude fewer effects")
     return kinds

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from diagnosis.result import Candidate
-from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.effects import known_effects
 
 
 def inclusion(candidates: Sequence[Candidate], read_off: Sequence[str]) -> dict[str, float]:
@@ -22,7 +22,7 @@ def inclusion(candidates: Sequence[Candidate], read_off: Sequence[str]) -> dict[
     """
     names = [frozenset(candidate.effect.split(" + ")) for candidate in candidates]
     found = {}
-    for kind in ALL_EFFECTS:
+    for kind in known_effects():
         named = [c.probability for c, own in zip(candidates, names, strict=True) if kind.name in own]
         found[kind.name] = min(sum(named), 1.0)
     return found | dict.fromkeys(read_off, 1.0 - GAP_FALSE_ALARM_RATE)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from diagnosis.result import ParameterEstimate
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
+from tunnel_sim.vocabulary.units import dimension, in_si, product
 
 #: Units of what acts on the yaw axis, and of the same per unit inertia.
 _PER_INERTIA = {
@@ -41,7 +42,15 @@ def parameter_unit(name: str, campaign: Campaign) -> str:
         return _PER_INERTIA_AREA[sized] if normalised else sized
     if info.unit == "l/V" and rig.reference_length is None:
         return "m/V"
-    return _PER_INERTIA.get(info.unit, info.unit) if normalised else info.unit
+    return _per_inertia(info.unit) if normalised else info.unit
+
+
+def _per_inertia(unit: str) -> str:
+    """The unit of a quantity whose mass is divided by Izz."""
+    if unit in _PER_INERTIA or unit == "l/V":
+        return _PER_INERTIA.get(unit, unit)
+    of = dimension(unit)
+    return in_si(product(of, dimension("kg m2"), -of[0])) if of[0] else unit
 
 
 def sized_coefficients(

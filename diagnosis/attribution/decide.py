@@ -28,9 +28,7 @@ from diagnosis.policy import (
     STEEPNESS_BEYOND,
     UNKNOWN_SHARE,
 )
-from tunnel_sim.effects import ALL_EFFECTS
-
-_EXACT = frozenset(kind.name for kind in ALL_EFFECTS if kind.exact)
+from tunnel_sim.effects import known_effects
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,8 @@ def form_floor(excess: float, effects: Sequence[str] = ()) -> float:
     Returns:
         The share.
     """
-    misfit = EXACT_MISFIT if effects and _EXACT.issuperset(effects) else FORM_MISFIT
+    exact = {kind.name for kind in known_effects() if kind.exact}
+    misfit = EXACT_MISFIT if effects and exact.issuperset(effects) else FORM_MISFIT
     return misfit * min(1.0, FORM_MISFIT_UP_TO / max(excess, 1e-9))
 
 

@@ -18,6 +18,9 @@ from diagnosis.blind.files import (
     read_hashes,
     write_document,
 )
+from tunnel_sim.effects import Effect
+from tunnel_sim.effects.effects_file import read_effects
+from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.files.writing import output_folder
 from tunnel_sim.processes import in_processes
@@ -26,21 +29,34 @@ from tunnel_sim.vocabulary.errors import TunnelError
 Progress = Callable[[int, int, str], None]
 
 
-def answers_folder(folder: Path, excluded: Sequence[str] = ()) -> Path:
+def answers_folder(folder: Path, excluded: Sequence[str] = (), effects_file: Path | None = None) -> Path:
     """Where the answers to a set go.
 
     Args:
         folder: of the set.
         excluded: effects withheld from the vocabulary.
+        effects_file: of effects added to it; None: none.
 
     Returns:
-        ``answers`` inside the set, or ``answers-without-…``.
+        ``answers`` inside the set, or ``answers-without-…-with-…``, which ends with a hash of the effects file.
     """
-    return folder / "-".join(["answers", *(["without", *sorted(set(excluded))] if excluded else [])])
+    without = ["without", *sorted(set(excluded))] if excluded else []
+    names = sorted(kind.name for kind in _own_effects(effects_file))
+    own = ["with", *names, file_hash(effects_file)[:8]] if effects_file else []
+    return folder / "-".join(["answers", *without, *own])
+
+
+def _own_effects(effects_file: Path | None) -> tuple[type[Effect], ...]:
+    return () if effects_file is None else read_effects(effects_file)
 
 
 def answer_set(
-    folder: Path, *, excluded: Sequence[str] = (), jobs: int = 1, progress: Progress | None = None
+    folder: Path,
+    *,
+    excluded: Sequence[str] = (),
+    jobs: int = 1,
+    progress: Progress | None = None,
+    effects_file: Path | None = None,
 ) -> str:
     """Diagnose every campaign of a set that has no answer yet.
 
@@ -52,6 +68,7 @@ def answer_set(
         excluded: effects withheld from the vocabulary.
         jobs: number of processes.
         progress: called with the number of campaigns answered, the number in all, and the name of the last.
+        effects_file: of effects added to the vocabulary; None: none.
 
     Returns:
         SHA-256 over all answers, in hexadecimal: publish it before the key is opened.
@@ -61,14 +78,14 @@ def answer_set(
     """
     campaigns = campaign_folders(folder)
     vocabulary(exclude=excluded)
-    target = answers_folder(folder, excluded)
+    target = answers_folder(folder, excluded, effects_file)
     output_folder(target)
     hashes = _answered(target)
     names = {path.name for path in campaigns}
     left = [path for path in campaigns if path.name not in hashes]
     if progress is not None:
         progress(len(names & hashes.keys()), len(campaigns), "")
-    for name, answer in _answers(left, sorted(set(excluded)), jobs):
+    for name, answer in _answers(left, sorted(set(excluded)), jobs, effects_file):
         hashes[name] = write_document(target / f"{name}.json", answer)
         _write_seal(target, hashes, excluded)
         if progress is not None:
@@ -102,20 +119,23 @@ def _write_seal(target: Path, hashes: dict[str, str], excluded: Sequence[str]) -
 
 
 def _answers(
-    campaigns: Sequence[Path], excluded: Sequence[str], jobs: int
+    campaigns: Sequence[Path], excluded: Sequence[str], jobs: int, effects_file: Path | None
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Name and answer of each campaign, as they come."""
-    work = partial(answer_campaign, excluded=tuple(excluded))
+    work = partial(answer_campaign, excluded=tuple(excluded), effects_file=effects_file)
     processes = jobs if jobs > 1 and len(campaigns) > 1 else 0
     return (answer for _, answer in in_processes(work, campaigns, processes))
 
 
-def answer_campaign(folder: Path, excluded: Sequence[str] = ()) -> tuple[str, dict[str, Any]]:
+def answer_campaign(
+    folder: Path, excluded: Sequence[str] = (), effects_file: Path | None = None
+) -> tuple[str, dict[str, Any]]:
     """Diagnose one campaign of a set.
 
     Args:
         folder: of the campaign.
         excluded: effects withheld from the vocabulary.
+        effects_file: of effects added to it; None: none.
 
     Returns:
         Its name and its answer: the diagnosis' JSON document with ``wall_s`` (s) and ``data_sha256``, or, where
@@ -123,7 +143,8 @@ def answer_campaign(folder: Path, excluded: Sequence[str] = ()) -> tuple[str, di
     """
     begun = time.perf_counter()
     try:
-        found = diagnose(read_campaign(folder), kinds=vocabulary(exclude=excluded))
+        with answering_with(_own_effects(effects_file)):
+            found = diagnose(read_campaign(folder), kinds=vocabulary(exclude=excluded))
         answer = found.to_json_dict()
         answer.pop("maps", None)  # pictures' data: larger than the records, and nothing is scored by them
     except Exception as error:  # one bad campaign must not end a night's work; the score counts it as wrong

@@ -208,7 +208,13 @@ class Score:
         }  # fmt: skip
 
 
-def score_set(folder: Path, *, excluded: Sequence[str] = (), key: Path | None = None) -> Score:
+def score_set(
+    folder: Path,
+    *,
+    excluded: Sequence[str] = (),
+    key: Path | None = None,
+    effects_file: Path | None = None,
+) -> Score:
     """Check a set and its answers against their hashes, open the key and put both together.
 
     A folder without a seal, but with ``truth.json`` in every campaign, is scored as an open set.
@@ -217,6 +223,7 @@ def score_set(folder: Path, *, excluded: Sequence[str] = (), key: Path | None = 
         folder: of the set.
         excluded: effects that were withheld when it was answered.
         key: file of the key; the set's own when None.
+        effects_file: with which it was answered; None: none.
 
     Returns:
         The score.
@@ -226,7 +233,7 @@ def score_set(folder: Path, *, excluded: Sequence[str] = (), key: Path | None = 
             them is malformed.
     """
     campaigns = campaign_folders(folder)
-    answers, answers_sha256 = _checked_answers(folder, campaigns, excluded)
+    answers, answers_sha256 = _checked_answers(folder, campaigns, excluded, effects_file)
     if (folder / SEAL).exists():
         document, key_sha256 = _checked_key(folder, campaigns, answers, key)
         with as_described(
@@ -264,10 +271,10 @@ def _made_with(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _checked_answers(
-    folder: Path, campaigns: Sequence[Path], excluded: Sequence[str]
+    folder: Path, campaigns: Sequence[Path], excluded: Sequence[str], effects_file: Path | None
 ) -> tuple[dict[str, dict[str, Any]], str]:
     """Answers by campaign, and the hash over all."""
-    target = answers_folder(folder, excluded)
+    target = answers_folder(folder, excluded, effects_file)
     again = f"answer the set first: tunnel blind diagnose {folder}" + "".join(
         f" --exclude {e}" for e in excluded
     )

@@ -9,6 +9,7 @@ the time scale of the rig that was measured.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from identification.decay.spectrum import highest_peak
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record, evenly_spaced
+from tunnel_sim.vocabulary.units import dimension
 
 REFERENCE_FREQUENCY = 2.0
 """Frequency of the similar rig, Hz."""
@@ -23,22 +25,16 @@ REFERENCE_FREQUENCY = 2.0
 REFERENCE_STIFFNESS = 16.0
 """Median stiffness of its springs, N m/rad."""
 
-#: How a quantity changes, by its unit: powers of m and s.
-_POWERS = {
-    "N m": (1, 0),
-    "N m/rad": (1, 0),
-    "N m s/rad": (1, 1),
-    "N m s2/rad2": (1, 2),
-    "rad/(N m)": (-1, 0),
-    "kg m2": (1, 2),
-    "rad/s": (0, -1),
-    "rad/s2": (0, -2),
-    "1/s": (0, -1),
-    "1/s2": (0, -2),
-    "s": (0, 1),
-    "s2": (0, 2),
-    "Hz": (0, -1),
-}
+
+@functools.cache
+def _powers(unit: str) -> tuple[float, float]:
+    """How a quantity changes, by its unit: powers of m and s.
+
+    Speeds stay as they are, so a length changes as a time does; a mass then changes as a moment does. The rig's
+    sizes and a time over l/V have rules of their own (`_rig`).
+    """
+    kg, metres, seconds = (0.0, 0.0, 0.0) if unit == "l/V" else dimension(unit)
+    return (0.0, 0.0) if kg == seconds == 0.0 else (kg, metres + seconds)
 
 
 @dataclass(frozen=True)
@@ -87,7 +83,7 @@ class Similarity:
         return value * self._factor(unit)
 
     def _factor(self, unit: str) -> float:
-        moment, time = _POWERS.get(unit, (0, 0))
+        moment, time = _powers(unit)
         return float(self.moment**moment * self.time**time)
 
 

@@ -205,6 +205,33 @@ def _moderate_change(base: Fit, problem: Problem, values: Array, scaled: int | N
     return None
 
 
+def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
+    """What an effect of typical size changes that the fitted parameters cannot absorb.
+
+    Args:
+        base: a fit without it.
+        kind: an effect without numbers of its own in every run.
+
+    Returns:
+        The scaled change of all runs, shape (n,), and its norm as a share of the whole change; None where the
+        runs cannot show the effect.
+    """
+    data = base.problem.data
+    trial = next(iter(kind.trials(_circumstances(data))), None)
+    if trial is None or (kind.condition == "wind_on" and not data.wind_on):
+        return None
+    problem = Problem(data, (*base.problem.effects, kind), base.problem.fixed, (kind.name,))
+    infos = _own_parameters(problem, kind)
+    values = np.array([trial.values.get(info.name, info.default) for info in infos])
+    scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)
+    change = _moderate_change(base, problem, values, scaled)
+    if change is None:
+        return None
+    left, whole = np.concatenate(project_out(base, change)), np.concatenate(change)
+    size = float(np.linalg.norm(whole))
+    return None if size == 0.0 else (left, float(np.linalg.norm(left)) / size)
+
+
 def project_out(base: Fit, columns: list[Array]) -> list[Array]:
     """The part of a change of the prediction that the fitted parameters cannot absorb.
 

@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "expression.h"
+
 _Static_assert(sizeof(mjtNum) == sizeof(double), "the law and the state are in double precision");
 
 typedef struct {
@@ -82,11 +84,21 @@ static mjtNum air_moment(const mjModel* m, const mjData* d, const vwt_ids* self,
   return vwt_air_moment(p, &air);
 }
 
+// The moment stated as an expression.
+static mjtNum stated_moment(const mjModel* m, const mjData* d, const vwt_ids* self, const Motion* at) {
+  if (self->program < 0) {
+    return 0;
+  }
+  const vwt_program program = {m->numeric_data + m->numeric_adr[self->program], m->numeric_size[self->program]};
+  const vwt_program_input in = {at->angle, at->rate, at->time, wind_speed_at(m, d, self, at->time)};
+  return vwt_program_value(&program, &in);
+}
+
 // All moments on the rod's upper end except friction, including those of MuJoCo's spring, damper and twisted rod.
-static mjtNum other_moment(const mjModel* m, const vwt_ids* self, const vwt_parameters* p, mjtNum air,
-                           const Motion* at) {
-  const mjtNum mechanism = vwt_mechanism_moment(p, at->angle, at->rate) - p->spring_stiffness * at->angle -
-                           p->mechanical_damping * at->rate;
+static mjtNum other_moment(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
+                           mjtNum air, const Motion* at) {
+  const mjtNum mechanism = vwt_mechanism_moment(p, at->angle, at->rate) + stated_moment(m, d, self, at) -
+                           p->spring_stiffness * at->angle - p->mechanical_damping * at->rate;
   if (self->twist_dof < 0) {
     return mechanism + air;
   }
@@ -116,7 +128,7 @@ static mjtNum friction(const mjModel* m, const mjData* d, const vwt_ids* self, c
   }
   const Motion start = start_motion(state, now);
   const mjtNum applied = d->qfrc_applied[self->dof];  // by the user, on the rod's upper end
-  const mjtNum other = other_moment(m, self, p, air_moment(m, d, self, p, state, &start), &start) + applied;
+  const mjtNum other = other_moment(m, d, self, p, air_moment(m, d, self, p, state, &start), &start) + applied;
   return vwt_friction_moment(p, inertia, start.rate, other, m->opt.timestep);
 }
 
@@ -125,7 +137,7 @@ void vwt_apply_moments(const mjModel* m, mjData* d, const vwt_ids* self, const v
   read_parameters(m, d, self, &p);
   const Motion now = present_motion(m, d, self);
   const mjtNum air = air_moment(m, d, self, &p, state, &now);
-  mjtNum mechanism = vwt_mechanism_moment(&p, now.angle, now.rate);
+  mjtNum mechanism = vwt_mechanism_moment(&p, now.angle, now.rate) + stated_moment(m, d, self, &now);
   if (p.friction_moment > 0) {
     mechanism += friction(m, d, self, &p, state, &now);
   }

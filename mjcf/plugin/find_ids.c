@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "expression.h"
 #include "instance.h"
 
 static int find_numeric(const mjModel* m, const char* name) { return mj_name2id(m, mjOBJ_NUMERIC, name); }
@@ -43,14 +44,15 @@ static void check_series(const mjModel* m, int values, int interval, const char*
 
 // A coefficient whose name is misspelt would silently stay zero.
 static void check_names(const mjModel* m) {
-  static const char* const series[] = {"wind_speed", "wind_speed_interval", "forcing", "forcing_interval"};
+  static const char* const series[] = {"wind_speed", "wind_speed_interval", "forcing", "forcing_interval",
+                                      "moment_program"};
   for (int i = 0; i < m->nnumeric; i++) {
     const char* name = m->names + m->name_numericadr[i];
     int known = !strncmp(name, "user_", 5);
     for (int k = 0; k < VWT_PARAMETER_COUNT && !known; k++) {
       known = !strcmp(name, vwt_parameter_names[k]);
     }
-    for (int k = 0; k < 4 && !known; k++) {
+    for (int k = 0; k < 5 && !known; k++) {
       known = !strcmp(name, series[k]);
     }
     if (!known) {
@@ -110,6 +112,18 @@ static void find_parameters(const mjModel* m, vwt_ids* self) {
   }
 }
 
+// A program that is malformed anywhere is so for every input.
+static void find_program(const mjModel* m, vwt_ids* self) {
+  self->program = find_numeric(m, "moment_program");
+  if (self->program < 0) {
+    return;
+  }
+  const vwt_program program = {m->numeric_data + m->numeric_adr[self->program], m->numeric_size[self->program]};
+  if (!vwt_program_sound(&program)) {
+    mju_error("vwt.yaw_moment: numeric moment_program is not a program; write it with tunnel_sim");
+  }
+}
+
 static void find_joints(const mjModel* m, int instance, vwt_ids* self) {
   self->joint = find_hinge(m, instance, "joint");
   if (self->joint < 0) {
@@ -137,4 +151,5 @@ void vwt_find_ids(const mjModel* m, int instance, vwt_ids* found) {
   check_names(m);
   find_series(m, found);
   find_parameters(m, found);
+  find_program(m, found);
 }

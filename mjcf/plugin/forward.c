@@ -45,11 +45,21 @@ static double air_at(const Step* s, double time, const Motion* y) {
   return vwt_air_moment(s->p, &air);
 }
 
+// The moment stated as an expression.
+static double stated_moment(const Step* s, double time, const Motion* y) {
+  const vwt_program program = {s->run->program, (int)s->run->program_count};
+  if (program.count == 0) {
+    return 0;
+  }
+  const vwt_program_input in = {y->angle, y->rate, time, wind_at(s->run, time)};
+  return vwt_program_value(&program, &in);
+}
+
 // Moments on the rod's upper end except friction; with a rigid rod they include the aerodynamic moment.
-static double other_moment(const Step* s, double air, const Motion* y) {
+static double other_moment(const Step* s, double air, double time, const Motion* y) {
   const vwt_parameters* p = s->p;
-  const double mechanism =
-      vwt_mechanism_moment(p, y->angle, y->rate) - p->spring_stiffness * y->angle - p->mechanical_damping * y->rate;
+  const double mechanism = vwt_mechanism_moment(p, y->angle, y->rate) + stated_moment(s, time, y) -
+                           p->spring_stiffness * y->angle - p->mechanical_damping * y->rate;
   if (s->run->twist_stiffness > 0) {
     return mechanism + s->run->twist_stiffness * y->twist + s->run->twist_damping * y->twist_rate;
   }
@@ -72,10 +82,10 @@ static Motion derivative(const Step* s, double time, const Motion* y) {
   if (s->run->twist_stiffness > 0) {
     const double share = s->run->inertia_share;
     const double rod = s->run->twist_stiffness * y->twist + s->run->twist_damping * y->twist_rate;
-    d.rate = stuck ? 0 : (other_moment(s, air, y) + friction) / (share * p->yaw_inertia);
+    d.rate = stuck ? 0 : (other_moment(s, air, time, y) + friction) / (share * p->yaw_inertia);
     d.twist_rate = (air - rod) / ((1 - share) * p->yaw_inertia) - d.rate;
   } else {
-    d.rate = stuck ? 0 : (other_moment(s, air, y) + friction) / p->yaw_inertia;
+    d.rate = stuck ? 0 : (other_moment(s, air, time, y) + friction) / p->yaw_inertia;
   }
   if (stuck) {
     d.angle = 0;
@@ -117,7 +127,7 @@ static void move(Step* s, double h, const Motion* to) {
 
 // Sign of the slip that starts from rest in the present state; 0 while friction sticks.
 static int slip_from_rest(const Step* s) {
-  const double other = other_moment(s, air_at(s, s->start, &s->from), &s->from);
+  const double other = other_moment(s, air_at(s, s->start, &s->from), s->start, &s->from);
   return fabs(other) <= s->p->friction_moment ? 0 : other > 0 ? 1 : -1;
 }
 
@@ -207,6 +217,13 @@ int vwt_forward(int count, const vwt_parameters* parameters, const vwt_run* runs
     }
   }
   return 0;
+}
+
+void vwt_evaluate(int size, const double* code, int count, const vwt_program_input* in, double* out) {
+  const vwt_program program = {code, size};
+  for (int i = 0; i < count; i++) {
+    out[i] = vwt_program_value(&program, &in[i]);
+  }
 }
 
 void vwt_backlash(int count, const double* in, double half, double start, double* out) {

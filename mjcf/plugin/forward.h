@@ -6,6 +6,7 @@
 #ifndef VWT_FORWARD_H_
 #define VWT_FORWARD_H_
 
+#include "expression.h"
 #include "moment.h"
 
 #ifdef _WIN32
@@ -22,6 +23,8 @@
   POINTER(forcing)         /* 1, forcing_count samples at forcing_interval s */     \
   NUMBER(forcing_count)    /* 0: none */                                            \
   NUMBER(forcing_interval)                                                          \
+  POINTER(program)         /* of the moment by expression, program_count elements */ \
+  NUMBER(program_count)    /* 0: none */                                            \
   NUMBER(angle)            /* rad, of the rod's upper end at time 0 */              \
   NUMBER(rate)             /* rad/s */                                              \
   NUMBER(twist)            /* rad, of the body relative to the upper end */         \
@@ -50,12 +53,18 @@ VWT_API int vwt_forward(int count, const vwt_parameters* parameters, const vwt_r
 // Reading behind a backlash of half width `half`: it moves only when pushed. `in` and `out` may be the same array.
 VWT_API void vwt_backlash(int count, const double* in, double half, double start, double* out);
 
-// Names of the law's parameters, the plugin's state variables and the fields of vwt_run, for callers in Python.
+// Values of a program for `count` inputs, N m.
+VWT_API void vwt_evaluate(int size, const double* code, int count, const vwt_program_input* in, double* out);
+
+// Names of the law's parameters, the plugin's state variables, the operations of a program and the fields of vwt_run,
+// for callers in Python.
 VWT_API int vwt_parameter_count(void);
 VWT_API const char* vwt_parameter_name(int index);
 VWT_API const char* vwt_parameter_unit(int index);
 VWT_API int vwt_state_count(void);
 VWT_API const char* vwt_state_name(int index);
+VWT_API int vwt_operation_count(void);
+VWT_API const char* vwt_operation_name(int index);
 VWT_API int vwt_run_size(void);  // bytes
 VWT_API int vwt_run_count(void);
 VWT_API const char* vwt_run_name(int index);

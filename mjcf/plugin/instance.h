@@ -22,6 +22,7 @@ typedef struct {
   int wind_speed, wind_interval;          // ids of numerics; intervals -1 where constant
   int forcing, forcing_interval;          // ids of numerics, -1 where absent
   int aero_lag, presliding;               // ids of numerics, -1 where absent
+  int program;                            // of the moment by expression; -1 where absent
   int span_count;
   vwt_span span[VWT_PARAMETER_COUNT];     // the parameters that are given in the model
 } vwt_ids;

@@ -2,6 +2,7 @@
 
 #include <stddef.h>
 
+#include "expression.h"
 #include "forward.h"
 #include "moment.h"
 #include "state.h"
@@ -16,6 +17,9 @@ static const char* const state_names[] = {VWT_STATE(X)};
 
 int vwt_state_count(void) { return VWT_STATE_COUNT; }
 const char* vwt_state_name(int index) { return state_names[index]; }
+
+int vwt_operation_count(void) { return VWT_OPERATION_COUNT; }
+const char* vwt_operation_name(int index) { return vwt_operation_names[index]; }
 
 typedef struct {
   const char* name;

@@ -27,6 +27,7 @@ INDEX = ROOT / "docs" / "README.md"
             "from-a-data-logger-to-cn-beta",
             ["import", "identify", "simulate", "export", "import", "identify"],
         ),
+        pytest.param("add-an-effect", ["effects", "simulate", "diagnose"], marks=pytest.mark.slow),
     ],
 )
 def test_shown_output_is_real_output(page: str, typed: list[str], tmp_path: Path) -> None:
@@ -38,7 +39,8 @@ def test_shown_output_is_real_output(page: str, typed: list[str], tmp_path: Path
         if kind == "csv":
             (tmp_path / "runs.csv").write_text(known, encoding="utf-8")
         if kind == "toml":
-            (tmp_path / "known.toml").write_text(known, encoding="utf-8")
+            name = "my.toml" if known.startswith("[[effects]]") else "known.toml"
+            (tmp_path / name).write_text(known, encoding="utf-8")
     assert [command.split()[1] for command, _ in sessions(text)] == typed
     for command, shown in sessions(text):
         assert_same(shown, output_of(command, tmp_path))
@@ -47,6 +49,7 @@ def test_shown_output_is_real_output(page: str, typed: list[str], tmp_path: Path
 def test_every_page_with_output_is_run() -> None:
     pages = [page.stem for page in PAGES.glob("*.md") if sessions(page.read_text(encoding="utf-8"))]
     assert sorted(pages) == [
+        "add-an-effect",
         "diagnose-a-campaign",
         "from-a-data-logger-to-cn-beta",
         "identify-a-record",
@@ -62,6 +65,11 @@ def test_the_figures_for_choosing_are_those_of_the_packaged_score(tmp_path: Path
     assert len(shown) == len(real) >= 3
     for (_, text), output in zip(shown, real, strict=True):
         assert_same(text.splitlines(), output.splitlines())
+
+
+def test_the_class_of_ones_own_is_found(tmp_path: Path) -> None:
+    shown = steps(PAGES / "add-an-effect.md")
+    assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path) == ["", "stopper\n"]
 
 
 def test_every_estimator_that_is_scored_has_its_line() -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +12,8 @@ import pytest
 from tests.reference.effect_cases import VALUES, VOCABULARY, settings
 from tests.reference.effect_oracle import Setting
 from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
-from tunnel_sim.engine.sensor import read_motion
-from tunnel_sim.engine.simulate import simulate, simulate_motions
+from tunnel_sim.engine import effect_laws
+from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -43,16 +43,6 @@ def record(effects: tuple[Effect, ...] = (), run: RunSettings = WIND_ON, seed: i
 
 def same(one: Record, other: Record) -> bool:
     return np.array_equal(one.yaw_rad, other.yaw_rad) and np.array_equal(one.time_s, other.time_s)
-
-
-@pytest.fixture(scope="module")
-def bare() -> Record:
-    return record()
-
-
-@pytest.fixture(scope="module")
-def bare_wind_off() -> Record:
-    return record(run=WIND_OFF)
 
 
 def test_the_vocabulary_is_whole_and_in_its_order() -> None:
@@ -89,33 +79,9 @@ def test_metadata_is_complete(kind: type[Effect]) -> None:
 
 
 @each_effect
-def test_at_its_null_the_record_is_that_of_no_effect_to_the_bit(kind: type[Effect], bare: Record) -> None:
-    severity = kind.parameters()[0].name
-    elsewhere = effect_from(kind.name, {**VALUES[kind.name], severity: 0.0})
-    for effect in (kind(), elsewhere):
-        assert effect.is_null
-        assert same(record((effect,)), bare)
-
-
-@each_effect
-def test_beyond_its_null_it_is_seen(kind: type[Effect], bare: Record) -> None:
-    # the laws of the null and of the wind would hold of an effect that never acts
-    assert not example(kind).is_null
-    assert not same(record((example(kind),)), bare)
-
-
-@each_effect
-def test_the_wind_off_run_knows_only_what_acts_always(kind: type[Effect], bare_wind_off: Record) -> None:
-    unchanged = same(record((example(kind),), WIND_OFF), bare_wind_off)
-    assert unchanged == (kind.condition == "wind_on")
-
-
-@each_effect
-def test_it_goes_through_json_by_name(kind: type[Effect]) -> None:
-    for effect in (example(kind), kind()):
-        document = json.loads(json.dumps(effect.to_json_dict(), allow_nan=False))
-        assert document["name"] == kind.name
-        assert effect_from(**document) == effect
+@pytest.mark.parametrize("law", effect_laws.LAWS.values(), ids=effect_laws.LAWS)
+def test_it_obeys_the_law(kind: type[Effect], law: Callable[[type[Effect]], str]) -> None:
+    assert law(kind) == ""
 
 
 @each_effect
@@ -141,29 +107,10 @@ def test_no_number_is_refused_in_one_line(kind: type[Effect], wrong: object) -> 
 
 
 @each_effect
-def test_the_bounds_are_those_stated(kind: type[Effect]) -> None:
+def test_the_bounds_are_allowed(kind: type[Effect]) -> None:
     for info in kind.parameters():
-        for bound, outward in ((info.lower, -math.inf), (info.upper, math.inf)):
+        for bound in (info.lower, info.upper):
             assert getattr(effect_from(kind.name, {info.name: bound}), info.name) == bound
-            with pytest.raises(TunnelError, match="out of range"):
-                effect_from(kind.name, {info.name: math.nextafter(bound, outward)})
-
-
-@each_effect
-def test_the_same_seed_gives_the_same_bits_at_any_thread_count(kind: type[Effect]) -> None:
-    effects, runs = (example(kind),), [replace(WIND_ON, duration=0.4), replace(WIND_OFF, duration=0.4)] * 2
-
-    def together(threads: int) -> list[Record]:
-        rngs = [np.random.default_rng([7, i]) for i in range(4)]
-        chains = [EffectChain.draw(run, effects, rng) for run, rng in zip(runs, rngs, strict=True)]
-        true = [chain.physics() for chain in chains]
-        motions = simulate_motions(RIG, true, SENSOR.sample_rate, nthread=threads)
-        return [read_motion(m, SENSOR, rng, c) for m, rng, c in zip(motions, rngs, chains, strict=True)]
-
-    one, three = together(1), together(3)
-    loop = [record(effects, run, seed=[7, i]) for i, run in enumerate(runs)]
-    for others in (three, loop):
-        assert all(same(a, b) for a, b in zip(one, others, strict=True))
 
 
 @each_effect

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tunnel_lab.terminal.options import split_names
+from tunnel_lab.terminal.options import EffectsFileOption, split_names
 from tunnel_lab.terminal.table_format import with_format
 
 if TYPE_CHECKING:
@@ -109,10 +109,12 @@ def diagnose(
     jobs: Annotated[
         int, typer.Option("--jobs", min=1, help="Number of campaigns diagnosed at the same time.")
     ] = 1,
+    effects_file: EffectsFileOption = None,
 ) -> None:
     """Diagnose every campaign of a set; continue where an interrupted run ended.
 
-    The answers go to FOLDER/answers (answers-without-… with --exclude), one JSON
+    The answers go to FOLDER/answers (answers-without-… with --exclude,
+    answers-with-… with --effects-file), one JSON
     file for each campaign; their SHA-256 goes to the seal.json in the same
     folder. The key is not read.
 
@@ -125,8 +127,8 @@ def diagnose(
 
     names = split_names(exclude)
     with bar("diagnosing", None) as tell:
-        sealed = answer_set(folder, excluded=names, jobs=jobs, progress=tell)
-    say(f"Answers: {answers_folder(folder, names)}")
+        sealed = answer_set(folder, excluded=names, jobs=jobs, progress=tell, effects_file=effects_file)
+    say(f"Answers: {answers_folder(folder, names, effects_file)}")
     say(f"Answers sha256 {sealed}")
 
 
@@ -146,6 +148,7 @@ def score(
         Path | None,
         typer.Option("--figure", metavar="FILE", help="Also draw the calibration of inclusion."),
     ] = None,
+    effects_file: EffectsFileOption = None,
 ) -> None:
     """Verify all hashes, open the key and score the answers.
 
@@ -169,7 +172,7 @@ def score(
     names = split_names(exclude)
     vocabulary(exclude=names)
     refuse_unwritable_files(markdown, json, figure)
-    found = score_set(folder, excluded=names, key=key)
+    found = score_set(folder, excluded=names, key=key, effects_file=effects_file)
     if figure is not None:
         _draw(found, figure)
     if markdown is not None:

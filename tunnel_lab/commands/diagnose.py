@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tunnel_lab.terminal.given_campaign import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.options import EffectsFileOption
 
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
@@ -47,6 +48,7 @@ def run(
         list[str] | None,
         typer.Option("--exclude", metavar="C", help="Leave these effects out; tunnel effects lists all."),
     ] = None,
+    effects_file: EffectsFileOption = None,
 ) -> None:
     """Find out why the nominal model does not fit the runs of a campaign.
 
@@ -63,6 +65,7 @@ def run(
       tunnel diagnose my-campaign --json answer.json --report report.html
       tunnel diagnose my-campaign --exclude buffeting,mains_hum
       tunnel diagnose my-campaign --json - | jq .causes
+      tunnel diagnose my-campaign --effects-file my.toml
 
     [bold]Exit status[/bold]
       0 diagnosed, whatever the answer; 2 bad input; 130 interrupted. Files are
@@ -75,6 +78,7 @@ def run(
     from tunnel_sim.files.json_text import json_text
     from tunnel_sim.files.writing import write_json
 
+    del effects_file  # its effects are known already
     kinds = vocabulary(split_names(effects), split_names(exclude))
     to_stdout = json is not None and str(json) == "-"
     refuse_unwritable_files(None if to_stdout else json, report)

@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from tunnel_lab.terminal.options import EffectsFileOption
+
 NAME = "simulate"
 
 
@@ -38,6 +40,7 @@ def run(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a campaign that is already in the folder.")
     ] = False,
+    effects_file: EffectsFileOption = None,
 ) -> None:
     r"""Simulate a campaign: springs × wind speeds × release angles × repeats.
 
@@ -72,6 +75,7 @@ def run(
     from tunnel_sim.files.campaign_io import write_campaign
     from tunnel_sim.files.plan_file import load_plan
 
+    del effects_file  # its effects are known already
     added = tuple(parse_effect(text) for text in effect or ())
     loaded = load_plan(plan)
     if seed is not None:

@@ -18,11 +18,10 @@ from identification.printing.numbers import (
     with_std,
 )
 from tunnel_lab.diagnosis_view.figures_common import plain
-from tunnel_sim.effects import ALL_EFFECTS, effect_class
+from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.vocabulary.campaign import Campaign
 
 Document = Mapping[str, Any]
-_EFFECTS = frozenset(kind.name for kind in ALL_EFFECTS)
 _UNDETERMINED = "cannot be determined from these runs"
 _CONDITIONS = {"always": "with or without wind", "wind_on": "only with the wind on", None: _UNDETERMINED}
 
@@ -200,8 +199,9 @@ def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
         Name, equation, signature, channel, condition and references of each.
     """
     found = []
+    known = {kind.name for kind in known_effects()}
     for name in [*document["causes"], *document["ambiguous_with"]]:
-        if name not in _EFFECTS:
+        if name not in known:
             continue
         kind = effect_class(name)
         found.append(

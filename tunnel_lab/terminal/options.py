@@ -28,6 +28,27 @@ EffectOption = Annotated[
 ]
 
 
+def _know_effects(context: typer.Context, path: Path | None) -> Path | None:
+    """Make the effects of a file known until the command ends."""
+    if path is not None:
+        from tunnel_sim.effects.effects_file import read_effects
+        from tunnel_sim.effects.registry import answering_with
+
+        context.with_resource(answering_with(read_effects(path)))
+    return path
+
+
+EffectsFileOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--effects-file",
+        metavar="FILE.toml",
+        help="Add the effects that this file states as expressions to the vocabulary.",
+        callback=_know_effects,
+    ),
+]
+
+
 def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
     """Names from repeated options, from lists with commas, or from both."""
     return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeAlias, cast
 
@@ -281,6 +281,18 @@ class Effect:
         del stated, drawn
         law = self.law()
         return with_law(run, **law) if law else run
+
+    def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float] | None:
+        """The moment that the effect adds, computed independently of its hooks, for ``tunnel effects check``.
+
+        Args:
+            stated: the run as the campaign states it.
+
+        Returns:
+            The moment (N m) as a function of time (s), angle (rad) and rate (rad/s); None: not stated.
+        """
+        del stated
+        return None
 
     def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Change when the motion is read.

@@ -49,7 +49,7 @@ class Model:
         """The same model with the numbers of another run, without compiling again.
 
         Args:
-            settings: must have the same layout: timestep, series lengths, and a rigid or twisting rod.
+            settings: must have the same layout: see `RunSettings.layout`.
 
         Returns:
             A model whose physics is bit-identical to that of ``build_model(rig, settings)``.
@@ -201,7 +201,7 @@ def _set_numerics(spec: mujoco.MjSpec, rig: Rig, settings: RunSettings) -> None:
 
 
 def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
-    """The ``<numeric>`` elements of the MJCF: the moment law's parameters and the sampled inputs.
+    """The ``<numeric>`` elements of the MJCF: the moment law's parameters, sampled inputs and program.
 
     Args:
         rig: gives frontal area, reference length and width.
@@ -222,6 +222,8 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
             raise TunnelError(f"unknown series {name!r}", remedy=did_you_mean(name, _SERIES))
         values[name] = series.values
         values[f"{name}_interval"] = (series.interval,)
+    if settings.program:
+        values["moment_program"] = settings.program
     return values
 
 

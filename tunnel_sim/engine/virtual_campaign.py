@@ -10,7 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_from
+from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.base import SPRING_TOLERANCE
 from tunnel_sim.engine.sensor import read_motion
 from tunnel_sim.engine.simulate import Progress, simulate_motions
@@ -146,7 +146,7 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
     """The effects of a plan.
 
     Returns:
-        The effects in the order of `ALL_EFFECTS`, which need not be the plan's; those between rod and sensor come
+        The effects in the order of the vocabulary, which need not be the plan's; those between rod and sensor come
         before those of the sensor itself.
 
     Raises:
@@ -164,7 +164,7 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
             )
         _check_spring(effect, plan)
     return tuple(
-        sorted(effects, key=lambda effect: (not effect.ahead_of_sensor, ALL_EFFECTS.index(type(effect))))
+        sorted(effects, key=lambda effect: (not effect.ahead_of_sensor, known_effects().index(type(effect))))
     )
 
 

@@ -24,7 +24,7 @@ def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, 
 
     Args:
         law: the moment law's parameters, shape (n, number of parameters), in the law's order.
-        runs: shape (n,), of `run_dtype`; the arrays that ``wind`` and ``forcing`` point to must stay alive.
+        runs: shape (n,), of `run_dtype`; the arrays that its pointers name must stay alive.
         samples: samples per run, the first at time 0.
 
     Returns:
@@ -87,6 +87,8 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
     run["wind_interval"] = wind.interval if wind is not None else 0.0
     run["forcing"], run["forcing_count"] = imposed.ctypes.data, imposed.size
     run["forcing_interval"] = forcing.interval if forcing is not None else 0.0
+    program = np.array(settings.program, dtype=np.float64)
+    run["program"], run["program_count"] = program.ctypes.data, program.size
     run["angle"], run["rate"], run["lagged"] = (
         settings.release_angle,
         settings.release_rate,
@@ -99,7 +101,7 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
         run["twist_stiffness"] = 1.0 / twist.compliance
         run["twist_damping"] = twist.damping(settings.yaw_inertia)
         run["inertia_share"] = twist.inertia_share
-    return run, (values, imposed)
+    return run, (values, imposed, program)
 
 
 def backlash(angle: Array, half_width: float, start: float) -> Array:

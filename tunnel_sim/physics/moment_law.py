@@ -1,4 +1,4 @@
-"""Names that the compiled library lists: parameters of the moment law, the plugin's state, fields of a run.
+"""Names that the compiled library lists: parameters and operations of the moment law, the state, fields of a run.
 
 Python looks them up by name, so that it cannot disagree with C about their order (``mjcf/plugin/tables.c``).
 """
@@ -26,12 +26,14 @@ def forward_library() -> ctypes.CDLL:
         TunnelError: when the package was not built.
     """
     library = ctypes.CDLL(str(native_library("vwt_forward")))
-    for kind in ("parameter_name", "parameter_unit", "state_name", "run_name"):
+    for kind in ("parameter_name", "parameter_unit", "state_name", "operation_name", "run_name"):
         getattr(library, f"vwt_{kind}").restype = ctypes.c_char_p
     pointer = ctypes.c_void_p
     library.vwt_forward.argtypes = [ctypes.c_int, pointer, pointer, pointer, pointer]
     library.vwt_backlash.argtypes = [ctypes.c_int, pointer, ctypes.c_double, ctypes.c_double, pointer]
     library.vwt_backlash.restype = None
+    library.vwt_evaluate.argtypes = [ctypes.c_int, pointer, ctypes.c_int, pointer, pointer]
+    library.vwt_evaluate.restype = None
     return library
 
 
@@ -83,6 +85,13 @@ def state_vector(values: Mapping[str, float]) -> Array:
     if unknown := set(values) - set(state_names()):
         raise ValueError(f"the plugin's state has no {', '.join(sorted(unknown))}")
     return np.array([float(values.get(name, 0.0)) for name in state_names()])
+
+
+@functools.cache
+def operation_names() -> tuple[str, ...]:
+    """The operations of a program, by their numbers (``mjcf/plugin/expression.h``)."""
+    library = forward_library()
+    return tuple(library.vwt_operation_name(i).decode() for i in range(library.vwt_operation_count()))
 
 
 @functools.cache

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite, sqrt
 from types import MappingProxyType
 
-from tunnel_sim.physics.moment_law import parameter_names
+from tunnel_sim.physics.moment_law import operation_names, parameter_names
 from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.rig import Rig
@@ -129,6 +129,7 @@ class RunSettings:
             zero.
         series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient.
         rod_twist: None for a rigid rod.
+        program: of a further moment on the rod's upper end (see ``mjcf/plugin/expression.h``); empty: none.
     """
 
     spring_stiffness: float
@@ -144,6 +145,7 @@ class RunSettings:
     parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     series: Mapping[str, Series] = field(default_factory=lambda: MappingProxyType({}))
     rod_twist: RodTwist | None = None
+    program: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Check names and numbers. The plugin checks the bounds of the law's parameters.
@@ -167,14 +169,23 @@ class RunSettings:
                     f"unknown parameter {name!r} of the moment law", remedy=did_you_mean(name, known)
                 )
 
+    def with_moment(self, program: tuple[float, ...]) -> RunSettings:
+        """A copy with a moment on the rod's upper end added.
+
+        Args:
+            program: of the moment, as for ``program``.
+        """
+        add = (float(operation_names().index("add")),) if self.program else ()
+        return replace(self, program=(*self.program, *program, *add))
+
     def layout(self) -> tuple[object, ...]:
         """What runs must have in common to share one compiled model.
 
         Returns:
-            Timestep, names and lengths of the series, and whether the rod is rigid.
+            Timestep, names and lengths of the series, length of the program, and whether the rod is rigid.
         """
         series = tuple((name, len(series.values)) for name, series in self.series.items())
-        return (self.timestep, series, self.rod_twist is None)
+        return (self.timestep, series, len(self.program), self.rod_twist is None)
 
     def law(self, rig: Rig) -> dict[str, float]:
         """Every parameter of the moment law.

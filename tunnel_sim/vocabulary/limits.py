@@ -25,6 +25,12 @@ INTEGER_BITS = 128
 """Longest integer, bits: a NumPy seed has 128; a float cannot exceed 1024."""
 NAME_CHARACTERS = 200
 """Longest name of a spring, characters: two lines of a table."""
+EXPRESSION_CHARACTERS = 500
+"""Longest expression of an effect, characters: six lines of a page."""
+OWN_EFFECTS = 64
+"""Most effects of an effects file: more than twice the vocabulary."""
+OWN_PARAMETERS = 8
+"""Most parameters of an effect by expression: each is fitted."""
 SMALLEST_NUMBER = 1e-100
 """Smallest magnitude above zero in a TOML file or table, SI: its square and cube do not underflow."""
 LARGEST_NUMBER = 1e100

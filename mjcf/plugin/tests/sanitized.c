@@ -140,15 +140,23 @@ static void check_forward(void) {
   enum { kSamples = 200 };
   const double wind[] = {18, 20, 19};
   double angle[kSamples], rate[kSamples], *angles[] = {angle}, *rates[] = {rate};
-  for (int kind = 0; kind < 4; kind++) {
+  const double program[] = {VWT_OPERATION_number, -2, VWT_OPERATION_angle, VWT_OPERATION_cube, VWT_OPERATION_multiply};
+  for (int kind = 0; kind < 5; kind++) {
     vwt_parameters p = {.air_density = 1.2, .frontal_area = 0.036, .reference_length = 0.625, .cn_beta = 0.35,
                         .cn_r = -0.7, .spring_stiffness = 16, .yaw_inertia = 0.1, .mechanical_damping = 0.02,
                         .aero_lag = 2, .friction_moment = kind ? 0.02 : 0, .presliding = kind == 2 ? 0.002 : 0};
     const vwt_run one = {.wind = wind, .wind_count = 3, .wind_interval = 0.05, .angle = 0.3, .lagged = 0.3,
                          .twist_stiffness = kind == 3 ? 500 : 0, .inertia_share = 0.3, .step = 0.001, .steps = 2,
-                         .samples = kSamples};
+                         .samples = kSamples, .program = program, .program_count = kind == 4 ? 5 : 0};
     EXPECT(vwt_forward(1, &p, &one, angles, rates) == 0);
     EXPECT(angle[kSamples - 1] > -1 && angle[kSamples - 1] < 1);
+  }
+  const double broken[] = {VWT_OPERATION_add, VWT_OPERATION_number, 1e300, -1, VWT_OPERATION_angle, VWT_OPERATION_number};
+  const vwt_program_input in = {0.1, 0.2, 0.3, 0.4};
+  for (int i = 0; i < 6; i++) {
+    double value;
+    vwt_evaluate(6 - i, broken + i, 1, &in, &value);
+    EXPECT(value != value);
   }
   vwt_backlash(kSamples, angle, 0.01, 0.3, angle);
   for (int i = 0; i < vwt_run_count(); i++) {

@@ -13,7 +13,7 @@ from small_model import small_model
 from tunnel_sim.physics.moment_law import parameter_names, parameter_units, parameter_vector
 
 README = (Path(__file__).parents[3] / "mjcf" / "plugin" / "README.md").read_text(encoding="utf-8")
-INPUTS = ("wind_speed", "wind_speed_interval", "forcing", "forcing_interval")
+INPUTS = ("wind_speed", "wind_speed_interval", "forcing", "forcing_interval", "moment_program")
 
 
 def _rows(heading: str) -> dict[str, list[str]]:

@@ -1,0 +1,241 @@
+"""Effects whose moment or reading is stated as an expression, with no class written for them."""
+
+from __future__ import annotations
+
+import keyword
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, make_dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from tunnel_sim.effects.base import Channel, Circumstances, Condition, Drawn, Effect, Trial, moment_scale
+from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.units import dimension, in_si
+
+#: What changes during a run: unit, and operation of the moment law.
+_INPUTS = {"b": ("rad", "angle"), "r": ("rad/s", "rate"), "t": ("s", "time"), "V": ("m/s", "speed")}
+_OF_RUN = {"Kr": "N m/rad", "omega": "rad/s"}
+_MOMENT = frozenset({*_INPUTS, *_OF_RUN})
+_READING = frozenset({"y", "t", "V", *_OF_RUN})
+_UNITS = {name: unit for name, (unit, _) in _INPUTS.items()} | _OF_RUN | {"y": "rad"}
+_WORDS = frozenset({*_UNITS, *FUNCTIONS, "pi"})
+
+#: Where an expression is tried when it is stated: the range of the rigs that the diagnosis was made for.
+_TRIED = {"b": 0.5, "y": 0.5, "r": 10.0, "t": 20.0, "V": 40.0, "Kr": 100.0, "omega": 60.0}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A parameter of an effect by expression.
+
+    Args:
+        unit: as `tunnel_sim.vocabulary.units.dimension` reads it.
+        scale: a typical value, in the unit.
+        lower: least value, in the unit.
+        upper: greatest value, in the unit.
+        default: value where none is given, in the unit.
+        meaning: one clause.
+    """
+
+    unit: str
+    scale: float
+    lower: float
+    upper: float
+    default: float
+    meaning: str
+
+
+@dataclass(frozen=True)
+class ExpressionEffect(Effect):
+    """Base of the effects by expression; `expression_effect` makes the classes."""
+
+    formula: ClassVar[Expression]
+    tries = 2
+
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """The severity's typical size, with the other parameters at their defaults and to both sides of them."""
+        severity, *others = cls.parameters()
+        start = {severity.name: severity.scale * moment_scale(severity, campaign)}
+        start |= {info.name: info.default for info in others}
+        aside = [
+            {info.name: math.copysign(math.sqrt(info.default * bound), info.default)}
+            for info in others
+            for bound in (info.lower, info.upper)
+            if info.default * bound > 0.0
+        ]
+        return [Trial(start | moved, severity.name) for moved in ({}, *aside)]
+
+    def _constants(self, stated: RunSettings) -> dict[str, float]:
+        """What does not change during a run, by name."""
+        own = {info.name: float(getattr(self, info.name)) for info in self.parameters()}
+        spring = stated.spring_stiffness
+        return own | {"Kr": spring, "omega": math.sqrt(spring / stated.yaw_inertia)}
+
+    def _acts(self, stated: RunSettings) -> bool:
+        windy = stated.wind_speed > 0.0 or "wind_speed" in stated.series
+        return not self.is_null and (self.condition == "always" or windy)
+
+
+class _Moment(ExpressionEffect):
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+        """Add the moment to the run's program."""
+        del drawn
+        if not self._acts(stated):
+            return run
+        inputs = {name: operation for name, (_, operation) in _INPUTS.items()}
+        return run.with_moment(self.formula.program(self._constants(stated), inputs))
+
+    def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float]:
+        """The moment by NumPy, without the compiled law."""
+        constants = self._constants(stated) | {"V": stated.wind_speed}
+
+        def moment(t: float, angle: float, rate: float) -> float:
+            return float(self.formula.value(constants | {"t": t, "b": angle, "r": rate}))
+
+        return moment if self._acts(stated) else lambda *_: 0.0
+
+
+class _Reading(ExpressionEffect):
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
+        """Apply the characteristic."""
+        del drawn
+        if not self._acts(stated):
+            return angle
+        moving: dict[str, float | Array] = {"y": angle, "t": time_s, "V": stated.wind_speed}
+        return np.broadcast_to(self.formula.value(moving | self._constants(stated)), angle.shape)
+
+
+def expression_effect(
+    name: str,
+    *,
+    channel: Channel,
+    parameters: Mapping[str, Quantity],
+    condition: Condition = "always",
+    moment: str | None = None,
+    reading: str | None = None,
+    summary: str = "",
+) -> type[Effect]:
+    """An effect whose moment or reading is an expression.
+
+    Args:
+        name: lower-case letters, digits and underscores.
+        channel: where it acts; ``sensor`` for a reading.
+        parameters: by name; the first is the severity.
+        condition: when it acts.
+        moment: on the right-hand side of the equation of motion, N m: of the angle ``b`` (rad) and rate ``r``
+            (rad/s) of the rod's upper end, the time ``t`` (s) since the run's start, the wind speed ``V`` (m/s),
+            the stated stiffness ``Kr`` (N m/rad), ``omega`` = √(Kr/Izz) (rad/s) and the parameters.
+        reading: rad: of ``y`` (rad), the reading without the effect, of ``t``, ``V``, ``Kr`` and ``omega`` as
+            above and of the parameters.
+        summary: what it is, one sentence.
+
+    Returns:
+        The class; it is not registered.
+
+    Raises:
+        TunnelError: when a name is taken, a unit is unknown or does not fit, or the effect acts at its null, does
+            nothing beyond it or has no value somewhere.
+    """
+    text = moment if reading is None else reading
+    if text is None or (moment is not None and reading is not None):
+        raise TunnelError("states not exactly one of moment and reading", remedy="state one of them")
+    if (channel == "sensor") != (reading is not None):
+        raise TunnelError(f"channel {channel!r} is not that of a {'moment' if reading is None else 'reading'}",
+                          remedy="use sensor for a reading, and another channel for a moment")  # fmt: skip
+    _check_names(parameters)
+    formula = parse(text, frozenset(parameters) | (_MOMENT if reading is None else _READING))
+    units = {own: quantity.unit for own, quantity in parameters.items()}
+    _check_units(formula, units, "N m" if reading is None else "rad")
+    _check_values(formula, parameters, "0" if reading is None else "y")
+    fields = [
+        (
+            own,
+            float,
+            parameter(own, q.unit, q.meaning, scale=q.scale, lower=q.lower, upper=q.upper, default=q.default),
+        )
+        for own, q in parameters.items()
+    ]
+    first, *others = parameters.values()
+    namespace: dict[str, Any] = {
+        "name": name,
+        "channel": channel,
+        "condition": condition,
+        "equation": f"{'moment' if reading is None else 'reading'} {text}",
+        "signature": "That of its expression.",
+        "references": (),
+        "example": (first.scale, *(q.default for q in others)),
+        "autonomous": "t" not in formula.names,
+        "formula": formula,
+        "__doc__": summary or "An effect by expression.",
+    }
+    base = _Moment if reading is None else _Reading
+    return make_dataclass(name, fields, bases=(base,), namespace=namespace, frozen=True)
+
+
+def _check_names(parameters: Mapping[str, Quantity]) -> None:
+    for name, quantity in parameters.items():
+        if not (name.isidentifier() and name.isascii()) or keyword.iskeyword(name):
+            raise TunnelError(f"{name!r} is not a parameter's name", remedy="use letters, digits and _")
+        if name in _WORDS or hasattr(ExpressionEffect, name):
+            raise TunnelError(
+                f"a parameter cannot be named {name!r}", remedy="choose a name that has no other meaning"
+            )
+        if not all(quantity.lower <= value <= quantity.upper for value in (quantity.default, quantity.scale)):
+            raise TunnelError(
+                f"parameter {name}: the default {quantity.default:g} or the scale {quantity.scale:g} is not from "
+                f"{quantity.lower:g} to {quantity.upper:g}",
+                remedy="correct lower, upper, scale or default",
+            )
+    severity = next(iter(parameters.values()), None)
+    if severity is None or severity.default != 0.0 or severity.scale == 0.0:
+        raise TunnelError(
+            "the first parameter is not a severity",
+            remedy="give it the default 0, which removes the effect, and a scale that is not 0",
+        )
+
+
+def _check_units(formula: Expression, units: Mapping[str, str], expected: str) -> None:
+    known = {name: dimension(unit) for name, unit in {**_UNITS, **units}.items()}
+    found = formula.dimension(known)
+    if found != dimension(expected):
+        raise TunnelError(
+            f"{formula.text!r} is in {in_si(found)}, not in {expected} ({in_si(dimension(expected))})",
+            remedy="correct the expression or the units of its parameters",
+        )
+    unused = [name for name in units if name not in formula.names]
+    if unused:
+        raise TunnelError(
+            f"parameter {unused[0]} is not in {formula.text!r}", remedy="use it or leave it out"
+        )
+
+
+def _check_values(formula: Expression, parameters: Mapping[str, Quantity], null: str) -> None:
+    """Refuse an expression that acts at its null, does nothing beyond it or has no value somewhere."""
+    rng = np.random.default_rng(0)
+    tried = {name: top * rng.uniform(-1.0, 1.0, 200) for name, top in _TRIED.items()}
+    tried |= {name: np.abs(tried[name]) for name in ("t", "V", "Kr", "omega")}
+    for name in ("b", "r", "y", "t", "V"):
+        tried[name][:: 7 + len(name) + ord(name[0]) % 5] = 0.0
+    at = {name: quantity.default for name, quantity in parameters.items()}
+    severity, size = next((name, quantity.scale) for name, quantity in parameters.items())
+    without = tried["y"] if null == "y" else 0.0
+    at_null, beyond = (formula.value({**tried, **at, **more}) for more in ({}, {severity: size}))
+    if not np.all(np.isfinite(at_null) & np.isfinite(beyond)):
+        raise TunnelError(
+            f"{formula.text!r} has no finite value somewhere in the motion of a rig",
+            remedy="avoid division by zero, and roots and logarithms of negative numbers",
+        )
+    if np.any(np.abs(at_null - without) > 1e-12):
+        raise TunnelError(
+            f"{formula.text!r} is not {null} at {severity} = 0",
+            remedy="write it so that the first parameter, the severity, removes the effect",
+        )
+    if np.all(np.abs(beyond - without) <= 1e-300):
+        raise TunnelError(f"{formula.text!r} does nothing", remedy="correct the expression or the scale")

@@ -1,0 +1,177 @@
+"""The vocabulary by name: built-in effects, registered ones, and those of a diagnosis under way."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from importlib import import_module
+from importlib.metadata import entry_points
+from pkgutil import iter_modules
+from typing import TypeVar, get_args
+
+import tunnel_sim.effects as package
+from tunnel_sim.effects.base import Channel, Condition, Effect
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
+
+ENTRY_POINTS = "tunnel.effects"
+"""Group of the entry points by which an installed package adds effects."""
+
+RESERVED = frozenset({"unknown", "none", "check"})
+"""Names that mean something else in an answer or on the command line."""
+
+KindT = TypeVar("KindT", bound=type[Effect])
+
+_registered: dict[str, type[Effect]] = {}
+_under_way: ContextVar[tuple[type[Effect], ...]] = ContextVar(
+    "effects of the diagnosis under way", default=()
+)
+
+
+def _found() -> tuple[type[Effect], ...]:
+    """The effects that the package's modules define, by their place."""
+    names = [f"{package.__name__}.{module.name}" for module in iter_modules(package.__path__)]
+    modules = [import_module(name) for name in names if name != __name__]
+    defined = {
+        kind
+        for module in modules
+        for kind in vars(module).values()
+        if isinstance(kind, type) and issubclass(kind, Effect) and kind.__module__ == module.__name__
+    }
+    return tuple(sorted((kind for kind in defined if hasattr(kind, "place")), key=lambda kind: kind.place))
+
+
+#: Every built-in effect, in the order of the vocabulary: a module of this package that defines one is enough.
+ALL_EFFECTS: tuple[type[Effect], ...] = _found()
+
+
+def known_effects() -> tuple[type[Effect], ...]:
+    """Every effect that has a name now: the built-in ones, then the registered ones in their order."""
+    _load_entry_points()
+    own = _registered | {kind.name: kind for kind in _under_way.get()}
+    return (*ALL_EFFECTS, *(kind for kind in own.values() if kind not in ALL_EFFECTS))
+
+
+def register_effect(kind: KindT) -> KindT:
+    """Add an effect of one's own to the vocabulary; as a decorator too.
+
+    Args:
+        kind: a frozen dataclass derived from `Effect`. It replaces an earlier one of the same name.
+
+    Returns:
+        The same class.
+
+    Raises:
+        TunnelError: when it has a built-in name, no severity, or lacks what the vocabulary needs.
+    """
+    check_kind(kind)
+    _registered[kind.name] = kind
+    return kind
+
+
+def check_kind(kind: object) -> None:
+    """Refuse what cannot be an effect of the vocabulary.
+
+    Args:
+        kind: a class.
+
+    Raises:
+        TunnelError: for the first fault.
+    """
+    where = f"effect {one_line(getattr(kind, 'name', kind))}"
+    if not (isinstance(kind, type) and issubclass(kind, Effect) and dataclasses.is_dataclass(kind)):
+        raise TunnelError("is not a class derived from Effect", where=where, remedy="derive it from Effect")
+    stated = ("name", "channel", "condition", "equation", "signature", "references", "example")
+    missing = [text for text in stated if not hasattr(kind, text)]
+    if missing:
+        raise TunnelError(f"states no {missing[0]}", where=where, remedy="state it in the class")
+    if not kind.name.isidentifier() or kind.name in RESERVED:
+        raise TunnelError("is not a name for an effect", where=where, remedy="use letters, digits and _")
+    if any(kind.name == one.name and kind is not one for one in ALL_EFFECTS):
+        raise TunnelError("is the name of a built-in effect", where=where, remedy="choose another name")
+    for text, allowed in (("channel", get_args(Channel)), ("condition", get_args(Condition))):
+        if getattr(kind, text) not in allowed:
+            raise TunnelError(
+                f"unknown {text} {getattr(kind, text)!r}",
+                where=where,
+                remedy=f"use one of {', '.join(allowed)}",
+            )
+    if not _has_null(kind):
+        raise TunnelError(
+            "the first parameter is its severity, whose default must be 0 within its bounds",
+            where=where,
+            remedy="declare its parameters with tunnel_sim.effects.parameters.parameter",
+        )
+    if kind.line or kind.skips or kind.random or kind.lattice:
+        raise TunnelError(
+            "line, skips, random and lattice are for built-in effects, which are found by methods of their own",
+            where=where,
+            remedy="leave these traits at their defaults",
+        )
+
+
+def _has_null(kind: type[Effect]) -> bool:
+    """Whether the parameters are described, and the severity can be zero."""
+    try:
+        severity = kind.parameters()[0]
+    except (TypeError, IndexError):
+        return False
+    return severity.default == 0.0 and severity.lower <= 0.0 <= severity.upper
+
+
+@functools.cache
+def _load_entry_points() -> None:
+    """Register the effects of installed packages, once."""
+    for point in entry_points(group=ENTRY_POINTS):
+        try:
+            register_effect(point.load())
+        except Exception as error:  # whatever a foreign package does wrong is said in one line
+            said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
+            raise TunnelError(
+                f"cannot be loaded ({one_line(said)})",
+                where=f"entry point {ENTRY_POINTS}: {point.name}",
+                remedy="correct or uninstall its package",
+            ) from error
+
+
+@contextmanager
+def answering_with(kinds: Sequence[type[Effect]]) -> Iterator[None]:
+    """Within the block, effects that nobody registered are known by name.
+
+    Args:
+        kinds: the effects that a diagnosis may answer with.
+
+    Raises:
+        TunnelError: when one cannot be an effect of the vocabulary, or two have one name.
+    """
+    own = [kind for kind in kinds if kind not in ALL_EFFECTS]
+    for kind in own:
+        check_kind(kind)
+    names = [kind.name for kind in kinds]
+    for name in names:
+        if names.count(name) > 1:
+            raise TunnelError("is given twice", where=f"effect {name}", remedy="give it once")
+    token = _under_way.set((*_under_way.get(), *own))
+    try:
+        yield
+    finally:
+        _under_way.reset(token)
+
+
+def effect_class(name: str) -> type[Effect]:
+    """The class of the effect with a given name.
+
+    Args:
+        name: such as ``coulomb_friction``.
+
+    Raises:
+        TunnelError: when there is none; the message suggests the closest name.
+    """
+    for kind in known_effects():
+        if kind.name == name:
+            return kind
+    raise TunnelError(
+        f"unknown effect {name!r}", remedy=did_you_mean(name, [kind.name for kind in known_effects()])
+    )

@@ -1,0 +1,213 @@
+"""Laws that every effect obeys, whatever it is: the conformance tests and ``tunnel effects check`` use them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from tunnel_sim.effects import Effect, EffectChain
+from tunnel_sim.effects.base import make_effect
+from tunnel_sim.engine.model import build_model
+from tunnel_sim.engine.sensor import read_motion
+from tunnel_sim.engine.simulate import simulate, simulate_motion, simulate_motions
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.steps import follow_fastest
+from tunnel_sim.vocabulary.aero import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.errors import TunnelError, one_line
+from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.record import Array, Record
+
+INTEGRATION_TOLERANCE = 2e-5
+"""Greatest error of the integration, rad: a twenty-fifth of the sensor's noise, as decision 0006 states it."""
+
+SENSOR = SensorModel(zero=0.003)
+WIND_ON = RunSettings(
+    16.12, AeroDerivatives(0.47, -0.3), 0.1014, 0.018,
+    wind_speed=20.0, air_density=1.204, release_angle=0.35, duration=1.0,
+)  # fmt: skip
+WIND_OFF = replace(WIND_ON, wind_speed=0.0)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether an effect obeys a law.
+
+    Args:
+        law: what is demanded.
+        fault: how it is violated; empty where it is obeyed.
+    """
+
+    law: str
+    fault: str = ""
+
+
+def example(kind: type[Effect]) -> Effect:
+    """The effect with the values at which its class says that it is visible."""
+    return make_effect(kind, _values(kind))
+
+
+def _values(kind: type[Effect]) -> dict[str, float]:
+    return dict(zip((info.name for info in kind.parameters()), kind.example, strict=False))
+
+
+def _record(effects: tuple[Effect, ...], run: RunSettings = WIND_ON) -> Record:
+    return simulate(load_rig(), run, SENSOR, np.random.default_rng(1), effects=effects)
+
+
+@cache
+def _bare(run_is_windy: bool) -> Record:
+    return _record((), WIND_ON if run_is_windy else WIND_OFF)
+
+
+def _same(one: Record, other: Record) -> bool:
+    return np.array_equal(one.yaw_rad, other.yaw_rad) and np.array_equal(one.time_s, other.time_s)
+
+
+def null(kind: type[Effect]) -> str:
+    """At zero severity the record is bit-identical to one without the effect."""
+    elsewhere = make_effect(kind, {**_values(kind), kind.parameters()[0].name: 0.0})
+    changed = [not _same(_record((effect,)), _bare(True)) for effect in (kind(), elsewhere)]
+    return "the record changes although the severity is 0" if any(changed) else ""
+
+
+def seen(kind: type[Effect]) -> str:
+    """Beyond its null it changes the record."""
+    effect = example(kind)
+    if effect.is_null:
+        return "its example has a severity of 0"
+    return "its example changes nothing" if _same(_record((effect,)), _bare(True)) else ""
+
+
+def condition(kind: type[Effect]) -> str:
+    """It acts with the wind off if its condition is always, and only then."""
+    unchanged = _same(_record((example(kind),), WIND_OFF), _bare(False))
+    if unchanged == (kind.condition == "wind_on"):
+        return ""
+    return f"its condition is {kind.condition}, but it {'does nothing' if unchanged else 'acts'} with the wind off"
+
+
+def round_trip(kind: type[Effect]) -> str:
+    """It goes through JSON by name."""
+    for effect in (example(kind), kind()):
+        document = json.loads(json.dumps(effect.to_json_dict(), allow_nan=False))
+        if document.get("name") != kind.name or make_effect(kind, document.get("parameters", {})) != effect:
+            return "the effect read back is another"
+    return ""
+
+
+def bounds(kind: type[Effect]) -> str:
+    """Values beyond the bounds stated are refused."""
+    for info in kind.parameters():
+        for bound, outward in ((info.lower, -math.inf), (info.upper, math.inf)):
+            try:
+                make_effect(kind, {info.name: math.nextafter(bound, outward)})
+            except TunnelError:
+                continue
+            if math.isfinite(bound):
+                return f"{info.name} beyond {bound:g} {info.unit} is accepted"
+    return ""
+
+
+def determinism(kind: type[Effect]) -> str:
+    """The same seed gives the same bits, with any number of threads."""
+    runs = [replace(WIND_ON, duration=0.4), replace(WIND_OFF, duration=0.4)] * 2
+
+    def records(threads: int) -> list[Record]:
+        rngs = [np.random.default_rng([7, i]) for i in range(len(runs))]
+        chains = [EffectChain.draw(run, (example(kind),), rng) for run, rng in zip(runs, rngs, strict=True)]
+        true = [chain.physics() for chain in chains]
+        motions = simulate_motions(load_rig(), true, SENSOR.sample_rate, nthread=threads)
+        return [read_motion(m, SENSOR, rng, c) for m, rng, c in zip(motions, rngs, chains, strict=True)]
+
+    alone = [
+        simulate(load_rig(), run, SENSOR, np.random.default_rng([7, i]), effects=(example(kind),))
+        for i, run in enumerate(runs)
+    ]
+    same = all(_same(a, b) for threads in (1, 3) for a, b in zip(alone, records(threads), strict=True))
+    return "" if same else "the records differ"
+
+
+def integration(kind: type[Effect]) -> str:
+    """Half the integration step changes the motion by less than the integrators' tolerance, and MuJoCo agrees."""
+    chain = EffectChain.draw(WIND_ON, (example(kind),), np.random.default_rng(1))
+    run = follow_fastest(load_rig(), chain.physics())
+    usual = forward_motion(load_rig(), run, 100.0)
+    finer = forward_motion(load_rig(), replace(run, timestep=0.5 * run.timestep), 100.0)
+    engine = simulate_motion(build_model(load_rig(), run), 100.0)
+    error = max(float(np.max(np.abs(other.angle - usual.angle))) for other in (finer, engine))
+    return "" if error < INTEGRATION_TOLERANCE else f"the angle changes by {error:.2g} rad"
+
+
+def oracle(kind: type[Effect]) -> str:
+    """It moves the rig as the moment does that its class states independently."""
+    worst = 0.0
+    for run in (WIND_ON, WIND_OFF):
+        moment = example(kind).moment_oracle(run)
+        if moment is None:
+            return ""
+        chain = EffectChain.draw(run, (example(kind),), np.random.default_rng(1))
+        found = simulate_motion(build_model(load_rig(), follow_fastest(load_rig(), chain.physics())), 100.0)
+        worst = max(worst, float(np.max(np.abs(found.angle - _by_scipy(run, moment, found.time_s)))))
+    return "" if worst < INTEGRATION_TOLERANCE else f"the angle differs by {worst:.2g} rad"
+
+
+def _by_scipy(run: RunSettings, moment: Callable[[float, float, float], float], time_s: Array) -> Array:
+    from scipy.integrate import solve_ivp  # only here: slow to load
+
+    body = load_rig().body
+    flow = {"air_density": run.air_density, "frontal_area": body.frontal_area, "wind_speed": run.wind_speed}
+    flow["reference_length"] = body.length
+    windy = run.wind_speed > 0.0
+    stiffness = aerodynamic_stiffness(run.derivatives.cn_beta, **flow) if windy else 0.0
+    damping = aerodynamic_damping(run.derivatives.cn_r, **flow) if windy else 0.0
+
+    def derivative(t: float, state: Array) -> tuple[float, float]:
+        angle, rate = state
+        linear = (stiffness - run.spring_stiffness) * angle + (damping - run.mechanical_damping) * rate
+        return rate, (linear + moment(t, angle, rate)) / run.yaw_inertia
+
+    start, span = (run.release_angle, run.release_rate), (0.0, float(time_s[-1]))
+    found = solve_ivp(derivative, span, start, "DOP853", time_s, rtol=1e-10, atol=1e-12, max_step=0.01)
+    return np.asarray(found.y[0], np.float64)
+
+
+LAWS: Mapping[str, Callable[[type[Effect]], str]] = {
+    "null": null,
+    "seen": seen,
+    "condition": condition,
+    "round trip": round_trip,
+    "bounds": bounds,
+    "determinism": determinism,
+    "integration": integration,
+    "oracle": oracle,
+}
+"""Every law by name; a function returns the fault, or nothing where the law is obeyed."""
+
+
+def check(kind: type[Effect]) -> list[Verdict]:
+    """Hold an effect to every law.
+
+    Args:
+        kind: the effect, registered or not.
+
+    Returns:
+        One verdict for each of `LAWS`, in their order; none for the oracle where the class states none. An
+        exception of the effect's own code is a fault.
+    """
+    unstated = kind.moment_oracle is Effect.moment_oracle
+    return [_verdict(kind, holds) for holds in LAWS.values() if not (unstated and holds is oracle)]
+
+
+def _verdict(kind: type[Effect], holds: Callable[[type[Effect]], str]) -> Verdict:
+    try:
+        fault = holds(kind)
+    except Exception as error:  # code of others: whatever it raises is a fault of it
+        fault = one_line(str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}")
+    return Verdict(" ".join((holds.__doc__ or "").split()).rstrip("."), fault)

@@ -1,0 +1,252 @@
+"""Expressions such as ``-k*b*exp(-(b/w)^2)``: parsed, checked for units, evaluated or compiled for the moment law.
+
+Nothing is evaluated as Python. An expression is a tree of the operations in ``mjcf/plugin/expression.h``.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from tunnel_sim.physics.moment_law import operation_names
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.units import NUMBER, Dimension, in_si, product
+
+#: A number, a name, or an operation and what it acts on.
+Node: TypeAlias = "float | str | tuple[Any, ...]"
+
+_BINARY = {ast.Add: "add", ast.Sub: "subtract", ast.Mult: "multiply", ast.Div: "divide", ast.Pow: "power"}
+FUNCTIONS = ("abs", "sign", "sqrt", "exp", "log", "sin", "cos", "tan", "tanh", "atan", "min", "max")
+"""The functions of an expression."""
+
+_NUMERICS: Mapping[str, Callable[..., Any]] = {
+    "add": np.add, "subtract": np.subtract, "multiply": np.multiply, "divide": np.divide, "power": np.power,
+    "min": np.fmin, "max": np.fmax, "negative": np.negative, "square": lambda x: x * x, "cube": lambda x: x * x * x,
+    "abs": np.abs, "sign": np.sign, "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos,
+    "tan": np.tan, "tanh": np.tanh, "atan": np.arctan,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A formula.
+
+    Args:
+        text: as stated.
+        root: the tree of its operations.
+    """
+
+    text: str
+    root: Node
+
+    @functools.cached_property
+    def names(self) -> frozenset[str]:
+        """The names in it."""
+        return frozenset(_names(self.root))
+
+    def value(self, values: Mapping[str, float | Array]) -> Array:
+        """The value for numbers or arrays.
+
+        Args:
+            values: by name, in SI units, numbers or arrays of shape (n,).
+
+        Returns:
+            Shape (n,), or (); not a number or infinite outside the domain of a function.
+        """
+        with np.errstate(all="ignore"):
+            return np.asarray(_value(self.root, values), np.float64)
+
+    def dimension(self, dimensions: Mapping[str, Dimension]) -> Dimension:
+        """The dimension, with a check of every operation.
+
+        Args:
+            dimensions: of the names.
+
+        Returns:
+            Of the value.
+
+        Raises:
+            TunnelError: when quantities of different dimensions are added or compared, or the argument of a
+                function or an exponent has a dimension.
+        """
+        return _dimension(self.root, dimensions) or NUMBER
+
+    def program(self, constants: Mapping[str, float], inputs: Mapping[str, str]) -> tuple[float, ...]:
+        """The code that the moment law evaluates, with the constants in it.
+
+        Args:
+            constants: value by name, in SI units.
+            inputs: operation by name, for what changes during a run.
+
+        Returns:
+            Elements as ``mjcf/plugin/expression.h`` describes them.
+        """
+        return _code(_folded(self.root, constants), inputs)
+
+
+def parse(text: str, names: frozenset[str]) -> Expression:
+    """Read an expression.
+
+    Args:
+        text: numbers, names, ``+ - * / ^``, parentheses and `FUNCTIONS`; ``pi`` is a number.
+        names: that it may contain.
+
+    Returns:
+        The expression.
+
+    Raises:
+        TunnelError: when it is too long or too deep, or holds anything else.
+    """
+    if len(text) > limits.EXPRESSION_CHARACTERS:
+        raise TunnelError(
+            f"an expression of {len(text)} characters",
+            remedy=f"give one of {limits.EXPRESSION_CHARACTERS} or fewer",
+        )
+    if "#" in text:  # Python would take the rest for a comment
+        raise _refused(f"{one_line(text)!r} is not a formula")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SyntaxWarning)
+            warnings.simplefilter("ignore", DeprecationWarning)
+            tree = ast.parse(text.strip().replace("^", "**"), mode="eval")
+        root = _node(tree.body, names)
+    except (SyntaxError, ValueError, MemoryError, RecursionError, OverflowError):
+        raise _refused(f"{one_line(text)!r} is not a formula") from None
+    if _height(root) > _DEEPEST:
+        raise _refused("an expression nested too deep")
+    return Expression(text, root)
+
+
+_DEEPEST = 24  # values held at once; the compiled law has room for 32
+
+
+def _refused(what: str) -> TunnelError:
+    return TunnelError(what, remedy=f"write numbers, names, + - * / ^ ( ) and {', '.join(FUNCTIONS)}")
+
+
+def _node(tree: ast.expr, names: frozenset[str]) -> Node:
+    """The tree of an expression from Python's."""
+    match tree:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool) and math.isfinite(
+            value
+        ):
+            return float(value)
+        case ast.Name(id=name):
+            return _named(name, names)
+        case ast.UnaryOp(op=ast.USub(), operand=one):
+            return "negative", _node(one, names)
+        case ast.UnaryOp(op=ast.UAdd(), operand=one):
+            return _node(one, names)
+        case ast.BinOp(op=operator, left=left, right=right) if type(operator) in _BINARY:
+            return _BINARY[type(operator)], _node(left, names), _node(right, names)
+        case ast.Call(func=ast.Name(id=name), args=list(given), keywords=[]) if name in FUNCTIONS:
+            if len(given) == (2 if name in ("min", "max") else 1):
+                return name, *(_node(one, names) for one in given)
+    raise _refused(f"{one_line(ast.unparse(tree))!r} is not part of a formula")
+
+
+def _named(name: str, names: frozenset[str]) -> Node:
+    if name == "pi":
+        return math.pi
+    if name not in names:
+        raise TunnelError(f"unknown name {one_line(name)!r}", remedy=did_you_mean(name, names))
+    return name
+
+
+def _names(node: Node) -> set[str]:
+    if isinstance(node, tuple):
+        return set().union(*(_names(one) for one in node[1:]))
+    return {node} if isinstance(node, str) else set()
+
+
+def _height(node: Node) -> int:
+    """Values that the program holds at once."""
+    if not isinstance(node, tuple):
+        return 1
+    return max(i + _height(one) for i, one in enumerate(node[1:]))
+
+
+def _value(node: Node, values: Mapping[str, float | Array]) -> Any:
+    if isinstance(node, tuple):
+        return _NUMERICS[node[0]](*(_value(one, values) for one in node[1:]))
+    return values[node] if isinstance(node, str) else np.float64(node)
+
+
+def _folded(node: Node, constants: Mapping[str, float]) -> Node:
+    """The tree with the value of everything that is constant, and with products for small powers."""
+    if isinstance(node, str):
+        return constants.get(node, node)
+    if not isinstance(node, tuple):
+        return node
+    operation, *parts = node[0], *(_folded(one, constants) for one in node[1:])
+    numbers = [np.float64(part) for part in parts if isinstance(part, float)]
+    if len(numbers) == len(parts):
+        with np.errstate(all="ignore"):
+            return float(_NUMERICS[operation](*numbers))
+    if operation == "power" and parts[1] in (2.0, 3.0):
+        return ("square" if parts[1] == 2.0 else "cube"), parts[0]
+    return operation, *parts
+
+
+def _code(node: Node, inputs: Mapping[str, str]) -> tuple[float, ...]:
+    number = operation_names().index
+    if isinstance(node, tuple):
+        parts = [element for one in node[1:] for element in _code(one, inputs)]
+        return *parts, float(number(node[0]))
+    if isinstance(node, str):
+        return (float(number(inputs[node])),)
+    return float(number("number")), node
+
+
+def _dimension(node: Node, known: Mapping[str, Dimension]) -> Dimension | None:
+    """The dimension of a node; None for zero, which has any."""
+    if isinstance(node, str):
+        return known[node]
+    if not isinstance(node, tuple):
+        return None if node == 0.0 else NUMBER
+    operation, *parts = node
+    of = [_dimension(part, known) for part in parts]
+    if operation in ("add", "subtract", "min", "max"):
+        return _of_alike(operation, of[0], of[1])
+    if operation in ("negative", "abs"):
+        return of[0]
+    one, other = of[0] or NUMBER, of[-1] or NUMBER
+    if operation in ("multiply", "divide"):
+        return product(one, other, -1.0 if operation == "divide" else 1.0)
+    if operation == "power":
+        return _of_power(one, parts[1], other)
+    if operation == "sqrt":
+        return product(NUMBER, one, 0.5)
+    if one != NUMBER and operation != "sign":
+        raise TunnelError(f"{operation} of a quantity in {in_si(one)}", remedy="its argument is a number")
+    return NUMBER
+
+
+def _of_alike(operation: str, one: Dimension | None, other: Dimension | None) -> Dimension | None:
+    if one is None or other is None or one == other:
+        return one or other
+    what = f"{operation} of {in_si(one)} and {in_si(other)}"
+    raise TunnelError(what, remedy="both must have the same unit")
+
+
+def _of_power(base: Dimension, exponent: Node, of_exponent: Dimension) -> Dimension:
+    if of_exponent != NUMBER:
+        raise TunnelError(f"an exponent in {in_si(of_exponent)}", remedy="an exponent is a number")
+    if base == NUMBER:
+        return NUMBER
+    power = _folded(exponent, {})
+    if not isinstance(power, float):
+        raise TunnelError(
+            f"a quantity in {in_si(base)} to the power of a parameter",
+            remedy="divide it by one of the same unit",
+        )
+    return product(NUMBER, base, power)

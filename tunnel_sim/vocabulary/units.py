@@ -1,0 +1,94 @@
+"""Units of quantities as powers of kilogram, metre and second. The radian counts as 1, as in the SI."""
+
+from __future__ import annotations
+
+import functools
+import re
+from typing import TypeAlias
+
+from tunnel_sim.vocabulary.errors import TunnelError
+
+#: Powers of kg, m and s.
+Dimension: TypeAlias = tuple[float, float, float]
+
+NUMBER: Dimension = (0.0, 0.0, 0.0)
+
+_UNITS: dict[str, Dimension] = {
+    "1": NUMBER,
+    "rad": NUMBER,
+    "kg": (1.0, 0.0, 0.0),
+    "m": (0.0, 1.0, 0.0),
+    "s": (0.0, 0.0, 1.0),
+    "Hz": (0.0, 0.0, -1.0),
+    "N": (1.0, 1.0, -2.0),
+}
+_FACTOR = re.compile(r"([A-Za-z]+|1)\^?(\d?)", re.ASCII)
+_FORM = "write it of kg, m, s, rad, N and Hz, such as 1, rad, N m/rad, 1/rad2 or rad/(N m)"
+
+
+def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
+    """The dimension of one quantity times a power of another.
+
+    Args:
+        one: powers of kg, m and s.
+        other: powers of kg, m and s.
+        power: of the other, a number.
+    """
+    kg, m, s = (a + power * b for a, b in zip(one, other, strict=True))
+    return kg, m, s
+
+
+@functools.cache
+def dimension(unit: str) -> Dimension:
+    """The dimension of a unit.
+
+    Args:
+        unit: factors with spaces between them and digits for powers, the denominator after one slash.
+
+    Returns:
+        Powers of kg, m and s.
+
+    Raises:
+        TunnelError: when the unit has another form or an unknown factor.
+    """
+    above, slash, below = unit.partition("/")
+    if below.startswith("(") and below.endswith(")"):
+        below = below[1:-1]
+    found = _factors(above, 1.0)
+    of_below = _factors(below, -1.0) if slash else NUMBER
+    if found is None or of_below is None:
+        raise TunnelError(f"unknown unit {unit!r}", remedy=_FORM)
+    return product(found, of_below)
+
+
+def _factors(text: str, sign: float) -> Dimension | None:
+    """The dimension of a product; None where a factor is unknown."""
+    found = NUMBER
+    for word in text.split() or [""]:
+        match = _FACTOR.fullmatch(word)
+        if match is None or match[1] not in _UNITS:
+            return None
+        found = product(found, _UNITS[match[1]], sign * float(match[2] or 1.0))
+    return found
+
+
+def in_si(given: Dimension) -> str:
+    """The unit of a dimension in kg, m and s.
+
+    Args:
+        given: powers of kg, m and s.
+
+    Returns:
+        Such as ``kg m2/s2``; ``1`` for a number.
+    """
+    named = list(zip(("kg", "m", "s"), given, strict=True))
+    above, below = (
+        [
+            f"{name}{f'{sign * power:g}' if abs(power) != 1.0 else ''}"
+            for name, power in named
+            if sign * power > 0.0
+        ]
+        for sign in (1.0, -1.0)
+    )
+    under = f"({' '.join(below)})" if len(below) > 1 else "".join(below)
+    return (" ".join(above) or "1") + (f"/{under}" if below else "")
