@@ -128,3 +128,9 @@ def test_an_effect_taken_out_leaves_the_fit_without_it():
     assert left.problem.effects == (effect_class("quadratic_damping"),)
     assert left.point.release.shape == base.point.release.shape
     assert left.total == pytest.approx(fit(direct.problem, direct.point).total, rel=1e-4)
+
+
+def test_a_second_mode_is_neither_a_drift_nor_the_motion_itself() -> None:
+    rates = (0.6, 6.0, 12.0, 14.0, 36.0)
+    modes = [effect_from("second_mode", {"amplitude": 0.002, "frequency": rate}) for rate in rates]
+    assert [mode.plausible(12.0) for mode in modes] == [False, True, False, False, True]

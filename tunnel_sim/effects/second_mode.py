@@ -11,6 +11,8 @@ from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
+_LEAST_DAMPING = 1e-4  # of a structure; a line that does not decay is not a mode of it
+_SLOWEST = 0.1  # of the motion's frequency: what is slower drifts in a record of some ten cycles
 _REFERENCE_RELEASE = 0.35  # rad: where all exponents give the same amplitude
 
 
@@ -47,15 +49,23 @@ class SecondMode(Effect):
         "ω2", "rad/s", "undamped angular frequency", scale=50.0, lower=0.01, upper=1e5, default=50.0
     )
     damping_ratio: float = parameter(
-        "ζ2", "1", "share of critical damping", scale=0.01, lower=0.0, upper=0.9, fit_upper=0.2, default=0.01
+        "ζ2",
+        "1",
+        "share of critical damping",
+        scale=0.01,
+        lower=0.0,
+        upper=0.9,
+        default=0.01,
+        fit_lower=_LEAST_DAMPING,
+        fit_upper=0.2,
     )
     exponent: float = parameter(
         "n", "1", "power of the release angle", scale=1.0, lower=0.0, upper=3.0, default=0.0, form=True
     )
 
     def plausible(self, omega: float) -> bool:
-        """Whether its frequency is not the motion's."""
-        return abs(self.frequency / omega - 1.0) > NEAR_MOTION
+        """Whether it is an oscillation of its own: not the motion's, and not so slow that it is a drift."""
+        return self.frequency > _SLOWEST * omega and abs(self.frequency / omega - 1.0) > NEAR_MOTION
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Add the oscillation at a phase of the run's own."""
