@@ -1,6 +1,6 @@
 """Seconds and memory of a diagnosis, and the same candidates fitted with `mujoco.sysid`.
 
-Run as ``python benchmarks/diagnosis.py``; see README.md beside it. The campaigns come from the MuJoCo model. Each
+Run as ``python -m benchmarks.diagnosis``; see README.md beside it. The campaigns come from the MuJoCo model. Each
 diagnosis runs in a process of its own, whose peak memory is the operating system's figure.
 """
 

@@ -1,6 +1,6 @@
 """Steps per second of FreeDecay-v0: the native vector environment against bare mujoco.batch and Gymnasium's async.
 
-Run as ``python benchmarks/envs.py``; see README.md beside it. Both sides of a ratio are measured in turn.
+Run as ``python -m benchmarks.envs``; see README.md beside it. Both sides of a ratio are measured in turn.
 """
 
 from __future__ import annotations

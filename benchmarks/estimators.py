@@ -1,6 +1,6 @@
 """Estimators side by side with other packages: RMSE over the Cramér–Rao bound and time, on the same records.
 
-Run as ``python benchmarks/estimators.py``; see README.md beside it. Every record goes through all methods in
+Run as ``python -m benchmarks.estimators``; see README.md beside it. Every record goes through all methods in
 turn, so that other load on the machine affects all of them.
 """
 

@@ -1,6 +1,6 @@
 """A sweep from end to end against the bare simulation of its runs, processes against threads, and memory.
 
-Run as ``python benchmarks/sweep.py``; see README.md beside it. Every sweep is done in a separate process, including
+Run as ``python -m benchmarks.sweep``; see README.md beside it. Every sweep is done in a separate process, including
 its start. The bare rate is that of ``mujoco.batch`` stepping the same runs, nothing recorded, on as many threads.
 """
 

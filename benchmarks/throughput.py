@@ -1,6 +1,6 @@
 """Throughput of the rig's model: with the plugin against without, and batches on two threads against one.
 
-Run as ``python benchmarks/throughput.py``; see README.md beside it. Every repetition measures both sides one
+Run as ``python -m benchmarks.throughput``; see README.md beside it. Every repetition measures both sides one
 after the other, so that other load on the machine affects both, and the ratio is taken within the repetition.
 """
 
