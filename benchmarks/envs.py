@@ -18,9 +18,9 @@ import numpy as np
 from mujoco import batch as mujoco_batch
 from rich.console import Console
 from rich.table import Table
-from throughput import interleaved, ratio
 
 import tunnel_sim.envs  # noqa: F401  registers the environments
+from benchmarks.throughput import interleaved, ratio
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.envs.conditions import plan_run
 from tunnel_sim.envs.config import FreeDecayConfig

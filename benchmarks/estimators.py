@@ -14,10 +14,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from peers import Method, present
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.peers import Method, present
 from identification.decay.run_fit import NO_WINDOWS
 from identification.estimators import ALL_ESTIMATORS, make_estimator
 from identification.estimators.output_error import OutputError

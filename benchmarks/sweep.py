@@ -119,7 +119,10 @@ def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]
 def apart(*words: str | int | Path) -> dict[str, float]:
     """One measurement in a separate process."""
     done = subprocess.run(
-        [sys.executable, __file__, *map(str, words)], stdout=subprocess.PIPE, text=True, check=True
+        [sys.executable, "-m", "benchmarks.sweep", *map(str, words)],
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
     )
     return dict(json.loads(done.stdout.splitlines()[-1]))
 

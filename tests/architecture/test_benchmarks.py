@@ -1,0 +1,26 @@
+"""The commands of the benchmarks' page start."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+COMMANDS = re.findall(
+    r"^python -m (benchmarks\.\w+)", (ROOT / "benchmarks/README.md").read_text(), re.MULTILINE
+)
+
+
+def test_every_benchmark_is_on_the_page() -> None:
+    files = {f"benchmarks.{path.stem}" for path in (ROOT / "benchmarks").glob("*.py")}
+    assert set(COMMANDS) == files - {"benchmarks.peers"}  # used by another
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("module", COMMANDS)
+def test_it_starts(module: str) -> None:
+    subprocess.run([sys.executable, "-m", module, "--help"], cwd=ROOT, check=True, capture_output=True)
