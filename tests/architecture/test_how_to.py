@@ -23,9 +23,10 @@ INDEX = ROOT / "docs" / "README.md"
         ("identify-a-record", ["springs"]),
         pytest.param("diagnose-a-campaign", ["simulate", "diagnose"], marks=pytest.mark.slow),
         pytest.param("state-uncertainties", ["simulate", "identify"], marks=pytest.mark.slow),
-        (
+        pytest.param(
             "from-a-data-logger-to-cn-beta",
             ["import", "identify", "simulate", "export", "import", "identify"],
+            marks=pytest.mark.slow,
         ),
         pytest.param("add-an-effect", ["effects", "simulate", "diagnose"], marks=pytest.mark.slow),
     ],
@@ -67,6 +68,7 @@ def test_the_figures_for_choosing_are_those_of_the_packaged_score(tmp_path: Path
         assert_same(text.splitlines(), output.splitlines())
 
 
+@pytest.mark.slow
 def test_the_class_of_ones_own_is_found(tmp_path: Path) -> None:
     shown = steps(PAGES / "add-an-effect.md")
     assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path) == ["", "stopper\n"]

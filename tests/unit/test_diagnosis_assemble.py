@@ -290,6 +290,7 @@ def test_records_without_noise_are_answered_with_a_status(effect, causes):
         assert answer.gap.p_value == 1.0
 
 
+@pytest.mark.slow
 def test_the_source_of_the_noise_is_said():
     data = campaign()
     assert diagnose(data, kinds=FEW).noise.source == "stated"
@@ -309,6 +310,7 @@ def test_the_probability_in_words_is_that_of_the_first_candidate(found):
     assert none.probability == 0.0
 
 
+@pytest.mark.slow
 def test_noise_that_misbehaves_is_unknown_once():
     """Every effect is weighed, and none explains noise that swells with the rate."""
     rng = np.random.default_rng(8)

@@ -125,6 +125,7 @@ def test_a_coefficient_that_is_not_determined_has_no_interval(given: Document) -
     assert (row["after"], row["interval"]) == ("not determined by these runs", "–")
 
 
+@pytest.mark.slow
 def test_a_p_value_is_never_zero(given: Document) -> None:
     none = given | {"gap": given["gap"] | {"tests": {"white": 0.0}}}
     assert Sections(render_report(none, campaign())).row("provenance", "white") == "< 1e-300"

@@ -93,6 +93,7 @@ def test_the_bound_is_that_of_the_start_actually_released():
         assert bound == pytest.approx(nominal.std(name), rel=0.12)  # releases scatter by 3 %
 
 
+@pytest.mark.slow
 def test_the_number_of_processes_changes_no_bit_and_an_interruption_costs_little(
     small, tmp_path, monkeypatch
 ):

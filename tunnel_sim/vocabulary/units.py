@@ -32,7 +32,7 @@ def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
     Args:
         one: powers of kg, m and s.
         other: powers of kg, m and s.
-        power: of the other, a number.
+        power: of the other, dimensionless.
     """
     kg, m, s = (a + power * b for a, b in zip(one, other, strict=True))
     return kg, m, s

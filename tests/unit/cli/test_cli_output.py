@@ -17,6 +17,7 @@ Tunnel = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[3]
 
 
+@pytest.mark.slow
 def test_diagnose_writes_before_it_prints(tiny_campaign: Path, tmp_path: Path) -> None:
     page, answer = tmp_path / "a.html", tmp_path / "a.json"
     words = ("diagnose", tiny_campaign, "--effects", "mains_hum", "--report", page)

@@ -112,6 +112,7 @@ def test_the_demo_sees_an_estimate_that_is_missing_or_failed(plan: CampaignPlan)
     assert reason.startswith("conventional: no run could be identified")
 
 
+@pytest.mark.slow
 def test_a_failed_check_ends_the_demo_with_status_one(
     tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, plan: CampaignPlan
 ) -> None:

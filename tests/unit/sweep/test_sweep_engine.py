@@ -195,6 +195,7 @@ def damages(first: Path, second: Path) -> Iterator[None]:
     yield
 
 
+@pytest.mark.slow
 def test_a_part_damaged_anywhere_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
     """Not only where its end is missing: a disk may lose a block in the middle."""
     store = run_sweep(sweep, tmp_path / "out", here).store
