@@ -69,7 +69,7 @@ double vwt_program_value(const vwt_program* program, const vwt_program_input* in
       case VWT_OPERATION_square: a[0] *= a[0]; break;
       case VWT_OPERATION_cube: a[0] = a[0] * a[0] * a[0]; break;
       case VWT_OPERATION_abs: a[0] = fabs(a[0]); break;
-      case VWT_OPERATION_sign: a[0] = (a[0] > 0) - (a[0] < 0); break;
+      case VWT_OPERATION_sign: a[0] = a[0] > 0 ? 1 : a[0] < 0 ? -1 : a[0]; break;  // NaN stays
       case VWT_OPERATION_sqrt: a[0] = sqrt(a[0]); break;
       case VWT_OPERATION_exp: a[0] = exp(a[0]); break;
       case VWT_OPERATION_log: a[0] = log(a[0]); break;

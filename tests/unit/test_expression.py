@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
@@ -67,6 +67,8 @@ _FORMULAS = st.recursive(
 
 @settings(max_examples=300, deadline=None)
 @given(_FORMULAS)
+@example("sign(sqrt(b))")
+@example("max(sqrt(b), min(log(r), t))")
 def test_the_compiled_law_and_numpy_agree(text: str) -> None:
     rng = np.random.default_rng(1)
     inputs = np.vstack([np.zeros(4), rng.normal(0.0, 1.0, (30, 4))])
