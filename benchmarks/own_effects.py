@@ -16,9 +16,9 @@ from rich.table import Table
 
 from benchmarks.throughput import interleaved, row, stepping
 from diagnosis import diagnose
+from tests.unit.own_effects import CUBIC, DETENT
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.cubic_stiffness import CubicStiffness
-from tunnel_sim.effects.expression_effect import Quantity, expression_effect
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.rig_file import load_rig
@@ -31,19 +31,6 @@ RUN = RunSettings(
     16.12, AeroDerivatives(0.35, -0.7), 0.1014, 0.018,
     wind_speed=20.0, air_density=1.204, release_angle=0.3, duration=20.0,
 )  # fmt: skip
-HARDENING = Quantity("1/rad2", 0.2, -10.0, 50.0, 0.0, "hardening")
-STATED = expression_effect(
-    "stated_cubic", channel="stiffness", moment="-k*Kr*b^3", parameters={"k": HARDENING}
-)
-DETENT = expression_effect(
-    "detent",
-    channel="stiffness",
-    moment="-k*b*exp(-(b/w)^2)",
-    parameters={
-        "k": Quantity("N m/rad", 0.1, 0.0, 50.0, 0.0, "stiffness at the centre"),
-        "w": Quantity("rad", 0.05, 0.01, 0.3, 0.06, "width"),
-    },
-)
 
 
 @dataclass(frozen=True)
@@ -72,9 +59,9 @@ def speeds(repetitions: int) -> Table:
         table.add_column(head)
     built_in = effect_class("cubic_stiffness")(1.0)
     model = {
-        e: build_model(load_rig(), e.on_run(RUN, RUN, None)).mj for e in (built_in, STATED(1.0), DETENT(1.0))
+        e: build_model(load_rig(), e.on_run(RUN, RUN, None)).mj for e in (built_in, CUBIC(1.0), DETENT(1.0))
     }
-    for name, effect in (("class", OwnCubic(1.0)), ("expression", STATED(1.0)), ("detent", DETENT(1.0))):
+    for name, effect in (("class", OwnCubic(1.0)), ("expression", CUBIC(1.0)), ("detent", DETENT(1.0))):
         times = interleaved(integrating(built_in), integrating(effect), repetitions)
         row(table, f"{name}, fits' integrator", 20_000, *times, "≥ 0.33")
         if effect in model:
@@ -101,7 +88,7 @@ def answers() -> Table:
     table = Table(title="One campaign with cubic stiffness of 0.3 /rad², diagnosed with each form")
     for head in ("form", "answer", "probability", "κ, 1/rad²", "closed", "seconds (CPU)"):
         table.add_column(head)
-    for form, kind in (("built in", CubicStiffness), ("class", OwnCubic), ("expression", STATED)):
+    for form, kind in (("built in", CubicStiffness), ("class", OwnCubic), ("expression", CUBIC)):
         begin = time.process_time()
         found = diagnose(campaign, kinds=(kind, *others))
         seconds = time.process_time() - begin

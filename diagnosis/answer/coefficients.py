@@ -19,7 +19,7 @@ from diagnosis.fitting.spectra import linear_coefficients
 from diagnosis.policy import COLOURED_EXCESS, EVEN_SHARE, FORM_CHANGE_STD
 from diagnosis.result import ParameterEstimate
 from identification.statistics.widening import scatter_of_runs
-from tunnel_sim.effects.base import WindOnRun
+from tunnel_sim.effects.fitting import WindOnRun
 from tunnel_sim.vocabulary.campaign import Campaign
 
 _UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1"}

@@ -15,7 +15,7 @@ from diagnosis.fitting.spectra import Line, mains_line, shedding_line
 from diagnosis.policy import GROSS_MISFIT
 from identification.decay.spectrum import highest_peak
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.base import Circumstances, Trial
+from tunnel_sim.effects.fitting import Circumstances, Trial
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.record import Array
 

@@ -1,4 +1,4 @@
-"""The laws of effects: an own class and an expression obey them, and five broken classes do not."""
+"""The laws of effects: an own class and an expression obey them, and broken ones do not."""
 
 from __future__ import annotations
 

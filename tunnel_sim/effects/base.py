@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
 
+from tunnel_sim.effects.fitting import Circumstances, Trial, WindOnRun, moment_scale
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
@@ -37,53 +38,6 @@ Law: TypeAlias = Mapping[str, float]
 
 #: What a run draws at random for an effect: nothing, a phase in rad, or random numbers, shape (n,).
 Drawn: TypeAlias = float | Array | None
-
-
-@dataclass(frozen=True)
-class Circumstances:
-    """What the starting values for the fit of an effect depend on.
-
-    Args:
-        springs: stated stiffnesses, ascending, N m/rad.
-        greatest_reading: greatest absolute reading of any run, rad.
-        normalised: whether runs are fitted per unit inertia.
-    """
-
-    springs: tuple[float, ...]
-    greatest_reading: float
-    normalised: bool
-
-
-@dataclass(frozen=True)
-class Trial:
-    """Starting values for the fit of an effect.
-
-    Args:
-        values: by parameter name; the others start at their defaults.
-        scaled: name of the parameter that linear theory rescales; None where the values are used as they are.
-    """
-
-    values: Mapping[str, float]
-    scaled: str | None
-
-
-@dataclass(frozen=True)
-class WindOnRun:
-    """A wind-on run in the fitted model.
-
-    Args:
-        spring_stiffness: Kr, N m/rad.
-        omega: natural frequency with the wind on, rad/s.
-        still_omega: natural frequency of the same rig in still air, rad/s.
-        per_cn_beta: ½ρV²Al, which multiplies Cnβ, N m.
-        per_cn_r: ½ρVAl², which multiplies Cnr, N m s.
-    """
-
-    spring_stiffness: float
-    omega: float
-    still_omega: float
-    per_cn_beta: float
-    per_cn_r: float
 
 
 @dataclass(frozen=True)
@@ -378,18 +332,6 @@ def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:
                 f"unknown parameter {name!r}", where=f"effect {kind.name}", remedy=did_you_mean(name, known)
             )
     return kind(**parameters)
-
-
-def moment_scale(info: ParameterInfo, campaign: Circumstances) -> float:
-    """Factor on a parameter's typical value: in normalised form moments are divided by about 0.1 kg m².
-
-    Args:
-        campaign: says whether runs are normalised.
-
-    Returns:
-        10 for a moment in normalised form, else 1.
-    """
-    return 10.0 if campaign.normalised and info.unit.startswith("N m") else 1.0
 
 
 def with_law(run: RunSettings, **values: float) -> RunSettings:

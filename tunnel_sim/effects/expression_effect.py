@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tunnel_sim.effects.base import Channel, Circumstances, Condition, Drawn, Effect, Trial, moment_scale
+from tunnel_sim.effects.base import Channel, Condition, Drawn, Effect
+from tunnel_sim.effects.fitting import Circumstances, Trial, moment_scale
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings

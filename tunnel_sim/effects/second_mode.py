@@ -11,8 +11,8 @@ from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
-_LEAST_DAMPING = 1e-4  # of a structure; a line that does not decay is not a mode of it
-_SLOWEST = 0.1  # of the motion's frequency: what is slower drifts in a record of some ten cycles
+_LEAST_DAMPING = 1e-4  # of a structure: judgement; a line that does not decay is not a mode
+_SLOWEST = 0.1  # of the motion's frequency: judgement; what is slower is a drift in a record of ten cycles
 _REFERENCE_RELEASE = 0.35  # rad: where all exponents give the same amplitude
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Circumstances, Effect, Trial
+from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.fitting import Circumstances, Trial
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.vocabulary.record import Array
 

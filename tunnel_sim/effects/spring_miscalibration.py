@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isclose
 
-from tunnel_sim.effects.base import SPRING_TOLERANCE, Circumstances, Drawn, Effect, Trial
+from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect
+from tunnel_sim.effects.fitting import Circumstances, Trial
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log, pi, sqrt
 
-from tunnel_sim.effects.base import Effect, Law, WindOnRun
+from tunnel_sim.effects.base import Effect, Law
+from tunnel_sim.effects.fitting import WindOnRun
 from tunnel_sim.effects.parameters import parameter
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Circumstances, Effect, Law, Trial, WindOnRun
+from tunnel_sim.effects.base import Effect, Law
+from tunnel_sim.effects.fitting import Circumstances, Trial, WindOnRun
 from tunnel_sim.effects.parameters import parameter
 
 #: Uncertainty of Cnr as a share of the first-order effect a·Cnβ, chosen from the errors in the tuning sets.

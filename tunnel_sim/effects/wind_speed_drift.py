@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Circumstances, Drawn, Effect, Trial
+from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.fitting import Circumstances, Trial
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.effects.ramp import EQUATION, ramp, settling
 from tunnel_sim.physics.run_settings import RunSettings, Series
