@@ -6,6 +6,7 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from test_readme import BLOCK, HOW_TO, ROOT, assert_same, output_of, sessions, toml_block
 from test_tutorials import printed, steps
@@ -72,6 +73,18 @@ def test_the_figures_for_choosing_are_those_of_the_packaged_score(tmp_path: Path
 def test_the_class_of_ones_own_is_found(tmp_path: Path) -> None:
     shown = steps(PAGES / "add-an-effect.md")
     assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path) == ["", "stopper\n"]
+
+
+def test_the_import_from_python_runs(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "reference" / "import.md").read_text(encoding="utf-8")
+    (code,) = [code for kind, code in BLOCK.findall(page) if kind == "python"]
+    time = np.arange(1000) / 100.0
+    rows = zip(time, 12.0 * np.exp(-0.1 * time) * np.cos(9.0 * time), strict=True)
+    text = "".join(f"{t:.2f},{angle:.4f}\n" for t, angle in rows)
+    (tmp_path / "log.csv").write_text("time,angle\n" + text, encoding="utf-8")
+    (out,) = printed([code], tmp_path)
+    assert out.startswith("100.0\n")
+    assert (tmp_path / "rig" / "campaign.toml").exists()
 
 
 def test_every_estimator_that_is_scored_has_its_line() -> None:
