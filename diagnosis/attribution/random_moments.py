@@ -19,6 +19,7 @@ from diagnosis.fitting.least_squares import Fit
 from diagnosis.policy import (
     BESIDE_EVIDENCE,
     CLOSED_WITHOUT_RANDOM,
+    HEAVY_TAILS,
     RANDOM_PARTNERS,
     RIVAL_EVIDENCE,
     STEADY_IN_TIME,
@@ -63,8 +64,8 @@ def weigh_random_moments(
 
     Returns:
         The most likely answer of each kind that passes, alone unless the evidence for an effect beside it is
-        strong. To pass, the innovations must be white by band and steady in time, and the wind-off runs free of a
-        gap. Empty where none passes, or where deterministic effects close the gap.
+        strong. To pass, the innovations must be white by band, steady in time and without heavy tails, and the
+        wind-off runs free of a gap. Empty where none passes, or where deterministic effects close the gap.
     """
     if any(
         max(hypothesis.fit.excess, 0.0) < CLOSED_WITHOUT_RANDOM * nominal.excess for hypothesis in hypotheses
@@ -116,8 +117,8 @@ def _try(
     process = explain(fit)
     if process is None or process.drop <= 0.0:
         return None
-    band, quarter, _ = whiteness(process)
-    if band > WHITE_BY_BAND or quarter > STEADY_IN_TIME:
+    band, quarter, tails = whiteness(process)
+    if band > WHITE_BY_BAND or quarter > STEADY_IN_TIME or tails > HEAVY_TAILS:
         return None
     share = (abs(process.excess) + max(off, 0.0)) / max(nominal.excess, 1e-9)
     return RandomAnswer(kind, process, beside, share)
