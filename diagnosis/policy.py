@@ -127,7 +127,7 @@ HEAVY_TAILS = 0.3
 WIND_OFF_SHARE, WIND_OFF_LEAST = 0.05, 0.1
 #: Single effects beside which a random moment is tried. Judgement: time against coverage.
 RANDOM_PARTNERS = 3
-#: −2 ln L by which an effect beside the random moment must improve on the moment alone. Judgement: a parameter
+#: −2 ln L by which every effect beside the random moment must improve it. Judgement: a parameter
 #: fitted by least squares to a random motion gains about ten for nothing.
 BESIDE_EVIDENCE = 60.0
 #: −2 ln L beyond which a likelier kind of random moment rules another out. Convention: odds of e^10.
