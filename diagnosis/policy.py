@@ -104,6 +104,9 @@ FORM_MISFIT_UP_TO = 1000.0
 CHANCE_STDS = 2.0
 #: Share at which a cause is as likely as an unknown one. Tuned.
 UNKNOWN_SHARE = 0.2
+#: Factor on that share for every further effect of the set that is compared with ``unknown``. Tuned (0018): on 15
+#: campaigns whose cause was not among the effects tried, four effects seldom closed much more than one.
+UNKNOWN_FURTHER = 0.7
 #: A second effect must leave less than this share of what the first leaves. Tuned.
 PAIR_SHARE = 0.40
 #: A freed form must leave less than this share of what is left without it. Tuned.
