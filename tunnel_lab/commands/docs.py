@@ -24,8 +24,9 @@ def run(
     run. It is kept in _build/html of the folder; pages that have not changed
     are not built again. It needs the extra 'docs'.
 
-    [bold]Example[/bold]
+    [bold]Examples[/bold]
       tunnel docs
+      tunnel docs --no-browser
 
     [bold]Exit status[/bold]
       0 built, 1 a page could not be built, 2 bad input.
