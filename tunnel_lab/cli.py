@@ -43,7 +43,7 @@ CommandLineError = cast("type[Exception]", typer.BadParameter.__mro__[2])
 app = typer.Typer(
     name="tunnel",
     no_args_is_help=False,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
