@@ -80,8 +80,13 @@ def test_gap(
         smallest < limit,
         min(1.0, smallest * len(everything)),
         everything,
-        any(p < limit * NOISE_FALSE_ALARM_SHARE for p in noisy.values()),
+        any(p < _misbehaves(everything) for p in noisy.values()),
     )
+
+
+def _misbehaves(tests: Mapping[str, float]) -> float:
+    """The p-value of one of these tests below which the noise itself misbehaves."""
+    return GAP_FALSE_ALARM_RATE * NOISE_FALSE_ALARM_SHARE / len(tests)
 
 
 def judge(
@@ -101,6 +106,7 @@ def judge(
         the motion is slow and the noise small, and fit and noise are whitened where the noise is coloured. Where
         whitening does not close the gap, colour is believed only if runs with the wind off have it, and if it shows
         above the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion.
+        Nor is it believed where there would be more noise than is stated.
     """
     errors = rounding_errors(nominal, noise.variance, step)
     allowed = None if errors is None else with_rounding(nominal.problem.data, errors)
@@ -114,7 +120,8 @@ def judge(
     coloured = noise.coloured(found, nominal.problem.data)
     test = test_gap(white, coloured, trend, coarse_step=coarse_step, errors=errors)
     still = any(not run.wind_on for run in nominal.problem.data.runs)
-    if test.detected and not (still and noise_colour(nominal, beyond=BEYOND_THE_MOTION)):
+    excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests)
+    if test.detected and (excessive or not (still and noise_colour(nominal, beyond=BEYOND_THE_MOTION))):
         return nominal, noise, plain
     return white, coloured, test
 

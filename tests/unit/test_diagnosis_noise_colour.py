@@ -128,6 +128,15 @@ def test_the_spectrum_and_its_uncertainty_are_those_of_the_noise():
     assert np.all(scatter > 0.25 * claimed)
 
 
+@pytest.mark.parametrize(("stated", "believed"), [(np.sqrt(5.0), True), (1.0, False)])
+def test_colour_beside_a_gap_is_not_believed_where_more_noise_is_seen_than_stated(stated, believed):
+    data = coloured(campaign(effect_class("coulomb_friction")(0.003)), "ar1")
+    sensor = dataclasses.replace(data.sensor, noise_std=stated * NOISE)
+    _, noise, found = judged(dataclasses.replace(data, sensor=sensor))
+    assert found.detected
+    assert (noise.colour is not None) == believed
+
+
 def test_what_is_said_of_the_noise():
     slow = NoiseTrend(0.0, 0.0, 0.0, judged=False)
     data = coloured(campaign(), "pink")
