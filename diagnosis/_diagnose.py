@@ -12,6 +12,7 @@ from diagnosis.answer.own_units import in_own_units
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.limit_cycles import diagnosable
 from diagnosis.detection.noise_remarks import noise_remarks
+from diagnosis.detection.own_model import SLIDE, with_law
 from diagnosis.detection.refusal import refuse_hopeless
 from diagnosis.investigate import Progress, investigate
 from diagnosis.localisation.localise import localise
@@ -20,10 +21,15 @@ from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.joint_law import JointLaw
 
 
 def diagnose(
-    campaign: Campaign, *, kinds: Sequence[type[Effect]] | None = None, progress: Progress | None = None
+    campaign: Campaign,
+    *,
+    kinds: Sequence[type[Effect]] | None = None,
+    progress: Progress | None = None,
+    law: JointLaw | None = None,
 ) -> Diagnosis:
     """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
@@ -31,6 +37,7 @@ def diagnose(
         campaign: measured or simulated runs.
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
+        law: of the joint in a model of one's own, which is then the nominal model (`read_own_model`).
 
     Returns:
         The answer, for the runs that one model can be fitted to; its cautions name the others.
@@ -40,6 +47,7 @@ def diagnose(
             cannot be fitted to them.
     """
     kinds = known_effects() if kinds is None else kinds
+    campaign = campaign if law is None else with_law(campaign, law)
     with answering_with(kinds):
         return _diagnose(campaign, kinds, progress)
 
@@ -53,6 +61,8 @@ def _diagnose(campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progr
         # Their sizes are those of angles, and their ranges too.
         kinds = [kind for kind in kinds if kind.channel != "sensor"]
         left_out = (*left_out, f"Effects of the sensor are not tried on {campaign.sensor.quantity}s.")
+    if campaign.law is not None and campaign.law.slide:
+        left_out = (*left_out, SLIDE)
     try:
         study = investigate(campaign, () if found.limit_cycles else kinds, progress)
     except TunnelError as error:

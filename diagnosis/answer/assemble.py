@@ -20,6 +20,7 @@ from diagnosis.answer.pulls import coefficient_move
 from diagnosis.answer.reference_sizes import size_note, sized_coefficients
 from diagnosis.answer.reported import excess_base, gap_summary, on_stretches, report_fits
 from diagnosis.answer.rest import rest
+from diagnosis.answer.small_swings import coefficient_names
 from diagnosis.answer.verdict import blind_spots, cnr_note, verdict
 from diagnosis.answer.waterfall import waterfall
 from diagnosis.attribution.decide import Weighed
@@ -122,7 +123,7 @@ def _in_own_units(
     study: Study, stated: Mapping[str, ParameterEstimate], chosen: Fit
 ) -> tuple[dict[str, ParameterEstimate], dict[str, float]]:
     """The coefficients stated, and how far what remains moves each, in the measured campaign's units."""
-    names = ("omega_n", "zeta") if chosen.problem.data.normalised else ("cn_beta", "cn_r")
+    names = coefficient_names(chosen.problem)
     return {name: own_estimate(given, study.similarity) for name, given in stated.items()}, {
         name: study.similarity.own(coefficient_move(chosen, coefficient), given.unit)
         for (name, given), coefficient in zip(stated.items(), names, strict=False)
