@@ -112,10 +112,17 @@ def patch_table(document: Mapping[str, Any]) -> TextTable:
     """
     model = document.get("model") or {"written": (), "file": ""}
     rows = [
-        (w["name"], _numbers(w["before"]), _numbers(w["after"]), "" if w["unit"] == "1" else unit_mark(w["unit"]))
+        (
+            w["name"],
+            _numbers(w["before"]),
+            _numbers(w["after"]),
+            "" if w["unit"] == "1" else unit_mark(w["unit"]),
+        )
         for w in model["written"]
     ]
-    return TextTable(f"Changes to {model['file']}", ("", "before", "after", ""), tuple(rows), ("before", "after"))
+    return TextTable(
+        f"Changes to {model['file']}", ("", "before", "after", ""), tuple(rows), ("before", "after")
+    )
 
 
 def patch_lines(document: Mapping[str, Any]) -> list[str]:
@@ -132,8 +139,8 @@ def patch_lines(document: Mapping[str, Any]) -> list[str]:
         return []
     closed, by_fit = (f"{100.0 * model[name]:.1f} %" for name in ("closed", "closed_by_fit"))
     return [
-        f"The patched model, simulated by MuJoCo as it stands, closes {closed} of the gap {model['closed_on']}; the fit "
-        f"itself {by_fit}. The reading is the position of {model['joint']} {model['zero_rad']:+.4g} rad.",
+        f"The patched model, simulated by MuJoCo as it stands, closes {closed} of the gap {model['closed_on']}; "
+        f"the fit itself {by_fit}. The reading is the position of {model['joint']} {model['zero_rad']:+.4g} rad.",
         *(f"- {note}" for note in model["notes"]),
     ]
 

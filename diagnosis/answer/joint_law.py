@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.fitting.problem import Problem, condensed
 from tunnel_sim.engine.joint_patch import JointPatch, Start
-from tunnel_sim.physics.expression import parse
+from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.moment_law import operation_names
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
@@ -17,16 +17,37 @@ from tunnel_sim.vocabulary.record import Array
 _FAITHFUL = 0.02  # of a moment's greatest value: what a polynomial may miss of it
 _GRID = 201
 
-#: Moments of the angle as expressions; each is written where its first parameter is not zero.
+#: Terms of the moment law: the coefficient without which there is none, the effect in words, the moment.
 _OF_ANGLE = (
-    "-Kr*stiffness_cubic*0.2^3*abs(b/0.2)^stiffness_cubic_exponent*sign(b)",
-    "-Kr*stiffness_quadratic*0.2^2*abs(b/0.2)^stiffness_quadratic_exponent",
-    "Kr*max(-free_play, min(free_play, b))",
-    "-gravity_stiffness*sin(b-gravity_angle)",
+    (
+        "stiffness_cubic",
+        "cubic stiffness",
+        "-Kr*stiffness_cubic*0.2^3*abs(b/0.2)^stiffness_cubic_exponent*sign(b)",
+    ),
+    (
+        "stiffness_quadratic",
+        "asymmetric stiffness",
+        "-Kr*stiffness_quadratic*0.2^2*abs(b/0.2)^stiffness_quadratic_exponent",
+    ),
+    ("free_play", "free play", "Kr*max(-free_play, min(free_play, b))"),
+    (
+        "gravity_stiffness",
+        "gravity stiffness",
+        "-gravity_stiffness*(sin(b-gravity_angle)+sin(gravity_angle))",
+    ),
 )
-_OF_RATE = ("-quadratic_damping*2^2*abs(r/2)^quadratic_damping_exponent*sign(r)",)
-_TEXTBOOK = {"stiffness_cubic_exponent": 3.0, "stiffness_quadratic_exponent": 2.0, "quadratic_damping_exponent": 2.0}
-_NATIVE = frozenset({"friction_moment", "loss_factor"})
+_OF_RATE = (
+    (
+        "quadratic_damping",
+        "quadratic damping",
+        "-quadratic_damping*2^2*abs(r/2)^quadratic_damping_exponent*sign(r)",
+    ),
+)
+_TEXTBOOK = {
+    "stiffness_cubic_exponent": 3.0,
+    "stiffness_quadratic_exponent": 2.0,
+    "quadratic_damping_exponent": 2.0,
+}
 
 
 @dataclass(frozen=True)
@@ -65,27 +86,28 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float) -> 
     rate = reach * np.sqrt(physics.spring_stiffness / physics.yaw_inertia)
     r = np.linspace(-rate, rate, _GRID)
     notes: list[str] = []
+    loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
+        physics.spring_stiffness * physics.yaw_inertia
+    )
     spring = np.array([physics.spring_stiffness - law.stiffness, 0.0, 0.0])
-    loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(physics.spring_stiffness * physics.yaw_inertia)
-    damping = np.array([physics.mechanical_damping + loss, *_own_damping(problem)])
+    damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
     program = _further(physics.program, data.program)
-    for texts, name, grid, forms, native in (
+    for terms, name, grid, forms, native in (
         (_OF_ANGLE, "b", b, (b, b**2, b**3), spring),
         (_OF_RATE, "r", r, (r, np.abs(r) * r, r**3), damping),
     ):
-        for text in texts:
-            values = _values(text, physics)
-            if values is None:
+        for coefficient, words, text in terms:
+            if physics.parameters.get(coefficient, 0.0) == 0.0:
                 continue
-            formula = parse(text, frozenset({name, *values}))
-            moment = formula.value({**values, name: grid})
-            found = _polynomial(forms, -moment, start=native)
-            if found is not None and abs(float(formula.value({**values, name: 0.0}))) < _FAITHFUL * np.ptp(moment):
-                native += found[0]
-                notes += _approximation(text, found[1])
+            formula = parse(text, _NAMES)
+            values = _values(formula, physics)
+            found, missed = _polynomial(forms, -formula.value({**values, name: grid}))
+            if missed < _FAITHFUL and not (name == "r" and native[0] + law.damping + found[0] < 0.0):
+                native += found
+                notes += _approximation(words, missed)
             else:
                 program = _joined(program, formula.program(values, {"b": "angle", "r": "rate"}))
-                notes.append(f"{_short(text)} has no native element; the plugin vwt.yaw_moment adds it.")
+                notes.append(f"The {words} has no native element; the plugin vwt.yaw_moment adds it.")
     notes += _unwritten(physics, problem)
     place = law.rest + data.similarity.rest
     units = ("N m/rad", "N m/rad2", "N m/rad3"), ("N m s/rad", "N m s2/rad2", "N m s3/rad3")
@@ -115,60 +137,42 @@ def start_of(problem: Problem, own: Array, index: int) -> Start:
     return Start(run.id, change.own(run.start, "s"), float(own[0]), change.own(float(own[1]), "rad/s"))
 
 
-def _own_damping(problem: Problem) -> tuple[float, float]:
-    """The damping of higher order that the model has already."""
-    law = problem.data.law
-    assert law is not None
-    terms = {term.expression: term.coefficient for term in law.terms}
-    return terms.get("abs(r)*r", 0.0), terms.get("r^3", 0.0)
+_NAMES = frozenset(
+    {"b", "r", "Kr", "gravity_angle", *_TEXTBOOK, *(name for name, *_ in (*_OF_ANGLE, *_OF_RATE))}
+)
 
 
-def _values(text: str, physics: RunSettings) -> dict[str, float] | None:
-    """Values of the names in an expression; None where its coefficient is zero."""
-    names = parse(text, frozenset({"b", "r", "Kr", *_TEXTBOOK, *_SEVERITIES, "gravity_angle"})).names - {"b", "r"}
-    severity = next(name for name in _SEVERITIES if name in names)
-    if physics.parameters.get(severity, 0.0) == 0.0:
-        return None
+def _values(formula: Expression, physics: RunSettings) -> dict[str, float]:
+    """Values of the constants in an expression."""
     known = {"Kr": physics.spring_stiffness, **physics.parameters}
-    return {name: known.get(name, 0.0) or _TEXTBOOK.get(name, 0.0) for name in names}
+    return {name: known.get(name, 0.0) or _TEXTBOOK.get(name, 0.0) for name in formula.names - {"b", "r"}}
 
 
-_SEVERITIES = ("stiffness_cubic", "stiffness_quadratic", "free_play", "gravity_stiffness", "quadratic_damping")
-
-
-def _polynomial(forms: tuple[Array, ...], wanted: Array, start: Array) -> tuple[Array, float] | None:
-    """Coefficients of native forms, and what they miss as a share; None where that is too much.
-
-    The linear coefficient may not become negative beside ``start``, which the engine would refuse.
-    """
+def _polynomial(forms: tuple[Array, ...], wanted: Array) -> tuple[Array, float]:
+    """Coefficients of native forms, and what they miss as a share of the greatest moment."""
     columns = np.array(forms).T
     sizes = np.max(np.abs(columns), axis=0)
     found = np.linalg.lstsq(columns / sizes, wanted, rcond=1e-12)[0]
     found[np.abs(found) < 1e-9 * np.max(np.abs(wanted))] = 0.0
     found /= sizes
-    missed = float(np.max(np.abs(columns @ found - wanted)) / np.max(np.abs(wanted)))
-    return None if missed > _FAITHFUL or start[0] + found[0] < 0.0 else (found, missed)
+    return found, float(np.max(np.abs(columns @ found - wanted)) / np.max(np.abs(wanted)))
 
 
-def _approximation(text: str, missed: float) -> list[str]:
+def _approximation(words: str, missed: float) -> list[str]:
     if missed < 1e-6:
         return []
     return [
-        f"{_short(text)} is written as a polynomial of third order, which misses {100.0 * missed:.2g} % of its "
+        f"The {words} is written as a polynomial of third order, which misses {100.0 * missed:.2g} % of its "
         f"greatest moment within the records."
     ]
-
-
-def _short(text: str) -> str:
-    return next(name for name in _SEVERITIES if name in text).replace("_", " ")
 
 
 def _unwritten(physics: RunSettings, problem: Problem) -> list[str]:
     notes = []
     if physics.parameters.get("friction_moment"):
         notes.append(
-            "frictionloss is a soft constraint: below a small rate it yields as a damper does, and at rest the joint "
-            "creeps; its time constant is set to two steps."
+            "frictionloss is a soft constraint: near rest it yields as a damper does, and the joint creeps. Its "
+            "time constant is set to two steps, the shortest allowed."
         )
     if physics.parameters.get("presliding"):
         notes.append("The presliding of the friction has no native element and is left out.")
@@ -179,7 +183,9 @@ def _unwritten(physics: RunSettings, problem: Problem) -> list[str]:
     sensors = [kind.name for kind in problem.effects if kind.channel == "sensor"]
     if sensors:
         named = ", ".join(name.replace("_", " ") for name in sensors)
-        notes.append(f"Of the sensor, and not part of the model: {named}; the comparison applies it to the reading.")
+        notes.append(
+            f"Of the sensor, and not part of the model: {named}; the comparison applies it to the reading."
+        )
     return notes
 
 

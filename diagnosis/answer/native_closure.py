@@ -61,7 +61,9 @@ def native_closure(
                 before.append(plain[runs[i].id][left])
                 fitted.append(caused[runs[i].id][left])
                 native.append(seen[left])
-    return NativeClosure(_power(before), _power(fitted), _power(native), "on stretches of time held out of the fit")
+    return NativeClosure(
+        _power(before), _power(fitted), _power(native), "on stretches of time held out of the fit"
+    )
 
 
 def _power(residuals: Sequence[Array]) -> float:
@@ -69,7 +71,12 @@ def _power(residuals: Sequence[Array]) -> float:
 
 
 def _residual(
-    problem: Problem, common: Array, own: Array, index: int, simulate: Simulate, seen: NDArray[np.bool_] | None = None
+    problem: Problem,
+    common: Array,
+    own: Array,
+    index: int,
+    simulate: Simulate,
+    seen: NDArray[np.bool_] | None = None,
 ) -> Array:
     """Reading minus the engine's prediction, in noise standard deviations, its start refitted to what was seen."""
     seen = np.ones(problem.data.runs[index].reading.size, bool) if seen is None else seen

@@ -173,7 +173,8 @@ def _law(law: JointLaw, change: Similarity) -> JointLaw:
         friction=change.similar(law.friction, "N m"),
         rest=law.rest - change.rest,
         terms=tuple(
-            dataclasses.replace(term, coefficient=change.similar(term.coefficient, term.unit)) for term in law.terms
+            dataclasses.replace(term, coefficient=change.similar(term.coefficient, term.unit))
+            for term in law.terms
         ),
     )
 

@@ -52,7 +52,9 @@ def run(
     effects_file: EffectsFileOption = None,
     model: Annotated[
         Path | None,
-        typer.Option("--model", metavar="FILE.xml", help="A model of your own, MJCF or URDF, as the nominal model."),
+        typer.Option(
+            "--model", metavar="FILE.xml", help="A model of your own, MJCF or URDF, as the nominal model."
+        ),
     ] = None,
     joint: Annotated[
         str | None, typer.Option("--joint", metavar="NAME", help="Its joint that was recorded; for --model.")
@@ -60,12 +62,16 @@ def run(
     free: Annotated[
         list[str] | None,
         typer.Option(
-            "--free", metavar="A,B", help="What of it is fitted: inertia, damping, stiffness, rest. Default: what matters."
+            "--free",
+            metavar="A,B",
+            help="What of it is fitted: inertia, damping, stiffness, rest. Default: what matters.",
         ),
     ] = None,
     patch: Annotated[
         Path | None,
-        typer.Option("--patch", metavar="OUT.xml", help="Write the model with the causes in it; for --model."),
+        typer.Option(
+            "--patch", metavar="OUT.xml", help="Write the model with the causes in it; for --model."
+        ),
     ] = None,
 ) -> None:
     """Find out why the nominal model does not fit the runs of a campaign.
@@ -103,9 +109,13 @@ def run(
     to_stdout = json is not None and str(json) == "-"
     refuse_unwritable_files(None if to_stdout else json, report, patch)
     if (model is None) != (joint is None) or (model is None and (free or patch)):
-        raise TunnelError("--model and --joint belong together, and --free and --patch to them", remedy="give both")
+        raise TunnelError(
+            "--model and --joint belong together, and --free and --patch to them", remedy="give both"
+        )
     data = given_campaign(campaign)
-    own = None if model is None or joint is None else read_model(model, joint, data, split_names(free) or None)
+    own = (
+        None if model is None or joint is None else read_model(model, joint, data, split_names(free) or None)
+    )
     answer = diagnose_with_progress(data, kinds, own)
     document = answer.to_json_dict()
     # Files first: the reader of a pipe may close it early.
@@ -153,7 +163,9 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
 
     if answer.model is None:
         raise TunnelError(
-            "there is no patched model to write", where="--patch", remedy="the answer without --patch says why"
+            "there is no patched model to write",
+            where="--patch",
+            remedy="the answer without --patch says why",
         )
     answer.model.write(path)
 

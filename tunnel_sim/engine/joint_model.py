@@ -19,7 +19,13 @@ _GRID = 361  # positions at which the moment is tabulated
 _EXACT = 1e-8  # of the greatest moment: what the terms of the law may leave, the engine's own rounding
 _PRESENT = 1e-9  # of the greatest moment: a smaller term is rounding
 _RATES = np.array([-3.0, -1.0, -0.3, 0.3, 1.0, 3.0])  # times the rate of the motion
-_MOMENTS = (("b", "N m/rad"), ("sin(b)-b", "N m"), ("cos(b)-1", "N m"), ("b^2", "N m/rad2"), ("b^3", "N m/rad3"))
+_MOMENTS = (
+    ("b", "N m/rad"),
+    ("sin(b)-b", "N m"),
+    ("cos(b)-1", "N m"),
+    ("b^2", "N m/rad2"),
+    ("b^3", "N m/rad3"),
+)
 _DAMPING = (("r", "N m s/rad"), ("abs(r)*r", "N m s2/rad2"), ("r^3", "N m s3/rad3"))
 _TYPES = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
 
@@ -43,17 +49,15 @@ class JointModel:
         return _read(self.path)
 
 
-def read_joint_model(
-    path: Path, joint: str, reach: float, free: Sequence[str] | None = None
-) -> JointModel:
+def read_joint_model(path: Path, joint: str, reach: float, free: Sequence[str] | None = None) -> JointModel:
     """Read a model, and the law of one joint from the engine's moments.
 
     Args:
         path: MJCF, or URDF that MuJoCo loads.
         joint: a hinge or slide, the only joint that moves.
         reach: greatest displacement from rest in the records, rad (m for a slide).
-        free: which of `FREE_PARAMETERS` are fitted; None: inertia, damping and rest position, and the stiffness where
-            the joint has a spring beside gravity.
+        free: which of `FREE_PARAMETERS` are fitted; None: inertia, damping and rest position, and the stiffness
+            where the joint has a spring beside gravity.
 
     Returns:
         The model. Its law is exact: the restoring moment is that of gravity and springs over the whole turn (for a
@@ -80,7 +84,9 @@ def _with_free(law: JointLaw, free: tuple[str, ...]) -> JointLaw:
     for name in free:
         if name not in FREE_PARAMETERS:
             raise TunnelError(
-                f"unknown parameter {one_line(name)!r}", where="--free", remedy=did_you_mean(name, FREE_PARAMETERS)
+                f"unknown parameter {one_line(name)!r}",
+                where="--free",
+                remedy=did_you_mean(name, FREE_PARAMETERS),
             )
     if {"inertia", "stiffness"} <= set(free) and not law.terms:
         raise TunnelError(
@@ -121,7 +127,7 @@ def _checked_joint(model: mujoco.MjModel, joint: str) -> str:
     """
     names = [model.joint(i).name for i in range(model.njnt)]
     if joint not in names:
-        raise TunnelError("there is no such joint", remedy=did_you_mean(joint, [n for n in names if n] or ["a name"]))
+        raise TunnelError("there is no such joint", remedy=did_you_mean(joint, filter(None, names)))
     others = [name or "without a name" for name in names if name != joint]
     if others:
         raise TunnelError(
@@ -214,8 +220,8 @@ def _fitted(
 ) -> dict[str, float] | None:
     """Coefficients by expression, those that are rounding left out; None where the forms do not make the moment.
 
-    ``scale`` is the moment (N m) against which rounding is judged. The slope of the sine at rest is left to the linear
-    term, so that the latter is the whole slope.
+    ``scale`` is the moment (N m) against which rounding is judged. The slope of the sine at rest is left to the
+    linear term, so that the latter is the whole slope.
     """
     from tunnel_sim.physics.expression import parse
 

@@ -15,7 +15,14 @@ from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.physics.motion import Motion
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 
-_AIR = ("air_density", "wind_speed", "frontal_area", "reference_length", "cn_beta", "cn_r")  # the plugin wants them
+_AIR = (
+    "air_density",
+    "wind_speed",
+    "frontal_area",
+    "reference_length",
+    "cn_beta",
+    "cn_r",
+)  # the plugin wants them
 _STIFF_STEPS = 2.0  # time constant of frictionloss in steps: the shortest that MuJoCo accepts
 
 
@@ -26,9 +33,9 @@ class JointPatch:
     Args:
         inertia: the whole inertia about the joint, kg m².
         spring: added restoring moment, the coefficients of b, b² and b³, N m/rad, N m/rad² and N m/rad³.
-        damping: the whole damping, the coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad², N m s³/rad³.
+        damping: added damping, the coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³.
         friction: the whole moment of dry friction, N m.
-        program: of a further moment, for the plugin (``mjcf/plugin/expression.h``); its angle is the joint's position.
+        program: of a further moment, for the plugin (``mjcf/plugin/expression.h``), in the joint's position.
         noise: standard deviation of the sensor's noise, rad; 0: not written.
     """
 
@@ -96,15 +103,19 @@ def patched(
     joint.springdamper = (0.0, 0.0)  # stiffness and damping are written themselves
     _write_inertia(spec, before, model, patch)
     _write_spring(joint, before, model, patch, degrees=bool(spec.compiler.degree))
-    joint.damping = np.array(patch.damping)
+    own = np.array([before.dof_damping[0], *before.dof_dampingpoly[0]])
+    joint.damping = own + patch.damping
+    joint.damping[0] = max(joint.damping[0], 0.0)  # a damping fitted as 0 less the model's own, rounded
     joint.frictionloss = patch.friction
-    if patch.friction > 0.0:
+    if patch.friction != before.dof_frictionloss[0]:
         joint.solref_friction = (_STIFF_STEPS * spec.option.timestep, 1.0)
     if patch.program:
         _write_program(spec, model, patch.program)
-    _write_sensor(spec, before, model, patch.noise)
+    _write_sensor(spec, model, patch.noise)
     for start in starts:
-        spec.add_key(name=f"{start.run} at {start.time:.6g} s", qpos=[model.law.rest + start.angle], qvel=[start.rate])
+        spec.add_key(
+            name=f"{start.run} at {start.time:.6g} s", qpos=[model.law.rest + start.angle], qvel=[start.rate]
+        )
     try:
         after = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
@@ -177,7 +188,9 @@ def _write_spring(
     roots = total.roots() if total.degree() else np.array([0.0])
     real = roots.real[np.abs(roots.imag) < 1e-6]
     if real.size == 0:
-        raise TunnelError("the spring of the patched model would vanish nowhere", remedy="give it a spring of its own")
+        raise TunnelError(
+            "the spring of the patched model would vanish nowhere", remedy="give it a spring of its own"
+        )
     zero = float(real[np.argmin(np.abs(real + offset))]) if np.any(own.coef) else 0.0
     about = total(np.polynomial.Polynomial([zero, 1.0])).coef
     joint.stiffness = np.array([*about[1:], 0.0, 0.0, 0.0])[:3]
@@ -196,7 +209,7 @@ def _write_program(spec: mujoco.MjSpec, model: JointModel, program: tuple[float,
     spec.add_numeric(name="moment_program", data=list(program), size=len(program))
 
 
-def _write_sensor(spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, noise: float) -> None:
+def _write_sensor(spec: mujoco.MjSpec, model: JointModel, noise: float) -> None:
     """The noise on the joint's position sensor, which is added where there is none."""
     if noise == 0.0:
         return
@@ -229,9 +242,7 @@ def _differences(before: mujoco.MjModel, after: mujoco.MjModel) -> tuple[Written
                 *map(float, model.dof_dampingpoly[0]),
             ),
             ("joint frictionloss", "N m"): (float(model.dof_frictionloss[0]),),
-            **{
-                (f"body {model.body(i).name or i} mass", "kg"): (float(model.body_mass[i]),) for i in moving
-            },
+            **{(f"body {model.body(i).name or i} mass", "kg"): (float(model.body_mass[i]),) for i in moving},
             ("plugin vwt.yaw_moment", "1"): (float(model.nplugin),),
         }
 
@@ -240,7 +251,8 @@ def _differences(before: mujoco.MjModel, after: mujoco.MjModel) -> tuple[Written
     return tuple(
         Written(name, old[name, unit], value, unit)
         for (name, unit), value in new.items()
-        if not np.allclose(value, old[name, unit], rtol=1e-9, atol=0.0) and (spring or name != "joint springref")
+        if not np.allclose(value, old[name, unit], rtol=1e-9, atol=0.0)
+        and (spring or name != "joint springref")
     )
 
 
@@ -269,6 +281,8 @@ def simulate_joint(model: mujoco.MjModel, law_rest: float, start: Start, duratio
     angle -= law_rest
     if not np.all(np.abs(angle) < 1e3):
         raise TunnelError(
-            "the patched model's motion grows without bound", where=f"run {start.run}", remedy="shorten its timestep"
+            "the patched model's motion grows without bound",
+            where=f"run {start.run}",
+            remedy="shorten its timestep",
         )
     return Motion(np.arange(count) * model.opt.timestep, angle, rate)
