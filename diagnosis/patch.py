@@ -22,9 +22,9 @@ class NativeClosure:
     """How far the gap closes on readings held out of the fit.
 
     Args:
-        before: mean squared residual of the nominal model, in noise powers of a block mean.
-        fit: of the fits' own integrator with the causes.
-        native: of the patched model, simulated by the engine.
+        before: mean squared residual of the nominal model, in units of the noise power of a block mean.
+        fit: of the fits' own integrator with the causes, in the same unit.
+        native: of the patched model, simulated by the engine, in the same unit.
         on: what was held out, in words.
     """
 

@@ -207,6 +207,7 @@ def show(document: dict[str, Any]) -> None:
         document: of a diagnosis.
     """
     from diagnosis import printing as parts
+    from diagnosis.patch import patch_lines, patch_table
     from tunnel_lab.terminal.tables import rich_table, say, show_tables
 
     say(document["verdict"])
@@ -218,7 +219,7 @@ def show(document: dict[str, Any]) -> None:
     show_tables(*(rich_table(table(document)) for table in answers))
     if line := parts.inclusion_line(document):
         say(f"{line}\n")
-    shown = (parts.waterfall_table, parts.gap_table, parts.coefficients_table, parts.patch_table)
+    shown = (parts.waterfall_table, parts.gap_table, parts.coefficients_table, patch_table)
     show_tables(*(rich_table(table(document)) for table in shown))
-    for line in (*parts.patch_lines(document), *parts.closing_lines(document)):
+    for line in (*patch_lines(document), *parts.closing_lines(document)):
         say(line)
