@@ -33,7 +33,7 @@ _OF_ANGLE = (
     (
         "gravity_stiffness",
         "gravity stiffness",
-        "-gravity_stiffness*(sin(b-gravity_angle)+sin(gravity_angle))",
+        "-gravity_stiffness*sin(b-gravity_angle)",
     ),
 )
 _OF_RATE = (
@@ -89,11 +89,11 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float) -> 
     loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
         physics.spring_stiffness * physics.yaw_inertia
     )
-    spring = np.array([physics.spring_stiffness - law.stiffness, 0.0, 0.0])
+    spring = np.array([0.0, physics.spring_stiffness - law.stiffness, 0.0, 0.0])
     damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
     program = _further(physics.program, data.program)
     for terms, name, grid, forms, native in (
-        (_OF_ANGLE, "b", b, (b, b**2, b**3), spring),
+        (_OF_ANGLE, "b", b, (b**0, b, b**2, b**3), spring),
         (_OF_RATE, "r", r, (r, np.abs(r) * r, r**3), damping),
     ):
         for coefficient, words, text in terms:
@@ -110,13 +110,13 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float) -> 
                 notes.append(f"The {words} has no native element; the plugin vwt.yaw_moment adds it.")
     notes += _unwritten(physics, problem)
     place = law.rest + data.similarity.rest
-    units = ("N m/rad", "N m/rad2", "N m/rad3"), ("N m s/rad", "N m s2/rad2", "N m s3/rad3")
-    k0, k1, k2 = (own(float(v), unit) for v, unit in zip(spring, units[0], strict=True))
+    units = ("N m", "N m/rad", "N m/rad2", "N m/rad3"), ("N m s/rad", "N m s2/rad2", "N m s3/rad3")
+    k0, k1, k2, k3 = (own(float(v), unit) for v, unit in zip(spring, units[0], strict=True))
     c0, c1, c2 = (own(float(v), unit) for v, unit in zip(damping, units[1], strict=True))
     friction = own(physics.parameters.get("friction_moment", 0.0), "N m")
     patch = JointPatch(
         inertia=own(physics.yaw_inertia, "kg m2"),
-        spring=(k0, k1, k2),
+        spring=(k0, k1, k2, k3),
         damping=(c0, c1, c2),
         friction=friction,
         program=_own_program(program, place, own) if program else (),

@@ -161,7 +161,7 @@ def test_the_inertia_written_leaves_gravity_as_it_is(tmp_path: Path, share: floa
 
 def test_springs_and_dampers_are_added_to_those_of_the_model(tmp_path: Path) -> None:
     found = model(tmp_path, 'stiffness="2 0 0.4" springref="0.5" damping="0.01"')
-    added = JointPatch(found.law.inertia, (0.3, 0.2, 0.1), (0.02, 0.03, 0.0), friction=0.004)
+    added = JointPatch(found.law.inertia, (0.0, 0.3, 0.2, 0.1), (0.02, 0.03, 0.0), friction=0.004)
     new = reread(found, added, tmp_path)
     assert new.law.rest == pytest.approx(found.law.rest, abs=1e-5)
     assert new.law.stiffness == pytest.approx(found.law.stiffness + 0.3, rel=1e-5)
@@ -179,7 +179,7 @@ def test_degrees_stay_degrees(tmp_path: Path) -> None:
     (tmp_path / "model.xml").write_text(text)
     found = read_joint_model(tmp_path / "model.xml", "hinge", 1.0)
     assert found.law.rest == pytest.approx(math.radians(30.0))
-    new = reread(found, JointPatch(found.law.inertia, (0.5, 0.0, 0.0)), tmp_path)
+    new = reread(found, JointPatch(found.law.inertia, (0.0, 0.5, 0.0, 0.0)), tmp_path)
     assert new.law.rest == pytest.approx(math.radians(30.0), abs=1e-5)
 
 
@@ -201,7 +201,7 @@ def test_the_patched_model_moves_as_the_law_says(tmp_path: Path) -> None:
     from scipy.integrate import solve_ivp
 
     found = model(tmp_path, 'ref="0.3"', option='integrator="RK4" timestep="0.001"')
-    patch = JointPatch(1.1 * found.law.inertia, (0.4, 0.1, 0.2), (0.002, 0.003, 0.0))
+    patch = JointPatch(1.1 * found.law.inertia, (0.0, 0.4, 0.1, 0.2), (0.002, 0.003, 0.0))
     spec, _ = patched(found, patch, [Start("r1", 0.0, 1.2, -0.5)])
     motion = simulate_joint(spec.compile(), found.law.rest, Start("r1", 0.0, 1.2, -0.5), 3.0)
     weight = MASS * G * LENGTH

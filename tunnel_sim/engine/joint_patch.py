@@ -33,7 +33,7 @@ class JointPatch:
 
     Args:
         inertia: the whole inertia about the joint, kg m².
-        spring: added restoring moment, the coefficients of b, b² and b³, N m/rad, N m/rad² and N m/rad³.
+        spring: added restoring moment, the coefficients of 1, b, b² and b³, N m, N m/rad, N m/rad² and N m/rad³.
         damping: added damping, the coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³.
         friction: the whole moment of dry friction, N m.
         program: of a further moment, for the plugin (``mjcf/plugin/expression.h``), in the joint's position.
@@ -41,7 +41,7 @@ class JointPatch:
     """
 
     inertia: float
-    spring: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    spring: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     damping: tuple[float, float, float] = (0.0, 0.0, 0.0)
     friction: float = 0.0
     program: tuple[float, ...] = ()
@@ -185,7 +185,7 @@ def _write_spring(
     """
     own = np.polynomial.Polynomial([0.0, before.jnt_stiffness[0], *before.jnt_stiffnesspoly[0]])
     offset = model.law.rest - float(before.qpos_spring[0])
-    total = own(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial([0.0, *patch.spring])
+    total = own(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
     total = total.trim(1e-12 * float(np.max(np.abs(total.coef))))
     roots = total.roots() if total.degree() else np.array([0.0])
     real = roots.real[np.abs(roots.imag) < 1e-6]
@@ -193,7 +193,8 @@ def _write_spring(
         raise TunnelError(
             "the spring of the patched model would vanish nowhere", remedy="give it a spring of its own"
         )
-    zero = float(real[np.argmin(np.abs(real + offset))]) if np.any(own.coef) else 0.0
+    usual = -offset if np.any(own.coef) else 0.0
+    zero = float(real[np.argmin(np.abs(real - usual))])
     about = total(np.polynomial.Polynomial([zero, 1.0])).coef
     joint.stiffness = np.array([*about[1:], 0.0, 0.0, 0.0])[:3]
     place = model.law.rest + zero
