@@ -25,6 +25,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
+    from diagnosis.patch import PatchedModel
     from diagnosis.study import Study
     from tunnel_sim.engine.joint_model import JointModel
 
@@ -102,25 +103,24 @@ def _diagnose(
         progress("where, and how far it closes")
     where, maps = localise(study)
     remarks = (*found.remarks, *noise_remarks(study.noise, study.trend))
-    answer = in_own_units(replace(assemble(study, where, maps, left_out), remarks=remarks), study.similarity)
+    patched, unpatched = (None, ()) if model is None else _patched(study, model)
+    assembled = assemble(study, where, maps, (*left_out, *unpatched), patched)
+    answer = in_own_units(replace(assembled, remarks=remarks), study.similarity)
     if found.limit_cycles:
         return limit_cycle_answer(answer, found.remarks)
-    if model is not None:
-        answer = _patched(answer, study, model)
     if answer.causes == ("unknown",):
         return replace(answer, cautions=(*answer.cautions, *second_modes(campaign)))
     return answer
 
 
-def _patched(answer: Diagnosis, study: Study, model: JointModel) -> Diagnosis:
-    """The answer with the patched model, or a caution that says why there is none."""
+def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tuple[str, ...]]:
+    """The patched model, or none and a sentence that says why."""
     from diagnosis.answer.patched_model import patched_model  # only here: MuJoCo is slow to load
 
     try:
-        return replace(answer, model=patched_model(study, model))
+        return patched_model(study, model), ()
     except TunnelError as error:
-        said = f"The causes could not be written into the model: {error.what}."
-        return replace(answer, cautions=(*answer.cautions, said))
+        return None, (f"The causes could not be written into the model: {error.what}.",)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

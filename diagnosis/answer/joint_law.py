@@ -63,14 +63,15 @@ class FoundLaw:
     notes: tuple[str, ...]
 
 
-def found_law(problem: Problem, common: Array, release: Array, noise: float) -> FoundLaw:
+def found_law(problem: Problem, common: Array, release: Array, noise: float, index: int = 0) -> FoundLaw:
     """The law of a fit.
 
     Args:
         problem: with the effects found.
         common: its common parameters, shape (common,).
-        release: of the first run, shape (own,).
+        release: of a run, shape (own,).
         noise: of the sensor, rad; 0: not written.
+        index: of that run, with the wind off.
 
     Returns:
         In the units of the measured campaign.
@@ -78,7 +79,7 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float) -> 
     data = problem.data
     law = data.law
     assert law is not None
-    chain = problem.chain(common, release, data.runs[0])
+    chain = problem.chain(common, release, data.runs[index])
     physics = condensed(chain.physics(), data)
     own = data.similarity.own
     reach = max(float(np.max(np.abs(run.reading))) for run in data.runs)

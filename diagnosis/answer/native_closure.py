@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.answer.held_out import HeldOut, fit_seen
+from diagnosis.answer.held_out import FOLDS, HeldOut, fit_seen
 from diagnosis.answer.held_out_stretches import predict_stretches, turns_of
 from diagnosis.answer.joint_law import start_of
 from diagnosis.fitting.least_squares import Fit
@@ -15,6 +15,7 @@ from diagnosis.fitting.problem import Problem, blocks_beyond, sample_means
 from diagnosis.patch import NativeClosure
 from tunnel_sim.engine.joint_patch import Start
 from tunnel_sim.physics.motion import Motion
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 Simulate = Callable[[Array, Array, Start, float], Motion]
@@ -38,10 +39,16 @@ def native_closure(
 
     Returns:
         The closure; runs with the wind on do not count.
+
+    Raises:
+        TunnelError: when nothing could be held out, or the patched model's motion grows without bound.
     """
     runs = chosen.problem.data.runs
-    held = [i for i, run in enumerate(runs) if run.id in chosen_out.points and not run.wind_on]
-    before, fitted, native = [], [], []
+    known = chosen_out.points.keys() & nominal_out.residuals.keys()
+    held = [i for i, run in enumerate(runs) if run.id in known and not run.wind_on]
+    before: list[Array] = []
+    fitted: list[Array] = []
+    native: list[Array] = []
     if held:
         for i in held:
             common, own = chosen_out.points[runs[i].id]
@@ -52,15 +59,20 @@ def native_closure(
     ids = [run.id for run in runs if not run.wind_on]
     turns = turns_of(nominal, ids)
     plain, caused = predict_stretches(nominal, turns), predict_stretches(chosen, turns)
-    for number in range(max(int(turn.max()) for turn in turns) + 1):
+    for number in range(FOLDS if ids else 0):
         out = [turn == number for turn in turns]
-        point, _ = fit_seen(chosen, [~left for left in out])
+        try:
+            point, _ = fit_seen(chosen, [~left for left in out])
+        except np.linalg.LinAlgError:
+            continue
         for i, left in enumerate(out):
             if left.any():
                 seen = _residual(chosen.problem, point.common, point.release[i], i, simulate, seen=~left)
                 before.append(plain[runs[i].id][left])
                 fitted.append(caused[runs[i].id][left])
                 native.append(seen[left])
+    if not native:
+        raise TunnelError("no run with the wind off could be held out", remedy="add runs with the wind off")
     return NativeClosure(
         _power(before), _power(fitted), _power(native), "on stretches of time held out of the fit"
     )

@@ -35,8 +35,10 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     problem, change = chosen.problem, study.similarity
     noise = change.own(study.noise.std, change.reading) if not study.campaign.sensor.derivative else 0.0
 
+    still = next((i for i, run in enumerate(problem.data.runs) if not run.wind_on), 0)
+
     def law(common: Array) -> FoundLaw:
-        return found_law(problem, common, chosen.point.release[0], noise)
+        return found_law(problem, common, chosen.point.release[still], noise, still)
 
     @lru_cache(maxsize=4)
     def compiled(common: bytes) -> mujoco.MjModel:

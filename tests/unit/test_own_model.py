@@ -148,7 +148,7 @@ def reread(found: JointModel, patch: JointPatch, folder: Path) -> JointModel:
     spec, _ = patched(found, patch)
     path = folder / "out.xml"
     path.write_text(patched_xml(spec, found, folder))
-    return read_joint_model(path, "hinge", 1.0)
+    return read_joint_model(path, "hinge", 0.05 if found.law.slide else 1.0)
 
 
 @pytest.mark.parametrize("share", [0.6, 0.98, 1.3])
@@ -157,6 +157,15 @@ def test_the_inertia_written_leaves_gravity_as_it_is(tmp_path: Path, share: floa
     law = reread(found, JointPatch(share * found.law.inertia), tmp_path).law
     assert law.inertia == pytest.approx(share * found.law.inertia, rel=1e-5)
     assert law.stiffness == pytest.approx(found.law.stiffness, rel=1e-5)
+
+
+@pytest.mark.parametrize("share", [0.6, 1.3])
+def test_a_slide_keeps_its_place_as_its_inertia_changes(tmp_path: Path, share: float) -> None:
+    body = '<body><joint name="hinge" type="slide" axis="0 0 1" {}/>{}</body>'
+    found = model(tmp_path, 'stiffness="50 0 900" springref="0.02"', body=body, reach=0.05)
+    law = reread(found, JointPatch(share * found.law.inertia), tmp_path).law
+    assert (law.inertia, law.rest) == pytest.approx((share * found.law.inertia, found.law.rest), rel=1e-5)
+    assert law.stiffness == pytest.approx(found.law.stiffness, rel=1e-4)
 
 
 def test_springs_and_dampers_are_added_to_those_of_the_model(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -94,7 +94,7 @@ def _with_free(law: JointLaw, free: tuple[str, ...]) -> JointLaw:
             where="--free",
             remedy="name one of the two",
         )
-    return JointLaw(**{**vars(law), "free": tuple(name for name in FREE_PARAMETERS if name in free)})
+    return replace(law, free=tuple(name for name in FREE_PARAMETERS if name in free))
 
 
 def _read(path: Path) -> mujoco.MjSpec:
@@ -127,7 +127,9 @@ def _checked_joint(model: mujoco.MjModel, joint: str) -> str:
     """
     names = [model.joint(i).name for i in range(model.njnt)]
     if joint not in names:
-        raise TunnelError("there is no such joint", remedy=did_you_mean(joint, filter(None, names)))
+        known = [name for name in names if name]
+        remedy = did_you_mean(joint, known) if known else "give the joint a name in the file"
+        raise TunnelError("there is no such joint", remedy=remedy)
     others = [name or "without a name" for name in names if name != joint]
     if others:
         raise TunnelError(
@@ -212,6 +214,8 @@ def _rest(engine: _Engine, centre: float, span: float) -> float:
             remedy="add the spring, or gravity, that restores it",
         )
     at = falls[np.argmin(np.abs(grid[falls] - centre))]
+    if engine.moment(grid[at]) <= 0.0:  # rest lies on the grid
+        return float(grid[at])
     return float(brentq(engine.moment, grid[at], grid[at + 1], xtol=1e-13))
 
 

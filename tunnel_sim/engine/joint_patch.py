@@ -102,8 +102,8 @@ def patched(
     before = spec.compile()
     joint = spec.joint(model.joint)
     joint.springdamper = (0.0, 0.0)  # stiffness and damping are written themselves
-    _write_inertia(spec, before, model, patch)
-    _write_spring(joint, before, model, patch, degrees=bool(spec.compiler.degree))
+    weight = _write_inertia(spec, before, model, patch)
+    _write_spring(spec, before, model, patch, weight)
     own = np.array([before.dof_damping[0], *before.dof_dampingpoly[0]])
     joint.damping = own + patch.damping
     joint.damping[0] = max(joint.damping[0], 0.0)  # a damping fitted as 0 less the model's own, rounded
@@ -145,16 +145,18 @@ def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
     return str(spec.to_xml())
 
 
-def _write_inertia(spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch) -> None:
+def _write_inertia(
+    spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch
+) -> float:
     """More inertia as armature; less as a smaller one, or as bodies drawn in towards the axis.
 
     Bodies of a times the mass at 1/a times the distance from the axis have the same moment of gravity and 1/a times
-    the inertia.
+    the inertia. On a slide they lose mass instead; returned is the share of the weight that remains.
     """
     armature = float(before.dof_armature[0]) + patch.inertia - model.law.inertia
     if armature >= 0.0:
         spec.joint(model.joint).armature = armature
-        return
+        return 1.0
     spec.joint(model.joint).armature = 0.0
     share = patch.inertia / (model.law.inertia - float(before.dof_armature[0]))
     data = mujoco.MjData(before)
@@ -166,17 +168,19 @@ def _write_inertia(spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointMode
             continue
         centre = data.xipos[number] - anchor
         along = axis * float(axis @ centre)
-        moved = anchor + along + (centre - along) * share - data.xpos[number]
+        across = (centre - along) * (1.0 if model.law.slide else share)
+        moved = anchor + along + across - data.xpos[number]
         body.explicitinertial = True
-        body.mass = float(before.body_mass[number]) / share
+        body.mass = float(before.body_mass[number]) * (share if model.law.slide else 1.0 / share)
         body.inertia = before.body_inertia[number] * share
         body.ipos = data.xmat[number].reshape(3, 3).T @ moved
         body.iquat = before.body_iquat[number]
         body.fullinertia = np.full(6, np.nan)
+    return share if model.law.slide else 1.0
 
 
 def _write_spring(
-    joint: mujoco.MjsJoint, before: mujoco.MjModel, model: JointModel, patch: JointPatch, *, degrees: bool
+    spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch, weight: float
 ) -> None:
     """The sum of the joint's own spring and the added one, about the position at which it vanishes.
 
@@ -186,6 +190,7 @@ def _write_spring(
     own = np.polynomial.Polynomial([0.0, before.jnt_stiffness[0], *before.jnt_stiffnesspoly[0]])
     offset = model.law.rest - float(before.qpos_spring[0])
     total = own(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
+    total -= (1.0 - weight) * own(offset)  # the spring carries the weight
     total = total.trim(1e-12 * float(np.max(np.abs(total.coef))))
     roots = total.roots() if total.degree() else np.array([0.0])
     real = roots.real[np.abs(roots.imag) < 1e-6]
@@ -196,9 +201,10 @@ def _write_spring(
     usual = -offset if np.any(own.coef) else 0.0
     zero = float(real[np.argmin(np.abs(real - usual))])
     about = total(np.polynomial.Polynomial([zero, 1.0])).coef
+    joint = spec.joint(model.joint)
     joint.stiffness = np.array([*about[1:], 0.0, 0.0, 0.0])[:3]
     place = model.law.rest + zero
-    joint.springref = math.degrees(place) if degrees and not model.law.slide else place
+    joint.springref = math.degrees(place) if spec.compiler.degree and not model.law.slide else place
 
 
 def _write_program(spec: mujoco.MjSpec, model: JointModel, program: tuple[float, ...]) -> None:
@@ -246,6 +252,7 @@ def _differences(before: mujoco.MjModel, after: mujoco.MjModel) -> tuple[Written
             ),
             ("joint frictionloss", "N m"): (float(model.dof_frictionloss[0]),),
             **{(f"body {model.body(i).name or i} mass", "kg"): (float(model.body_mass[i]),) for i in moving},
+            ("sensor noise", "rad"): (float(np.max(model.sensor_noise, initial=0.0)),),
             ("plugin vwt.yaw_moment", "1"): (float(model.nplugin),),
         }
 
