@@ -95,7 +95,7 @@ def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]
     """Seconds per run and peak memory of a sweep: by processes, or by one whose simulation has threads."""
     wall, cpu = time.perf_counter(), time.process_time()
     from tunnel_lab.sweep.engine import run_sweep
-    from tunnel_lab.sweep.processes import in_processes
+    from tunnel_lab.sweep.processes import shards_in_processes
     from tunnel_lab.sweep.reading import read_sweep
 
     def by_threads(text, shards):
@@ -105,7 +105,7 @@ def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]
             yield run_shard(text, index, nthread=threads)
 
     plan = read_sweep(file)
-    run_sweep(plan, out, by_threads if threads > 1 else in_processes(workers, print))
+    run_sweep(plan, out, by_threads if threads > 1 else shards_in_processes(workers, print))
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = time.process_time() - cpu + children.ru_utime + children.ru_stime
     return {

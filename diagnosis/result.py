@@ -127,7 +127,7 @@ class Candidate:
     """An answer that was considered.
 
     Args:
-        effect: name, ``none`` or ``unknown``; several names are joined by `` + ``.
+        effect: name, ``none`` or ``unknown``; several names are joined by a plus sign.
         probability: that it is the answer, a fraction.
         excess_after: with it added, in the fitted runs, in units of the noise variance.
         closed: share of the gap it closes there.

@@ -17,6 +17,7 @@ from tunnel_lab.commands import (
     blind,
     demo,
     diagnose,
+    docs,
     effects,
     export,
     identify,
@@ -42,7 +43,7 @@ CommandLineError = cast("type[Exception]", typer.BadParameter.__mro__[2])
 app = typer.Typer(
     name="tunnel",
     no_args_is_help=False,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -87,6 +88,7 @@ def tunnel(
       tunnel view                        the rig in real time, in a window or browser
       tunnel render                      a film of a run, and a picture
       tunnel train w.safetensors         train the paper's networks from a seed
+      tunnel docs                        the documentation, in a browser
 
     [bold]Units[/bold]
       SI and radians throughout.
@@ -115,10 +117,11 @@ COMMANDS = (
     view,
     render,
     train,
+    docs,
 )
 """Every command that is one function, in the order of the help."""
 
-WITHOUT_TABLES = (simulate, plot, export, view, render)
+WITHOUT_TABLES = (simulate, plot, export, view, render, docs)
 
 for _command in COMMANDS:
     app.command(_command.NAME)(_command.run if _command in WITHOUT_TABLES else with_format(_command.run))

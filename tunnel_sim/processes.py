@@ -1,54 +1,75 @@
-"""Independent work side by side in processes of this machine."""
+"""Independent work side by side in processes of this machine.
+
+Every process has one thread: most of the work is Python, which threads cannot share, and the last bit of a sum must
+not depend on the number of threads of a linear algebra library. Measured in benchmarks/sweep.py.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from contextlib import contextmanager
+from itertools import islice
+from multiprocessing.connection import Connection
 from typing import TypeVar
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+_ONE_THREAD = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "POLARS_MAX_THREADS",
+)
 
 
 def in_processes(
     work: Callable[[ItemT], ResultT], items: Sequence[ItemT], jobs: int
 ) -> Iterator[tuple[ItemT, ResultT]]:
-    """Do work in processes of one thread each.
+    """Do work in processes of one thread each, few items in flight at a time, which bounds the memory.
 
     Args:
         work: what to do; it and its results must be picklable.
+        items: on which.
         jobs: number of processes; 0 works in this one.
 
     Yields:
         Items with their results, in the order in which they finish.
+
+    Raises:
+        BrokenProcessPool: when a process dies.
     """
     if jobs == 0 or not items:
         yield from ((item, work(item)) for item in items)
         return
     context = multiprocessing.get_context("spawn")
-    with (
-        _one_thread_each(),
-        ProcessPoolExecutor(min(jobs, len(items)), mp_context=context, initializer=_die_quietly) as pool,
-    ):
+    line, end = context.Pipe(duplex=False)
+    waiting = iter(items)
+    with _one_thread_each():
+        pool = ProcessPoolExecutor(
+            min(jobs, len(items)), mp_context=context, initializer=_start, initargs=(line,)
+        )
         try:
-            waiting = {pool.submit(work, item): item for item in items}  # items need not be hashable
-            for finished in as_completed(waiting):
-                yield waiting[finished], finished.result()
-        except BaseException:  # an interruption above all: nobody will read what is still running
+            flying = {pool.submit(work, item): item for item in islice(waiting, 2 * jobs)}
+            while flying:
+                landed, _ = wait(flying, return_when=FIRST_COMPLETED)
+                flying |= {pool.submit(work, item): item for item in islice(waiting, len(landed))}
+                for done in landed:
+                    yield flying.pop(done), done.result()
+            pool.shutdown()
+        finally:
+            end.close()  # ends the processes at once
             pool.shutdown(wait=False, cancel_futures=True)
-            for child in multiprocessing.active_children():
-                child.terminate()
-            raise
+            line.close()
 
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Give children one thread for linear algebra: the last digits must not depend on the machine."""
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
     try:
@@ -61,6 +82,15 @@ def _one_thread_each() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def _die_quietly() -> None:
-    """A child ends silently on Ctrl-C; the parent reports it."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+def _start(line: Connection) -> None:
+    """Prepare a process: Ctrl-C is handled by the parent, and the process ends with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(line,), daemon=True).start()
+
+
+def _end_with(line: Connection) -> None:
+    """End this process when the pipe to the parent is closed, by the parent or by its death."""
+    try:
+        line.recv()
+    except (EOFError, OSError):
+        os._exit(1)

@@ -6,7 +6,8 @@ significant. So hypotheses are weighed by the share s of the gap that they leave
     weight = δ^(γ−1) (s + δ)^−γ [(u + δ)/(max(s, u) + δ)]^2γ
 
 δ is the misfit of form that is common among true causes, γ is `STEEPNESS` and u is `UNKNOWN_SHARE`. A second effect
-must close most of what the first leaves, and ``unknown`` weighs as much as a cause that leaves the share u.
+must close most of what the first leaves. Against a set of n effects ``unknown`` weighs as much as such a set that
+leaves the share u `UNKNOWN_FURTHER`^(n−1): effects that do not act close an unknown gap little further.
 """
 
 from __future__ import annotations
@@ -26,9 +27,12 @@ from diagnosis.policy import (
     PAIR_SHARE,
     STEEPNESS,
     STEEPNESS_BEYOND,
+    UNKNOWN_FURTHER,
     UNKNOWN_SHARE,
 )
 from tunnel_sim.effects import known_effects
+
+UNKNOWN = ("unknown",)
 
 
 @dataclass(frozen=True)
@@ -88,12 +92,16 @@ def weigh(
     weights = {
         names: evidence(names, share, freed.get(names, 0), excess, chance) for names, share in answers.items()
     }
-    answers[("unknown",)] = min(UNKNOWN_SHARE, max(outside, 0.0))
-    weights[("unknown",)] = evidence((), answers[("unknown",)], 0, excess, chance)
-    total, even = sum(weights.values()), EVEN_SHARE / len(weights)
+    odds = sum(
+        weight / _unknown_evidence(len(names), outside, excess, chance) for names, weight in weights.items()
+    )
+    known = odds / (1.0 + odds) / (sum(weights.values()) or 1.0)
+    probabilities = {names: known * weight for names, weight in weights.items()}
+    answers[UNKNOWN], probabilities[UNKNOWN] = min(UNKNOWN_SHARE, max(outside, 0.0)), 1.0 / (1.0 + odds)
+    even = EVEN_SHARE / len(answers)
     found = [
-        Weighed(names, answers[names], (1.0 - EVEN_SHARE) * weight / total + even)
-        for names, weight in weights.items()
+        Weighed(names, share, (1.0 - EVEN_SHARE) * probabilities[names] + even)
+        for names, share in answers.items()
     ]
     return sorted(found, key=lambda w: -w.probability)
 
@@ -113,6 +121,14 @@ def evidence(effects: Sequence[str], share: float, forms: int, excess: float, ch
     """
     floor = form_floor(excess, effects) + CHANCE_STDS * chance
     return _density(share, floor) * _prior(len(effects), forms)
+
+
+def _unknown_evidence(count: int, outside: float, excess: float, chance: float) -> float:
+    """Weight of ``unknown`` against sets of so many effects; an outsider that closes more weighs as one effect."""
+    if outside < UNKNOWN_SHARE:
+        return evidence((), max(outside, 0.0), 0, excess, chance)
+    floor = form_floor(excess) + CHANCE_STDS * chance
+    return _density(UNKNOWN_SHARE * UNKNOWN_FURTHER ** (count - 1), floor) * _prior(count, 0)
 
 
 def _density(share: float, floor: float) -> float:

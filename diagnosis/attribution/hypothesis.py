@@ -73,8 +73,8 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
         tuple(name for name in large.free_forms if name in names),
     )
     common = [large.names.index(name) for name in problem.names]
-    first = whole.point.release.shape[1] - len(large.phased)  # of the phases and instants
-    own = [*range(first), *(first + large.phased.index(name) for name in problem.phased)]
+    places = large.own_places(whole.point.release.shape[1])
+    own = [*range(large.first_phase), *(i for name in problem.phased for i in np.r_[places[name]].tolist())]
     return dataclasses.replace(
         whole,
         problem=problem,

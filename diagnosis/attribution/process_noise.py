@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import minimize
 from scipy.signal import lfilter
+from scipy.stats import kurtosis
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import linear_coefficients, resonance
@@ -280,14 +281,15 @@ def _steady_covariance(transition: Array, disturbance: Array, variance: Array) -
 
 
 def whiteness(result: ProcessNoise) -> tuple[float, float, float]:
-    """How far innovations are from white and steady.
+    """How far innovations are from white, steady and normal.
 
     Args:
         result: a fit of process noise.
 
     Returns:
         Largest departure of a frequency band's mean power from 1, in its standard deviations; the same of a
-        quarter of the record in time; and the greatest share of the squared innovations' excess in one run.
+        quarter of the record in time; and the excess kurtosis of all innovations, less four times its standard
+        deviation under a normal distribution: a blow is in few innovations.
     """
     bands, quarters = [], []
     for innovations in result.innovations:
@@ -296,5 +298,6 @@ def whiteness(result: ProcessNoise) -> tuple[float, float, float]:
             bands.append((float(part.mean()) - 1.0) * np.sqrt(part.size))
         for part in np.array_split(innovations, 4):
             quarters.append((float(np.mean(part**2)) - 1.0) * np.sqrt(part.size / 2.0))
-    by_run = [float(np.mean(i**2)) - 1.0 for i in result.innovations]
-    return float(np.max(np.abs(bands))), float(np.max(np.abs(quarters))), float(np.max(np.abs(by_run)))
+    pooled = np.concatenate(result.innovations)
+    excess = float(kurtosis(pooled)) - 4.0 * np.sqrt(24.0 / pooled.size)
+    return float(np.max(np.abs(bands))), float(np.max(np.abs(quarters))), excess

@@ -19,6 +19,7 @@ from diagnosis.fitting.least_squares import Fit
 from diagnosis.policy import (
     BESIDE_EVIDENCE,
     CLOSED_WITHOUT_RANDOM,
+    HEAVY_TAILS,
     RANDOM_PARTNERS,
     RIVAL_EVIDENCE,
     STEADY_IN_TIME,
@@ -31,12 +32,12 @@ from tunnel_sim.effects import Effect, the_effect
 
 @dataclass(frozen=True, eq=False)
 class RandomAnswer:
-    """A random moment, alone or beside one effect.
+    """A random moment, alone or beside other effects.
 
     Args:
         kind: of the random moment.
         process: its fit.
-        beside: the fitted effect beside it, or None.
+        beside: the fitted effects beside it, or None.
         share: of the gap left open: the innovations' and the wind-off runs' excess over the nominal one's.
     """
 
@@ -62,9 +63,9 @@ def weigh_random_moments(
         allowed: names of the vocabulary to answer in.
 
     Returns:
-        The most likely answer of each kind that passes, alone unless the evidence for an effect beside it is
-        strong. To pass, the innovations must be white by band and steady in time, and the wind-off runs free of a
-        gap. Empty where none passes, or where deterministic effects close the gap.
+        The most likely answer of each kind that passes, with as few effects beside it as the evidence asks for.
+        To pass, the innovations must be white by band, steady in time and without heavy tails, and the wind-off
+        runs free of a gap. Empty where none passes, or where deterministic effects close the gap.
     """
     if any(
         max(hypothesis.fit.excess, 0.0) < CLOSED_WITHOUT_RANDOM * nominal.excess for hypothesis in hypotheses
@@ -88,14 +89,11 @@ def _likeliest(
     kind: type[Effect], fits: Sequence[_Kind], nominal: Fit, hypotheses: Sequence[Hypothesis]
 ) -> RandomAnswer | None:
     for explain in fits:  # a spectrum with more freedom only where the simpler one does not pass
-        alone = _try(kind, explain, nominal, None, nominal)
-        partners = _partners(kind, hypotheses)
-        beside = [a for s in partners if (a := _try(kind, explain, s.fit, s, nominal)) is not None]
-        best = min(beside, key=lambda a: a.process.cost, default=None)
-        if alone is None or (best is not None and best.process.cost < alone.process.cost - BESIDE_EVIDENCE):
-            alone = best
-        if alone is not None:
-            return alone
+        tried = [_try(kind, explain, nominal, None, nominal)]
+        tried += [_try(kind, explain, s.fit, s, nominal) for s in _partners(kind, hypotheses)]
+        passed = [answer for answer in tried if answer is not None]
+        if passed:
+            return min(passed, key=lambda a: a.process.cost + BESIDE_EVIDENCE * len(a.effects))
     return None
 
 
@@ -116,8 +114,8 @@ def _try(
     process = explain(fit)
     if process is None or process.drop <= 0.0:
         return None
-    band, quarter, _ = whiteness(process)
-    if band > WHITE_BY_BAND or quarter > STEADY_IN_TIME:
+    band, quarter, tails = whiteness(process)
+    if band > WHITE_BY_BAND or quarter > STEADY_IN_TIME or tails > HEAVY_TAILS:
         return None
     share = (abs(process.excess) + max(off, 0.0)) / max(nominal.excess, 1e-9)
     return RandomAnswer(kind, process, beside, share)

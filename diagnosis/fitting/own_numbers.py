@@ -12,6 +12,7 @@ from tunnel_sim.vocabulary.record import Array
 
 _PADDING = 4  # zero padding of the spectra
 _DECAYS = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of a ringing in one run, nepers
+_MOST_SKIPS, _SWEEPS = 3, 4  # skips sought in a run, and how often each is sought again beside the others
 _EDGE = 8  # blocks at either end of a run in which a skip cannot be told from the release or seen at all
 
 
@@ -21,7 +22,7 @@ class OwnNumbers:
 
     Args:
         values: of the effect's parameters that belong to its textbook form, in their order.
-        numbers: of every run its phase (rad) or instant (share of the run), shape (runs,).
+        numbers: of every run its phase (rad), shape (runs,), or its instants (shares of the run), shape (runs, n).
         drop: of χ² by taking it out, dimensionless.
     """
 
@@ -88,38 +89,93 @@ def skip(fit: Fit) -> OwnNumbers | None:
         fit: whose residuals.
 
     Returns:
-        The time lost (s) with every run's instant; None where no run is long enough.
+        The time lost (s) with every run's instants, as many as χ² asks for; None where no run is long enough.
     """
-    found = [_run_skip(fit, number) for number in range(len(fit.problem.data.runs))]
-    if any(run is None for run in found):
+    runs = [_Skipping(fit, number) for number in range(len(fit.problem.data.runs))]
+    if any(run.left.size < 4 * _EDGE for run in runs):
         return None
-    times, weights, numbers = (np.array(column) for column in zip(*filter(None, found), strict=True))
+    found = [_skips(runs, count) for count in range(1, _MOST_SKIPS + 1)]
+    cost = 2.0 * sum(
+        np.log(run.left.size) for run in runs
+    )  # of an instant, which is sought among as many blocks
+    return max(found, key=lambda one: one.drop - cost * one.numbers.shape[1])
+
+
+def _skips(runs: list[_Skipping], count: int) -> OwnNumbers:
+    """So many skips in every run, all of one time."""
+    steps = [run.steps(count) for run in runs]
+    times, weights = (
+        np.array([[getattr(step, name) for step in run] for run in steps]) for name in ("time", "weight")
+    )
     lost = float(np.sum(times * weights) / np.sum(weights))
-    return OwnNumbers((max(lost, 0.0),), numbers, float(np.sum(times**2 * weights)))
+    drop = sum(run.drop(of_run, lost) for run, of_run in zip(runs, steps, strict=True))
+    numbers = np.array(
+        [[run.share(step) for step in of_run] for run, of_run in zip(runs, steps, strict=True)]
+    )
+    return OwnNumbers((max(lost, 0.0) * count,), numbers, drop)
 
 
-def _run_skip(fit: Fit, number: int) -> tuple[float, float, float] | None:
-    """Time lost (s), its weight (1/s²) and the instant of one run, by linear theory.
+@dataclass(frozen=True)
+class _Step:
+    """A skip in one run: its block, the time lost (s) and the weight of that (1/s²)."""
+
+    block: int
+    time: float
+    weight: float
+
+
+class _Skipping:
+    """One run, in which skips are sought by linear theory.
 
     The reading from block k on changes by the rate of the motion for every second lost. What the run's own
     sensitivities absorb of that is taken out for all k at once by sums from the end.
     """
-    run, residual = fit.problem.data.runs[number], fit.residuals[number]
-    if residual.size < 4 * _EDGE:
-        return None
-    basis = np.linalg.qr(np.column_stack(fit.jacobian[number]))[0]
-    slope = run.scaled(np.gradient(run.reading - run.unscaled(residual), run.interval))
-    left = residual - basis @ (basis.T @ residual)
 
-    def after(values: Array) -> Array:
-        """Sums from each block to the last."""
-        return np.asarray(np.cumsum(values[::-1], axis=0)[::-1], np.float64)
+    def __init__(self, fit: Fit, number: int) -> None:
+        run, residual = fit.problem.data.runs[number], fit.residuals[number]
+        self.interval, self.duration = run.interval, run.duration
+        self.basis = np.linalg.qr(np.column_stack(fit.jacobian[number]))[0]
+        self.slope = run.scaled(np.gradient(run.reading - run.unscaled(residual), run.interval))
+        self.left = self._unabsorbed(residual)
+        power = _after(self.slope**2) - np.sum(_after(self.slope[:, None] * self.basis) ** 2, axis=1)
+        self.weight = np.maximum(power, 1e-9 * float(self.slope @ self.slope))
 
-    along = after(slope * left)
-    power = after(slope**2) - np.sum(after(slope[:, None] * basis) ** 2, axis=1)
-    inside = slice(_EDGE, residual.size - _EDGE)
-    weight = np.maximum(power[inside], 1e-9 * float(slope @ slope))
-    times = np.maximum(along[inside], 0.0) / weight
-    best = int(np.argmax(times**2 * weight))
-    instant = (best + _EDGE) * run.interval / run.duration
-    return float(times[best]), float(weight[best]), float(instant)
+    def steps(self, count: int) -> list[_Step]:
+        """The skips that leave least, each sought again beside the others."""
+        found: list[_Step] = []
+        for sweep in range(1 if count == 1 else _SWEEPS):
+            for place in range(count):
+                others = [step for i, step in enumerate(found) if i != place]
+                step = self._best(self.left - self._change([(s, s.time) for s in others]))
+                found = [*found[:place], step, *found[place + 1 :]] if sweep else [*found, step]
+        return found
+
+    def _best(self, left: Array) -> _Step:
+        inside = slice(_EDGE, left.size - _EDGE)
+        weight = self.weight[inside]
+        times = np.maximum(_after(self.slope * left)[inside], 0.0) / weight
+        best = int(np.argmax(times**2 * weight))
+        return _Step(best + _EDGE, float(times[best]), float(weight[best]))
+
+    def drop(self, steps: list[_Step], time: float) -> float:
+        """Of χ² by skips of one time (s)."""
+        left = self.left - self._change([(step, time) for step in steps])
+        return float(self.left @ self.left - left @ left)
+
+    def share(self, step: _Step) -> float:
+        """Instant of a skip, as a share of the run."""
+        return float(step.block * self.interval / self.duration)
+
+    def _change(self, steps: list[tuple[_Step, float]]) -> Array:
+        ahead = np.zeros(self.slope.size)
+        for step, time in steps:
+            ahead[step.block :] += time
+        return self._unabsorbed(self.slope * ahead)
+
+    def _unabsorbed(self, values: Array) -> Array:
+        return np.asarray(values - self.basis @ (self.basis.T @ values), np.float64)
+
+
+def _after(values: Array) -> Array:
+    """Sums from each block to the last."""
+    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1], np.float64)

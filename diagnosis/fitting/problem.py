@@ -37,8 +37,8 @@ class Point:
         common: parameters common to the runs, in the order of `Problem.names`, shape (common,).
         release: of every run its own parameters, shape (runs, own): angle (rad) and rate (rad/s) of the sensor's
             end at the record's start, the sensor's zero (rad) where each run has its own, then in the effects'
-            order the phase (rad) of each periodic one and the instant (share of the run's length) of each that
-            skips samples.
+            order the phase (rad) of each periodic one and the instants (shares of the run's length) of the one
+            that skips samples.
     """
 
     common: Array
@@ -116,8 +116,25 @@ class Problem:
 
     @cached_property
     def phased(self) -> tuple[str, ...]:
-        """Names of the effects that have a phase or an instant of their own in every run."""
+        """Names of the effects that have a phase or instants of their own in every run."""
         return tuple(kind.name for kind in self.effects if kind.line or kind.skips)
+
+    def own_places(self, width: int) -> dict[str, slice]:
+        """Where the phase or the instants of each effect are among a run's own parameters.
+
+        Args:
+            width: number of a run's own parameters (a count), which tells the number of instants.
+
+        Returns:
+            By the effects' names.
+        """
+        places, first = {}, self.first_phase
+        instants = width - first - len(self.phased) + 1
+        for kind in self.effects:
+            if kind.name in self.phased:
+                places[kind.name] = slice(first, first + (instants if kind.skips else 1))
+                first = places[kind.name].stop
+        return places
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
@@ -186,8 +203,11 @@ class Problem:
         Returns:
             The effects with the phases and instants that the run has.
         """
-        phases = dict(zip(self.phased, own[self.first_phase :].tolist(), strict=True))
-        drawn = tuple(phases.get(kind.name) for kind in self.effects)
+        phases = {name: own[place] for name, place in self.own_places(own.size).items()}
+        drawn = tuple(
+            phases.get(kind.name) if kind.skips or kind.name not in phases else float(phases[kind.name][0])
+            for kind in self.effects
+        )
         known = self.effects_at(common) if effects is None else effects
         return EffectChain(self.stated(common, own, run), known, drawn)
 

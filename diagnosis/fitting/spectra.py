@@ -163,7 +163,7 @@ def shedding_line(fit: Fit) -> Line | None:
     if not concerned or data.width <= 0.0:
         return None
     spectra = residual_spectra(fit)
-    speeds = np.array([data.runs[i].wind_speed for i in concerned])
+    speeds = np.array([_fitted_speed(fit, i) for i in concerned])
     spacing = 0.1 * data.width / (float(speeds.max()) * max(data.runs[i].duration for i in concerned))
     grid = np.arange(0.02, 0.60, spacing)
     powers = []
@@ -190,6 +190,12 @@ def shedding_line(fit: Fit) -> Line | None:
     return Line(
         best, float(total.max()), float(total.max()) / max(floor, 1e-9), amplitude, phases, len(concerned)
     )
+
+
+def _fitted_speed(fit: Fit, run_index: int) -> float:
+    """The wind speed of a run, corrected by the effects of the fit, m/s."""
+    run, point = fit.problem.data.runs[run_index], fit.point
+    return fit.problem.chain(point.common, point.release[run_index], run).physics().wind_speed
 
 
 def _local_excess(power: Array) -> Array:

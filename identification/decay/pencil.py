@@ -2,8 +2,8 @@
 
 Block means y of a decay are a sum of two exponentials λ₁ⁱ, λ₂ⁱ and a constant. Their Hankel matrix,
 with the mean of each row removed, has rank two. A shift by one block maps its column space onto itself, and this
-2×2 map has the eigenvalues λ. The two leading singular vectors are found by orthogonal iteration with products by
-FFT, so the cost grows as n log n.
+2×2 map has the eigenvalues λ. The two leading singular vectors of a long record are found by orthogonal iteration
+with products by FFT, so the cost grows as n log n.
 
 To first order δλ = qᴴ E v is linear in the noise's Hankel matrix E, so a convolution of q with v gives the
 weight of every block mean in δλ, and with it the covariance. Source: Hua & Sarkar, IEEE Trans. Acoust.
@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
@@ -25,6 +26,7 @@ from tunnel_sim.vocabulary.record import Array
 
 _LENGTH = 0.35  # rows over blocks: a third is best at light damping, and more hardly helps elsewhere
 _LEAST_BLOCKS = 8
+_DENSE = 64  # values up to which a full decomposition is faster than the iteration, which noise alone slows
 _MAX_SWEEPS = 60
 _SETTLED = 1e-10  # change of the subspace in a sweep
 
@@ -92,6 +94,17 @@ def _exponents(poles: Complex, interval: float) -> Complex | None:
 def _leading_pair(values: Array, rows: int, angle: float) -> tuple[Array, Array, Array] | None:
     # Left vectors (rows, 2), singular values (2,), right vectors (columns, 2) of the row-centred Hankel matrix.
     columns = values.size - rows + 1
+    if values.size <= _DENSE:
+        hankel = sliding_window_view(values, columns)
+        vectors, sizes, turn = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)
+        found = vectors[:, :2], sizes[:2], turn[:2].T
+    else:
+        found = _iterated_pair(values, rows, columns, angle)
+    sizes = found[1]
+    return found if sizes[1] > 1e-12 * sizes[0] > 0.0 else None
+
+
+def _iterated_pair(values: Array, rows: int, columns: int, angle: float) -> tuple[Array, Array, Array]:
     size = next_fast_len(values.size, real=True)
     spectrum = rfft(values, size)[:, None]
 
@@ -110,8 +123,6 @@ def _leading_pair(values: Array, rows: int, angle: float) -> tuple[Array, Array,
         if np.linalg.norm(right - before @ (before.T @ right)) < _SETTLED:
             break
     vectors, sizes, turn = np.linalg.svd(image, full_matrices=False)
-    if not sizes[1] > 1e-12 * sizes[0] or sizes[0] == 0.0:
-        return None
     return left @ turn.T, sizes, vectors
 
 

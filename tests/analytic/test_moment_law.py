@@ -26,7 +26,19 @@ def _simulated(case: Case, timestep: float = 1e-3) -> np.ndarray:
     return _RUNS[key]
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+_LONG = (
+    "narrow_presliding",
+    "many",
+    "presliding_flexible_rod",
+    "presliding_and_turbulence",
+)  # their oracles are
+
+
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(c, marks=pytest.mark.slow) if c.name in _LONG else c for c in CASES],
+    ids=lambda case: case.name,
+)
 def test_term_matches_the_equation(case: Case) -> None:
     exact = case.oracle()
     assert np.max(np.abs(_simulated(case) - exact)) < case.tolerance

@@ -19,8 +19,8 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
 SEED = 1
-READER_TRIALS, IDENTIFY_TRIALS = 1000, 60
-"""A share that the quick suite can afford: some twenty checkpoints, the rarest files."""
+READER_TRIALS, IDENTIFY_TRIALS = 200, 12
+"""A share that the quick suite can afford; continuous integration runs 2,000 trials beside it."""
 
 
 @pytest.mark.parametrize(("group", "count"), [("readers", READER_TRIALS), ("identify", IDENTIFY_TRIALS)])

@@ -40,7 +40,7 @@ def test_every_effect_is_a_family_with_its_one_textbook_form_first():
 def motions():
     """Every form at ten times its start (limits kept), and the nominal motion."""
     draws = [
-        drawn(f, min(10 * f.start, f.limits[1] / 2), f.signs[-1], duration=1.5, resolution=1e-9)
+        drawn(f, min(10 * f.start, f.limits[1] / 2), f.signs[-1], duration=0.75, resolution=1e-9)
         for f in ALL_FORMS
     ]
     plain = CampaignDraw("none", draws[0].conditions, (), 3)

@@ -5,7 +5,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis.attribution.decide import form_floor, weigh
-from diagnosis.policy import FORM_MISFIT, FORM_MISFIT_UP_TO, PAIR_SHARE, RIVAL_PROBABILITY, UNKNOWN_SHARE
+from diagnosis.policy import (
+    FORM_MISFIT,
+    FORM_MISFIT_UP_TO,
+    PAIR_SHARE,
+    RIVAL_PROBABILITY,
+    UNKNOWN_FURTHER,
+    UNKNOWN_SHARE,
+)
 
 NAMES = ("a", "b", "c", "d", "e")
 SHARES = st.floats(0.0, 1.5)
@@ -53,6 +60,21 @@ def test_a_cause_that_leaves_more_than_its_share_loses_to_unknown(share, chance,
     found = {w.effects: w.probability for w in weigh([(("a",), share)], chance, excess)}
     if abs(share - UNKNOWN_SHARE) > 1e-9:
         assert (found[("a",)] > found[("unknown",)]) == (share < UNKNOWN_SHARE)
+
+
+@given(st.integers(1, 5), SHARES, CHANCE, EXCESS)
+def test_unknown_may_leave_less_where_more_effects_are_tried(count, share, chance, excess):
+    names = NAMES[:count]
+    found = {w.effects: w.probability for w in weigh([(names, share)], chance, excess)}
+    limit = UNKNOWN_SHARE * UNKNOWN_FURTHER ** (count - 1)
+    if abs(share - limit) > 1e-9:
+        assert (found[names] > found[("unknown",)]) == (share < limit)
+
+
+def test_an_outsider_that_closes_more_weighs_as_one_effect():
+    sets = [(NAMES[:4], 0.03)]
+    assert weigh(sets, 1e-4, 20.0)[0].effects == NAMES[:4]
+    assert weigh(sets, 1e-4, 20.0, outside=0.03)[0].effects == ("unknown",)
 
 
 def test_nothing_weighed_leaves_unknown():

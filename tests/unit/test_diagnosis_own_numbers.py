@@ -5,18 +5,48 @@ Truth: campaigns made from known values by the forward integrator.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.own_numbers import ringing, skip
 from diagnosis.fitting.starting_points import starting_points
+from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import Effect, effect_from
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Record
 
 MODE = effect_from("second_mode", {"amplitude": 0.002, "frequency": 70.0, "damping_ratio": 0.01})
 LOST = effect_from("dropped_samples", {"lost_time": 0.006})
 OWN = np.linspace(0.2, 0.8, 6)  # as planted: rad, or share of the run
+
+
+INSTANTS = np.sort(np.random.default_rng(8).uniform(0.1, 0.9, (6, 3)), axis=1)  # shares of the run
+
+
+def thrice_skipped() -> Campaign:
+    """The same motions with 10 ms lost at each of three instants of every run."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gap_campaigns, "NOISE", 1e-12)
+        quiet = campaign()
+    rng, runs = np.random.default_rng(9), []
+    for run, instants in zip(quiet.runs, INSTANTS, strict=True):
+        time = run.record.time_s
+        read = time + 0.01 * np.sum(time[:, None] >= instants * time[-1], axis=1)
+        reading = CubicSpline(time, run.record.yaw_rad)(read)[read <= time[-1]]
+        runs.append(
+            replace(
+                run,
+                record=Record(
+                    time[: reading.size], reading + rng.normal(0.0, gap_campaigns.NOISE, reading.size)
+                ),
+            )
+        )
+    return replace(campaign(), runs=tuple(runs))
 
 
 def fitted(effect: Effect) -> Fit:
@@ -49,7 +79,21 @@ def test_a_skip_is_placed_to_within_a_few_blocks() -> None:
     found = skip(nominal(campaign(LOST)))
     assert found is not None
     assert found.values[0] == pytest.approx(0.006, rel=0.1)
-    assert found.numbers == pytest.approx(OWN, abs=0.005)  # 50 ms: at a turn of the motion a skip is not seen
+    assert found.numbers[:, 0] == pytest.approx(
+        OWN, abs=0.005
+    )  # 50 ms: at a turn of the motion a skip is not seen
+
+
+def test_three_skips_in_every_run_are_found_and_fitted() -> None:
+    base = nominal(thrice_skipped())
+    found = skip(base)
+    assert found is not None
+    assert found.numbers.shape == (6, 3)
+    assert np.sort(found.numbers, axis=1) == pytest.approx(INSTANTS, abs=0.02)
+    (start,) = starting_points(base, type(LOST))
+    fit_found = fit(start.problem, start.point, base=base)
+    assert fit_found.excess < 0.02 * base.excess
+    assert fit_found.value("dropped_samples.lost_time") == pytest.approx(0.03, rel=0.02)
 
 
 def test_without_a_gap_next_to_nothing_is_expected_of_either() -> None:

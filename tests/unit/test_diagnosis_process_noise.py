@@ -83,10 +83,18 @@ def test_intensity_and_bandwidth_are_recovered(windy):
 def test_innovations_of_the_right_model_are_white_and_steady(windy):
     found = fit_turbulence(windy)
     assert found is not None
-    band, quarter, _ = whiteness(found)
+    band, quarter, tails = whiteness(found)
     assert band < 5.0
     assert quarter < 5.0
+    assert tails < 0.0
     assert len(found.run_ids) == sum(speed > 0.0 for _, speed in CONDITIONS)
+
+
+def test_a_blow_in_steady_turbulence_shows_as_heavy_tails(windy):
+    found = fit_turbulence(windy)
+    struck = [i.copy() for i in found.innovations]
+    struck[0][100:104] += 5.0  # five standard deviations during four of the filter's samples
+    assert whiteness(replace(found, innovations=struck))[2] > 0.3
 
 
 def test_without_a_random_moment_there_is_nothing_to_gain():

@@ -145,6 +145,18 @@ def test_a_shedding_line_gives_its_strouhal_number_amplitude_and_phase():
     np.testing.assert_allclose(np.angle(np.exp(1j * turn)), 0.0, atol=0.3)
 
 
+def test_a_shedding_line_follows_the_wind_speed_that_the_fit_has_corrected():
+    shed = effect_from("vortex_shedding", {"amplitude": 0.02, "strouhal_number": 0.19})
+    offset = effect_from("wind_speed_offset", {"offset": -1.5})
+    base = nominal(campaign(shed, offset))
+    (start,) = starting_points(base, type(offset))
+    corrected = fit(start.problem, start.point, base=base)
+    lead = starting_points(corrected, type(shed))[0]
+    found = fit(lead.problem, lead.point, base=corrected)
+    assert abs(found.excess) < 5.0 * np.sqrt(2.0 / found.count)
+    assert found.value("vortex_shedding.strouhal_number") == pytest.approx(0.19, rel=1e-3)
+
+
 def test_a_sine_in_the_residuals_has_its_amplitude_in_their_spectrum():
     base = nominal(campaign())
     time = base.problem.data.runs[0].interval * np.arange(base.residuals[0].size)

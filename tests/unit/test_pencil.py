@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from identification.decay import pencil
 from identification.decay.damped_oscillation import Decay, free_decay
 from identification.decay.pencil import pencil_decay
 
@@ -38,6 +39,18 @@ def test_the_weights_are_the_slope():
     moved = pencil_decay(yaw + away, 0.05, 9.0)
     change = [moved.decay.rate - found.decay.rate, moved.decay.stiffness - found.decay.stiffness]
     np.testing.assert_allclose(change, found.weights @ away, rtol=1e-3)
+
+
+@pytest.mark.parametrize("zeta", [0.002, 0.05])
+def test_short_and_long_records_are_decomposed_alike(zeta, monkeypatch):
+    yaw = free_decay(0.05 * np.arange(60), Decay.from_modal(9.0, zeta), 0.3, 0.0)
+    yaw += 1e-3 * np.random.default_rng(6).standard_normal(60)
+    dense = pencil_decay(yaw, 0.05, 9.0)
+    monkeypatch.setattr(pencil, "_DENSE", 0)
+    iterated = pencil_decay(yaw, 0.05, 9.0)
+    assert iterated.decay.rate == pytest.approx(dense.decay.rate, rel=1e-7)
+    assert iterated.decay.stiffness == pytest.approx(dense.decay.stiffness, rel=1e-9)
+    np.testing.assert_allclose(iterated.weights, dense.weights, rtol=1e-5, atol=1e-8)
 
 
 def test_it_says_when_there_is_nothing():

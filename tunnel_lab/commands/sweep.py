@@ -131,7 +131,7 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
 
 def _work(workers: int | None, scheduler: str | None, sweep: Sweep) -> Work:
     from tunnel_lab.sweep.cluster import on_cluster
-    from tunnel_lab.sweep.processes import available_processors, in_processes
+    from tunnel_lab.sweep.processes import available_processors, shards_in_processes
     from tunnel_lab.terminal.tables import say
 
     count = min(workers or available_processors(), sweep.shards)
@@ -139,7 +139,7 @@ def _work(workers: int | None, scheduler: str | None, sweep: Sweep) -> Work:
     def tell(line: str) -> None:
         say(f"tunnel: {line}", stderr=True)
 
-    return in_processes(count, tell) if scheduler is None else on_cluster(scheduler, count, tell)
+    return shards_in_processes(count, tell) if scheduler is None else on_cluster(scheduler, count, tell)
 
 
 def show_summary(folder: Path) -> None:

@@ -19,7 +19,7 @@ class DroppedSamples(Effect):
     """Samples missing without a gap in the time stamps.
 
     Args:
-        lost_time: time that the missing samples would have taken, s.
+        lost_time: time that the missing samples would have taken, s; an equal part at each instant.
     """
 
     name = "dropped_samples"
@@ -28,10 +28,10 @@ class DroppedSamples(Effect):
     condition = "always"
     equation = (
         "y(t) = β(t) until the instant and β(t + τ) after it, shared out over one sample interval; "
-        "the instant is drawn for every run"
+        "the instant is drawn for every run. With n instants in a run, τ/n is lost at each"
     )
     signature = (
-        "The phase jumps at one instant of a run; before and after it frequency and damping are the same."
+        "The phase jumps at an instant of a run; before and after it frequency and damping are the same."
     )
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.02,)
@@ -52,14 +52,18 @@ class DroppedSamples(Effect):
         del stated
         if self.is_null:
             return run
-        self.drawn_number(drawn)  # an error here, before the motion is computed
+        self._instants(drawn)  # an error here, before the motion is computed
         return replace(run, duration=run.duration + self.lost_time + _MARGIN)
 
     def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """The true time runs ahead of the stamps from the instant on."""
+        """The true time runs ahead of the stamps from every instant on."""
         if self.is_null:
             return time_s
-        instant = self.drawn_number(drawn) * stated.duration
+        instants = self._instants(drawn) * stated.duration
         interval = time_s[1] - time_s[0]
-        after = np.clip((time_s - instant) / interval + 0.5, 0.0, 1.0)
-        return np.asarray(time_s + self.lost_time * after, np.float64)
+        after = np.clip((time_s[:, None] - instants) / interval + 0.5, 0.0, 1.0)
+        return np.asarray(time_s + self.lost_time * after.mean(axis=1), np.float64)
+
+    def _instants(self, drawn: Drawn) -> Array:
+        """Shares of the run, shape (n,)."""
+        return drawn if isinstance(drawn, np.ndarray) else np.array([self.drawn_number(drawn)])

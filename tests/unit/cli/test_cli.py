@@ -156,3 +156,10 @@ def test_help_imports_nothing_heavy_and_answers_in_half_a_second() -> None:
         # Processor time: what the machine does besides is not the help's.
         seconds.append(sum(after[2:4]) - sum(before[2:4]))
     assert min(seconds) < 0.5
+
+
+def test_a_shell_completes_commands(tunnel: Tunnel, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("_TUNNEL_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", "tunnel ident")
+    monkeypatch.setenv("COMP_CWORD", "1")
+    assert tunnel()[:2] == (0, "identify\n")

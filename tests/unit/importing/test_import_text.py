@@ -107,6 +107,19 @@ def test_a_rate_beside_the_angle_is_not_taken_for_it(tmp_path: Path) -> None:
     assert any("'column 3' is left out: it is the rate" in line for line in imported.remarks())
 
 
+@pytest.mark.parametrize("stamp", ["{}", "2026-03-01 {}", "2026-03-01T{}Z", '"{}"'])
+def test_times_of_day_are_seconds_and_go_on_at_midnight(stamp: str, tmp_path: Path) -> None:
+    seconds, angle = 86397.5 + 0.05 * np.arange(120), 0.2 * np.cos(9.0 * 0.05 * np.arange(120))
+    clocks = [f"{s % 86400 // 3600:02.0f}:{s % 3600 // 60:02.0f}:{s % 60:06.3f}" for s in seconds]
+    lines = [f"{stamp.format(clock)};{value:.6f}" for clock, value in zip(clocks, angle, strict=True)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["stamp;yaw_rad", *lines]))
+    imported = read_records([path])
+    record = imported.campaign.runs[0].record
+    np.testing.assert_allclose(record.time_s, seconds - seconds[0], atol=1e-6)
+    assert any("'stamp' holds times of day" in remark for remark in imported.remarks())
+
+
 def test_texts_among_the_numbers_are_said(tmp_path: Path) -> None:
     time, angle = decay()
     rows = [f"{t:.3f},{y:.8f},ok" for t, y in zip(time, angle, strict=True)]

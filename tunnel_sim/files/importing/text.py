@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,8 @@ MAGIC: tuple[bytes, ...] = ()
 """Text begins with anything."""
 KIND = "a table of text"
 """As messages name it."""
+_CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:Z|[+-]\d{2}:?\d{2})?$"
+_DAY = 86400.0  # s
 _HEAD, _MIDDLE = 2**18, 2**14  # bytes that are looked at
 _HEAD_LINES = 400
 _NAMES = {"tab": "\t", ";": ";", ",": ",", "|": "|", "blank": " "}
@@ -198,14 +200,29 @@ def _from_texts(
     cells = pl.all().str.strip_chars(' \t\r"')
     cells = cells.str.replace(",", ".", literal=True) if dialect.decimal == "," else cells
     numbers = frame.select(cells.cast(pl.Float64, strict=False))
-    notes = []
-    for name, text, number in zip(layout.names, frame.get_columns(), numbers.get_columns(), strict=True):
+    notes, units = [], list(layout.units)
+    for i, (name, text) in enumerate(zip(layout.names, frame.get_columns(), strict=True)):
+        number = numbers.to_series(i)
         lost = number.null_count() - text.null_count()
-        if number.null_count() == text.len() and lost:
+        if number.null_count() == text.len() and lost and (clock := _clock(text)) is not None:
+            numbers.replace_column(i, clock)
+            units[i] = "s"
+            notes.append(f"the column '{name}' holds times of day, taken as seconds")
+        elif number.null_count() == text.len() and lost:
             notes.append(f"the column '{name}' holds text and is left out")
         elif lost:
             notes.append(f"{lost} texts in the column '{name}' are taken as missing")
-    return channels_of(numbers, layout), tuple(notes)
+    return channels_of(numbers, replace(layout, units=tuple(units))), tuple(notes)
+
+
+def _clock(text: pl.Series) -> pl.Series | None:
+    """Times of day such as 14:03:07.25, with or without a date, in s; they go on at midnight."""
+    fields = [text.str.extract(_CLOCK, group).str.replace(",", ".").cast(pl.Float64) for group in (1, 2, 3)]
+    seconds = 3600.0 * fields[0] + 60.0 * fields[1] + fields[2]
+    if 2 * seconds.null_count() > seconds.len():
+        return None
+    midnights = (seconds.forward_fill().diff() < -_DAY / 2).fill_null(value=False).cum_sum()
+    return seconds + _DAY * midnights
 
 
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:

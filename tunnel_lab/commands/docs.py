@@ -1,0 +1,53 @@
+"""``tunnel docs``: the documentation site."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+NAME = "docs"
+
+
+def run(
+    source: Annotated[
+        Path, typer.Option(help="Folder of the pages, in the source tree.", file_okay=False)
+    ] = Path("docs"),
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the first page, or only say where it is.")
+    ] = True,
+) -> None:
+    """Build the documentation site and open it.
+
+    The site has all pages, an API reference and three notebooks, which are
+    run. It is kept in _build/html of the folder; pages that have not changed
+    are not built again. It needs the extra 'docs'.
+
+    [bold]Examples[/bold]
+      tunnel docs
+      tunnel docs --no-browser
+
+    [bold]Exit status[/bold]
+      0 built, 1 a page could not be built, 2 bad input.
+    """
+    from tunnel_lab.terminal import tables
+    from tunnel_sim.vocabulary.errors import TunnelError, shown
+
+    if not (source / "conf.py").is_file():
+        raise TunnelError(
+            "no documentation here", where=shown(source), remedy="run it in the source tree, or give --source"
+        )
+    try:
+        from sphinx.cmd.build import main as build
+    except ImportError:
+        raise TunnelError(
+            "the documentation needs Sphinx", remedy="run: pip install 'virtual-wind-tunnel[docs]'"
+        ) from None
+    site = source / "_build" / "html"
+    if build(["-q", "-W", "--keep-going", "-b", "html", str(source), str(site)]):
+        raise typer.Exit(1)
+    page = (site / "index.html").resolve()
+    tables.say(f"Built: {page}")
+    if browser:
+        typer.launch(page.as_uri())
