@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tunnel_sim.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from diagnosis._diagnose import diagnose, vocabulary
+    from diagnosis._diagnose import diagnose, read_model, vocabulary
     from diagnosis.result import (
         Candidate,
         Coefficients,
@@ -22,7 +22,7 @@ else:
     __getattr__, __dir__ = lazy_names(
         __name__,
         {
-            "._diagnose": "diagnose vocabulary",
+            "._diagnose": "diagnose read_model vocabulary",
             ".result": "Candidate Coefficients Diagnosis GapSummary ParameterEstimate RunGap Where",
         },
     )
@@ -36,5 +36,6 @@ __all__ = [
     "RunGap",
     "Where",
     "diagnose",
+    "read_model",
     "vocabulary",
 ]

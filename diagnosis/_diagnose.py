@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from diagnosis.answer.assemble import assemble
 from diagnosis.answer.limit_cycles import limit_cycle_answer, refused_limit_cycles
@@ -12,6 +14,7 @@ from diagnosis.answer.own_units import in_own_units
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.limit_cycles import diagnosable
 from diagnosis.detection.noise_remarks import noise_remarks
+from diagnosis.detection.own_model import SLIDE, reach, with_law
 from diagnosis.detection.refusal import refuse_hopeless
 from diagnosis.investigate import Progress, investigate
 from diagnosis.localisation.localise import localise
@@ -21,9 +24,18 @@ from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
+if TYPE_CHECKING:
+    from diagnosis.patch import PatchedModel
+    from diagnosis.study import Study
+    from tunnel_sim.engine.joint_model import JointModel
+
 
 def diagnose(
-    campaign: Campaign, *, kinds: Sequence[type[Effect]] | None = None, progress: Progress | None = None
+    campaign: Campaign,
+    *,
+    kinds: Sequence[type[Effect]] | None = None,
+    progress: Progress | None = None,
+    model: JointModel | None = None,
 ) -> Diagnosis:
     """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
@@ -31,6 +43,7 @@ def diagnose(
         campaign: measured or simulated runs.
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
+        model: a model of one's own, from `read_model`, which is then the nominal model.
 
     Returns:
         The answer, for the runs that one model can be fitted to; its cautions name the others.
@@ -40,11 +53,36 @@ def diagnose(
             cannot be fitted to them.
     """
     kinds = known_effects() if kinds is None else kinds
+    campaign = campaign if model is None else with_law(campaign, model.law)
     with answering_with(kinds):
-        return _diagnose(campaign, kinds, progress)
+        return _diagnose(campaign, kinds, progress, model)
 
 
-def _diagnose(campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progress | None) -> Diagnosis:
+def read_model(
+    path: Path | str, joint: str, campaign: Campaign, free: Sequence[str] | None = None
+) -> JointModel:
+    """Read a model of one's own for the diagnosis of a campaign.
+
+    Args:
+        path: MJCF, or URDF that MuJoCo loads.
+        joint: name of the joint recorded, the only one that moves.
+        campaign: whose records say how far the joint moves.
+        free: what is fitted, of ``inertia``, ``damping``, ``stiffness`` and ``rest``; None: what matters.
+
+    Returns:
+        The model with the law of its joint.
+
+    Raises:
+        TunnelError: when the model cannot be the nominal model of the campaign.
+    """
+    from tunnel_sim.engine.joint_model import read_joint_model  # only here: MuJoCo is slow to load
+
+    return read_joint_model(Path(path), joint, reach(campaign), free)
+
+
+def _diagnose(
+    campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progress | None, model: JointModel | None
+) -> Diagnosis:
     found = diagnosable(campaign)
     if not found.limit_cycles:
         refuse_hopeless(found.campaign)
@@ -53,6 +91,8 @@ def _diagnose(campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progr
         # Their sizes are those of angles, and their ranges too.
         kinds = [kind for kind in kinds if kind.channel != "sensor"]
         left_out = (*left_out, f"Effects of the sensor are not tried on {campaign.sensor.quantity}s.")
+    if campaign.law is not None and campaign.law.slide:
+        left_out = (*left_out, SLIDE)
     try:
         study = investigate(campaign, () if found.limit_cycles else kinds, progress)
     except TunnelError as error:
@@ -63,12 +103,24 @@ def _diagnose(campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progr
         progress("where, and how far it closes")
     where, maps = localise(study)
     remarks = (*found.remarks, *noise_remarks(study.noise, study.trend))
-    answer = in_own_units(replace(assemble(study, where, maps, left_out), remarks=remarks), study.similarity)
+    patched, unpatched = (None, ()) if model is None else _patched(study, model)
+    assembled = assemble(study, where, maps, (*left_out, *unpatched), patched)
+    answer = in_own_units(replace(assembled, remarks=remarks), study.similarity)
     if found.limit_cycles:
         return limit_cycle_answer(answer, found.remarks)
     if answer.causes == ("unknown",):
         return replace(answer, cautions=(*answer.cautions, *second_modes(campaign)))
     return answer
+
+
+def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tuple[str, ...]]:
+    """The patched model, or none and a sentence that says why."""
+    from diagnosis.answer.patched_model import patched_model  # only here: MuJoCo is slow to load
+
+    try:
+        return patched_model(study, model), ()
+    except TunnelError as error:
+        return None, (f"The causes could not be written into the model: {error.what}.",)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

@@ -9,6 +9,7 @@ from typing import Any
 import polars as pl
 
 from diagnosis.closure import Rest, Waterfall
+from diagnosis.patch import PatchedModel
 from diagnosis.printing import diagnosis_parts
 from identification.printing.frames import wide_frame
 from identification.printing.table import as_html, as_text
@@ -231,6 +232,7 @@ class Diagnosis:
         inclusion: by effect of the vocabulary, the probability that it is among the causes.
         waterfall: how far the gap closes with each cause.
         rest: what remains after the causes.
+        model: the model given, with the causes written into it; None where none was given.
     """
 
     campaign: str
@@ -253,6 +255,7 @@ class Diagnosis:
     inclusion: Mapping[str, float] = field(default_factory=dict)
     waterfall: Waterfall = field(default_factory=Waterfall)
     rest: Rest | None = None
+    model: PatchedModel | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""
@@ -298,6 +301,7 @@ class Diagnosis:
             "inclusion": dict(self.inclusion),
             **self.waterfall.to_json_dict(),
             "rest": None if self.rest is None else self.rest.to_json_dict(),
+            "model": None if self.model is None else self.model.to_json_dict(),
             "ambiguous_with": list(self.ambiguous_with),
             "next_run": None if self.next_run is None else dict(self.next_run),
             "coefficients": {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -20,11 +21,13 @@ from diagnosis.answer.pulls import coefficient_move
 from diagnosis.answer.reference_sizes import size_note, sized_coefficients
 from diagnosis.answer.reported import excess_base, gap_summary, on_stretches, report_fits
 from diagnosis.answer.rest import rest
+from diagnosis.answer.small_swings import coefficient_names
 from diagnosis.answer.verdict import blind_spots, cnr_note, verdict
 from diagnosis.answer.waterfall import waterfall
 from diagnosis.attribution.decide import Weighed
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.localisation.maps import Maps
+from diagnosis.patch import PatchedModel
 from diagnosis.policy import RIVAL_PROBABILITY, UNKNOWN_SHARE
 from diagnosis.result import (
     Coefficients,
@@ -42,7 +45,13 @@ _LATE_START = (
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
 
-def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = ()) -> Diagnosis:
+def assemble(
+    study: Study,
+    where: Where,
+    maps: Maps,
+    left_out: Sequence[str] = (),
+    patched: PatchedModel | None = None,
+) -> Diagnosis:
     """Compose the answer.
 
     Args:
@@ -50,6 +59,7 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
         where: where the gap is.
         maps: data of the figures.
         left_out: sentences on runs that were left out.
+        patched: the model given with the causes written into it; the share closed is then its own.
 
     Returns:
         The diagnosis.
@@ -67,6 +77,9 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
     begun = time.perf_counter()
     steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
     gap = on_stretches(gap, steps)
+    if patched is not None and study.causes not in ((), ("unknown",)):
+        on = f"{patched.closure.on}, simulated with the patched model"
+        gap = replace(gap, closed=patched.closure.native_closed, closed_on=on)
     seconds["waterfall"] = time.perf_counter() - begun
     found = _coefficients(study, chosen, nominal_out, chosen_out)
     left = rest(study, *_in_own_units(study, found.after, chosen), steps.steps[-1].excess)
@@ -115,6 +128,7 @@ def assemble(study: Study, where: Where, maps: Maps, left_out: Sequence[str] = (
         inclusion=inclusion(weighed, study.read_off),
         waterfall=steps,
         rest=left,
+        model=patched,
     )
 
 
@@ -122,7 +136,7 @@ def _in_own_units(
     study: Study, stated: Mapping[str, ParameterEstimate], chosen: Fit
 ) -> tuple[dict[str, ParameterEstimate], dict[str, float]]:
     """The coefficients stated, and how far what remains moves each, in the measured campaign's units."""
-    names = ("omega_n", "zeta") if chosen.problem.data.normalised else ("cn_beta", "cn_r")
+    names = coefficient_names(chosen.problem)
     return {name: own_estimate(given, study.similarity) for name, given in stated.items()}, {
         name: study.similarity.own(coefficient_move(chosen, coefficient), given.unit)
         for (name, given), coefficient in zip(stated.items(), names, strict=False)

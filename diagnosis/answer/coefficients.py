@@ -11,7 +11,13 @@ import numpy as np
 from diagnosis.answer.determined import meant_coefficient
 from diagnosis.answer.held_out import HeldOut
 from diagnosis.answer.pulls import coefficient_move
-from diagnosis.answer.small_swings import coefficient_gradient, coefficient_value, stiffness_names
+from diagnosis.answer.small_swings import (
+    JOINT_UNITS,
+    coefficient_gradient,
+    coefficient_names,
+    coefficient_value,
+    stiffness_names,
+)
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import Fit
@@ -22,7 +28,7 @@ from identification.statistics.widening import scatter_of_runs
 from tunnel_sim.effects.fitting import WindOnRun
 from tunnel_sim.vocabulary.campaign import Campaign
 
-_UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1"}
+_UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1", **JOINT_UNITS}
 
 
 def coefficients(
@@ -42,7 +48,7 @@ def coefficients(
         textbook: the same effects in textbook form, where the fit freed their forms.
 
     Returns:
-        ``cn_beta`` and ``cn_r``, or ``omega_n`` and ``zeta`` of small swings in normalised form. The variance is
+        By the names of `coefficient_names`; ``omega_n`` and ``zeta`` are those of small swings. The variance is
         that of the fit scaled by its excess, or where the residuals are coloured the greatest of that, the
         delete-a-group jackknife (Kott, J. Off. Stat. 17 (2001) 521), the scatter of the runs and half the
         difference between two halves of the data (`diagnosis.answer.pulls`); plus the rounding of the air density,
@@ -50,9 +56,8 @@ def coefficients(
         (another family of forms may change as much), plus the spread over rivals. No standard deviation is given
         at a bound and where the runs do not determine the coefficient.
     """
-    names = ("omega_n", "zeta") if fit.problem.data.normalised else ("cn_beta", "cn_r")
     result = {}
-    for name in names:
+    for name in coefficient_names(fit.problem):
         value, std = _value(fit, held_out, name)
         if value is None:
             continue
@@ -70,7 +75,7 @@ def coefficients(
 
 def _estimate(fit: Fit, name: str, value: float, std: float) -> ParameterEstimate:
     """A coefficient, marked where the fit stopped at a bound or the runs do not determine it."""
-    bound = fit.bound("mechanical_damping") if name == "zeta" else None
+    bound = fit.bound("mechanical_damping") if name in ("zeta", "mechanical_damping") else None
     if name == "omega_n" and len(stiffness_names(fit.problem.names)) == 1:  # no gravity instead of the spring
         bound = fit.bound("stiffness")
     found = ParameterEstimate(value, None if bound else std, _UNITS[name], bound)

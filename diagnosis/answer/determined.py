@@ -34,7 +34,7 @@ def meant_coefficient(found: ParameterEstimate, fit: Fit, name: str) -> Paramete
     Args:
         found: the estimate.
         fit: that it comes from.
-        name: ``cn_beta``, ``cn_r``, ``omega_n`` or ``zeta``.
+        name: ``cn_beta``, ``cn_r``, ``omega_n``, ``zeta`` or a parameter of a joint's law.
 
     Returns:
         The estimate; not determined where its standard deviation exceeds ωn itself, a damping ratio of 1, or the
@@ -44,6 +44,8 @@ def meant_coefficient(found: ParameterEstimate, fit: Fit, name: str) -> Paramete
         return _limited(found, abs(found.value))
     if name == "zeta":
         return _limited(found, 1.0)
+    if not name.startswith("cn_"):
+        return found
     return _limited(found, min((_own_moment(fit, i, name) for i in _windy(fit)), default=math.inf))
 
 

@@ -82,7 +82,8 @@ def planned_run(
 def _designs(fit: Fit) -> list[tuple[RunData, float]]:
     data = fit.problem.data
     density = max((run.air_density for run in data.runs), default=0.0) or 1.2
-    springs = sorted({round(k * f, 2) for k in data.springs for f in _STIFFNESS_FACTORS} | set(data.springs))
+    factors = _STIFFNESS_FACTORS if data.law is None else ()  # a model's spring cannot be chosen
+    springs = sorted({round(k * f, 2) for k in data.springs for f in factors} | set(data.springs))
     speeds = [v for v in _SPEEDS if v == 0.0 or data.wind_on]
     designs = []
     for spring in springs[:: max(1, len(springs) // 4)]:

@@ -7,8 +7,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from diagnosis.fitting.problem import Problem
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.record import Array
+
+#: Parameters of a joint's law, by name in a fit, and their units.
+JOINT_UNITS = {
+    "yaw_inertia": "kg m2",
+    "mechanical_damping": "N m s/rad",
+    "added_stiffness": "N m/rad",
+}
 
 #: Parameters that add to the spring's stiffness at small amplitudes, as gravity does.
 _STIFFNESSES = tuple(
@@ -16,6 +24,22 @@ _STIFFNESSES = tuple(
     for kind in ALL_EFFECTS
     if kind.channel == "stiffness" and kind.parameters()[0].unit == "N m/rad"
 )
+
+
+def coefficient_names(problem: Problem) -> tuple[str, ...]:
+    """The coefficients that a diagnosis states.
+
+    Args:
+        problem: nominal, or with effects.
+
+    Returns:
+        ``omega_n`` and ``zeta`` in normalised form, else ``cn_beta`` and ``cn_r``; before these the free inertia,
+        damping and stiffness of a joint in a model of one's own.
+    """
+    if problem.data.normalised:
+        return "omega_n", "zeta"
+    own = () if problem.data.law is None else JOINT_UNITS
+    return *(name for name in own if name in problem.names), "cn_beta", "cn_r"
 
 
 def stiffness_names(names: Sequence[str]) -> tuple[str, ...]:

@@ -231,6 +231,7 @@ def difference_steps(problem: Problem, common: Array) -> Array:
     scales = {
         "yaw_inertia": 0.1,
         "stiffness": 10.0,
+        "added_stiffness": 1.0,
         "mechanical_damping": 0.02,
         "cn_beta": 0.4,
         "cn_r": 0.1,

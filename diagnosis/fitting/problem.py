@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -65,8 +65,14 @@ class Problem:
     def nominal_names(self) -> tuple[str, ...]:
         """Names of the nominal model's common parameters."""
         first = "stiffness" if self.data.normalised else "yaw_inertia"
+        spring = () if self.data.law is None else ("added_stiffness",)
         air = ("cn_beta", "cn_r") if self.data.wind_on else ()
-        return (first, "mechanical_damping", *air, *(() if self.data.own_zeros else ("zero",)))
+        names = (first, "mechanical_damping", *spring, *air, *(() if self.data.own_zeros else ("zero",)))
+        return tuple(name for name in names if name not in self._held)
+
+    @cached_property
+    def _held(self) -> Mapping[str, float]:
+        return {} if self.data.law is None else self.data.law.held
 
     @property
     def first_phase(self) -> int:
@@ -83,7 +89,9 @@ class Problem:
         Returns:
             In the unit of the reading.
         """
-        return float(own[2] if self.data.own_zeros else common[self.nominal_names.index("zero")])
+        if self.data.own_zeros:
+            return float(own[2])
+        return self._held["zero"] if "zero" in self._held else float(common[self.nominal_names.index("zero")])
 
     @cached_property
     def effect_names(self) -> tuple[str, ...]:
@@ -163,11 +171,12 @@ class Problem:
         Returns:
             The physics, before any effect.
         """
-        value = dict(zip(self.names, common.tolist(), strict=True))
+        value = {**self._held, **dict(zip(self.names, common.tolist(), strict=True))}
+        law = self.data.law
         spring = value["stiffness"] if self.data.normalised else run.spring_stiffness
         assert spring is not None
         return RunSettings(
-            spring_stiffness=spring,
+            spring_stiffness=max(spring + value.get("added_stiffness", 0.0), 0.0),
             derivatives=AeroDerivatives(value.get("cn_beta", 0.0), value.get("cn_r", 0.0)),
             yaw_inertia=1.0 if self.data.normalised else value["yaw_inertia"],
             mechanical_damping=value["mechanical_damping"],
@@ -176,6 +185,8 @@ class Problem:
             release_angle=float(release[0]),
             release_rate=float(release[1]),
             duration=run.duration,
+            parameters={} if law is None else {"friction_moment": law.friction},
+            program=self.data.program,
         )
 
     def chain(

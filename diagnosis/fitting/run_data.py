@@ -11,9 +11,11 @@ import numpy as np
 from diagnosis.fitting.samples import Samples, hermite_basis, hermite_means
 from diagnosis.fitting.similarity import AS_MEASURED, Similarity
 from diagnosis.fitting.whitening import WHITE, colour, colouring, response, whiten
+from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.aero import aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.record import Array
 
 #: Interval of the block means, s: the motion stays below 10 Hz and the mains at 50 Hz.
@@ -196,6 +198,7 @@ class Data:
         windy: whether the runs are part of a campaign with the wind on, though none of these may be: the model
             then keeps its aerodynamic parameters.
         similarity: how the campaign was made from the measured one.
+        law: of the joint in a model of one's own; None: spring and damper.
     """
 
     runs: tuple[RunData, ...]
@@ -207,6 +210,14 @@ class Data:
     own_zeros: bool = False
     windy: bool = False
     similarity: Similarity = AS_MEASURED
+    law: JointLaw | None = None
+
+    @cached_property
+    def program(self) -> tuple[float, ...]:
+        """The moment that the law has beside its linear spring and damper, as the moment law evaluates it."""
+        if self.law is None or not self.law.terms:
+            return ()
+        return departure(self.law).program({}, {"b": "angle", "r": "rate"})
 
     @property
     def springs(self) -> tuple[float, ...]:
@@ -272,6 +283,7 @@ def prepare(
         The prepared data. Where any run states no stiffness, all are taken in normalised form.
     """
     rig = campaign.rig
+    held = {} if campaign.law is None else campaign.law.held
     return Data(
         runs=tuple(
             _prepare_run(run, noise_variance[run.id], campaign.sensor.derivative) for run in campaign.runs
@@ -281,9 +293,23 @@ def prepare(
         width=rig.width or 0.0,
         normalised=any(run.spring_stiffness is None for run in campaign.runs),
         yaw_inertia=rig.yaw_inertia,
-        own_zeros=campaign.sensor.zero == "per_run",
+        own_zeros=campaign.sensor.zero == "per_run" and "zero" not in held,
         similarity=similarity,
+        law=campaign.law,
     )
+
+
+def departure(law: JointLaw) -> Expression:
+    """The moment that a joint's law has beside its linear spring, damper and friction.
+
+    Args:
+        law: with one term or more.
+
+    Returns:
+        Of the displacement ``b`` from rest (rad) and its rate ``r`` (rad/s), in N m.
+    """
+    text = "".join(f"-({term.coefficient!r})*({term.expression})" for term in law.terms)
+    return parse(text, frozenset("br"))
 
 
 def _prepare_run(run: Run, noise_variance: float, derivative: int) -> RunData:

@@ -16,6 +16,7 @@ import numpy as np
 
 from identification.decay.spectrum import highest_peak
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.record import Record, evenly_spaced
 from tunnel_sim.vocabulary.units import dimension
 
@@ -116,6 +117,7 @@ def similar_campaign(campaign: Campaign) -> tuple[Campaign, Similarity]:
             rig=_rig(campaign.rig, change),
             sensor=_sensor(campaign.sensor, change),
             runs=tuple(_run(run, change) for run in campaign.runs),
+            law=None if campaign.law is None else _law(campaign.law, change),
         ),
         change,
     )
@@ -159,6 +161,21 @@ def _sensor(sensor: SensorProperties, change: Similarity) -> SensorProperties:
         sample_rate=similar(sensor.sample_rate, "Hz"),
         resolution=similar(sensor.resolution, change.reading),
         noise_std=similar(sensor.noise_std, change.reading),
+    )
+
+
+def _law(law: JointLaw, change: Similarity) -> JointLaw:
+    return dataclasses.replace(
+        law,
+        inertia=change.similar(law.inertia, "kg m2"),
+        stiffness=change.similar(law.stiffness, "N m/rad"),
+        damping=change.similar(law.damping, "N m s/rad"),
+        friction=change.similar(law.friction, "N m"),
+        rest=law.rest - change.rest,
+        terms=tuple(
+            dataclasses.replace(term, coefficient=change.similar(term.coefficient, term.unit))
+            for term in law.terms
+        ),
     )
 
 

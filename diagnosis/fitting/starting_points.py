@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ import numpy as np
 from diagnosis.fitting.least_squares import Fit, normal_equations
 from diagnosis.fitting.own_numbers import OwnNumbers, ringing, skip
 from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.run_data import Data, RunData
+from diagnosis.fitting.run_data import Data, RunData, departure
 from diagnosis.fitting.spectra import Line, mains_line, shedding_line
 from diagnosis.policy import GROSS_MISFIT
 from identification.decay.spectrum import highest_peak
@@ -20,6 +21,7 @@ from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.record import Array
 
 _STILL = 0.02  # of the largest swing, below which a run or a stretch of it counts as at rest
+_PHASES = 64  # of a cycle, for its mean
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
@@ -47,7 +49,7 @@ def nominal_start(data: Data) -> Point:
             np.array([typical, 0.01 * float(np.sqrt(typical)), *_still(data), *zero]),
             release,
         )
-    spring = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
+    spring = _seen_stiffness(data, swing)
     pressure = np.array([data.air_moment(run) for run in data.runs])
     # Kr = Izz ω² + pressure Cnβ, with equal relative errors
     design = np.column_stack([omega2, pressure]) / spring[:, None] * moving[:, None]
@@ -57,7 +59,24 @@ def nominal_start(data: Data) -> Point:
     inertia = float(solution[0]) if solution[0] > 0.0 else float(np.median((spring / omega2)[moving > 0.0]))
     air = (float(solution[1]), 0.0) if data.wind_on else ()
     damping = 0.01 * inertia * float(np.sqrt(typical))
-    return Point(np.array([inertia, damping, *air, *zero]), release)
+    names = Problem(dataclasses.replace(data, law=None)).nominal_names
+    start = dict(zip(names, [inertia, damping, *air, *zero], strict=True)) | {"added_stiffness": 0.0}
+    return Point(np.array([start[name] for name in Problem(data).nominal_names]), release)
+
+
+def _seen_stiffness(data: Data, swing: Array) -> Array:
+    """Stiffness of every run at its amplitude, N m/rad, shape (runs,), by harmonic balance.
+
+    ``swing`` holds the runs' root mean square displacements, rad.
+    """
+    stated = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
+    if data.law is None or not data.law.terms:
+        return stated
+    phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
+    amplitude = np.sqrt(2.0) * swing[:, None]
+    further = departure(data.law).value({"b": amplitude * np.cos(phase), "r": 0.0})
+    seen = stated - 2.0 * np.mean(further * np.cos(phase), axis=1) / np.maximum(amplitude[:, 0], 1e-12)
+    return np.where(seen > 0.0, seen, stated)
 
 
 def _still(data: Data) -> tuple[float, ...]:

@@ -26,6 +26,9 @@ COEFFICIENTS: Mapping[str, str] = {
     "cn_r_area_length2": "Cnr·A·l²",
     "omega_n": "ωn",
     "zeta": "ζ",
+    "yaw_inertia": "inertia",
+    "mechanical_damping": "damping",
+    "added_stiffness": "added stiffness",
 }
 """Symbols of the coefficients of a diagnosis, also of those multiplied by sizes that are not stated."""
 

@@ -44,7 +44,13 @@ def printed(codes: list[str], folder: Path) -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "count"), [("the-papers-own-gap", 6), ("measured-records", 3), ("the-papers-networks", 7)]
+    ("name", "count"),
+    [
+        ("the-papers-own-gap", 6),
+        ("measured-records", 3),
+        ("a-model-of-your-own", 4),
+        ("the-papers-networks", 7),
+    ],
 )
 def test_shown_output_is_real_output(name: str, count: int, tmp_path: Path) -> None:
     shown = steps(PAGES / f"{name}.md")
@@ -57,6 +63,7 @@ def test_shown_output_is_real_output(name: str, count: int, tmp_path: Path) -> N
 def test_every_page_is_executed() -> None:
     assert {page.stem for page in PAGES.glob("*.md")} == {
         "the-papers-own-gap",
+        "a-model-of-your-own",
         "measured-records",
         "the-papers-networks",
     }

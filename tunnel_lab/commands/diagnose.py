@@ -16,6 +16,7 @@ from tunnel_lab.terminal.options import EffectsFileOption
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
     from tunnel_sim.effects import Effect
+    from tunnel_sim.engine.joint_model import JointModel
     from tunnel_sim.vocabulary.campaign import Campaign
 
 NAME = "diagnose"
@@ -49,6 +50,29 @@ def run(
         typer.Option("--exclude", metavar="C", help="Leave these effects out; tunnel effects lists all."),
     ] = None,
     effects_file: EffectsFileOption = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model", metavar="FILE.xml", help="A model of your own, MJCF or URDF, as the nominal model."
+        ),
+    ] = None,
+    joint: Annotated[
+        str | None, typer.Option("--joint", metavar="NAME", help="Its joint that was recorded; for --model.")
+    ] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--free",
+            metavar="A,B",
+            help="What of it is fitted: inertia, damping, stiffness, rest. Default: what matters.",
+        ),
+    ] = None,
+    patch: Annotated[
+        Path | None,
+        typer.Option(
+            "--patch", metavar="OUT.xml", help="Write the model with the causes in it; for --model."
+        ),
+    ] = None,
 ) -> None:
     """Find out why the nominal model does not fit the runs of a campaign.
 
@@ -66,27 +90,39 @@ def run(
       tunnel diagnose my-campaign --exclude buffeting,mains_hum
       tunnel diagnose my-campaign --json - | jq .causes
       tunnel diagnose my-campaign --effects-file my.toml
+      tunnel diagnose my-campaign --model pendulum.xml --joint hinge --patch out.xml
 
     [bold]Exit status[/bold]
       0 diagnosed, whatever the answer; 2 bad input; 130 interrupted. Files are
       written completely or not at all.
     """
-    from diagnosis import vocabulary
+    from diagnosis import read_model, vocabulary
     from tunnel_lab.terminal.given_campaign import given_campaign
     from tunnel_lab.terminal.options import refuse_unwritable_files, split_names
     from tunnel_lab.terminal.tables import say_written
     from tunnel_sim.files.json_text import json_text
     from tunnel_sim.files.writing import write_json
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     del effects_file  # its effects are known already
     kinds = vocabulary(split_names(effects), split_names(exclude))
     to_stdout = json is not None and str(json) == "-"
-    refuse_unwritable_files(None if to_stdout else json, report)
+    refuse_unwritable_files(None if to_stdout else json, report, patch)
+    if (model is None) != (joint is None) or (model is None and (free or patch)):
+        raise TunnelError(
+            "--model and --joint belong together, and --free and --patch to them", remedy="give both"
+        )
     data = given_campaign(campaign)
-    document = diagnose_with_progress(data, kinds).to_json_dict()
+    own = (
+        None if model is None or joint is None else read_model(model, joint, data, split_names(free) or None)
+    )
+    answer = diagnose_with_progress(data, kinds, own)
+    document = answer.to_json_dict()
     # Files first: the reader of a pipe may close it early.
     if json is not None and not to_stdout:
         write_json(json, document)
+    if patch is not None:
+        write_patch(answer, patch)
     if report is not None:
         from diagnosis.detection.limit_cycles import diagnosable
         from tunnel_lab.diagnosis_view import write_report
@@ -96,19 +132,42 @@ def run(
         typer.echo(json_text(document), nl=False)
         return
     show(document)
-    say_written(json, report)
+    say_written(json, report, patch)
 
 
-def diagnose_with_progress(campaign: Campaign, kinds: tuple[type[Effect], ...]) -> Diagnosis:
+def diagnose_with_progress(
+    campaign: Campaign, kinds: tuple[type[Effect], ...], model: JointModel | None = None
+) -> Diagnosis:
     """Diagnose, with step and effect on standard error where that is a terminal.
 
     Args:
         kinds: effects to answer with.
+        model: the nominal model; None: spring and damper.
     """
     from diagnosis import diagnose
 
     with step_display() as tell:
-        return diagnose(campaign, kinds=kinds, progress=tell)
+        return diagnose(campaign, kinds=kinds, progress=tell, model=model)
+
+
+def write_patch(answer: Diagnosis, path: Path) -> None:
+    """Write the patched model of an answer.
+
+    Args:
+        path: of the MJCF file.
+
+    Raises:
+        TunnelError: when the answer has none.
+    """
+    from tunnel_sim.vocabulary.errors import TunnelError
+
+    if answer.model is None:
+        raise TunnelError(
+            "there is no patched model to write",
+            where="--patch",
+            remedy="the answer without --patch says why",
+        )
+    answer.model.write(path)
 
 
 @contextmanager
@@ -148,6 +207,7 @@ def show(document: dict[str, Any]) -> None:
         document: of a diagnosis.
     """
     from diagnosis import printing as parts
+    from diagnosis.patch import patch_lines, patch_table
     from tunnel_lab.terminal.tables import rich_table, say, show_tables
 
     say(document["verdict"])
@@ -159,7 +219,7 @@ def show(document: dict[str, Any]) -> None:
     show_tables(*(rich_table(table(document)) for table in answers))
     if line := parts.inclusion_line(document):
         say(f"{line}\n")
-    shown = (parts.waterfall_table, parts.gap_table, parts.coefficients_table)
+    shown = (parts.waterfall_table, parts.gap_table, parts.coefficients_table, patch_table)
     show_tables(*(rich_table(table(document)) for table in shown))
-    for line in parts.closing_lines(document):
+    for line in (*patch_lines(document), *parts.closing_lines(document)):
         say(line)

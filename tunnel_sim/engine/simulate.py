@@ -130,7 +130,7 @@ def _integrate_chunk(rig: Rig, runs: list[RunSettings], sample_rate: float, nthr
     batch.set_const()
     samples, steps = sampling(runs[0], sample_rate)
     qpos, qvel = states["qpos"].copy(), states["qvel"].copy()
-    with _no_log():
+    with no_log():
         recorded = batch.rollout(nstep=(samples - 1) * steps, record=("qpos", "qvel"))
     at = model.yaw_address
     time = np.arange(samples) / sample_rate
@@ -143,8 +143,8 @@ def _integrate_chunk(rig: Rig, runs: list[RunSettings], sample_rate: float, nthr
 
 
 @contextmanager
-def _no_log() -> Iterator[None]:
-    """Suppress MuJoCo's warnings on the terminal and in a log file; `_check_finite` reports the same."""
+def no_log() -> Iterator[None]:
+    """Suppress MuJoCo's warnings on the terminal and in a log file; the caller reports the same."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
@@ -108,6 +109,7 @@ class Campaign:
     Args:
         name: short name, also of the folder.
         runs: at least one run, with unique ids.
+        law: of the joint in a model of one's own; None: spring and damper.
     """
 
     name: str
@@ -115,3 +117,4 @@ class Campaign:
     sensor: SensorProperties
     runs: tuple[Run, ...]
     description: str = ""
+    law: JointLaw | None = None

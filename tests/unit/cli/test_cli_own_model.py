@@ -1,0 +1,84 @@
+"""``tunnel diagnose --model``: what is refused in one line, and the patched model that is written.
+
+Truth: a linear decay in closed form.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.reference.free_decays import Setting, campaign
+from tunnel_sim.files.campaign_io import write_campaign
+
+Tunnel = Callable[..., tuple[int, str, str]]
+SPRING = 16.12
+MODEL = f"""<mujoco><option gravity="0 0 0" timestep="0.001" integrator="RK4"/><worldbody><body>
+<joint name="yaw" axis="0 0 1" stiffness="{SPRING}"/><geom type="box" size="0.3 0.1 0.1" mass="4"/>
+</body></worldbody></mujoco>"""
+
+
+@pytest.fixture
+def spring(tmp_path: Path) -> Path:
+    """Two decays of one spring, and a model of the rig whose inertia is too large."""
+    settings = [Setting(SPRING, 0.0), Setting(SPRING, 0.0)]
+    data = campaign(settings, duration=5.0, rate=500.0, noise=5e-4, rng=np.random.default_rng(8))
+    (tmp_path / "rig.xml").write_text(MODEL)
+    return write_campaign(data, tmp_path / "rig")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--model", "rig.xml"], "--model and --joint belong together"),
+        (["--patch", "out.xml"], "--model and --joint belong together"),
+        (["--model", "none.xml", "--joint", "yaw"], "none.xml: is not a file"),
+        (["--model", "rig.xml", "--joint", "jaw"], "there is no such joint; did you mean 'yaw'?"),
+        (["--model", "rig.xml", "--joint", "yaw", "--free", "mass"], "unknown parameter 'mass'"),
+        (["--model", "rig.xml", "--joint", "yaw", "--patch", "no/out.xml"], "its folder does not exist"),
+    ],
+)
+def test_bad_options_are_one_line_and_nothing_is_written(
+    tunnel: Tunnel, spring: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], said: str
+) -> None:
+    monkeypatch.chdir(spring.parent)
+    status, _, err = tunnel("diagnose", spring, *options)
+    assert status == 2
+    assert said in err
+    assert len(err.strip().splitlines()) == 1
+    assert not (spring.parent / "out.xml").exists()
+
+
+def test_the_free_parameters_are_written_where_there_is_no_gap(
+    tunnel: Tunnel, spring: Path, tmp_path: Path
+) -> None:
+    model, out, answer = tmp_path / "rig.xml", tmp_path / "out.xml", tmp_path / "answer.json"
+    options = ("--model", model, "--joint", "yaw", "--patch", out, "--json", answer)
+    status, shown, _ = tunnel("diagnose", spring, "--effects", "coulomb_friction", *options)
+    assert status == 0
+    document = json.loads(answer.read_text())
+    assert document["causes"] == []
+    assert {w["name"] for w in document["model"]["written"]} >= {"joint damping"}
+    assert "Changes to rig.xml" in shown
+    again = tunnel(
+        "diagnose", spring, "--effects", "coulomb_friction", "--model", out, "--joint", "yaw", "--json", "-"
+    )
+    inertias = [d["coefficients"]["after"]["yaw_inertia"]["value"] for d in (document, json.loads(again[1]))]
+    assert inertias[1] == pytest.approx(inertias[0], rel=1e-6)
+
+
+def test_a_slide_says_so(tunnel: Tunnel, spring: Path, tmp_path: Path) -> None:
+    model = tmp_path / "rig.xml"
+    model.write_text(model.read_text().replace('name="yaw"', 'name="yaw" type="slide"'))
+    given = ("--model", model, "--joint", "yaw", "--json", "-")
+    status, shown, _ = tunnel("diagnose", spring, "--effects", "coulomb_friction", *given)
+    assert status == 0
+    document = json.loads(shown)
+    assert document["causes"] == []
+    assert "The joint slides: read m for rad, N for N m and kg for kg m2 throughout." in document["cautions"]
+    (mass,) = next(w["after"] for w in document["model"]["written"] if w["name"].endswith("mass"))
+    assert mass == pytest.approx(document["coefficients"]["after"]["yaw_inertia"]["value"])

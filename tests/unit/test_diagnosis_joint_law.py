@@ -1,0 +1,109 @@
+"""A law written into a model moves MuJoCo as the fits' integrator moves with it, term by term, in real units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis import read_model
+from diagnosis.answer.joint_law import found_law
+from diagnosis.answer.native_closure import _left
+from diagnosis.detection.own_model import with_law
+from diagnosis.fitting.least_squares import scaled_residuals
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.run_data import prepare
+from diagnosis.fitting.similarity import similar_campaign
+from tunnel_sim.effects import Effect, effect_class
+from tunnel_sim.effects.expression_effect import Quantity, expression_effect
+from tunnel_sim.engine.joint_patch import Start, patched, simulate_joint
+from tunnel_sim.physics.motion import Motion
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array, Record
+
+NOISE = 1e-3
+XML = """<mujoco><option timestep="0.0005" integrator="RK4"/><worldbody><body>
+<joint name="hinge" axis="0 1 0" ref="20" damping="0.002 0.001 0" frictionloss="{}"/>
+<geom type="capsule" fromto="0 0 0 0 0 -0.6" size="0.01" mass="0.7"/></body></worldbody></mujoco>"""
+
+DETENT = expression_effect(
+    "detent",
+    channel="stiffness",
+    moment="-k*(b*exp(-(b/w)^2)*(1+0.1*sin(omega*t))+c*r*abs(b))",
+    parameters={
+        "k": Quantity("N m/rad", 0.1, 0.0, 50.0, 0.0, "depth"),
+        "w": Quantity("rad", 0.3, 0.01, 1.0, 0.3, "width"),
+        "c": Quantity("s", 0.01, 0.0, 1.0, 0.01, "loss"),
+    },
+)
+
+
+def pendulum(folder: Path, friction: float = 0.0) -> tuple[Campaign, Path]:
+    time = np.arange(0.0, 6.0, 0.005)
+    reading = 0.35 + 1.1 * np.exp(-0.1 * time) * np.cos(4.9 * time)
+    path = folder / "pendulum.xml"
+    path.write_text(XML.format(friction))
+    runs = (Run("r1", Record(time, reading), 0.0),)
+    return Campaign("pendulum", RigProperties(), SensorProperties(200.0), runs), path
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "tolerance", "said"),
+    [
+        ("cubic_stiffness", (0.4, 3.0), 0.05, ""),
+        ("cubic_stiffness", (0.2, 4.2), 0.05, "plugin"),
+        ("asymmetric_stiffness", (0.2, 2.0), 0.05, ""),
+        ("free_play", (0.05,), 0.5, "plugin"),
+        ("gravity_stiffness", (3.0, 0.4), 2.0, "misses"),
+        ("quadratic_damping", (0.05, 2.0), 0.05, ""),
+        ("quadratic_damping", (0.05, 2.4), 0.1, "plugin"),
+        ("structural_damping", (0.05,), 0.05, ""),
+        ("coulomb_friction", (0.1, 0.0), 3.0, "soft constraint"),
+        ("sensor_nonlinearity", (0.05,), 0.5, "Of the sensor"),
+        (DETENT, (1.0, 0.3, 0.05), 0.1, ""),
+    ],
+)
+def test_the_patched_model_moves_as_the_fit_does(
+    tmp_path: Path, kind: str | type[Effect], values: tuple[float, ...], tolerance: float, said: str
+) -> None:
+    data, path = pendulum(tmp_path)
+    model = read_model(path, "hinge", data)
+    similar, change = similar_campaign(with_law(data, model.law))
+    effect = effect_class(kind) if isinstance(kind, str) else kind
+    prepared = prepare(similar, {"r1": NOISE**2}, change)
+    held = dict(zip((info.name for info in effect.parameters()), values, strict=False))
+    fixed = tuple((f"{effect.name}.{key}", value) for key, value in held.items())
+    free = (effect.name,) if len(values) == len(effect.parameters()) else ()
+    problem = Problem(prepared, (effect,), fixed, free)
+    at = {
+        "yaw_inertia": change.similar(1.2 * model.law.inertia, "kg m2"),
+        "mechanical_damping": change.similar(0.004, "N m s/rad"),
+        "zero": 0.01,
+    }
+    common = np.array([at.get(key, 0.0) for key in problem.names])
+    own = np.array([1.1, 0.2])
+    patch = found_law(problem, common, own, 0.0)
+    assert said in " ".join(patch.notes)
+    assert said or not any("plugin" in note or "misses" in note for note in patch.notes)
+    compiled = patched(model, patch.patch)[0].compile()
+
+    def simulate(common: Array, own: Array, start: Start, duration: float) -> Motion:
+        del common, own
+        return simulate_joint(compiled, model.law.rest, start, duration)
+
+    forward = scaled_residuals(problem, Point(common, own[None]))[0]
+    native = _left(problem, common, own, 0, simulate)
+    assert (
+        np.max(np.abs(forward)) > 10.0
+    )  # the motion is not the record, so that the comparison means something
+    assert np.sqrt(np.mean((forward - native) ** 2)) < tolerance
+
+
+def test_the_models_own_friction_is_part_of_the_nominal_model(tmp_path: Path) -> None:
+    data, path = pendulum(tmp_path, friction=0.05)
+    model = read_model(path, "hinge", data)
+    similar, change = similar_campaign(with_law(data, model.law))
+    prepared = prepare(similar, {"r1": NOISE**2}, change)
+    patch = found_law(Problem(prepared), np.array([0.1, 0.02, 0.0]), np.array([1.1, 0.0]), 0.0).patch
+    assert patch.friction == pytest.approx(0.05)

@@ -1,0 +1,273 @@
+"""A model of one's own, MJCF or URDF, with one joint that moves: reading it, and the law of that joint."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from tunnel_sim.engine.plugin import load_plugin
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
+from tunnel_sim.vocabulary.joint_law import FREE_PARAMETERS, JointLaw, Term
+from tunnel_sim.vocabulary.record import Array
+
+_GRID = 361  # positions at which the moment is tabulated
+_EXACT = 1e-8  # of the greatest moment: what the terms of the law may leave, the engine's own rounding
+_PRESENT = 1e-9  # of the greatest moment: a smaller term is rounding
+_RATES = np.array([-3.0, -1.0, -0.3, 0.3, 1.0, 3.0])  # times the rate of the motion
+_MOMENTS = (
+    ("b", "N m/rad"),
+    ("sin(b)-b", "N m"),
+    ("cos(b)-1", "N m"),
+    ("b^2", "N m/rad2"),
+    ("b^3", "N m/rad3"),
+)
+_DAMPING = (("r", "N m s/rad"), ("abs(r)*r", "N m s2/rad2"), ("r^3", "N m s3/rad3"))
+_TYPES = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
+
+
+@dataclass(frozen=True, eq=False)
+class JointModel:
+    """A model whose only joint that moves is the one recorded.
+
+    Args:
+        path: of the file.
+        joint: its name.
+        law: of the joint.
+    """
+
+    path: Path
+    joint: str
+    law: JointLaw
+
+    def spec(self) -> mujoco.MjSpec:
+        """The model's specification, read again, to be changed."""
+        return _read(self.path)
+
+
+def read_joint_model(path: Path, joint: str, reach: float, free: Sequence[str] | None = None) -> JointModel:
+    """Read a model, and the law of one joint from the engine's moments.
+
+    Args:
+        path: MJCF, or URDF that MuJoCo loads.
+        joint: a hinge or slide, the only joint that moves.
+        reach: greatest displacement from rest in the records, rad (m for a slide).
+        free: which of `FREE_PARAMETERS` are fitted; None: inertia, damping and rest position, and the stiffness
+            where the joint has a spring beside gravity.
+
+    Returns:
+        The model. Its law is exact: the restoring moment is that of gravity and springs over the whole turn (for a
+        slide, over twice the reach).
+
+    Raises:
+        TunnelError: when MuJoCo refuses it, another joint moves, there is contact, a limit or another constraint in
+            the path, the joint does not oscillate, or its moment is not of a kind that the law has.
+    """
+    where = f"{shown(path)}, joint {one_line(joint)!r}"
+    model = _compiled(_read(path), path)
+    try:
+        kind = _checked_joint(model, joint)
+        law = _law(model, reach, slide=kind == "slide")
+    except TunnelError as error:
+        raise TunnelError(error.what, where=where, remedy=error.remedy) from error
+    spring = bool(model.jnt_stiffness[0])
+    gravity = any(term.expression.startswith(("sin", "cos")) for term in law.terms)
+    usual = ("inertia", "damping", *(("stiffness",) if spring and gravity else ()), "rest")
+    return JointModel(path, joint, _with_free(law, usual if free is None else tuple(free)))
+
+
+def _with_free(law: JointLaw, free: tuple[str, ...]) -> JointLaw:
+    for name in free:
+        if name not in FREE_PARAMETERS:
+            raise TunnelError(
+                f"unknown parameter {one_line(name)!r}",
+                where="--free",
+                remedy=did_you_mean(name, FREE_PARAMETERS),
+            )
+    if {"inertia", "stiffness"} <= set(free) and not law.terms:
+        raise TunnelError(
+            "inertia and stiffness of a linear spring cannot both be found from free decays",
+            where="--free",
+            remedy="name one of the two",
+        )
+    return replace(law, free=tuple(name for name in FREE_PARAMETERS if name in free))
+
+
+def _read(path: Path) -> mujoco.MjSpec:
+    load_plugin()
+    if not path.is_file():
+        raise TunnelError("is not a file", where=shown(path), remedy="name an MJCF or URDF file")
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except (ValueError, mujoco.FatalError) as error:
+        raise _refused(error, path) from error
+
+
+def _compiled(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
+    try:
+        return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise _refused(error, path) from error
+
+
+def _refused(error: Exception, path: Path) -> TunnelError:
+    said = one_line(" ".join(str(error).split()), 300)
+    return TunnelError(f"MuJoCo cannot load it ({said})", where=shown(path), remedy="correct the file")
+
+
+def _checked_joint(model: mujoco.MjModel, joint: str) -> str:
+    """The kind of the only joint.
+
+    Raises:
+        TunnelError: when the joint is missing, of another kind, or not the only one, or a constraint holds it.
+    """
+    names = [model.joint(i).name for i in range(model.njnt)]
+    if joint not in names:
+        known = [name for name in names if name]
+        remedy = did_you_mean(joint, known) if known else "give the joint a name in the file"
+        raise TunnelError("there is no such joint", remedy=remedy)
+    others = [name or "without a name" for name in names if name != joint]
+    if others:
+        raise TunnelError(
+            f"other joints move too: {one_line(', '.join(others), 200)}",
+            remedy="remove them, so that the bodies are welded; one joint is recorded",
+        )
+    if model.neq or model.nflex or model.na:
+        raise TunnelError(
+            "equality constraints, deformable bodies and actuators with states cannot be part of the law",
+            remedy="remove them",
+        )
+    kind = _TYPES.get(int(model.jnt_type[0]))
+    if kind is None:
+        raise TunnelError("is not a hinge or slide", remedy="name the joint that the sensor reads")
+    return kind
+
+
+class _Engine:
+    """Moments on the joint as the engine computes them."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model, self.data = model, mujoco.MjData(model)
+
+    def moment(self, position: float, rate: float = 0.0) -> float:
+        """Of gravity, springs, dampers and actuators without control; constraints excluded, N m."""
+        self.data.qpos[0], self.data.qvel[0] = position, rate
+        mujoco.mj_forward(self.model, self.data)
+        return float(self.data.qfrc_passive[0] + self.data.qfrc_actuator[0] - self.data.qfrc_bias[0])
+
+    def inertia(self) -> float:
+        """At the position of the last moment, kg m²."""
+        full = np.zeros((1, 1))
+        mujoco.mj_fullM(self.model, self.data, full)
+        return float(full[0, 0])
+
+
+def _law(model: mujoco.MjModel, reach: float, *, slide: bool) -> JointLaw:
+    engine = _Engine(model)
+    centre = float(model.qpos0[0])
+    rest = _rest(engine, centre, 10.0 * reach if slide else math.pi)
+    span = 2.0 * reach if slide else math.pi
+    b = np.linspace(-span, span, _GRID)
+    restoring = np.array([-engine.moment(rest + x) for x in b])
+    terms = _fitted(_MOMENTS, {"b": b}, restoring, float(np.max(np.abs(restoring))))
+    if terms is None:
+        raise TunnelError(
+            "its restoring moment is not that of gravity and of springs up to the third power",
+            remedy="write tendons, dead bands and actuators as the joint's own stiffness",
+        )
+    stiffness = terms.pop("b", 0.0)
+    _check_path(engine, rest, reach)
+    inertias = [(engine.moment(rest + x), engine.inertia())[1] for x in (0.0, 0.4 * span, -0.7 * span)]
+    if np.ptp(inertias) > _EXACT * inertias[0]:
+        raise TunnelError("its inertia changes with its position", remedy="remove the tendon's armature")
+    if not stiffness > 0.0:
+        raise TunnelError("does not oscillate: nothing restores it", remedy="add the spring, or gravity")
+    damping = _damping(engine, rest, math.sqrt(stiffness / inertias[0]) * reach, stiffness * reach)
+    linear = damping.pop("r", 0.0)
+    units = dict((*_MOMENTS, *_DAMPING))
+    return JointLaw(
+        inertias[0],
+        stiffness,
+        linear,
+        float(model.dof_frictionloss[0]),
+        rest,
+        tuple(Term(text, value, units[text]) for text, value in {**terms, **damping}.items()),
+        slide=slide,
+    )
+
+
+def _rest(engine: _Engine, centre: float, span: float) -> float:
+    """The stable rest position closest to the model's own configuration."""
+    from scipy.optimize import brentq  # only here: slow to load
+
+    grid = centre + np.linspace(-span, span, _GRID) * (1.0 + 1e-9)
+    moments = np.array([engine.moment(x) for x in grid])
+    moments[np.abs(moments) < 1e-12 * np.max(np.abs(moments))] = 0.0
+    falls = np.flatnonzero((moments[:-1] >= 0.0) & (moments[1:] < 0.0))
+    if falls.size == 0:
+        raise TunnelError(
+            "does not oscillate: it has no stable rest position nearby",
+            remedy="add the spring, or gravity, that restores it",
+        )
+    at = falls[np.argmin(np.abs(grid[falls] - centre))]
+    if engine.moment(grid[at]) <= 0.0:  # rest lies on the grid
+        return float(grid[at])
+    return float(brentq(engine.moment, grid[at], grid[at + 1], xtol=1e-13))
+
+
+def _fitted(
+    forms: Sequence[tuple[str, str]], moving: dict[str, Array], wanted: Array, scale: float
+) -> dict[str, float] | None:
+    """Coefficients by expression, those that are rounding left out; None where the forms do not make the moment.
+
+    ``scale`` is the moment (N m) against which rounding is judged. The slope of the sine at rest is left to the
+    linear term, so that the latter is the whole slope.
+    """
+    from tunnel_sim.physics.expression import parse
+
+    columns = np.array([parse(text, frozenset(moving)).value(moving) for text, _ in forms]).T
+    sizes = np.max(np.abs(columns), axis=0)
+    found = np.linalg.lstsq(columns / sizes, wanted, rcond=1e-13)[0]
+    kept = np.abs(found) > _PRESENT * scale
+    found = np.zeros(len(forms))
+    if kept.any():
+        found[kept] = np.linalg.lstsq(columns[:, kept] / sizes[kept], wanted, rcond=1e-13)[0] / sizes[kept]
+    if np.max(np.abs(columns @ found - wanted)) > _EXACT * scale:
+        return None
+    return {text: float(value) for (text, _), value in zip(forms, found, strict=True) if value != 0.0}
+
+
+def _damping(engine: _Engine, rest: float, rate: float, scale: float) -> dict[str, float]:
+    rates = _RATES * rate
+    lost = np.array([engine.moment(rest) - engine.moment(rest, r) for r in rates])
+    found = _fitted(_DAMPING, {"r": rates}, lost, scale)
+    elsewhere = engine.moment(rest + 0.1) - engine.moment(rest + 0.1, rates[-1])
+    if found is None or abs(elsewhere - lost[-1]) > _EXACT * scale:
+        raise TunnelError(
+            "it has losses other than the joint's own damping and frictionloss, such as a fluid's",
+            remedy="write them as damping, or leave them out: the diagnosis looks for them",
+        )
+    return found
+
+
+def _check_path(engine: _Engine, rest: float, reach: float) -> None:
+    """Refuse contacts, limits and other constraints within the records' reach."""
+    model, data = engine.model, engine.data
+    own = int(model.dof_frictionloss[0] > 0.0)
+    for x in np.linspace(-reach, reach, _GRID // 4):
+        engine.moment(rest + float(x))
+        if data.ncon:
+            pair = [model.geom(g).name or f"geom {g}" for g in data.contact.geom[0]]
+            raise TunnelError(
+                f"{' and '.join(map(one_line, pair))} touch at {rest + x:.3g} rad, within the records' reach",
+                remedy="exclude the contact, or set contype and conaffinity to 0",
+            )
+        if data.nefc > own:
+            raise TunnelError(
+                f"a limit or another constraint acts at {rest + x:.3g} rad, within the records' reach",
+                remedy="widen the joint's range, or check the units of range and records",
+            )

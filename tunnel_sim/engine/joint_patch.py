@@ -1,0 +1,298 @@
+"""Writing a joint's law into a model of one's own, as native elements and, beside them, the plugin."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from tunnel_sim.engine.joint_model import JointModel
+from tunnel_sim.engine.simulate import no_log
+from tunnel_sim.physics.motion import Motion
+from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+
+_AIR = (
+    "air_density",
+    "wind_speed",
+    "frontal_area",
+    "reference_length",
+    "cn_beta",
+    "cn_r",
+)  # the plugin wants them
+_STIFF_STEPS = 2.0  # time constant of frictionloss in steps: the shortest that MuJoCo accepts
+
+
+@dataclass(frozen=True)
+class JointPatch:
+    """The law to write, in SI units; moments are of the displacement b from rest and its rate.
+
+    Args:
+        inertia: the whole inertia about the joint, kg m².
+        spring: added restoring moment, the coefficients of 1, b, b² and b³, N m, N m/rad, N m/rad² and N m/rad³.
+        damping: added damping, the coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³.
+        friction: the whole moment of dry friction, N m.
+        program: of a further moment, for the plugin (``mjcf/plugin/expression.h``), in the joint's position.
+        noise: standard deviation of the sensor's noise, rad; 0: not written.
+    """
+
+    inertia: float
+    spring: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    damping: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    friction: float = 0.0
+    program: tuple[float, ...] = ()
+    noise: float = 0.0
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a run starts.
+
+    Args:
+        run: its id.
+        time: since the start of the record, s.
+        angle: displacement from rest, rad.
+        rate: rad/s.
+    """
+
+    run: str
+    time: float
+    angle: float
+    rate: float
+
+
+@dataclass(frozen=True)
+class Written:
+    """An attribute that was written.
+
+    Args:
+        name: element and attribute.
+        before: its value in the model given, in the unit.
+        after: its value in the patched model, in the unit.
+        unit: SI.
+    """
+
+    name: str
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+    unit: str
+
+
+def patched(
+    model: JointModel, patch: JointPatch, starts: Sequence[Start] = ()
+) -> tuple[mujoco.MjSpec, tuple[Written, ...]]:
+    """The model with a law written into it.
+
+    Args:
+        model: as given.
+        patch: the law.
+        starts: of the runs, written as keyframes.
+
+    Returns:
+        The specification, and what was written.
+
+    Raises:
+        TunnelError: when MuJoCo refuses the patched model.
+    """
+    spec = model.spec()
+    before = spec.compile()
+    joint = spec.joint(model.joint)
+    joint.springdamper = (0.0, 0.0)  # stiffness and damping are written themselves
+    weight = _write_inertia(spec, before, model, patch)
+    _write_spring(spec, before, model, patch, weight)
+    own = np.array([before.dof_damping[0], *before.dof_dampingpoly[0]])
+    joint.damping = own + patch.damping
+    joint.damping[0] = max(joint.damping[0], 0.0)  # a damping fitted as 0 less the model's own, rounded
+    joint.frictionloss = patch.friction
+    if patch.friction != before.dof_frictionloss[0]:
+        joint.solref_friction = (_STIFF_STEPS * spec.option.timestep, 1.0)
+    if patch.program:
+        _write_program(spec, model, patch.program)
+    _write_sensor(spec, model, patch.noise)
+    for start in starts:
+        name = f"{start.run} at {start.time:.6g} s"
+        if (known := spec.key(name)) is not None:
+            spec.delete(known)
+        spec.add_key(name=name, qpos=[model.law.rest + start.angle], qvel=[start.rate])
+    try:
+        after = spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        said = one_line(" ".join(str(error).split()), 300)
+        raise TunnelError(
+            f"MuJoCo refuses the patched model ({said})", where=shown(model.path), remedy="simplify the model"
+        ) from error
+    return spec, _differences(before, after)
+
+
+def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
+    """The text of a patched model.
+
+    Args:
+        spec: from `patched`.
+        model: it was made of.
+        folder: where the text will be, for the paths of its meshes.
+
+    Returns:
+        MJCF.
+    """
+    for name in ("meshdir", "texturedir") if spec.meshes or spec.textures or spec.hfields else ():
+        assets = model.path.parent.resolve() / getattr(spec.compiler, name)
+        setattr(spec.compiler, name, os.path.relpath(assets, folder.resolve()))
+    return str(spec.to_xml())
+
+
+def _write_inertia(
+    spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch
+) -> float:
+    """More inertia as armature; less as a smaller one, or as bodies drawn in towards the axis.
+
+    Bodies of a times the mass at 1/a times the distance from the axis have the same moment of gravity and 1/a times
+    the inertia. On a slide they lose mass instead; returned is the share of the weight that remains.
+    """
+    armature = float(before.dof_armature[0]) + patch.inertia - model.law.inertia
+    if armature >= 0.0:
+        spec.joint(model.joint).armature = armature
+        return 1.0
+    spec.joint(model.joint).armature = 0.0
+    share = patch.inertia / (model.law.inertia - float(before.dof_armature[0]))
+    data = mujoco.MjData(before)
+    mujoco.mj_forward(before, data)
+    axis, anchor = data.xaxis[0], data.xanchor[0]
+    for body in spec.bodies:
+        number = body.id
+        if before.body_weldid[number] == 0 or before.body_mass[number] == 0.0:
+            continue
+        centre = data.xipos[number] - anchor
+        along = axis * float(axis @ centre)
+        across = (centre - along) * (1.0 if model.law.slide else share)
+        moved = anchor + along + across - data.xpos[number]
+        body.explicitinertial = True
+        body.mass = float(before.body_mass[number]) * (share if model.law.slide else 1.0 / share)
+        body.inertia = before.body_inertia[number] * share
+        body.ipos = data.xmat[number].reshape(3, 3).T @ moved
+        body.iquat = before.body_iquat[number]
+        body.fullinertia = np.full(6, np.nan)
+    return share if model.law.slide else 1.0
+
+
+def _write_spring(
+    spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch, weight: float
+) -> None:
+    """The sum of the joint's own spring and the added one, about the position at which it vanishes.
+
+    Raises:
+        TunnelError: when it vanishes nowhere.
+    """
+    own = np.polynomial.Polynomial([0.0, before.jnt_stiffness[0], *before.jnt_stiffnesspoly[0]])
+    offset = model.law.rest - float(before.qpos_spring[0])
+    total = own(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
+    total -= (1.0 - weight) * own(offset)  # the spring carries the weight
+    total = total.trim(1e-12 * float(np.max(np.abs(total.coef))))
+    roots = total.roots() if total.degree() else np.array([0.0])
+    real = roots.real[np.abs(roots.imag) < 1e-6]
+    if real.size == 0:
+        raise TunnelError(
+            "the spring of the patched model would vanish nowhere", remedy="give it a spring of its own"
+        )
+    usual = -offset if np.any(own.coef) else 0.0
+    zero = float(real[np.argmin(np.abs(real - usual))])
+    about = total(np.polynomial.Polynomial([zero, 1.0])).coef
+    joint = spec.joint(model.joint)
+    joint.stiffness = np.array([*about[1:], 0.0, 0.0, 0.0])[:3]
+    place = model.law.rest + zero
+    joint.springref = math.degrees(place) if spec.compiler.degree and not model.law.slide else place
+
+
+def _write_program(spec: mujoco.MjSpec, model: JointModel, program: tuple[float, ...]) -> None:
+    if model.law.slide:
+        raise TunnelError("the plugin acts on hinges only", remedy="leave out --patch")
+    plugin = spec.add_plugin(name="tunnel", plugin_name="vwt.yaw_moment", active=True)
+    plugin.config = {"joint": model.joint}
+    spec.activate_plugin("vwt.yaw_moment")
+    for name in _AIR:
+        spec.add_numeric(name=name, data=[0.0], size=1)
+    spec.add_numeric(name="moment_program", data=list(program), size=len(program))
+
+
+def _write_sensor(spec: mujoco.MjSpec, model: JointModel, noise: float) -> None:
+    """The noise on the joint's position sensor, which is added where there is none."""
+    if noise == 0.0:
+        return
+    kind = mujoco.mjtSensor.mjSENS_JOINTPOS
+    for sensor in spec.sensors:
+        if sensor.type == kind and sensor.objname == model.joint:
+            sensor.noise = noise
+            return
+    spec.add_sensor(
+        name=f"{model.joint}_reading",
+        type=kind,
+        objtype=mujoco.mjtObj.mjOBJ_JOINT,
+        objname=model.joint,
+        noise=noise,
+    )
+
+
+def _differences(before: mujoco.MjModel, after: mujoco.MjModel) -> tuple[Written, ...]:
+    def of(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...]]:
+        moving = [i for i in range(model.nbody) if model.body_weldid[i]]
+        return {
+            ("joint armature", "kg m2"): (float(model.dof_armature[0]),),
+            ("joint stiffness", "N m/rad, /rad2, /rad3"): (
+                float(model.jnt_stiffness[0]),
+                *map(float, model.jnt_stiffnesspoly[0]),
+            ),
+            ("joint springref", "rad"): (float(model.qpos_spring[0]),),
+            ("joint damping", "N m s/rad, s2/rad2, s3/rad3"): (
+                float(model.dof_damping[0]),
+                *map(float, model.dof_dampingpoly[0]),
+            ),
+            ("joint frictionloss", "N m"): (float(model.dof_frictionloss[0]),),
+            **{(f"body {model.body(i).name or i} mass", "kg"): (float(model.body_mass[i]),) for i in moving},
+            ("sensor noise", "rad"): (float(np.max(model.sensor_noise, initial=0.0)),),
+            ("plugin vwt.yaw_moment", "1"): (float(model.nplugin),),
+        }
+
+    old, new = of(before), of(after)
+    spring = any(new["joint stiffness", "N m/rad, /rad2, /rad3"])
+    return tuple(
+        Written(name, old[name, unit], value, unit)
+        for (name, unit), value in new.items()
+        if not np.allclose(value, old[name, unit], rtol=1e-9, atol=0.0)
+        and (spring or name != "joint springref")
+    )
+
+
+def simulate_joint(model: mujoco.MjModel, law_rest: float, start: Start, duration: float) -> Motion:
+    """Simulate one run with the model's own integrator and steps.
+
+    Args:
+        model: patched.
+        law_rest: the joint's position at rest, rad.
+        start: where the run starts.
+        duration: s.
+
+    Returns:
+        The displacement from rest and its rate at every step.
+
+    Raises:
+        TunnelError: when the motion grows without bound.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[0], data.qvel[0] = law_rest + start.angle, start.rate
+    count = math.ceil(duration / model.opt.timestep) + 1
+    angle, rate = np.empty(count), np.empty(count)
+    with no_log():
+        for i in range(count):
+            angle[i], rate[i] = data.qpos[0], data.qvel[0]
+            mujoco.mj_step(model, data)
+    if data.time < 0.5 * count * model.opt.timestep:  # the engine has reset a motion that grew without bound
+        raise TunnelError(
+            "the patched model's motion grows without bound",
+            where=f"run {start.run}",
+            remedy="shorten its timestep",
+        )
+    return Motion(np.arange(count) * model.opt.timestep, angle - law_rest, rate)
