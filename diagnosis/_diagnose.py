@@ -14,6 +14,7 @@ from diagnosis.detection.limit_cycles import diagnosable
 from diagnosis.detection.noise_remarks import noise_remarks
 from diagnosis.detection.refusal import refuse_hopeless
 from diagnosis.investigate import Progress, investigate
+from diagnosis.law.explain import closable
 from diagnosis.localisation.localise import localise
 from diagnosis.result import Diagnosis
 from tunnel_sim.effects import Effect, effect_class, known_effects
@@ -66,6 +67,10 @@ def _diagnose(campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progr
     answer = in_own_units(replace(assemble(study, where, maps, left_out), remarks=remarks), study.similarity)
     if found.limit_cycles:
         return limit_cycle_answer(answer, found.remarks)
+    if progress is not None:
+        progress("what no effect explains")
+    significant = answer.rest is not None and answer.rest.significant
+    answer = replace(answer, closable=closable(study, significant=significant))
     if answer.causes == ("unknown",):
         return replace(answer, cautions=(*answer.cautions, *second_modes(campaign)))
     return answer

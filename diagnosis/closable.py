@@ -1,4 +1,4 @@
-"""How much of what no effect explains could be closed, by kind, and the law that would close it; with their JSON."""
+"""How much of what no effect explains could be closed, by kind, and the law that would do it, with their JSON."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import polars as pl
 
+from diagnosis.closable import Closable
 from diagnosis.closure import Rest, Waterfall
 from diagnosis.printing import diagnosis_parts
 from identification.printing.frames import wide_frame
@@ -231,6 +232,7 @@ class Diagnosis:
         inclusion: by effect of the vocabulary, the probability that it is among the causes.
         waterfall: how far the gap closes with each cause.
         rest: what remains after the causes.
+        closable: how much of that could be closed, and by what; None where nothing remains beyond chance.
     """
 
     campaign: str
@@ -253,6 +255,7 @@ class Diagnosis:
     inclusion: Mapping[str, float] = field(default_factory=dict)
     waterfall: Waterfall = field(default_factory=Waterfall)
     rest: Rest | None = None
+    closable: Closable | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""
@@ -298,6 +301,7 @@ class Diagnosis:
             "inclusion": dict(self.inclusion),
             **self.waterfall.to_json_dict(),
             "rest": None if self.rest is None else self.rest.to_json_dict(),
+            "closable": None if self.closable is None else self.closable.to_json_dict(),
             "ambiguous_with": list(self.ambiguous_with),
             "next_run": None if self.next_run is None else dict(self.next_run),
             "coefficients": {

@@ -18,17 +18,18 @@ def whiten(values: Array, whitening: Array) -> Array:
     """Predict every value from those before it, and keep the errors.
 
     Args:
-        values: of a record, shape (n,), any unit.
+        values: of a record, or of several in columns, shape (n,) or (n, k), any unit.
         whitening: the errors' filter, 1 and the negative autoregressive coefficients, shape (order + 1,).
 
     Returns:
-        Shape (n,), of the values' unit. Noise of that spectrum becomes white with the variance of its innovations;
+        Of the values' shape and unit. Noise of that spectrum becomes white with the variance of its innovations;
         the first values are predicted from the fewer before them, and scaled to the same variance.
     """
     if whitening.size == 1:
         return values
-    errors = oaconvolve(values, whitening)[: values.size]
-    start = _start(whitening.tobytes())[: values.size, : values.size]
+    taps = whitening.reshape(-1, *[1] * (values.ndim - 1))
+    errors = oaconvolve(values, taps, axes=0)[: len(values)]
+    start = _start(whitening.tobytes())[: len(values), : len(values)]
     errors[: len(start)] = start @ values[: len(start)]
     return np.asarray(errors, np.float64)
 

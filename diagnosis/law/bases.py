@@ -1,9 +1,10 @@
-"""Bases of what may be missing from the model: moments of the state, with the wind, in time, errors of the reading."""
+"""Bases of what may be missing: moments of the state, with the wind and in time, and errors of the reading."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -15,6 +16,49 @@ _FINE, _MEDIUM, _COARSE = 33, 15, 7  # splines over the range of the motion
 _SLOW = 16  # splines over the time of a run
 _PER_CYCLE = 6.0  # splines in time that follow a blow
 _SETTLED = 0.02  # of the greatest rate: within it, dry friction may be any moment
+
+
+class Motion(Protocol):
+    """What a basis depends on: `Path` has it, and so has `Places`."""
+
+    @property
+    def angle(self) -> Array:
+        """rad, shape (n,)."""
+
+    @property
+    def rate(self) -> Array:
+        """rad/s, shape (n,)."""
+
+    @property
+    def time(self) -> Array:
+        """s, shape (n,)."""
+
+    @property
+    def stiffness(self) -> float:
+        """Of the spring, N m/rad."""
+
+    @property
+    def speed(self) -> float:
+        """Of the wind, m/s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Some places at which a basis is evaluated, as in `Motion`.
+
+    Args:
+        angle: rad, shape (n,).
+        rate: rad/s, shape (n,).
+        time: s, shape (n,).
+        stiffness: of the spring, N m/rad.
+        speed: of the wind, m/s.
+    """
+
+    angle: Array
+    rate: Array
+    time: Array
+    stiffness: float
+    speed: float
 
 
 @dataclass(frozen=True)
@@ -44,13 +88,12 @@ def ranges(runs: Sequence[Path]) -> Ranges:
     Args:
         runs: their paths.
     """
-    springs = [path.run.spring_stiffness or 1.0 for path in runs]
     return Ranges(
         angle=max(float(np.max(np.abs(path.angle))) for path in runs),
         rate=max(float(np.max(np.abs(path.rate))) for path in runs),
         time=max(float(path.time[-1]) for path in runs),
         cycle=float(np.median([2.0 * np.pi / path.omega for path in runs])),
-        stiffness=float(np.median(springs)),
+        stiffness=float(np.median([path.stiffness for path in runs])),
         speed=max(max(path.speed for path in runs), 1.0),
     )
 
@@ -77,95 +120,95 @@ def _times(one: Array, other: Array) -> Array:
     return np.asarray((one[:, :, None] * other[:, None, :]).reshape(one.shape[0], -1))
 
 
-def _spring(path: Path, r: Ranges) -> float:
+def _spring(at: Motion, r: Ranges) -> float:
     """How far the run's spring is from the median, a share."""
-    return (path.run.spring_stiffness or r.stiffness) / r.stiffness - 1.0
+    return at.stiffness / r.stiffness - 1.0
 
 
-def _of_angle(path: Path, r: Ranges, count: int) -> Array:
-    return splines(path.angle, -r.angle, r.angle, count)
+def _of_angle(at: Motion, r: Ranges, count: int) -> Array:
+    return splines(at.angle, -r.angle, r.angle, count)
 
 
-def _of_rate(path: Path, r: Ranges, count: int) -> Array:
-    return splines(path.rate, -r.rate, r.rate, count)
+def _of_rate(at: Motion, r: Ranges, count: int) -> Array:
+    return splines(at.rate, -r.rate, r.rate, count)
 
 
-def _rate_shapes(path: Path, r: Ranges) -> Array:
-    u = path.rate / r.rate
+def _rate_shapes(at: Motion, r: Ranges) -> Array:
+    u = at.rate / r.rate
     return np.column_stack([u, np.tanh(u / _SETTLED), np.abs(u)])
 
 
-def angle(path: Path, r: Ranges) -> Array:
+def angle(at: Motion, r: Ranges) -> Array:
     """Moments of the angle alone, the same for all springs or in proportion to the spring."""
-    return np.column_stack([_of_angle(path, r, _FINE), _spring(path, r) * _of_angle(path, r, _MEDIUM)])
+    return np.column_stack([_of_angle(at, r, _FINE), _spring(at, r) * _of_angle(at, r, _MEDIUM)])
 
 
-def rate(path: Path, r: Ranges) -> Array:
+def rate(at: Motion, r: Ranges) -> Array:
     """Moments of the rate alone."""
-    columns = [_of_rate(path, r, _FINE), _rate_shapes(path, r), _spring(path, r) * _of_rate(path, r, _COARSE)]
+    columns = [_of_rate(at, r, _FINE), _rate_shapes(at, r), _spring(at, r) * _of_rate(at, r, _COARSE)]
     return np.column_stack(columns)
 
 
-def state(path: Path, r: Ranges) -> Array:
+def state(at: Motion, r: Ranges) -> Array:
     """Moments of angle and rate."""
     both = [
-        _times(_of_angle(path, r, 21), _rate_shapes(path, r)),
-        _times(_of_angle(path, r, _COARSE), _of_rate(path, r, _COARSE)),
+        _times(_of_angle(at, r, 21), _rate_shapes(at, r)),
+        _times(_of_angle(at, r, _COARSE), _of_rate(at, r, _COARSE)),
     ]
-    return np.column_stack([angle(path, r), rate(path, r), *both])
+    return np.column_stack([angle(at, r), rate(at, r), *both])
 
 
-def wind(path: Path, r: Ranges) -> Array:
+def wind(at: Motion, r: Ranges) -> Array:
     """Moments of angle and rate in proportion to the dynamic pressure, or to the wind speed if of the rate."""
-    share = path.speed / r.speed
+    share = at.speed / r.speed
     still = [
-        share * _of_angle(path, r, _FINE),
-        _times(_of_angle(path, r, _COARSE), _of_rate(path, r, _COARSE)) * share,
-        _times(_of_angle(path, r, _COARSE), _rate_shapes(path, r)[:, :1]),
+        share * _of_angle(at, r, _FINE),
+        _times(_of_angle(at, r, _COARSE), _of_rate(at, r, _COARSE)) * share,
+        _times(_of_angle(at, r, _COARSE), _rate_shapes(at, r)[:, :1]),
     ]
     return np.column_stack(still) * share
 
 
-def time(path: Path, r: Ranges) -> Array:
+def time(at: Motion, r: Ranges) -> Array:
     """Moments that change in time, alike in all runs: alone, as a stiffness, damping or friction."""
-    slow = splines(path.time, 0.0, r.time, _SLOW)
-    fine = splines(path.time, 0.0, r.time, max(4, round(_PER_CYCLE * r.time / r.cycle)))
-    stiffness = path.angle / r.angle * np.array([[1.0], [_spring(path, r)], [(path.speed / r.speed) ** 2]])
-    share = np.column_stack([*stiffness, path.rate / r.rate, _rate_shapes(path, r)[:, 1]])
+    slow = splines(at.time, 0.0, r.time, _SLOW)
+    fine = splines(at.time, 0.0, r.time, max(4, round(_PER_CYCLE * r.time / r.cycle)))
+    stiffness = at.angle / r.angle * np.array([[1.0], [_spring(at, r)], [(at.speed / r.speed) ** 2]])
+    share = np.column_stack([*stiffness, at.rate / r.rate, _rate_shapes(at, r)[:, 1]])
     return np.column_stack([fine, _times(slow, share)])
 
 
-def reading(path: Path, r: Ranges) -> Array:
+def reading(at: Motion, r: Ranges) -> Array:
     """Errors of the reading, as shares of the greatest angle: of angle, rate and time, alike in all runs."""
-    slow = splines(path.time, 0.0, r.time, _SLOW)
+    slow = splines(at.time, 0.0, r.time, _SLOW)
     columns = [
-        _of_angle(path, r, _FINE),
-        _of_rate(path, r, _MEDIUM),
-        _times(_of_angle(path, r, _COARSE), _of_rate(path, r, _COARSE)),
-        splines(path.time, 0.0, r.time, 4 * _SLOW),
-        slow * (path.angle / r.angle)[:, None],
+        _of_angle(at, r, _FINE),
+        _of_rate(at, r, _MEDIUM),
+        _times(_of_angle(at, r, _COARSE), _of_rate(at, r, _COARSE)),
+        splines(at.time, 0.0, r.time, 4 * _SLOW),
+        slow * (at.angle / r.angle)[:, None],
     ]
     return np.column_stack(columns)
 
 
-def event(path: Path, r: Ranges) -> Array:
+def event(at: Motion, r: Ranges) -> Array:
     """Moments that change in time, different in every run."""
-    return splines(path.time, float(path.time[0]), float(path.time[-1]),
-                   max(4, round(_PER_CYCLE * (path.time[-1] - path.time[0]) / r.cycle)))  # fmt: skip
+    return splines(at.time, float(at.time[0]), float(at.time[-1]),
+                   max(4, round(_PER_CYCLE * (at.time[-1] - at.time[0]) / r.cycle)))  # fmt: skip
 
 
-def between(path: Path, r: Ranges) -> Array:
+def between(at: Motion, r: Ranges) -> Array:
     """A steady moment, stiffness and damping of its own in every run."""
-    return np.column_stack([np.ones(path.angle.size), path.angle / r.angle, path.rate / r.rate])
+    return np.column_stack([np.ones(at.angle.size), at.angle / r.angle, at.rate / r.rate])
 
 
-def wander(path: Path, r: Ranges) -> Array:
+def wander(at: Motion, r: Ranges) -> Array:
     """A zero of the reading that wanders or jumps, different in every run: steps, whose sum is a random walk."""
-    knots = np.linspace(path.time[0], path.time[-1], max(4, round(_PER_CYCLE * r.time / r.cycle)))[1:-1]
-    return np.asarray((path.time[:, None] > knots[None, :]).astype(np.float64))
+    knots = np.linspace(at.time[0], at.time[-1], max(4, round(_PER_CYCLE * r.time / r.cycle)))[1:-1]
+    return np.asarray((at.time[:, None] > knots[None, :]).astype(np.float64))
 
 
-Basis = Callable[[Path, Ranges], Array]
+Basis = Callable[[Motion, Ranges], Array]
 
 #: Kinds whose law holds in every run, so that it predicts a run left out; the simpler first.
 COMMON: Mapping[str, Basis] = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from diagnosis.closable import Ceiling
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.law import bases
 from diagnosis.law.paths import Path, paths
-from diagnosis.law.ridge import Normal, Ridge, Rows, best_ridge, common_ridge, held_out, normal, total
+from diagnosis.law.ridge import Normal, Ridge, Rows, best_ridge, common_ridge, held_out, normal, ratio, total
 from tunnel_sim.vocabulary.record import Array
 
 RUNS = "runs"
@@ -58,11 +59,13 @@ class Evidence:
     Args:
         ceiling: how much it closes.
         gain: twice the logarithm of its evidence over that of the model without it.
+        precision: of its prior.
         solution: the coefficients, where one set holds in all runs.
     """
 
     ceiling: Ceiling
     gain: float
+    precision: float
     solution: Ridge | None = None
 
 
@@ -129,7 +132,7 @@ class Rest:
         """
         drop = (before - after)[self.seen]
         left = self._left_over + (before - self._fitted)
-        return _ratio(drop, left[self.seen])
+        return ratio(drop, left[self.seen])
 
     @cached_property
     def _fitted(self) -> Array:
@@ -156,7 +159,7 @@ class Rest:
         parts = self.normals(self.columns(kind))
         ridge, gain = best_ridge(total(parts))
         closed, std = self.share(self.before, held_out(parts, self.groups, ridge.precision))
-        return Evidence(Ceiling(kind, closed, std, self.held_out), gain, ridge)
+        return Evidence(Ceiling(kind, closed, std, self.held_out), gain, ridge.precision, ridge)
 
     def single(self, kind: str) -> Evidence:
         """A kind that is different in every run: short gaps are predicted from what is around them."""
@@ -171,8 +174,8 @@ class Rest:
             after = sum(_gap_cost(matrix, residual, turn == t, precision) for t in range(_TURNS))
             drops.append(float(residual @ residual) - after)
         left = [float(r @ r) - r.size for r in self.fit.residuals]
-        closed, std = _ratio(np.array(drops), np.array(left))
-        return Evidence(Ceiling(kind, closed, std, GAPS), gain)
+        closed, std = ratio(np.array(drops), np.array(left))
+        return Evidence(Ceiling(kind, closed, std, GAPS), gain, precision)
 
 
 def _excess_in(residual: Array, unit: Unit) -> float:
@@ -197,13 +200,4 @@ def _stretches(path: Path) -> list[Unit]:
     """A run in stretches of some cycles."""
     cycles = path.residual.size * path.group * path.run.interval * path.omega / (2.0 * np.pi)
     edges = np.linspace(0, path.residual.size, max(2, min(_STRETCHES, int(cycles / 3.0))) + 1).astype(int)
-    return [Unit(path, slice(int(a), int(b))) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-
-
-def _ratio(drop: Array, left: Array) -> tuple[float, float]:
-    """Sum of drops over sum of what was left, and its standard deviation from their scatter."""
-    whole = max(float(left.sum()), 1e-9)
-    closed = float(drop.sum()) / whole
-    scatter = float(np.sum((drop - closed * left) ** 2))
-    count = drop.size
-    return closed, float(np.sqrt(scatter * count / max(count - 1, 1)) / whole)
+    return [Unit(path, slice(int(a), int(b))) for a, b in pairwise(edges)]

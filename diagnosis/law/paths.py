@@ -11,11 +11,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter, oaconvolve, savgol_filter
+from scipy.signal import cont2discrete, lfilter, savgol_filter
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import RunData
 from diagnosis.fitting.spectra import linear_coefficients, resonance
+from diagnosis.fitting.whitening import whiten
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
 _WINDOW, _NARROW = 0.4, 0.2  # of a cycle; the first passes the third harmonic at half height
@@ -47,8 +49,8 @@ class Path:
 
     @cached_property
     def time(self) -> Array:
-        """Time since the start of the record, s, shape (n,)."""
-        return np.asarray(self.run.start + (np.arange(self.run.reading.size) + 0.5) * self.run.interval)
+        """Time since the start of what is fitted, s, shape (n,)."""
+        return np.asarray((np.arange(self.run.reading.size) + 0.5) * self.run.interval)
 
     @cached_property
     def _motion(self) -> tuple[Array, Array]:
@@ -57,7 +59,9 @@ class Path:
         fitted = run.reading - residual - self.fit.zero(self.index)
         slope = np.gradient(fitted, run.interval)
         omega = self.omega
-        if run.derivative:  # each derivative of an oscillation leads by a quarter cycle and is ω times as large
+        if (
+            run.derivative
+        ):  # each derivative of an oscillation leads by a quarter cycle and is ω times as large
             angle, rate = ((-slope, fitted * omega**2), (-fitted, -slope))[run.derivative - 1]
             return angle / omega**2, rate / omega**2
         large = float(np.mean(self.fit.residuals[self.index] ** 2)) > _LARGE
@@ -83,6 +87,21 @@ class Path:
         """Wind speed, m/s."""
         return self.run.wind_speed
 
+    @property
+    def stiffness(self) -> float:
+        """Of the spring, stated or fitted where none is stated, N m/rad."""
+        return self._stated.spring_stiffness
+
+    @property
+    def still_omega(self) -> float:
+        """√(Kr/Izz), rad/s, as the expressions of effects have it."""
+        return float(np.sqrt(self._stated.spring_stiffness / self._stated.yaw_inertia))
+
+    @cached_property
+    def _stated(self) -> RunSettings:
+        point = self.fit.point
+        return self.fit.problem.stated(point.common, point.release[self.index], self.run)
+
     def _filter(self, interval: float) -> tuple[Array, Array]:
         """Numerator and denominator of the reading's response to a moment that is linear in between."""
         numerator = [1.0] + [0.0] * self.run.derivative
@@ -102,9 +121,7 @@ class Path:
         if self._white:
             rows = self.rows(moment) / np.sqrt(run.noise_variance)
             return np.asarray(lfilter(*self._filter(self.group * run.interval), rows, axis=0))
-        top, bottom = self._filter(run.interval)
-        reading = lfilter(np.convolve(top, run.whitening), bottom, moment, axis=0)
-        return self._weighted(reading)
+        return self.seen(lfilter(*self._filter(run.interval), moment, axis=0))
 
     @property
     def _white(self) -> bool:
@@ -124,16 +141,12 @@ class Path:
         Returns:
             Shape (rows, k), in noise standard deviations.
         """
-        if not self._white:
-            reading = oaconvolve(reading, self.run.whitening[:, None], axes=0)[: len(reading)]
-        return self._weighted(reading)
-
-    def _weighted(self, innovations: Array) -> Array:
         run = self.run
-        weight = 1.0 / np.sqrt(run.noise_variance)
         if run.samples is None:
-            return self.rows(innovations * weight)
-        return self.rows(innovations * (weight * np.sqrt(run.samples.count / run.block))[:, None])
+            return self.rows(whiten(reading, run.whitening) / np.sqrt(run.noise_variance))
+        count = run.samples.count[:, None]
+        white = whiten(np.where(count > 0, reading, 0.0), run.whitening)
+        return self.rows(white * np.sqrt(count / (run.block * run.noise_variance)))
 
     def rows(self, white: Array) -> Array:
         """Residuals averaged in groups.
@@ -144,10 +157,8 @@ class Path:
         Returns:
             Of the same noise, shape (rows, k) or (rows,); an incomplete last group is left out.
         """
-        # the filter of coloured noise needs some values before the first that it makes white
-        first = self.run.whitening.size - 1
-        count = (white.shape[0] - first) // self.group
-        grouped = white[first : first + count * self.group].reshape(count, self.group, *white.shape[1:])
+        count = white.shape[0] // self.group
+        grouped = white[: count * self.group].reshape(count, self.group, *white.shape[1:])
         return np.asarray(grouped.sum(axis=1) / np.sqrt(self.group))
 
     @cached_property
@@ -169,7 +180,7 @@ class Path:
 
     @cached_property
     def nominal(self) -> Array:
-        """Responses to the model's common parameters, shape (rows, common).
+        """Responses to a step of the model's common parameters, in their order, shape (rows, common).
 
         The moments of inertia, damping and air are those along the measured path, so that they hold however far the
         parameters move.
@@ -178,7 +189,8 @@ class Path:
         inertia, damping, stiffness = linear_coefficients(self.fit, self.index)
         pressure = data.air_moment(run)
         lag = pressure * data.reference_length / run.wind_speed if run.wind_on else 0.0
-        moments = [(stiffness * self.angle + damping * self.rate) / inertia, self.rate]
+        swing = (stiffness * self.angle + damping * self.rate) / inertia  # the angular acceleration, reversed
+        moments = [-self.angle if data.normalised else swing, -self.rate]
         if data.wind_on:
             moments += [pressure * self.angle, lag * self.rate]
         columns = [self.response(np.column_stack(moments))]

@@ -206,3 +206,19 @@ def _solve(whole: Normal, precision: float | None) -> Array:
     found = np.zeros(whole.gradient.size)
     found[:c] = Ridge(alone, 0.0).solution
     return found
+
+
+def ratio(drop: Array, left: Array) -> tuple[float, float]:
+    """Share of what was left that is closed.
+
+    Args:
+        drop: of χ², by unit, shape (units,).
+        left: excess before, by unit, shape (units,).
+
+    Returns:
+        Sum over sum, and its standard deviation from the scatter of the units.
+    """
+    whole = max(float(left.sum()), 1e-9)
+    closed = float(drop.sum()) / whole
+    scatter = float(np.sum((drop - closed * left) ** 2))
+    return closed, float(np.sqrt(scatter * drop.size / max(drop.size - 1, 1)) / whole)

@@ -27,6 +27,7 @@ STEPS = {
     "pruning": "fitting the answer without each effect",
     "polishing": "fitting the answer to convergence",
     "where, and how far it closes": "locating the gap, predicting held-out runs",
+    "what no effect explains": "estimating what no effect explains",
 }
 """Steps of the study in words; any other progress message is a set of effects."""
 
