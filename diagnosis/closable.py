@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from identification.printing.table import TextTable
+
 KINDS: Mapping[str, str] = {
     "angle": "a moment of the angle alone",
     "rate": "a moment of the rate alone",
@@ -125,3 +127,52 @@ class Closable:
                 "std": law.std,
             },
         }
+
+
+def closable_words(document: Mapping[str, Any]) -> str:
+    """What could be closed, in words.
+
+    Args:
+        document: of a diagnosis.
+
+    Returns:
+        A line; empty where nothing remains beyond chance.
+    """
+    found = document.get("closable")
+    return f"What could be closed: {found['words']}" if found else ""
+
+
+def closable_table(document: Mapping[str, Any]) -> TextTable:
+    """How much each kind could close.
+
+    Args:
+        document: of a diagnosis.
+
+    Returns:
+        A table of shares in per cent with one standard deviation; without rows where nothing remains beyond chance.
+    """
+    found = document.get("closable") or {"ceilings": ()}
+    rows = [
+        (KINDS[one["kind"]], percent(max(one["closed"], 0.0), one["std"]), one["held_out"])
+        for one in found["ceilings"]
+    ]
+    return TextTable(
+        "Share of what is left that could be closed at most",
+        ("by", "share", "held out"),
+        tuple(rows),
+        ("share",),
+    )
+
+
+def percent(share: float, std: float | None = None) -> str:
+    """A share in per cent with its standard deviation.
+
+    Args:
+        share: a fraction.
+        std: likewise; None: not given.
+
+    Returns:
+        Text such as ``94.2 ± 0.6 %``; a standard deviation beyond 100 % is not resolved further.
+    """
+    beside = "" if std is None else f" ± {min(max(100.0 * std, 0.1), 100.0):.1f}"
+    return f"{min(100.0 * share, 100.0):.1f}{beside} %"

@@ -214,7 +214,7 @@ LAW_TERM_SHARE = 0.02
 #: Share of what its kind could close from which a formula needs no further term. Judgement.
 LAW_REACHES = 0.97
 #: Share of what is left within which a simpler kind counts as closing as much. Judgement: that of a basis itself.
-AS_MUCH = 0.01
+AS_MUCH = 0.02
 #: Share of what laws of single runs close that a law common to all runs must reach. Judgement.
 COMMON_SHARE = 0.8
 #: Share of what is left below which no kind is named. Judgement.

@@ -182,7 +182,7 @@ def reading(at: Motion, r: Ranges) -> Array:
     """Errors of the reading, as shares of the greatest angle: of angle, rate and time, alike in all runs."""
     slow = splines(at.time, 0.0, r.time, _SLOW)
     columns = [
-        _of_angle(at, r, _FINE),
+        _of_angle(at, r, 2 * _FINE),
         _of_rate(at, r, _MEDIUM),
         _times(_of_angle(at, r, _COARSE), _of_rate(at, r, _COARSE)),
         splines(at.time, 0.0, r.time, 4 * _SLOW),
@@ -216,7 +216,7 @@ COMMON: Mapping[str, Basis] = {
 }  # fmt: skip
 
 #: Kinds that are different in every run, so that only short gaps in it can be predicted.
-SINGLE: Mapping[str, Basis] = {"between": between, "event": event, "wander": wander}
+SINGLE: Mapping[str, Basis] = {"between": between, "wander": wander, "event": event}
 
 #: Kinds that are errors of the reading; the others are moments.
 OF_READING = frozenset({"reading", "wander"})

@@ -15,7 +15,17 @@ from diagnosis.closable import Ceiling
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.law import bases
 from diagnosis.law.paths import Path, paths
-from diagnosis.law.ridge import Normal, Ridge, Rows, best_ridge, common_ridge, held_out, normal, ratio, total
+from diagnosis.law.ridge import (
+    Normal,
+    Ridge,
+    Rows,
+    best_ridge,
+    common_precision,
+    held_out,
+    normal,
+    ratio,
+    total,
+)
 from tunnel_sim.vocabulary.record import Array
 
 RUNS = "runs"
@@ -58,13 +68,13 @@ class Evidence:
 
     Args:
         ceiling: how much it closes.
-        gain: twice the logarithm of its evidence over that of the model without it.
+        drop: of χ² on what was held out.
         precision: of its prior.
         solution: the coefficients, where one set holds in all runs.
     """
 
     ceiling: Ceiling
-    gain: float
+    drop: float
     precision: float
     solution: Ridge | None = None
 
@@ -123,15 +133,14 @@ class Rest:
             return [path.seen(basis(path, self.ranges) * self.ranges.angle) for path in self.paths]
         return [path.response(basis(path, self.ranges)) for path in self.paths]
 
-    def share(self, before: Array, after: Array) -> tuple[float, float]:
+    def share(self, after: Array) -> tuple[float, float]:
         """Share closed on what was held out, with its standard deviation from the scatter of the units.
 
         Args:
-            before: χ² of every unit without the law, shape (units,).
-            after: with it.
+            after: χ² of every unit with the law, shape (units,).
         """
-        drop = (before - after)[self.seen]
-        left = self._left_over + (before - self._fitted)
+        drop = (self.before - after)[self.seen]
+        left = self._left_over + (self.before - self._fitted)
         return ratio(drop, left[self.seen])
 
     @cached_property
@@ -157,9 +166,10 @@ class Rest:
     def common(self, kind: str) -> Evidence:
         """A kind whose law holds in every run."""
         parts = self.normals(self.columns(kind))
-        ridge, gain = best_ridge(total(parts))
-        closed, std = self.share(self.before, held_out(parts, self.groups, ridge.precision))
-        return Evidence(Ceiling(kind, closed, std, self.held_out), gain, ridge.precision, ridge)
+        ridge = best_ridge(total(parts))
+        after = held_out(parts, self.groups, ridge.precision)
+        drop = float((self.before - after)[self.seen].sum())
+        return Evidence(Ceiling(kind, *self.share(after), self.held_out), drop, ridge.precision, ridge)
 
     def single(self, kind: str) -> Evidence:
         """A kind that is different in every run: short gaps are predicted from what is around them."""
@@ -167,7 +177,7 @@ class Rest:
         columns = [unit.left(matrix) for unit, matrix in zip(runs, self.columns(kind), strict=True)]
         residuals = [unit.left(unit.path.residual) for unit in runs]
         parts = [_basis_only(c, r) for c, r in zip(columns, residuals, strict=True)]
-        precision, gain = common_ridge(parts)
+        precision = common_precision(parts)
         drops = []
         for matrix, residual in zip(columns, residuals, strict=True):
             turn = np.arange(residual.size) // _GAP % _TURNS
@@ -175,7 +185,7 @@ class Rest:
             drops.append(float(residual @ residual) - after)
         left = [float(r @ r) - r.size for r in self.fit.residuals]
         closed, std = ratio(np.array(drops), np.array(left))
-        return Evidence(Ceiling(kind, closed, std, GAPS), gain, precision)
+        return Evidence(Ceiling(kind, closed, std, GAPS), sum(drops), precision)
 
 
 def _excess_in(residual: Array, unit: Unit) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from diagnosis.answer.held_out import predict_held_out
 from diagnosis.answer.held_out_stretches import predict_stretches, turns_of
-from diagnosis.closable import KINDS, Ceiling, Closable, Curve, Law
+from diagnosis.closable import KINDS, Ceiling, Closable, Curve, Law, percent
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.similarity import Similarity
 from diagnosis.law import bases
@@ -56,7 +57,8 @@ def explain(left: Fit, similarity: Similarity, *, named: bool) -> Closable:
     law, shape, where = None, None, ()
     if kind in common:
         shape = _own_curve(curve(rest, common[kind]), similarity)
-        law = _law(rest, kind, common[kind].ceiling.closed, similarity)
+        law = _law(rest, kind, common[kind].drop, similarity)
+        kind = _of_formula(kind, law)
     elif kind in single:
         where = tuple(_own_event(one, similarity) for one in events(rest, kind, single[kind].precision))
     excess = left.excess / left.problem.data.runs[0].block
@@ -74,18 +76,26 @@ def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) 
     Returns:
         One of `diagnosis.closable.KINDS`.
     """
-    best = max(one.ceiling.closed for one in common.values())
-    most = max(single.values(), key=lambda one: one.ceiling.closed).ceiling
-    if max(best, most.closed) < LEAST_CLOSABLE:
+    of_all, of_one = (
+        max((one.ceiling for one in kinds.values()), key=lambda one: one.closed) for kinds in (common, single)
+    )
+    if max(of_all.closed, of_one.closed) < LEAST_CLOSABLE:
         return "noise"
-    if best >= COMMON_SHARE * most.closed:
-        return next(kind for kind, one in common.items() if one.ceiling.closed >= best - AS_MUCH)
-    return next(kind for kind, one in single.items() if one.ceiling.closed >= most.closed - AS_MUCH)
+    among, best = (common, of_all) if of_all.closed >= COMMON_SHARE * of_one.closed else (single, of_one)
+    least = best.closed - max(AS_MUCH, best.std)
+    return next(kind for kind, one in among.items() if one.ceiling.closed >= least)
 
 
-def _law(rest: Rest, kind: str, ceiling: float, similarity: Similarity) -> Law | None:
+def _of_formula(kind: str, law: Law | None) -> str:
+    """The kind, corrected by the formula: few runs may show angle and rate as a function of one of them."""
+    formula = "" if law is None else str(law.effect.get("moment", ""))
+    other = {"angle": "r", "rate": "b"}.get(kind)
+    return "state" if other and re.search(rf"\b{other}\b", formula) else kind
+
+
+def _law(rest: Rest, kind: str, drop: float, similarity: Similarity) -> Law | None:
     """The formula of a kind, where one is supported."""
-    formula = choose(rest, kind, ceiling * rest.excess)
+    formula = choose(rest, kind, drop)
     proposal = None if formula is None else propose(rest, formula, kind)
     if proposal is None:
         return None
@@ -188,17 +198,3 @@ def _places(where: tuple[Mapping[str, Any], ...]) -> str:
     first = where[0]
     run = f"run {first['run']} ({first['from_s']:.2f} to {first['to_s']:.2f} s)"
     return run if len(where) == 1 else f"{len(where)} runs, the largest part in {run}"
-
-
-def percent(share: float, std: float | None = None) -> str:
-    """A share in per cent with its standard deviation.
-
-    Args:
-        share: a fraction.
-        std: likewise; None: not given.
-
-    Returns:
-        Text such as ``94.2 ± 0.6 %``.
-    """
-    beside = "" if std is None else f" ± {max(100.0 * std, 0.1):.1f}"
-    return f"{min(100.0 * share, 100.0):.1f}{beside} %"

@@ -142,40 +142,38 @@ def _spectrum(whole: Normal) -> _Spectrum:
     return _Spectrum(values[keep], axes[:, keep].T @ along)
 
 
-def best_ridge(whole: Normal) -> tuple[Ridge, float]:
+def best_ridge(whole: Normal) -> Ridge:
     """The width of the prior that the readings make most probable.
 
     Args:
         whole: all units.
 
     Returns:
-        The solution, and twice the logarithm of the evidence over that without the basis.
+        The solution.
     """
     spectrum = _spectrum(whole)
     if not spectrum.values.size:
-        return Ridge(whole, 1e300), 0.0
+        return Ridge(whole, 1e300)
     scale = 1.0 / float(spectrum.values[-1])
     tried = [(spectrum.evidence(1.0 / (scale * width)), 1.0 / (scale * width)) for width in _WIDTHS**2]
-    evidence, precision = max(tried)
-    return Ridge(whole, precision), evidence
+    return Ridge(whole, max(tried)[1])
 
 
-def common_ridge(parts: Sequence[Normal]) -> tuple[float, float]:
+def common_precision(parts: Sequence[Normal]) -> float:
     """One width of the prior for units with coefficients of their own.
 
     Args:
         parts: by unit.
 
     Returns:
-        The precision, and twice the logarithm of the evidence over that without the basis, all units together.
+        The precision.
     """
     spectra = [_spectrum(part) for part in parts]
     greatest = max(max(s.values, default=0.0) for s in spectra)
     if greatest <= 0.0:
-        return 1e300, 0.0
+        return 1e300
     tried = [greatest / width for width in _WIDTHS**2]
-    gain, precision = max((sum(s.evidence(p) for s in spectra), p) for p in tried)
-    return precision, gain
+    return max((sum(s.evidence(p) for s in spectra), p) for p in tried)[1]
 
 
 def held_out(parts: Sequence[Normal], groups: Sequence[Sequence[int]], precision: float | None) -> Array:
