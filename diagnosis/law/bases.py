@@ -133,6 +133,12 @@ def _of_rate(at: Motion, r: Ranges, count: int) -> Array:
     return splines(at.rate, -r.rate, r.rate, count)
 
 
+def _wide(values: Array, reach: float) -> Array:
+    """Wide splines, which a law uses before narrow ones: without them the prior would prefer a rough law."""
+    found = [splines(values, -reach, reach, count) * (_FINE / count) for count in (_MEDIUM, _COARSE)]
+    return np.column_stack(found)
+
+
 def _rate_shapes(at: Motion, r: Ranges) -> Array:
     u = at.rate / r.rate
     return np.column_stack([u, np.tanh(u / _SETTLED), np.abs(u)])
@@ -140,13 +146,14 @@ def _rate_shapes(at: Motion, r: Ranges) -> Array:
 
 def angle(at: Motion, r: Ranges) -> Array:
     """Moments of the angle alone, the same for all springs or in proportion to the spring."""
-    return np.column_stack([_of_angle(at, r, _FINE), _spring(at, r) * _of_angle(at, r, _MEDIUM)])
+    wide = _wide(at.angle, r.angle)
+    return np.column_stack([_of_angle(at, r, _FINE), wide, _spring(at, r) * wide])
 
 
 def rate(at: Motion, r: Ranges) -> Array:
     """Moments of the rate alone."""
-    columns = [_of_rate(at, r, _FINE), _rate_shapes(at, r), _spring(at, r) * _of_rate(at, r, _COARSE)]
-    return np.column_stack(columns)
+    wide = _wide(at.rate, r.rate)
+    return np.column_stack([_of_rate(at, r, _FINE), _rate_shapes(at, r), wide, _spring(at, r) * wide])
 
 
 def state(at: Motion, r: Ranges) -> Array:
