@@ -12,12 +12,12 @@ KINDS: Mapping[str, str] = {
     "angle": "a moment of the angle alone",
     "rate": "a moment of the rate alone",
     "state": "a moment of angle and rate",
-    "wind": "a moment of angle and rate that grows with the wind",
-    "time": "a moment that changes in time, alike in all runs",
+    "wind": "a moment of angle and rate with the wind",
+    "time": "a moment in time, alike in all runs",
     "reading": "an error of the reading, alike in all runs",
-    "between": "a stiffness, damping or steady moment that differs from run to run",
-    "event": "a moment that changes in time, different in every run",
-    "wander": "a zero of the reading that wanders or jumps, different in every run",
+    "between": "a stiffness, damping or moment of each run's own",
+    "event": "a moment in time of each run's own",
+    "wander": "a wandering or jumping zero of each run's own",
     "noise": "nothing smooth: the rest is noise",
 }
 """Kinds of what may be missing, in words; ``noise`` where none of the others closes much."""
@@ -30,7 +30,7 @@ class Ceiling:
     Args:
         kind: of `KINDS`.
         closed: share of what is left, on readings held out of the fit; negative where the prediction is worse.
-        std: its standard deviation, from the scatter of the runs.
+        std: its standard deviation from the scatter of the runs, a share.
         held_out: what was held out, in words.
     """
 
@@ -68,7 +68,7 @@ class Law:
         effect: table of an effects file that states it.
         parameters: value and standard deviation by name, in the unit that the table states.
         closed: share of what is left that it closes, on runs held out of the fit.
-        std: its standard deviation, from the scatter of the runs.
+        std: its standard deviation from the scatter of the runs, a share.
     """
 
     effect: Mapping[str, Any]
@@ -88,6 +88,7 @@ class Closable:
         words: the same in a sentence or two.
         curve: of that kind; None where it has none.
         law: a formula; None where none is supported.
+        events: where a kind that differs from run to run lies: ``run``, its ``share``, ``from_s`` and ``to_s``.
     """
 
     excess: float

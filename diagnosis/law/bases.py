@@ -104,7 +104,7 @@ def splines(values: Array, low: float, high: float, count: int) -> Array:
     Args:
         values: shape (n,); those outside the range are taken at its end.
         low: end of the range, in the unit of the values.
-        high: other end.
+        high: other end, in the same unit.
         count: number of splines, 4 or more.
 
     Returns:

@@ -30,7 +30,7 @@ from tunnel_sim.vocabulary.record import Array
 
 RUNS = "runs"
 STRETCHES = "stretches of time"
-GAPS = "short gaps in every run"
+GAPS = "short gaps"
 _STRETCHES = 6  # in a run, where no run can be left out
 _GAP = 3  # rows: an eighth of a cycle
 _TURNS = 3
@@ -68,8 +68,8 @@ class Evidence:
 
     Args:
         ceiling: how much it closes.
-        drop: of χ² on what was held out.
-        precision: of its prior.
+        drop: of χ² on what was held out, dimensionless.
+        precision: one over the variance of a coefficient in its prior, in the basis' units.
         solution: the coefficients, where one set holds in all runs.
     """
 

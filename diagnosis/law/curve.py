@@ -87,7 +87,7 @@ def events(rest: Rest, kind: str, precision: float) -> list[dict[str, Any]]:
     Args:
         rest: what is left.
         kind: of `diagnosis.law.bases.SINGLE`.
-        precision: of the prior.
+        precision: one over the variance of a coefficient in the prior, in the basis' units.
 
     Returns:
         By run, largest first: ``run``, its ``share`` of what is closed, and ``from_s`` and ``to_s`` since the start

@@ -177,10 +177,12 @@ def _words(
     others = [
         one for one in ceilings.values() if one.held_out == best.held_out and not _includes(one.kind, kind)
     ]
-    if others:
-        next_best = max(others, key=lambda one: one.closed)
-        if next_best.closed < best.closed - _BESIDE * np.hypot(best.std, next_best.std):
-            said.append(f"No other kind would close more than {percent(max(next_best.closed, 0.0))}.")
+    alike = [one for one in others if one.closed >= best.closed - max(AS_MUCH, best.std)]
+    if alike:
+        said.append(f"These runs cannot tell it from {' or '.join(KINDS[one.kind] for one in alike)}.")
+    elif others:
+        most = max(one.closed for one in others)
+        said.append(f"No other kind would close more than {percent(max(most, 0.0))}.")
     if where:
         said.append(f"Most of it is in {_places(where)}.")
     if law is not None:

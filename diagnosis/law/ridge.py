@@ -36,7 +36,7 @@ class Normal:
     Args:
         matrix: free columns first, shape (c + k, c + k).
         gradient: shape (c + k,).
-        power: of the residuals.
+        power: sum of the squared residuals, in noise variances.
         free: number of columns without a prior.
     """
 
@@ -87,7 +87,7 @@ class Ridge:
 
     Args:
         whole: the normal equations.
-        precision: of the prior, one over the variance of a coefficient.
+        precision: of the prior, one over the variance of a coefficient, in the basis' units.
     """
 
     whole: Normal
@@ -95,7 +95,7 @@ class Ridge:
 
     @cached_property
     def _scaled(self) -> tuple[Array, Array]:
-        """Scale of the columns, and eigen-decomposition-free inverse of the penalised matrix."""
+        """Scale of the columns, and the penalised matrix in it."""
         matrix = self.whole.matrix
         penalty = np.full(len(matrix), self.precision)
         penalty[: self.whole.free] = 0.0
@@ -182,7 +182,7 @@ def held_out(parts: Sequence[Normal], groups: Sequence[Sequence[int]], precision
     Args:
         parts: by unit.
         groups: indices of the units left out together.
-        precision: of the prior; None: the free columns alone.
+        precision: of the prior, as in `Ridge`, in the basis' units; None: the free columns alone.
 
     Returns:
         Shape (units,).
