@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,11 @@ def closable(study: Study, *, significant: bool) -> Closable | None:
     left = study.chosen
     if not study.causes or not significant or study.random_answer(study.fitted) is not None:
         return None
-    return explain(left, study.similarity, named=study.causes != ("unknown",)) if left.excess > 0.0 else None
+    if left.excess <= 0.0:
+        return None
+    with suppress(np.linalg.LinAlgError):  # the answer stands without it
+        return explain(left, study.similarity, named=study.causes != ("unknown",))
+    return None
 
 
 def explain(left: Fit, similarity: Similarity, *, named: bool) -> Closable:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from scipy.stats import chi2
@@ -17,7 +18,7 @@ from diagnosis.law.ceiling import Rest
 from diagnosis.law.library import Term, terms
 from diagnosis.law.ridge import Normal, Ridge, held_out, total
 from diagnosis.policy import LAW_FALSE_RATE, LAW_REACHES, LAW_TERM_SHARE
-from tunnel_sim.effects import Effect
+from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -89,10 +90,14 @@ def _chosen(rest: Rest, kind: str, closable: float) -> Formula | None:
     if not candidates:
         return None
     of_reading = kind in _READING_KINDS
+    if of_reading and rest.paths[0].run.derivative:
+        return None  # an effect's reading is an angle
     columns = [_columns(rest, candidates, index, of_reading) for index in range(len(rest.paths))]
     size = np.maximum(np.max([np.max(np.abs(c), axis=0) for c in columns], axis=0), 1e-300)
     parts = rest.normals([c / size for c in columns])
     chosen, gained = _greedy(rest, parts, len(candidates), closable)
+    while sum(1 + len(candidates[i].inner) for i in chosen) > limits.OWN_PARAMETERS:
+        chosen.pop()
     if not chosen:
         return None
     whole = _of(total(parts), chosen)
@@ -185,7 +190,7 @@ def propose(rest: Rest, formula: Formula, kind: str) -> Proposal | None:
     Returns:
         The effect and its fit; None where the fit fails.
     """
-    table = effect_table(formula, kind)
+    table = effect_table(formula, _free_name(f"proposed_{kind}"))
     try:
         effect = effect_of(table)
     except TunnelError:
@@ -205,12 +210,19 @@ def propose(rest: Rest, formula: Formula, kind: str) -> Proposal | None:
     return None if best is None or best.total >= base.total else Proposal(effect, table, best)
 
 
-def effect_table(formula: Formula, kind: str) -> dict[str, object]:
+def _free_name(name: str) -> str:
+    """The name, or with a number where it is an effect's already."""
+    taken = {kind.name for kind in known_effects()}
+    numbered = (f"{name}_{number}" for number in range(2, len(taken) + 3))
+    return next(free for free in chain((name,), numbered) if free not in taken)
+
+
+def effect_table(formula: Formula, name: str) -> dict[str, object]:
     """A formula as the table of an effects file.
 
     Args:
         formula: of the fit's units.
-        kind: of `diagnosis.closable.KINDS`.
+        name: of the effect.
 
     Returns:
         The table, its values those of the formula.
@@ -223,9 +235,9 @@ def effect_table(formula: Formula, kind: str) -> dict[str, object]:
     texts = []
     for number, (term, value) in enumerate(zip(formula.terms, formula.coefficients, strict=True), 1):
         text = term.text
-        for name, inner in term.inner.items():
-            text = re.sub(rf"\b{name}\b", f"{name}{number}", text)
-            parameters[f"{name}{number}"] = _inner(inner, term.units[name])
+        for own, inner in term.inner.items():
+            text = re.sub(rf"\b{own}\b", f"{own}{number}", text)
+            parameters[f"{own}{number}"] = _inner(inner, term.units[own])
         if number > 1:
             ratio = product(first.dimension, term.dimension, -1.0)
             parameters[f"a{number}"] = _coefficient(value / severity, dimension_text(ratio))
@@ -236,7 +248,7 @@ def effect_table(formula: Formula, kind: str) -> dict[str, object]:
     windy = all(term.text.startswith("V") for term in formula.terms)
     names = set().union(*(term.formula.names for term in formula.terms))
     return {
-        "name": f"proposed_{kind}",
+        "name": name,
         "channel": "sensor" if formula.of_reading else _channel(names),
         "condition": "wind_on" if windy else "always",
         **({"reading": f"y + {whole}"} if formula.of_reading else {"moment": whole}),
@@ -281,6 +293,4 @@ def effect_of(table: dict[str, object]) -> type[Effect]:
         own: Quantity(**{**values, "meaning": f"parameter {own}"})
         for own, values in given.pop("parameters").items()  # type: ignore[attr-defined]
     }
-    if len(parameters) > limits.OWN_PARAMETERS:
-        raise TunnelError("a formula of too many parameters", remedy="use fewer terms")
     return expression_effect(name, parameters=parameters, **given)  # type: ignore[arg-type]

@@ -36,7 +36,7 @@ class Normal:
     Args:
         matrix: free columns first, shape (c + k, c + k).
         gradient: shape (c + k,).
-        power: sum of the squared residuals, in noise variances.
+        power: sum of the squared residuals, dimensionless.
         free: number of columns without a prior.
     """
 
