@@ -51,15 +51,21 @@ def answer(folder: Path) -> dict[str, Any]:
 
 def _closes(found: Mapping[str, Any]) -> float:
     """Share of what is closable that the law closes; 0 without a law."""
+    if found["law"] is None:
+        return 0.0
     ceiling = next(one["closed"] for one in found["ceilings"] if one["kind"] == found["kind"])
-    law = found["law"]
-    return 0.0 if law is None else law["closed"] / max(ceiling, 1e-9)
+    return float(found["law"]["closed"] / max(ceiling, 1e-9))
 
 
 def tables(truths: Mapping[str, Any], answers: Mapping[str, Any]) -> list[Table]:
     """The figures, and one row per form."""
     seen = {name: (truths[name], answers[name]) for name in answers}
-    gaps = {n: (t["form"][0], a["closable"]) for n, (t, a) in seen.items() if t["form"] and a["closable"]}
+    nothing = {"kind": None, "law": None}
+    gaps = {
+        n: (t["form"][0], a["closable"] or nothing)
+        for n, (t, a) in seen.items()
+        if t["form"] and a["detected"]
+    }
     state = {n: v for n, v in gaps.items() if RIGHT[v[0]] in (STATE, ("wind",))}
     empty = [a for t, a in seen.values() if not t["form"]]
     rows: dict[str, Share] = {
@@ -88,7 +94,7 @@ def tables(truths: Mapping[str, Any], answers: Mapping[str, Any]) -> list[Table]
         forms.add_column(head)
     for form in sorted({form for form, _ in gaps.values()}):
         own = [f for other, f in gaps.values() if other == form]
-        kinds = sorted({f["kind"] for f in own})
+        kinds = sorted({str(f["kind"]) for f in own})
         right = sum(f["kind"] in RIGHT[form] for f in own)
         closes = [_closes(f) for f in own]
         forms.add_row(form, str(len(own)), str(right), ", ".join(kinds), f"{np.median(closes):.2f}")

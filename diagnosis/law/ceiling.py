@@ -140,13 +140,15 @@ class Rest:
             after: χ² of every unit with the law, shape (units,).
         """
         drop = (self.before - after)[self.seen]
-        left = self._left_over + (self.before - self._fitted)
+        # averaged rows have less noise than the residuals but all of the misfit; a stretch's own release takes some
+        left = self._left_over + (self.before - self._power)
         return ratio(drop, left[self.seen])
 
     @cached_property
-    def _fitted(self) -> Array:
-        """χ² of every unit with the model's own parameters fitted to all."""
-        return held_out(self._alone, [], None)
+    def _power(self) -> Array:
+        """χ² of every unit's rows in the fit, shape (units,)."""
+        rows = [unit.path.residual[unit.rows] for unit in self.units]
+        return np.array([float(own @ own) for own in rows])
 
     @cached_property
     def _alone(self) -> list[Normal]:

@@ -172,8 +172,8 @@ def common_precision(parts: Sequence[Normal]) -> float:
     greatest = max(max(s.values, default=0.0) for s in spectra)
     if greatest <= 0.0:
         return 1e300
-    tried = [greatest / width for width in _WIDTHS**2]
-    return max((sum(s.evidence(p) for s in spectra), p) for p in tried)[1]
+    tried = [greatest / float(width) for width in _WIDTHS**2]
+    return max(tried, key=lambda precision: sum(s.evidence(precision) for s in spectra))
 
 
 def held_out(parts: Sequence[Normal], groups: Sequence[Sequence[int]], precision: float | None) -> Array:

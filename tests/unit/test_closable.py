@@ -35,9 +35,9 @@ RUNS = rig(
 FORMS = {form.name: form for form in (*OUTSIDE_FORMS, *LAW_FORMS)}
 
 
-def study_of(name, value, **extra):
+def study_of(name, value, conditions=RUNS, **extra):
     effects = () if not name else (EffectDraw(FORMS[name], extra, 1, 1.0, value),)
-    draw = CampaignDraw("law", RUNS, effects, 5)
+    draw = CampaignDraw("law", conditions, effects, 5)
     (motion,) = simulate_motions([draw], fine=False)
     return investigate(as_campaign(read_and_fit(draw, motion), name or "plain"), ())
 
@@ -90,6 +90,14 @@ def test_its_formula_closes_held_out_runs_and_is_an_effect_of_a_file(detent, tmp
     assert moment(0.0, 0.03, 0.0) - 3.0 * moment(0.0, 0.01, 0.0) == pytest.approx(
         true - 3.0 * 0.01 * 0.2 * np.exp(0.5 - 0.5 * 0.04), rel=0.1
     )
+
+
+def test_the_share_of_a_single_run_is_of_what_its_stretches_show():
+    alone = rig(stiffness=(21.02,), speed=(0.0,), angle=(0.35,), duration=10.0)
+    found = closable(study_of("stops", 0.8, alone, place=0.15), significant=True)
+    assert {one.held_out for one in found.ceilings} == {"stretches of time", "short gaps"}
+    assert found.kind == "angle"
+    assert closed(found)["angle"] > 0.85
 
 
 def test_what_differs_in_one_run_is_placed_in_it():
