@@ -17,6 +17,7 @@ from diagnosis.detection.noise_remarks import noise_remarks
 from diagnosis.detection.own_model import SLIDE, reach, with_law
 from diagnosis.detection.refusal import refuse_hopeless
 from diagnosis.investigate import Progress, investigate
+from diagnosis.law.explain import closable
 from diagnosis.localisation.localise import localise
 from diagnosis.result import Diagnosis
 from tunnel_sim.effects import Effect, effect_class, known_effects
@@ -108,6 +109,10 @@ def _diagnose(
     answer = in_own_units(replace(assembled, remarks=remarks), study.similarity)
     if found.limit_cycles:
         return limit_cycle_answer(answer, found.remarks)
+    if progress is not None:
+        progress("what no effect explains")
+    significant = answer.rest is not None and answer.rest.significant
+    answer = replace(answer, closable=closable(study, significant=significant))
     if answer.causes == ("unknown",):
         return replace(answer, cautions=(*answer.cautions, *second_modes(campaign)))
     return answer

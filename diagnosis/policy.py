@@ -210,3 +210,18 @@ BLIND_WITHIN = 3.0
 #: Share of what one free decay leaves that two may leave, for a second mode to be named. Judgement: the lines must
 #: also be resolved, that is, farther apart than the sum of their half-power widths.
 SECOND_MODE_LEFT = 0.5
+
+# ---- What no effect explains (0023) ---------------------------------------------------------------------------
+
+#: Rate at which chance alone supports a term of a formula, all terms of the library together. Convention.
+LAW_FALSE_RATE = 1e-3
+#: Share of what its kind could close that a further term of a formula must close. Judgement.
+LAW_TERM_SHARE = 0.02
+#: Share of what its kind could close from which a formula needs no further term. Judgement.
+LAW_REACHES = 0.97
+#: Share of what is left within which a simpler kind counts as closing as much. Judgement: that of a basis itself.
+AS_MUCH = 0.02
+#: Share of what laws of single runs close that a law common to all runs must reach. Judgement.
+COMMON_SHARE = 0.8
+#: Share of what is left below which no kind is named. Judgement.
+LEAST_CLOSABLE = 0.1

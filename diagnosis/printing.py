@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from diagnosis.closable import closable_table, closable_words
 from diagnosis.patch import patch_lines, patch_table
 from diagnosis.policy import LISTED_PROBABILITY
 from identification.printing.numbers import coefficient_label, estimated, significant, unit_mark
@@ -38,6 +39,8 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
         parameters_table(document),
         inclusion_line(document),
         waterfall_table(document),
+        closable_words(document),
+        closable_table(document),
         coefficients_table(document),
         patch_table(document),
         *patch_lines(document),

@@ -8,6 +8,7 @@ from typing import Any
 
 import polars as pl
 
+from diagnosis.closable import Closable
 from diagnosis.closure import Rest, Waterfall
 from diagnosis.patch import PatchedModel
 from diagnosis.printing import diagnosis_parts
@@ -233,6 +234,7 @@ class Diagnosis:
         waterfall: how far the gap closes with each cause.
         rest: what remains after the causes.
         model: the model given, with the causes written into it; None where none was given.
+        closable: how much of that could be closed, and by what; None where nothing remains beyond chance.
     """
 
     campaign: str
@@ -256,6 +258,7 @@ class Diagnosis:
     waterfall: Waterfall = field(default_factory=Waterfall)
     rest: Rest | None = None
     model: PatchedModel | None = None
+    closable: Closable | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""
@@ -302,6 +305,7 @@ class Diagnosis:
             **self.waterfall.to_json_dict(),
             "rest": None if self.rest is None else self.rest.to_json_dict(),
             "model": None if self.model is None else self.model.to_json_dict(),
+            "closable": None if self.closable is None else self.closable.to_json_dict(),
             "ambiguous_with": list(self.ambiguous_with),
             "next_run": None if self.next_run is None else dict(self.next_run),
             "coefficients": {

@@ -12,10 +12,13 @@ from tunnel_reference.circumstances import draw_circumstances
 from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.forms import FAMILIES, forms_of
 from tunnel_reference.outside import OUTSIDE_FORMS
+from tunnel_reference.outside_laws import LAW_FORMS
 
 NUMBERS = {"none": 0, "single": 1, "pair": 2, "three": 3, "four": 4}
 """Number of effects that matter, by kind of campaign."""
-KINDS = (*NUMBERS, "outside")
+BEYOND = {"outside": OUTSIDE_FORMS, "law": LAW_FORMS}
+"""Forms outside the known families, by kind of campaign."""
+KINDS = (*NUMBERS, *BEYOND)
 DEFAULT_SHARES = {"single": 0.3, "pair": 0.17, "three": 0.14, "four": 0.11, "none": 0.14, "outside": 0.14}
 _STRONG_SHARE = 0.2
 _SMALL = (0.03, 0.3)
@@ -104,8 +107,8 @@ def draw_campaign(
         _draw_effect(rng, _draw_form(rng, name, mixture), conditions, small=name in small)
         for name in (*names, *small)
     )
-    if kind == "outside":
-        pool = _pool(OUTSIDE_FORMS, rng, mixture)
+    if kind in BEYOND:
+        pool = _pool(BEYOND[kind], rng, mixture)
         effects = (_draw_effect(rng, pool[int(rng.integers(len(pool)))], conditions),)
     return CampaignDraw(kind, conditions, effects, int(rng.integers(2**62)), mixture)
 

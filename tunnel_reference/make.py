@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tunnel_reference.conditions import FRONTAL_AREA, NOMINAL_INERTIA, REFERENCE_LENGTH, WIDTH
-from tunnel_reference.draw import DEFAULT_SHARES, NUMBERS, CampaignDraw, Mixture, draw_campaign
+from tunnel_reference.draw import DEFAULT_SHARES, KINDS, NUMBERS, CampaignDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES
 from tunnel_reference.separable import size_separably
 from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions
@@ -171,7 +171,9 @@ def make_set(
 
 
 def parse_shares(text: str) -> dict[str, float]:
-    """Parse kinds with optional weights, such as ``single:3,none``; the default weights are `DEFAULT_SHARES`.
+    """Parse kinds with optional weights, such as ``single:3,none``.
+
+    The default weights are `DEFAULT_SHARES`, and 1 for a kind that is not among them.
 
     Raises:
         TunnelError: for an unknown kind or a weight that is not a positive number.
@@ -179,12 +181,10 @@ def parse_shares(text: str) -> dict[str, float]:
     shares: dict[str, float] = {}
     for item in text.split(","):
         kind, _, weight = item.strip().partition(":")
-        if kind not in DEFAULT_SHARES:
-            raise TunnelError(
-                f"unknown kind {kind!r}", where="--kinds", remedy=did_you_mean(kind, DEFAULT_SHARES)
-            )
+        if kind not in KINDS:
+            raise TunnelError(f"unknown kind {kind!r}", where="--kinds", remedy=did_you_mean(kind, KINDS))
         try:
-            shares[kind] = float(weight) if weight else DEFAULT_SHARES[kind]
+            shares[kind] = float(weight) if weight else DEFAULT_SHARES.get(kind, 1.0)
         except ValueError:
             shares[kind] = -1.0
         if not 0.0 < shares[kind] < np.inf:

@@ -18,18 +18,19 @@ def whiten(values: Array, whitening: Array) -> Array:
     """Predict every value from those before it, and keep the errors.
 
     Args:
-        values: of a record, shape (n,), any unit.
+        values: of a record, or of several in columns, shape (n,) or (n, k), any unit.
         whitening: the errors' filter, 1 and the negative autoregressive coefficients, shape (order + 1,).
 
     Returns:
-        Shape (n,), of the values' unit. Noise of that spectrum becomes white with the variance of its innovations;
+        Of the values' shape and unit. Noise of that spectrum becomes white with the variance of its innovations;
         the first values are predicted from the fewer before them, and scaled to the same variance.
     """
     if whitening.size == 1:
         return values
-    start = _start(whitening.tobytes())[: values.size, : values.size]
+    taps = whitening.reshape(-1, *[1] * (values.ndim - 1))
+    start = _start(whitening.tobytes())[: len(values), : len(values)]
     with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
-        errors = oaconvolve(values, whitening)[: values.size]
+        errors = oaconvolve(values, taps, axes=0)[: len(values)]
         errors[: len(start)] = start @ values[: len(start)]
     return np.asarray(errors, np.float64)
 

@@ -29,7 +29,11 @@ INDEX = ROOT / "docs" / "README.md"
             ["import", "identify", "simulate", "export", "import", "identify"],
             marks=pytest.mark.slow,
         ),
-        pytest.param("add-an-effect", ["effects", "simulate", "diagnose"], marks=pytest.mark.slow),
+        pytest.param(
+            "add-an-effect",
+            ["effects", "simulate", "diagnose", "diagnose", "diagnose"],
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_shown_output_is_real_output(page: str, typed: list[str], tmp_path: Path) -> None:

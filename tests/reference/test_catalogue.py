@@ -13,9 +13,10 @@ from tunnel_reference.forcings import turbulence
 from tunnel_reference.forms import FAMILIES, FORMS, forms_of
 from tunnel_reference.nominal_fit import fit_nominal
 from tunnel_reference.outside import OUTSIDE_FORMS
+from tunnel_reference.outside_laws import LAW_FORMS
 from tunnel_reference.severity import bind_effects, read_and_fit, simulate_motions, size_effects
 
-ALL_FORMS = (*FORMS, *OUTSIDE_FORMS)
+ALL_FORMS = (*FORMS, *OUTSIDE_FORMS, *LAW_FORMS)
 
 
 def drawn(form, value, sign=1, seed=3, **changes):

@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from diagnosis.closable import Ceiling, Closable, Curve
 from diagnosis.closure import Step, Waterfall
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.starting_points import starting_points
@@ -29,6 +30,10 @@ from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 
 CAUSE = "quadratic_damping"
+CLOSABLE = Closable(
+    0.37, (Ceiling("angle", 0.417, 0.023, "runs"), Ceiling("time", -3.0, 7.0, "runs")), "angle", "A moment.",
+    Curve(("angle",), ((-0.1, 0.0, 0.1),), (-0.002, 0.0, 0.003), (0.001, 0.001, 0.001), "N m"),
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +75,7 @@ def document(data):
         noise=NoiseSummary(4e-4, 4e-4, "estimated", "from the records"),
         blind_spots=("an error of the clock",),
         cautions=("There is one run only.",),
+        closable=CLOSABLE,
         waterfall=Waterfall((Step(None, base.excess), Step(CAUSE, 0.01)), {CAUSE: base.excess}, "somewhere"),
         seconds={"nominal fit": 0.5},
     )  # fmt: skip
@@ -158,6 +164,14 @@ def test_numbers_are_those_of_the_document(page, document):
     assert effect_class(CAUSE).signature in text
 
 
+def test_what_could_be_closed_is_on_the_page_only_where_something_remains(page, document, data):
+    text = Page(page).text
+    assert "What could be closed: A moment." in text
+    assert "a moment of the angle alone 41.7 ± 2.3 %" in text
+    assert "0.0 ± 100.0 %" in text  # worse than nothing, and beyond any meaning
+    assert "What could be closed" not in render_report(document | {"closable": None}, data)
+
+
 def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, document, data):
     assert "There is one run only." in page
     assert "the MuJoCo model" in page
@@ -198,5 +212,5 @@ def test_a_page_that_cannot_be_written_is_one_line(document, data, tmp_path):
 
 def test_every_figure_is_described(document, data):
     without_maps = diagnosis_figures(document | {"maps": None}, data)
-    assert list(without_maps) == ["waterfall", "which", "how-far", "coefficients"]
+    assert list(without_maps) == ["waterfall", "which", "how-far", "law", "coefficients"]
     assert list(diagnosis_figures(document, data)) == list(DESCRIPTIONS)

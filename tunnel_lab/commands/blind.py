@@ -48,7 +48,9 @@ def make(
     kinds: Annotated[
         str | None,
         typer.Option(
-            "--kinds", metavar="KIND:WEIGHT,…", help="single, pair, three, four, none, outside, with weights."
+            "--kinds",
+            metavar="KIND:WEIGHT,…",
+            help="single, pair, three, four, none, outside, law, with weights.",
         ),
     ] = None,
     textbook: Annotated[

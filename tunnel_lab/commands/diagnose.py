@@ -28,6 +28,7 @@ STEPS = {
     "pruning": "fitting the answer without each effect",
     "polishing": "fitting the answer to convergence",
     "where, and how far it closes": "locating the gap, predicting held-out runs",
+    "what no effect explains": "estimating what no effect explains",
 }
 """Steps of the study in words; any other progress message is a set of effects."""
 
@@ -73,6 +74,12 @@ def run(
             "--patch", metavar="OUT.xml", help="Write the model with the causes in it; for --model."
         ),
     ] = None,
+    propose: Annotated[
+        Path | None,
+        typer.Option(
+            "--propose", metavar="LAW.toml", help="Write the formula proposed for what no effect explains."
+        ),
+    ] = None,
 ) -> None:
     """Find out why the nominal model does not fit the runs of a campaign.
 
@@ -82,7 +89,9 @@ def run(
     "unknown" (no effect of the vocabulary explains it), each with a probability.
     Gap and coefficients are given before and after the effects are added, and
     whether what remains could move the coefficients; the gap is predicted for
-    runs, or stretches of time, held out of the fit.
+    runs, or stretches of time, held out of the fit. Where something remains, it
+    says how much could be closed, by what kind of moment or error of the reading,
+    and by which formula; --propose writes that for --effects-file.
 
     [bold]Examples[/bold]
       tunnel diagnose my-campaign
@@ -91,6 +100,7 @@ def run(
       tunnel diagnose my-campaign --json - | jq .causes
       tunnel diagnose my-campaign --effects-file my.toml
       tunnel diagnose my-campaign --model pendulum.xml --joint hinge --patch out.xml
+      tunnel diagnose my-campaign --propose law.toml
 
     [bold]Exit status[/bold]
       0 diagnosed, whatever the answer; 2 bad input; 130 interrupted. Files are
@@ -99,7 +109,7 @@ def run(
     from diagnosis import read_model, vocabulary
     from tunnel_lab.terminal.given_campaign import given_campaign
     from tunnel_lab.terminal.options import refuse_unwritable_files, split_names
-    from tunnel_lab.terminal.tables import say_written
+    from tunnel_lab.terminal.tables import say, say_written
     from tunnel_sim.files.json_text import json_text
     from tunnel_sim.files.writing import write_json
     from tunnel_sim.vocabulary.errors import TunnelError
@@ -107,7 +117,7 @@ def run(
     del effects_file  # its effects are known already
     kinds = vocabulary(split_names(effects), split_names(exclude))
     to_stdout = json is not None and str(json) == "-"
-    refuse_unwritable_files(None if to_stdout else json, report, patch)
+    refuse_unwritable_files(None if to_stdout else json, report, patch, propose)
     if (model is None) != (joint is None) or (model is None and (free or patch)):
         raise TunnelError(
             "--model and --joint belong together, and --free and --patch to them", remedy="give both"
@@ -128,11 +138,34 @@ def run(
         from tunnel_lab.diagnosis_view import write_report
 
         write_report(document, diagnosable(data).campaign, report)
+    proposed = None if propose is None else write_proposal(propose, document)
     if to_stdout:
         typer.echo(json_text(document), nl=False)
         return
     show(document)
-    say_written(json, report, patch)
+    if propose is not None and proposed is None:
+        say("No formula is proposed: " + ("none is supported" if document["closable"] else "nothing remains"))
+    say_written(json, report, patch, proposed)
+
+
+def write_proposal(path: Path, document: dict[str, Any]) -> Path | None:
+    """Write the formula proposed as an effects file.
+
+    Args:
+        path: the TOML file.
+        document: of a diagnosis.
+
+    Returns:
+        The file; None where no formula is proposed, and nothing is written.
+    """
+    import tomli_w
+
+    from tunnel_sim.files.writing import write_whole
+
+    law = (document["closable"] or {}).get("law")
+    if law is None:
+        return None
+    return write_whole(path, tomli_w.dumps({"effects": [law["effect"]]}).encode())
 
 
 def diagnose_with_progress(
@@ -207,6 +240,7 @@ def show(document: dict[str, Any]) -> None:
         document: of a diagnosis.
     """
     from diagnosis import printing as parts
+    from diagnosis.closable import closable_table, closable_words
     from diagnosis.patch import patch_lines, patch_table
     from tunnel_lab.terminal.tables import rich_table, say, show_tables
 
@@ -219,7 +253,9 @@ def show(document: dict[str, Any]) -> None:
     show_tables(*(rich_table(table(document)) for table in answers))
     if line := parts.inclusion_line(document):
         say(f"{line}\n")
-    shown = (parts.waterfall_table, parts.gap_table, parts.coefficients_table, patch_table)
+    if line := closable_words(document):
+        say(f"{line}\n")
+    shown = (closable_table, parts.waterfall_table, parts.gap_table, parts.coefficients_table, patch_table)
     show_tables(*(rich_table(table(document)) for table in shown))
     for line in (*patch_lines(document), *parts.closing_lines(document)):
         say(line)

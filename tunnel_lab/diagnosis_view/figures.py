@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from tunnel_lab.diagnosis_view import figures_answer as answer
 from tunnel_lab.diagnosis_view import figures_where as where
 from tunnel_lab.diagnosis_view.figures_common import Document
+from tunnel_lab.diagnosis_view.figures_law import law_figure
 from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -33,5 +34,6 @@ def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figur
     found["how-far"] = answer.closure_figure(document)
     if document.get("maps"):
         found["residuals"] = answer.traces_figure(document, campaign)
+    found["law"] = law_figure(document)
     found["coefficients"] = answer.coefficients_figure(document)
     return {name: figure for name, figure in found.items() if figure is not None}

@@ -7,6 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from diagnosis.closable import closable_table, closable_words
 from diagnosis.printing import inclusion_line
 from identification.printing.numbers import p_text, significant
 from tunnel_lab.diagnosis_view import view
@@ -28,6 +29,7 @@ DESCRIPTIONS = {
     "which": "Bars: probability of each answer.",
     "how-far": "Excess of every run with the nominal model and with the causes added.",
     "residuals": "Reading and residuals of the runs with the largest gap against time.",
+    "law": "The missing moment, or error of the reading, as a curve with its band or as a map.",
     "coefficients": "Coefficients before and after the causes are added, with 95 % intervals.",
 }
 
@@ -89,6 +91,8 @@ def _context(document: Document, campaign: Campaign) -> dict[str, Any]:
         "causes": view.cause_paragraphs(document),
         "inclusion": plain(inclusion_line(document)),
         "steps": view.step_rows(document),
+        "closable": closable_table(document).rows,
+        "closable_words": closable_words(document),
         "rivals": [plain(name) for name in document["ambiguous_with"]],
         "next_run": view.next_run_rows(document),
         "runs": view.run_rows(document, campaign),

@@ -92,3 +92,24 @@ def in_si(given: Dimension) -> str:
     )
     under = f"({' '.join(below)})" if len(below) > 1 else "".join(below)
     return (" ".join(above) or "1") + (f"/{under}" if below else "")
+
+
+_USUAL = (
+    "1", "rad", "s", "s2", "1/s", "1/s2", "1/m", "m/s", "s/m", "s2/m2", "N m", "N m s", "N m s2", "N m s3", "N m/s",
+    "N m/s2", "N s", "N s2", "N s3/m", "kg", "kg m",
+)  # fmt: skip
+
+
+def dimension_text(found: Dimension) -> str:
+    """A unit of a dimension.
+
+    Args:
+        found: whole powers of kg, m and s.
+
+    Returns:
+        As `dimension` reads it: a usual unit, or kg, m and s.
+    """
+    for unit in _USUAL:
+        if dimension(unit) == found:
+            return unit
+    return in_si(found)

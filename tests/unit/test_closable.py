@@ -1,0 +1,203 @@
+"""What could be closed of a gap, and the law proposed; the reference simulator gives the truth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+
+from diagnosis.closable import KINDS, Ceiling, closable_table, closable_words
+from diagnosis.investigate import investigate
+from diagnosis.law.ceiling import Evidence
+from diagnosis.law.explain import chosen_kind, closable
+from diagnosis.law.library import terms
+from diagnosis.law.paths import paths
+from diagnosis.law.ridge import Rows, best_ridge, held_out, normal, total
+from tests.reference.rigs import rig
+from tunnel_lab.commands.diagnose import write_proposal
+from tunnel_reference.draw import CampaignDraw, EffectDraw
+from tunnel_reference.make import as_campaign
+from tunnel_reference.outside import OUTSIDE_FORMS
+from tunnel_reference.outside_laws import LAW_FORMS
+from tunnel_reference.severity import read_and_fit, simulate_motions
+from tunnel_sim.effects.effects_file import read_effects
+from tunnel_sim.vocabulary.units import dimension, dimension_text
+
+RUNS = rig(
+    stiffness=(21.02, 21.02, 45.0, 45.0, 21.02, 45.0),
+    speed=(0.0, 20.0, 0.0, 20.0, 0.0, 20.0),
+    angle=(0.35, 0.35, 0.35, 0.35, 0.2, 0.25),
+    duration=6.0,
+)
+FORMS = {form.name: form for form in (*OUTSIDE_FORMS, *LAW_FORMS)}
+
+
+def study_of(name, value, conditions=RUNS, **extra):
+    effects = () if not name else (EffectDraw(FORMS[name], extra, 1, 1.0, value),)
+    draw = CampaignDraw("law", conditions, effects, 5)
+    (motion,) = simulate_motions([draw], fine=False)
+    return investigate(as_campaign(read_and_fit(draw, motion), name or "plain"), ())
+
+
+@pytest.fixture(scope="module")
+def detent():
+    study = study_of("magnetic_detent", 0.01, width=0.05)
+    return study, closable(study, significant=True)
+
+
+def closed(found):
+    return {one.kind: one.closed for one in found.ceilings}
+
+
+def test_a_moment_of_the_angle_is_seen_as_one(detent):
+    _, found = detent
+    assert found.kind == "angle"
+    assert closed(found)["angle"] > 0.95
+    assert max(closed(found)[kind] for kind in ("rate", "time", "wind", "reading", "between")) < 0.9
+
+
+def test_its_curve_is_the_missing_moment(detent):
+    _, found = detent
+    (angle,) = map(np.array, found.curve.places)
+    missing = 0.01 * angle / 0.05 * np.exp(0.5 - 0.5 * (angle / 0.05) ** 2)
+    line = np.column_stack([np.ones(angle.size), angle])
+    missing -= line @ np.linalg.lstsq(line, missing, rcond=None)[0]
+    assert found.curve.over == ("angle",)
+    assert found.curve.unit == "N m"
+    # the runs never turn within 0.1 rad: there they show little more than the mean
+    values, std = np.array(found.curve.values), np.array(found.curve.std)
+    turned = (np.abs(angle) > 0.1) & (np.abs(angle) < 0.33)
+    assert np.all(np.abs(values - missing)[turned] < 4.0 * std[turned])
+    assert np.corrcoef(values, missing)[0, 1] > 0.9
+
+
+def test_its_formula_closes_held_out_runs_and_is_an_effect_of_a_file(detent, tmp_path):
+    study, found = detent
+    assert found.law.closed > 0.97
+    document = {"closable": found.to_json_dict()}
+    path = write_proposal(tmp_path / "law.toml", document)
+    (kind,) = read_effects(path)
+    assert kind.name == "proposed_angle"
+    assert study.similarity.moment == pytest.approx(16.0 / 33.01, rel=0.1)  # so its units did change
+    effect = kind(**{name: value for name, (value, _) in found.law.parameters.items()})
+    nominal = study.nominal
+    stated = nominal.problem.stated(nominal.point.common, np.zeros(2), nominal.problem.data.runs[0])
+    moment = effect.moment_oracle(replace(stated, spring_stiffness=21.02))
+    true = 0.01 * 0.6 * np.exp(0.5 - 0.5 * 0.36)
+    assert moment(0.0, 0.03, 0.0) - 3.0 * moment(0.0, 0.01, 0.0) == pytest.approx(
+        true - 3.0 * 0.01 * 0.2 * np.exp(0.5 - 0.5 * 0.04), rel=0.1
+    )
+
+
+def test_the_share_of_a_single_run_is_of_what_its_stretches_show():
+    alone = rig(stiffness=(21.02,), speed=(0.0,), angle=(0.35,), duration=10.0)
+    found = closable(study_of("stops", 0.8, alone, place=0.15), significant=True)
+    assert {one.held_out for one in found.ceilings} == {"stretches of time", "short gaps"}
+    assert found.kind == "angle"
+    assert closed(found)["angle"] > 0.85
+
+
+def test_what_differs_in_one_run_is_placed_in_it():
+    study = study_of("bump_one_run", 0.008, run=2.0, part=0.5, width=0.05)
+    found = closable(study, significant=True)
+    assert found.kind == "event"
+    assert found.law is None
+    first = found.events[0]
+    assert first["run"] == "r03"
+    assert first["from_s"] == pytest.approx(3.0, abs=0.4)
+    assert first["to_s"] == pytest.approx(3.0, abs=0.4)
+    assert "r03" in found.words
+
+
+def test_more_noise_cannot_be_closed():
+    found = closable(study_of("motion_noise", 0.03), significant=True)
+    assert found is None or (found.kind == "noise" and found.law is None and "noise" in found.words)
+
+
+def test_nothing_is_proposed_without_a_gap(tmp_path):
+    study = study_of("", 0.0)
+    assert closable(study, significant=False) is None
+    assert write_proposal(tmp_path / "law.toml", {"closable": None}) is None
+    assert not (tmp_path / "law.toml").exists()
+    assert closable_words({"closable": None}) == ""
+    assert closable_table({"closable": None}).rows == ()
+
+
+def test_the_table_names_every_kind(detent):
+    _, found = detent
+    document = {"closable": found.to_json_dict()}
+    assert {row[0] for row in closable_table(document).rows} == set(KINDS.values()) - {KINDS["noise"]}
+    assert closable_words(document).endswith("%.")
+
+
+def test_a_steady_moment_turns_the_rig_as_the_closed_form_says(detent):
+    path = paths(detent[0].nominal)[0]
+    from diagnosis.fitting.spectra import linear_coefficients
+
+    inertia, damping, stiffness = linear_coefficients(path.fit, 0)
+    sigma = damping / (2.0 * inertia)
+    omega = np.sqrt(stiffness / inertia - sigma**2)
+    step = path.run.interval * path.group
+    time = step * np.arange(path.residual.size)
+    wave = np.cos(omega * time) + sigma / omega * np.sin(omega * time)
+    turned = (1.0 - np.exp(-sigma * time) * wave) / stiffness
+    whole = path.response(np.ones((path.angle.size, 1)))[:, 0]
+    released = turned * np.sqrt(path.group / path.run.noise_variance)
+    # it may set in within the first row: the free motion after that is the release's
+    found, expected = (one - path.release @ (path.release.T @ one) for one in (whole, released))
+    assert found == pytest.approx(expected, abs=2e-3 * np.max(np.abs(expected)))
+
+
+def test_the_prior_shrinks_what_is_noise_and_keeps_what_is_not():
+    rng = np.random.default_rng(3)
+    rows = []
+    for _ in range(8):
+        free, basis = rng.standard_normal((200, 2)), rng.standard_normal((200, 30))
+        rows.append(Rows(free, basis, 5.0 * free[:, 0] + basis[:, 4] + rng.standard_normal(200)))
+    parts = [normal(one) for one in rows]
+    ridge = best_ridge(total(parts))
+    assert ridge.solution[0] == pytest.approx(5.0, abs=0.2)
+    assert ridge.solution[2 + 4] == pytest.approx(1.0, abs=0.15)
+    groups = [(i,) for i in range(8)]
+    alone, with_basis = (held_out(parts, groups, precision).sum() for precision in (None, ridge.precision))
+    assert with_basis == pytest.approx(1600.0, rel=0.08)
+    assert alone - with_basis == pytest.approx(1600.0, rel=0.2)
+
+
+def evidence(kind, share):
+    return Evidence(Ceiling(kind, share, 0.001, "runs"), 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("common", "single", "kind"),
+    [
+        ({"angle": 0.95, "state": 0.96}, {"event": 0.97}, "angle"),
+        ({"angle": 0.60, "state": 0.96}, {"event": 0.97}, "state"),
+        ({"angle": 0.10, "state": 0.20}, {"event": 0.97}, "event"),
+        ({"angle": 0.01, "state": 0.02}, {"event": 0.03}, "noise"),
+    ],
+)
+def test_the_simplest_kind_that_closes_as_much_is_chosen(common, single, kind):
+    given = [{name: evidence(name, share) for name, share in kinds.items()} for kinds in (common, single)]
+    assert chosen_kind(*given) == kind
+
+
+@pytest.mark.parametrize("kind", ["angle", "rate", "state", "wind", "time", "reading"])
+def test_every_term_has_a_unit_and_a_value(kind, detent):
+    from diagnosis.law.bases import ranges
+
+    r = ranges(paths(detent[0].nominal))
+    places = {"b": 0.1, "y": 0.1, "r": 1.0, "t": 2.0, "V": 20.0, "Kr": 21.0, "omega": 14.0}
+    for term in terms(kind, r):
+        assert np.isfinite(term.value(places))
+        assert dimension(dimension_text(term.dimension)) == term.dimension
+
+
+def test_a_proposed_file_is_plain_toml(detent, tmp_path: Path):
+    _, found = detent
+    text = tomli_w.dumps({"effects": [dict(found.law.effect)]})
+    (tmp_path / "law.toml").write_text(text)
+    assert [kind.name for kind in read_effects(tmp_path / "law.toml")] == ["proposed_angle"]
