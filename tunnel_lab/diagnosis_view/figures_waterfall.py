@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.printing import held_out_excess
+from diagnosis.printing import excess_std, held_out_excess
 from tunnel_lab.diagnosis_view import figures_common as common
 from tunnel_lab.plotting.common import figure, grid
 
@@ -31,7 +31,7 @@ def waterfall_figure(document: common.Document) -> Figure | None:
     steps = document.get("waterfall", [])
     if len(steps) < 2:
         return None
-    noise = _SIGMAS * _noise(document)
+    noise = _SIGMAS * (excess_std(document) or _LEAST_NOISE)
     floor = 0.1 * noise
     left = np.array([step["excess"] for step in steps], np.float64)
     fig = figure(common.WIDTH, 1.5 + 0.42 * (left.size + 1))
@@ -83,11 +83,3 @@ def _rest_name(document: common.Document) -> str:
     if not rest.get("significant"):
         return "the rest: within the noise"
     return "the rest: material" if rest.get("material") else "the rest: immaterial"
-
-
-def _noise(document: common.Document) -> float:
-    """Standard deviation of the campaign's excess by chance, in noise powers."""
-    runs = (document.get("maps") or {"runs": []})["runs"]
-    if not runs:
-        return _LEAST_NOISE
-    return float(np.sqrt(np.mean([run["std"] ** 2 for run in runs]) / len(runs)))
