@@ -154,7 +154,7 @@ _LEFT = ("left", "left without it alone")
 
 
 def excess_std(document: Document) -> float | None:
-    """Standard deviation of the campaign's excess by chance, in noise powers; None without the noise of its runs."""
+    """Standard deviation of the campaign's excess by chance, in noise powers; None where there are no maps."""
     runs = (document.get("maps") or {"runs": []})["runs"]
     return math.sqrt(sum(run["std"] ** 2 for run in runs)) / len(runs) if runs else None
 

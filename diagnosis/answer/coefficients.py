@@ -77,9 +77,7 @@ def coefficients(
     return result
 
 
-def _estimate(
-    fit: Fit, name: str, value: float, std: float, parts: Mapping[str, float]
-) -> ParameterEstimate:
+def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str, float]) -> ParameterEstimate:
     """A coefficient, marked where the fit stopped at a bound or the runs do not determine it."""
     whole = sum(parts.values())
     shares = {source: part / whole for source, part in parts.items()} if whole > 0.0 else {}

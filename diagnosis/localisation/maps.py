@@ -93,7 +93,7 @@ class Maps:
         moment_time: energy of the apparent moment by bin of ``time``, shape (n,), as shares of the whole.
         amplitude: excess over the amplitude of the motion, rad.
         frequency: excess over frequency, Hz.
-        frequency_by_run: mean excess by run (rows) and bin of frequency (columns), shape (runs, n); NaN where empty.
+        frequency_by_run: mean excess by run and bin of frequency, shape (runs, n); NaN where a bin is empty.
         frequency_after: mean by bin with the causes added, shape of ``frequency.mean``; None where not added.
         resonance: least and greatest frequency of the runs' free motion, Hz.
         bands: the residual by multiples of the runs' own frequency.

@@ -51,7 +51,7 @@ def file_hashes(path: Path) -> dict[str, str]:
         path: as for `given_campaign`, which has read it.
 
     Returns:
-        Hexadecimal digests by name, relative to the campaign's folder: ``campaign.toml`` and the runs, or the one file.
+        Hexadecimal digests by name in the campaign's folder: ``campaign.toml`` and the runs, or the one file.
     """
     from tunnel_sim.files.campaign_schema import CAMPAIGN_FILE, read_document
     from tunnel_sim.vocabulary.errors import one_line
