@@ -26,12 +26,12 @@ def font_face(characters: str) -> str:
     options = Options(
         flavor="woff", layout_features=[], hinting=False, drop_tables=["FFTM", "GPOS", "GSUB", "GDEF", "kern"]
     )
-    font = load_font(str(file), options)
     subsetter = Subsetter(options)
     subsetter.populate(text=characters)
-    subsetter.subset(font)
-    font.flavor = "woff"
     buffer = io.BytesIO()
-    font.save(buffer)
+    with load_font(str(file), options) as font:
+        subsetter.subset(font)
+        font.flavor = "woff"
+        font.save(buffer)
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
     return f'@font-face {{ font-family: "{FAMILY}"; src: url(data:font/woff;base64,{data}) format("woff"); }}'

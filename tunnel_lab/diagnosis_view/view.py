@@ -153,7 +153,7 @@ def _number(values: Document) -> str:
     if not values.get("determined", True):
         return UNDETERMINED
     if values["std"]:
-        return minus(with_std(values["value"], values["std"])).replace(" ", "\u00a0")
+        return minus(with_std(values["value"], values["std"]))
     return minus(significant(values["value"], 5)) + (" (held)" if values["std"] == 0.0 else at_bound(values))
 
 
@@ -205,13 +205,13 @@ def _interval95(values: Document) -> str:
     if not values["std"]:
         return "–"
     reach = 1.96 * values["std"]
-    width = with_std(0.0, reach).partition("± ")[2]
+    width = with_std(values["value"], reach).partition("± ")[2]
     places = len(width.partition(".")[2])
     ends = (values["value"] - reach, values["value"] + reach)
     texts = [
         significant(end) if not width.replace(".", "").isdigit() else f"{end:.{places}f}" for end in ends
     ]
-    return " to ".join(map(minus, texts)).replace(" ", "\u00a0")
+    return " to ".join(map(minus, texts))
 
 
 def next_steps(document: Document) -> list[str]:
