@@ -116,6 +116,7 @@ def _summary(document: Document, byline: Byline) -> dict[str, Any]:
         "byline": byline,
         "answer": answer,
         "kind": kind,
+        "named": kind in ("open", "found"),
         "facts": view.facts(document),
         "coefficients": view.coefficient_rows(document),
         "next_steps": view.next_steps(document),
