@@ -94,8 +94,8 @@ def noise_axis(axes: Axes, noise: float, greatest: float) -> float:
 
     Args:
         axes: its horizontal axis is set.
-        noise: what chance alone gives, three standard deviations, in noise variances.
-        greatest: value shown, in noise variances.
+        noise: three standard deviations of an excess by chance, in noise variances, a ratio.
+        greatest: value shown, in noise variances, a ratio.
 
     Returns:
         The floor: smaller and negative excesses are drawn on it.

@@ -205,8 +205,10 @@ def phase_plane_figure(document: Document) -> Figure | None:
     fig = figure(NARROW, 4.4)
     axes = fig.add_subplot()
     extent = (float(edges[0]), float(edges[-1]), float(edges[0]), float(edges[-1]))
-    colours = {"cmap": faded(AFTER, BEFORE), "vmin": -reach, "vmax": reach}
-    image = axes.imshow(clear, origin="lower", extent=extent, interpolation="nearest", **colours)
+    colours = faded(AFTER, BEFORE)
+    image = axes.imshow(
+        clear, origin="lower", extent=extent, cmap=colours, vmin=-reach, vmax=reach, interpolation="nearest"
+    )
     axes.set_xlabel(_ANGLE)
     axes.set_ylabel(_RATE)
     fig.colorbar(image, ax=axes, location="top", label=f"missing moment [{unit}]", shrink=0.9, aspect=40)

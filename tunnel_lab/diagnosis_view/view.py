@@ -131,7 +131,8 @@ def others(document: Document) -> str:
 
 
 def _listed(document: Document) -> int:
-    return max(3, sum(c["probability"] >= LISTED_PROBABILITY for c in document["candidates"]))
+    probable = [c for c in document["candidates"] if c["probability"] >= LISTED_PROBABILITY]
+    return max(3, len(probable))
 
 
 def estimate(values: Document) -> str:

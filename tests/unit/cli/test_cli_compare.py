@@ -59,14 +59,14 @@ def test_gap_answer_parameters_and_coefficients_stand_side_by_side(
     status, out, err = tunnel("compare", before, after, "--format", "json")
     assert (status, err) == (0, "")
     gap, parameters, coefficients, changes = tables(out).values()
-    told = {row["quantity"]: (row["before"], row["after"]) for row in gap}
+    gaps = {row["quantity"]: (row["before"], row["after"]) for row in gap}
     # ± the noise of three runs: √(0.021² + 0.019² + 0.017²) / 3 = 0.011
-    assert told["gap [noise powers]"] == ("27.350 ± 0.011", 0.0123)
-    assert told["left [noise powers]"] == ("0.123 ± 0.011", "–")
-    assert told["share closed"] == ("98.8 %", "–")
-    assert told["causes"] == ("quadratic_damping", "none")
-    assert told["or"] == ("coulomb_friction", "–")
-    assert told["probability"] == (0.912, 0.988)
+    assert gaps["gap [noise powers]"] == ("27.350 ± 0.011", 0.0123)
+    assert gaps["left [noise powers]"] == ("0.123 ± 0.011", "–")
+    assert gaps["share closed"] == ("98.8 %", "–")
+    assert gaps["causes"] == ("quadratic_damping", "none")
+    assert gaps["or"] == ("coulomb_friction", "–")
+    assert gaps["probability"] == (0.912, 0.988)
     assert parameters == [
         {
             "effect": "quadratic_damping", "parameter": "coefficient",
