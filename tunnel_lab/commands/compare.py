@@ -13,7 +13,7 @@ NAME = "compare"
 
 def run(
     documents: Annotated[
-        list[Path], typer.Argument(metavar="DIAGNOSIS.json...", help="Written by tunnel diagnose --json.")
+        list[Path], typer.Argument(metavar="DIAGNOSIS.json", help="Written by tunnel diagnose --json.")
     ],
 ) -> None:
     """Compare diagnoses, such as before and after a repair of the rig.
@@ -28,7 +28,7 @@ def run(
       tunnel compare may.json june.json july.json --format csv
 
     [bold]Exit status[/bold]
-      0 compared; 2 bad input.
+      0 compared, 2 bad input.
     """
     from tunnel_lab.terminal.comparison import comparison_tables
     from tunnel_lab.terminal.diagnosis_file import read_diagnosis
