@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -156,6 +157,12 @@ def waterfall_table(document: Document) -> TextTable:
 
 
 _LEFT = ("left", "left without it alone")
+
+
+def excess_std(document: Document) -> float | None:
+    """Standard deviation of the campaign's excess by chance, in noise powers; None where there are no maps."""
+    runs = (document.get("maps") or {"runs": []})["runs"]
+    return math.sqrt(sum(run["std"] ** 2 for run in runs)) / len(runs) if runs else None
 
 
 def held_out_excess(value: float) -> str:

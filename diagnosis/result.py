@@ -32,6 +32,7 @@ class ParameterEstimate:
         unit: of both.
         bound: ``lower`` or ``upper`` where the fit stopped at that end of the range allowed; ``std`` is then None.
         determined: whether the runs determine it; where not, ``value`` means nothing and ``std`` is None.
+        shares: of ``std`` squared by source, fractions; empty where they are not known.
     """
 
     value: float
@@ -39,11 +40,14 @@ class ParameterEstimate:
     unit: str
     bound: str | None = None
     determined: bool = True
+    shares: Mapping[str, float] = field(default_factory=dict)
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Value, std and unit; the bound where there is one, and ``determined`` where it is false."""
+        """Value, std and unit; the bound and the shares where there are any, ``determined`` where it is false."""
         data: dict[str, Any] = {"value": self.value, "std": self.std, "unit": self.unit}
         bound = {} if self.bound is None else {"bound": self.bound}
+        if self.shares and self.std is not None:
+            data["shares"] = dict(self.shares)
         return data | bound | ({} if self.determined else {"determined": False})
 
 

@@ -15,6 +15,7 @@ import typer
 
 from tunnel_lab.commands import (
     blind,
+    compare,
     demo,
     diagnose,
     docs,
@@ -79,6 +80,7 @@ def tunnel(
       tunnel import log.csv --out c      a campaign of a data logger's files
       tunnel identify c --json est.json  its coefficients; also of measured runs
       tunnel diagnose c                  why the model does not fit it
+      tunnel compare a.json b.json       diagnoses side by side
       tunnel plot c                      figures of it
       tunnel export c --format mat       c as MAT, CSV, Excel or HDF5
       tunnel effects                     effects that a plan can add
@@ -108,6 +110,7 @@ COMMANDS = (
     importing,
     identify,
     diagnose,
+    compare,
     plot,
     export,
     springs,

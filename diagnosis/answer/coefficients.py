@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 
 import numpy as np
@@ -68,17 +68,28 @@ def coefficients(
         unseen = _unseen_form(fit, name) if name.startswith("cn_") else 0.0
         unfreed = None if textbook is None else _value_only(textbook, name)
         moved = 0.0 if unfreed is None else FORM_CHANGE_STD * (value - unfreed)
+        noise = min(_formal_std(fit, name), std)
+        parts = {
+            "noise": noise**2,
+            "misfit": (std - noise) * (std + noise),
+            "air density": rounding**2,
+            "unseen form": unseen**2,
+            "freed form": moved**2,
+            "rivals": spread,
+        }
         variance = std**2 + rounding**2 + unseen**2 + moved**2 + spread
-        result[name] = _estimate(fit, name, value, math.sqrt(variance))
+        result[name] = _estimate(fit, name, value, math.sqrt(variance), parts)
     return result
 
 
-def _estimate(fit: Fit, name: str, value: float, std: float) -> ParameterEstimate:
+def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str, float]) -> ParameterEstimate:
     """A coefficient, marked where the fit stopped at a bound or the runs do not determine it."""
+    whole = sum(parts.values())
+    shares = {source: part / whole for source, part in parts.items()} if whole > 0.0 else {}
     bound = fit.bound("mechanical_damping") if name in ("zeta", "mechanical_damping") else None
     if name == "omega_n" and len(stiffness_names(fit.problem.names)) == 1:  # no gravity instead of the spring
         bound = fit.bound("stiffness")
-    found = ParameterEstimate(value, None if bound else std, _UNITS[name], bound)
+    found = ParameterEstimate(value, None if bound else std, _UNITS[name], bound, shares=shares)
     return meant_coefficient(found, fit, name)
 
 

@@ -30,7 +30,7 @@ _TIME_BINS = 60
 _AMPLITUDE_BINS = 40
 _FREQUENCY_BINS = 110  # of equal ratio, for the picture
 _FINE_BINS = 1500  # of equal width, for the interval
-_TRACES = 2
+_TRACES = 16  # runs
 _TRACE_POINTS = 600
 
 
@@ -75,7 +75,8 @@ def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     times = [s + _mid_times(run) for s, run in zip(starts, nominal.problem.data.runs, strict=True)]
     time = _time_profile(scaled, inside, times)
     energy, z = _moment_energy(nominal, times, time.edges)
-    after = None if best is None else _spectrum(run_excesses(campaign, best), _log_edges(excesses)).mean
+    edges = _log_edges(excesses)
+    after = None if best is None else _spectrum(run_excesses(campaign, best), edges).mean
     resonances = [run.resonance for run in excesses]
     maps = Maps(
         runs=_run_maps(scaled, excesses),
@@ -84,7 +85,8 @@ def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         time_by_run=_time_by_run(scaled, times, time.edges),
         moment_time=np.maximum(energy, 0.0) / max(float(np.maximum(energy, 0.0).sum()), 1e-300),
         amplitude=_amplitude_profile(scaled, inside),
-        frequency=_spectrum(excesses, _log_edges(excesses)),
+        frequency=_spectrum(excesses, edges),
+        frequency_by_run=np.stack([_spectrum([run], edges).mean for run in excesses]),
         frequency_after=after,
         resonance=(min(resonances), max(resonances)),
         bands=bands,

@@ -93,6 +93,7 @@ class Maps:
         moment_time: energy of the apparent moment by bin of ``time``, shape (n,), as shares of the whole.
         amplitude: excess over the amplitude of the motion, rad.
         frequency: excess over frequency, Hz.
+        frequency_by_run: mean excess by run and bin of frequency, shape (runs, n); NaN where a bin is empty.
         frequency_after: mean by bin with the causes added, shape of ``frequency.mean``; None where not added.
         resonance: least and greatest frequency of the runs' free motion, Hz.
         bands: the residual by multiples of the runs' own frequency.
@@ -109,6 +110,7 @@ class Maps:
     moment_time: Array
     amplitude: Profile
     frequency: Profile
+    frequency_by_run: Array
     frequency_after: Array | None
     resonance: tuple[float, float]
     bands: tuple[BandExcess, ...]
@@ -134,6 +136,7 @@ class Maps:
             "frequency": {
                 **_profile(self.frequency, "edges_hz"),
                 "after": None if after is None else numbers(after),
+                "by_run": [numbers(row) for row in self.frequency_by_run],
                 "resonance_hz": list(self.resonance),
             },
             "bands": [vars(band) for band in self.bands],

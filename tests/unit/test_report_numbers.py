@@ -13,9 +13,10 @@ import pytest
 
 from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
-from tunnel_lab.diagnosis_view import render_report, view
+from tunnel_lab.diagnosis_view import provenance, render_report, view, view_detail
 
 Document = dict[str, Any]
+NOT_READ = ("svg", "style", "script", "caption", "figcaption", "footer")
 
 
 class Sections(HTMLParser):
@@ -29,7 +30,7 @@ class Sections(HTMLParser):
         self.feed(page)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._hidden += tag in ("svg", "style")
+        self._hidden += tag in NOT_READ
         if tag == "section":
             self._section = str(dict(attrs)["id"])
             self.rows[self._section], self.texts[self._section] = [], ""
@@ -40,7 +41,7 @@ class Sections(HTMLParser):
             self._cell = True
 
     def handle_endtag(self, tag: str) -> None:
-        self._hidden -= tag in ("svg", "style")
+        self._hidden -= tag in NOT_READ
         self._cell = self._cell and tag not in ("td", "th", "dt", "dd", "span")
 
     def handle_data(self, data: str) -> None:
@@ -83,11 +84,11 @@ def test_the_head_is_on_the_page(given: Document, page: Sections) -> None:
 
 
 def test_where_the_gap_is(given: Document) -> None:
-    rows = [value for _, value in view.place_rows(given) if re.search(r"\d", value)]
+    rows = [value for _, value in view_detail.place_rows(given) if re.search(r"\d", value)]
     where = given["where"]
     for text, key in zip(rows, ("time_s", "amplitude_rad", "frequency_hz"), strict=True):
         assert_shows(text, where[key])
-    assert ", ".join(where["runs"]) in [value for _, value in view.place_rows(given)]
+    assert ", ".join(where["runs"]) in [value for _, value in view_detail.place_rows(given)]
 
 
 def test_narrow_lines(given: Document, page: Sections) -> None:
@@ -116,7 +117,7 @@ def test_the_gap_as_the_causes_are_added(given: Document, page: Sections) -> Non
     assert_shows(page.row("how-far-section", "nominal model"), [28.45])
     assert_shows(page.row("how-far-section", CAUSE.replace("_", " ")), [2.75, 21.85])
     assert_shows(page.row("how-far-section", RIVAL.replace("_", " ")), [0.1345, 2.85])
-    assert view.step_rows(given | {"waterfall": []}) == []
+    assert view_detail.step_rows(given | {"waterfall": []}) == []
 
 
 def test_a_coefficient_that_is_not_determined_has_no_interval(given: Document) -> None:
@@ -128,19 +129,22 @@ def test_a_coefficient_that_is_not_determined_has_no_interval(given: Document) -
 @pytest.mark.slow
 def test_a_p_value_is_never_zero(given: Document) -> None:
     none = given | {"gap": given["gap"] | {"tests": {"white": 0.0}}}
-    assert Sections(render_report(none, campaign())).row("provenance", "white") == "< 1e-300"
+    assert Sections(render_report(none, campaign())).row("provenance", "white") == "– ; < 1e-300"
 
 
 def test_answers_left_out_are_counted(given: Document) -> None:
-    rows, more = view.candidate_rows(given)
-    assert (len(rows), more) == (4, 3)
+    assert len(view.candidate_rows(given)) == 4
+    assert_shows(
+        view.others(given), [3, 0.1, 0.1]
+    )  # 0.4 + 0.05 + 0.03 thousandths, none above 0.4 thousandths
     few = given | {"candidates": given["candidates"][:2]}
-    assert view.candidate_rows(few)[1] == 0
-    assert len(view.candidate_rows(few)[0]) == 2
+    assert view.others(few) == ""
+    assert len(view.candidate_rows(few)) == 2
     improbable = given | {"candidates": [c | {"probability": 0.001} for c in given["candidates"]]}
-    assert len(view.candidate_rows(improbable)[0]) == 3
+    assert len(view.candidate_rows(improbable)) == 3
     even = given | {"candidates": [c | {"probability": 0.01} for c in given["candidates"]]}
-    assert view.candidate_rows(even)[1] == 0
+    assert view.others(even) == ""
+    assert view.others(given | {"candidates": given["candidates"][:5]}).startswith("1 more answer has a ")
 
 
 def test_the_count_of_answers_left_out_is_on_the_page(page: Sections) -> None:
@@ -157,14 +161,14 @@ def test_every_run(given: Document, page: Sections) -> None:
 
 def test_a_run_that_the_gap_leaves_out_has_no_excess(given: Document) -> None:
     fewer = given | {"gap": given["gap"] | {"runs": given["gap"]["runs"][1:]}}
-    first, second, _ = view.run_rows(fewer, campaign())
+    first, second, _ = view_detail.run_rows(fewer, campaign())
     assert (first["before"], first["after"]) == ("–", "–")
     assert_shows(f"{second['before']} ; {second['after']}", [4.583, 0.2345])
 
 
 def test_coefficients(given: Document, page: Sections) -> None:
     before, after = given["coefficients"]["before"], given["coefficients"]["after"]
-    for name, label in (("cn_beta", "Cnβ"), ("cn_r", "Cnr")):
+    for name, label in (("cn_beta", "Cnβ [1/rad]"), ("cn_r", "Cnr [1/rad]")):
         old, new = before[name], after[name]
         reach = 1.96 * new["std"]
         wanted = [
@@ -175,8 +179,7 @@ def test_coefficients(given: Document, page: Sections) -> None:
             new["value"] - reach,
             new["value"] + reach,
         ]
-        text = page.row("coefficients-section", label).replace("1/rad", "")
-        assert_shows(text, wanted)
+        assert_shows(page.row("coefficients-section", label), wanted)
 
 
 def test_the_interval_is_that_of_the_nominal_model_where_it_stands_alone(given: Document) -> None:
@@ -210,18 +213,54 @@ def test_tests_and_times(given: Document, page: Sections) -> None:
         assert_shows(page.row("provenance", name), [value])
     for name, value in given["seconds"].items():
         assert_shows(page.row("provenance", name), [value])
-    assert_shows(page.row("provenance", "Runs"), [len(IDS)])
-    assert_known(page.texts["provenance"], _all(given) | {len(IDS), 412.3e-3, 398.7e-3})
+    for name in provenance.TESTS:
+        document = given | {"gap": given["gap"] | {"tests": {name: 0.5}}}
+        ((_, words, p),) = provenance.test_rows(document)
+        assert (words, p) == (provenance.TESTS[name], "0.5")
+
+
+def test_the_uncertainty_budget(given: Document) -> None:
+    shares = {"noise": 0.36, "misfit": 0.64, "air density": 0.0}
+    after = {"cn_beta": {"value": 0.4789, "std": 0.0013, "unit": "1/rad", "shares": shares}}
+    heads, rows = provenance.budget(given | {"coefficients": given["coefficients"] | {"after": after}})
+    assert heads == ["Cnβ [1/rad]"]
+    found = dict(rows)
+    assert_shows(found["noise of the readings"], [0.6 * 0.0013, 36.0])
+    assert_shows(found["what the model leaves unexplained"], [0.8 * 0.0013, 64.0])
+    assert found["rounding of the stated air density"] == "–"
+    assert_shows(found["combined standard deviation"], [0.0013])
+    assert provenance.budget(given) == ([], [])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"causes": []}, ["nominal model"]),
+        ({"causes": ["unknown"]}, ["examine the rig", "--effects-file"]),
+        ({"ambiguous_with": []}, ["Repair the rig (quadratic damping)", "with the causes"]),
+        ({}, ["spring of 81.5 N m/rad", "Repair the rig", "with the causes"]),
+        ({"causes": [], "rest": None, "remarks": [{"outcome": "cut", "runs": ["beta"], "remedy": "cut it"}]},
+         ["beta: cut it.", "nominal model"]),
+        ({"causes": ["unknown"], "rest": {"material": True}}, ["examine", "--effects-file", "Do not trust"]),
+    ],
+)  # fmt: skip
+def test_what_to_do_next(given: Document, changes: Document, words: list[str]) -> None:
+    steps = view.next_steps(given | changes)
+    run = given["next_run"] is not None and "ambiguous_with" not in changes and changes
+    steps = [step for step in steps if not (run and "distinguishes" in step)]
+    assert len(steps) == len(words)
+    for step, part in zip(steps, words, strict=True):
+        assert part in step
 
 
 def test_no_number_of_the_page_comes_from_elsewhere(given: Document, page: Sections) -> None:
     """A number in any sentence is one of the document's, or of the records', in per cent or thousandths."""
     values = _all(given) | {float(x) for row in CONDITIONS for x in row if x is not None}
     ends = {e["value"] + s * e["std"] for e in given["coefficients"]["after"].values() for s in (-1.96, 1.96)}
-    counts = {2.0, 3.0, 4.0}  # lines, runs and answers
+    counts = {1.0, 2.0, 3.0, 4.0, 0.5, 1.5, 2.5, 3.5, 0.0}  # lines, runs, answers; edges of the bands
     known = values | {1e2 * v for v in values} | {1e3 * v for v in values} | ends | counts
     for section in ("verdict", "how-far-section", "provenance"):
-        text = re.sub(r"95 %|10⁻³", "", page.texts[section]).replace("1/s", "")
+        text = re.sub(r"95 %|10⁻³|SHA-256", "", page.texts[section]).replace("1/s", "")
         assert_known(text, known)
 
 
@@ -253,8 +292,8 @@ def test_excesses(value: float, text: str) -> None:
 
 def test_a_line_cannot_hold_more_than_all() -> None:
     line = {"run": "alpha", "frequency_hz": 50.0, "amplitude_rad": 1e-3, "share": 1.3}
-    assert view.line_rows({"maps": {"lines": [line]}})[0]["share"] == "100 %"
-    assert view.line_rows({"maps": None}) == []
+    assert view_detail.line_rows({"maps": {"lines": [line]}})[0]["share"] == "100 %"
+    assert view_detail.line_rows({"maps": None}) == []
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -42,6 +43,9 @@ def run(
     report: Annotated[
         Path | None, typer.Option("--report", metavar="FILE.html", help="Write a report, one HTML page.")
     ] = None,
+    author: Annotated[
+        str, typer.Option("--author", metavar="NAME", help="Who made the diagnosis, for the report.")
+    ] = "",
     effects: Annotated[
         list[str] | None,
         typer.Option("--effects", metavar="A,B", help="Consider these effects only."),
@@ -95,7 +99,7 @@ def run(
 
     [bold]Examples[/bold]
       tunnel diagnose my-campaign
-      tunnel diagnose my-campaign --json answer.json --report report.html
+      tunnel diagnose my-campaign --json answer.json --report report.html --author "A. Smith"
       tunnel diagnose my-campaign --exclude buffeting,mains_hum
       tunnel diagnose my-campaign --json - | jq .causes
       tunnel diagnose my-campaign --effects-file my.toml
@@ -107,7 +111,7 @@ def run(
       written completely or not at all.
     """
     from diagnosis import read_model, vocabulary
-    from tunnel_lab.terminal.given_campaign import given_campaign
+    from tunnel_lab.terminal.given_campaign import file_hashes, given_campaign
     from tunnel_lab.terminal.options import refuse_unwritable_files, split_names
     from tunnel_lab.terminal.tables import say, say_written
     from tunnel_sim.files.json_text import json_text
@@ -123,11 +127,13 @@ def run(
             "--model and --joint belong together, and --free and --patch to them", remedy="give both"
         )
     data = given_campaign(campaign)
+    hashes = file_hashes(campaign)
     own = (
         None if model is None or joint is None else read_model(model, joint, data, split_names(free) or None)
     )
     answer = diagnose_with_progress(data, kinds, own)
     document = answer.to_json_dict()
+    document["provenance"]["sha256"] = hashes
     # Files first: the reader of a pipe may close it early.
     if json is not None and not to_stdout:
         write_json(json, document)
@@ -135,9 +141,10 @@ def run(
         write_patch(answer, patch)
     if report is not None:
         from diagnosis.detection.limit_cycles import diagnosable
-        from tunnel_lab.diagnosis_view import write_report
+        from tunnel_lab.diagnosis_view import Byline, write_report
 
-        write_report(document, diagnosable(data).campaign, report)
+        byline = Byline(datetime.now().astimezone().date().isoformat(), author)
+        write_report(document, diagnosable(data).campaign, report, byline)
     proposed = None if propose is None else write_proposal(propose, document)
     if to_stdout:
         typer.echo(json_text(document), nl=False)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from tunnel_lab.diagnosis_view import figures_answer as answer
 from tunnel_lab.diagnosis_view import figures_where as where
+from tunnel_lab.diagnosis_view.figures_backbone import backbone_figure
 from tunnel_lab.diagnosis_view.figures_common import Document
 from tunnel_lab.diagnosis_view.figures_law import law_figure
 from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
@@ -28,8 +29,10 @@ def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figur
     if document.get("maps"):
         found["where-runs"] = where.runs_figure(document)
         found["where-profiles"] = where.profiles_figure(document)
-        found["where-backbones"] = where.backbone_figure(document)
+        found["where-spectrum"] = where.spectrum_figure(document)
+        found["where-backbones"] = backbone_figure(document)
         found["where-phase-plane"] = where.phase_plane_figure(document)
+        found["where-moment"] = where.moment_figure(document)
     found["which"] = answer.candidates_figure(document)
     found["how-far"] = answer.closure_figure(document)
     if document.get("maps"):

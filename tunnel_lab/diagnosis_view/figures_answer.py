@@ -6,18 +6,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from diagnosis.policy import LISTED_PROBABILITY
 from identification.printing.numbers import coefficient_label
 from tunnel_lab.diagnosis_view.figures_common import (
     ACCENT,
     AFTER,
     BEFORE,
+    LINE,
+    PAPER,
     QUIET,
+    SIGMAS,
+    SOFT,
     WIDTH,
     Document,
     array,
+    noise_axis,
     plain,
 )
-from tunnel_lab.plotting.common import figure, figure_text, grid
+from tunnel_lab.plotting.common import figure, figure_text, grid, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,72 +31,73 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 SHOWN = 8
-"""Number of candidates drawn; the others are improbable."""
+"""Most answers drawn."""
+_DRAWN_TRACES = 2
+_LEAST_NOISE = 0.03  # noise variances, three standard deviations: where the document has no maps
 
 
-def candidates_figure(document: Document) -> Figure:
+@styled
+def candidates_figure(document: Document) -> Figure | None:
     """The answers by probability.
 
     Returns:
-        A bar for each of the first eight answers, with its probability.
+        A bar for each answer that is not improbable; None where there are fewer than two, which words say better.
     """
-    shown = document["candidates"][:SHOWN]
-    fig = figure(WIDTH, 0.8 + 0.34 * len(shown))
+    shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= LISTED_PROBABILITY]
+    if len(shown) < 2:
+        return None
+    fig = figure(WIDTH, 0.7 + 0.3 * len(shown))
     axes = fig.add_subplot()
     values = [candidate["probability"] for candidate in shown]
-    colours = [ACCENT if index == 0 else "0.72" for index in range(len(shown))]
-    axes.barh(range(len(shown)), values, color=colours, height=0.68)
+    axes.barh(range(len(shown)), values, color=[ACCENT, *[QUIET] * (len(shown) - 1)], height=0.6)
     for index, value in enumerate(values):
-        axes.text(value + 0.01, index, _percent(value), va="center", fontsize=9)
+        axes.text(value + 0.01, index, _percent(value), va="center")
     axes.set_yticks(range(len(shown)), [plain(candidate["effect"]) for candidate in shown])
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.12)
     axes.set_xticks(np.linspace(0.0, 1.0, 6), [f"{v:.0%}" for v in np.linspace(0.0, 1.0, 6)])
     axes.set_xlabel("probability")
-    grid(axes)
+    grid(axes, "x")
     return fig
 
 
 def _percent(value: float) -> str:
-    if value >= 0.9995:
-        return "> 99.9 %"
-    return "< 0.1 %" if value < 1e-3 else f"{100.0 * value:.1f} %"
+    return "> 99.9 %" if value >= 0.9995 else f"{100.0 * value:.1f} %"
 
 
+@styled
 def closure_figure(document: Document) -> Figure:
-    """Excess of every run before and after the causes are added, on a logarithmic scale above the noise.
+    """Excess of every run before and after the causes are added, on a logarithmic scale from below the noise.
 
     Returns:
         A pair of points per run; the second is filled where the run was held out of the fit.
     """
     runs = document["gap"]["runs"]
-    fig = figure(WIDTH, 1.3 + 0.24 * max(len(runs), 4))
+    fig = figure(WIDTH, 1.2 + 0.22 * max(len(runs), 4))
     axes = fig.add_subplot()
     rows = np.arange(len(runs))
     before = np.array([run["before"] for run in runs])
     after = np.array([run["after"] for run in runs])
-    axes.hlines(rows, after, before, color="0.8", linewidth=2.5)
-    axes.plot(before, rows, "s", color=BEFORE, ms=6, label="nominal model")
+    stds = [run["std"] for run in (document.get("maps") or {"runs": []})["runs"]]
+    noise = SIGMAS * max(stds) if stds else _LEAST_NOISE
+    floor = noise_axis(axes, noise, float(max(before.max(), after.max())))
+    shown, left = np.maximum(before, floor), np.maximum(after, floor)
+    axes.hlines(rows, left, shown, color=LINE, linewidth=2.5)
+    axes.plot(shown, rows, "s", color=BEFORE, ms=5, label="nominal model")
     if not np.array_equal(before, after):
         held_out = np.array([run["held_out"] for run in runs])
-        for chosen, face, words in ((held_out, AFTER, "held out"), (~held_out, "white", "fitted")):
+        for chosen, face, words in ((held_out, AFTER, "held out"), (~held_out, PAPER, "fitted")):
             if chosen.any():
                 label = f"with the causes, run {words}"
-                axes.plot(after[chosen], rows[chosen], "o", color=AFTER, mfc=face, ms=6, label=label)
-    noise = [run["std"] for run in (document.get("maps") or {"runs": []})["runs"]]
-    if noise:
-        axes.axvspan(-3.0 * max(noise), 3.0 * max(noise), color="0.92", linewidth=0, label="noise (3σ)")
-    axes.axvline(0.0, color=QUIET, linewidth=0.8)
-    axes.set_xscale("symlog", linthresh=3.0 * max(noise, default=0.03))
-    axes.set_yticks(rows, [figure_text(run["id"]) for run in runs], fontsize=8)
-    axes.margins(x=0.04)
+                axes.plot(left[chosen], rows[chosen], "o", color=AFTER, mfc=face, ms=5, label=label)
+    axes.set_yticks(rows, [figure_text(run["id"]) for run in runs])
     axes.invert_yaxis()
-    axes.set_xlabel("excess: mean squared residual over noise variance, minus one")
-    fig.legend(loc="outside upper left", ncols=4, fontsize=8, frameon=False)
+    fig.legend(loc="outside upper left", ncols=4)
     grid(axes)
     return fig
 
 
+@styled
 def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
     """Reading and residuals of the runs with the largest gap.
 
@@ -102,33 +109,34 @@ def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
     """
     traces = document["maps"]["traces"]
     records = {run.id: run.record for run in campaign.runs}
-    traces = [trace for trace in traces if trace["id"] in records]
+    traces = [trace for trace in traces if trace["id"] in records][:_DRAWN_TRACES]
     if not traces:
         return None
-    fig = figure(WIDTH, 4.4)
+    fig = figure(WIDTH, 3.8)
     panels = fig.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.2))
     for column, trace in enumerate(traces):
         top, bottom = panels[0, column], panels[1, column]
         record = records[trace["id"]]
         step = max(1, record.yaw_rad.size // 1500)
         time = record.time_s - record.time_s[0]
-        top.plot(time[::step], record.yaw_rad[::step], color="0.25", linewidth=0.7)
-        top.set_title(f"{figure_text(trace['id'])}: reading [rad]", fontsize=10, loc="left")
+        top.plot(time[::step], record.yaw_rad[::step], color=SOFT, linewidth=0.7)
+        top.set_title(f"{figure_text(trace['id'])}: reading [rad]")
         when, before = array(trace["time_s"]), 1e3 * array(trace["before_rad"])
         bottom.plot(when, before, color=BEFORE, linewidth=0.8, label="nominal model")
         if trace["after_rad"] is not None:
             after = 1e3 * array(trace["after_rad"])
             bottom.plot(when, after, color=AFTER, linewidth=0.8, label="with the causes")
-        bottom.set_title("residual [10⁻³ rad]", fontsize=10, loc="left")
+        bottom.set_title("residual [10⁻³ rad]")
         bottom.set_xlabel("time since the start of the record [s]")
         bottom.margins(x=0.01)
         grid(top)
         grid(bottom)
     handles, labels = panels[1, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
+    fig.legend(handles, labels, loc="outside lower center", ncols=2)
     return fig
 
 
+@styled
 def coefficients_figure(document: Document) -> Figure | None:
     """The coefficients before and after, with 95 % intervals.
 

@@ -1,4 +1,4 @@
-"""Helpers of the figures of a diagnosis."""
+"""Helpers of the figures of a diagnosis, and the colours that change with the theme of the page."""
 
 from __future__ import annotations
 
@@ -12,16 +12,44 @@ from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
 
 Document = Mapping[str, Any]
-BEFORE, AFTER, ACCENT, QUIET = "#D55E00", "#0072B2", "#009E73", "0.55"
-WIDTH = 9.0  # inches
+BEFORE, AFTER, ACCENT, QUIET = "#d55e00", "#0072b2", "#009e73", "#77808a"
+INK, SOFT, LINE, NOISE, MARK, PAPER = "#1b1f24", "#59636e", "#d9dee3", "#e6e9ec", "#f0e442", "#ffffff"
+THEMED = {
+    INK: "ink", SOFT: "soft", LINE: "line", NOISE: "noise", PAPER: "paper", QUIET: "quiet", MARK: "mark",
+    BEFORE: "before", AFTER: "after", ACCENT: "accent",
+}  # fmt: skip
+"""Custom properties of the style sheet by colour of the figures."""
+WIDTH = 7.2  # inches
+NARROW = 4.4  # inches: legible on a phone without scrolling
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
+SIGMAS = 3.0
+"""Standard deviations within which values count as noise in the figures."""
+_FAINTEST = 0.12
 
 
 def array(values: Sequence[float | None]) -> Array:
     """Numbers of a JSON list, NaN where it says null, shape (n,)."""
     return np.array([np.nan if v is None else v for v in values], dtype=np.float64)
+
+
+def faded(*colours: str) -> Colormap:
+    """A colour map that fades out instead of becoming white, so that it suits a light and a dark page.
+
+    Args:
+        colours: one, from faint to opaque; or two, opaque at the ends and transparent in the middle.
+    """
+    from matplotlib.colors import LinearSegmentedColormap, to_rgba
+
+    strong = [to_rgba(colour) for colour in colours]
+    if len(strong) == 1:
+        ramp = [(0.0, (*strong[0][:3], _FAINTEST)), (1.0, strong[0])]
+    else:
+        low, high = strong
+        ramp = [(0.0, low), (0.5, (*low[:3], 0.0)), (0.5, (*high[:3], 0.0)), (1.0, high)]
+    return LinearSegmentedColormap.from_list("faded", ramp)
 
 
 def run_label(run: Document) -> str:
@@ -33,11 +61,16 @@ def run_label(run: Document) -> str:
     Returns:
         Text such as ``r02 · 16.1 N m/rad · 15 m/s``.
     """
-    parts = [figure_text(str(run["id"]))]
+    parts = [str(run["id"])]
     if run["spring_stiffness"] is not None:
         parts.append(f"{run['spring_stiffness']:.4g} N m/rad")
         parts.append(f"{run['wind_speed']:g} m/s" if run["wind_speed"] > 0 else "wind off")
     return " · ".join(parts)
+
+
+def drawn_label(run: Document) -> str:
+    """The same for matplotlib."""
+    return figure_text(run_label(run))
 
 
 def plain(name: str) -> str:
@@ -53,4 +86,23 @@ def shade(axes: Axes, interval: Sequence[float] | None) -> None:
         interval: its ends, in the unit of the horizontal axis; None: nothing is shaded.
     """
     if interval is not None:
-        axes.axvspan(interval[0], interval[1], color="#F0E442", alpha=0.28, linewidth=0)
+        axes.axvspan(interval[0], interval[1], color=MARK, alpha=0.28, linewidth=0)
+
+
+def noise_axis(axes: Axes, noise: float, greatest: float) -> float:
+    """A logarithmic axis of excesses that begins below the noise, which is shaded.
+
+    Args:
+        axes: its horizontal axis is set.
+        noise: three standard deviations of an excess by chance, in noise variances, a ratio.
+        greatest: value shown, in noise variances, a ratio.
+
+    Returns:
+        The floor: smaller and negative excesses are drawn on it.
+    """
+    floor = 0.1 * noise
+    axes.set_xscale("log")
+    axes.axvspan(floor, noise, color=NOISE, linewidth=0, label="noise (3σ)")
+    axes.set_xlim(0.8 * floor, 1.6 * max(greatest, 10.0 * noise))
+    axes.set_xlabel("excess (noise variances)")
+    return floor

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import textwrap
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.printing import held_out_excess
+from diagnosis.printing import excess_std, held_out_excess
 from tunnel_lab.diagnosis_view import figures_common as common
-from tunnel_lab.plotting.common import figure, grid
+from tunnel_lab.plotting.common import figure, grid, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,65 +18,65 @@ if TYPE_CHECKING:
 
     from tunnel_sim.vocabulary.record import Array
 
-_SIGMAS = 3.0
+_LABEL = 20  # characters in a line of a label
 _LEAST_NOISE = 1e-3  # noise powers: where the document has no maps, and so no noise of an excess
 
 
+@styled
 def waterfall_figure(document: common.Document) -> Figure | None:
     """What is left of the gap as the causes are added one after another.
 
     Returns:
-        A bar for the nominal gap; for each cause one from what was left before it to what it leaves; and one for
-        the rest, on a logarithmic scale. None where no cause is named.
+        A dot for the nominal gap, a bar for each cause from what was left before it to what it leaves, and a dot
+        for the rest, on a logarithmic scale. None where no cause is named.
     """
     steps = document.get("waterfall", [])
     if len(steps) < 2:
         return None
-    noise = _SIGMAS * _noise(document)
-    floor = 0.1 * noise
+    noise = common.SIGMAS * (excess_std(document) or _LEAST_NOISE)
     left = np.array([step["excess"] for step in steps], np.float64)
-    fig = figure(common.WIDTH, 1.5 + 0.42 * (left.size + 1))
+    alone = np.array(list(document.get("without", {}).values()), np.float64)
+    fig = figure(common.NARROW, 1.2 + 0.4 * (left.size + 1))
     axes = fig.add_subplot()
-    axes.set_xscale("log")
-    axes.axvspan(floor, noise, color="0.92", linewidth=0, label="noise (3σ)")
-    _bars(axes, left, floor)
-    greatest = max(float(left.max()), _alone(axes, document, floor), 10.0 * noise)
-    names = [f"+ {common.plain(str(step['effect']))}" for step in steps[1:]]
-    axes.set_yticks(range(left.size + 1), ["nominal model", *names, _rest_name(document)])
-    axes.set_xlim(floor, 20.0 * greatest)
+    floor = common.noise_axis(axes, noise, float(np.concatenate([left, alone]).max()))
+    axes.set_xlim(None, 12.0 * axes.get_xlim()[1])  # room for the numbers
+    _steps(axes, left, floor)
+    _alone(axes, document, floor)
+    names = [textwrap.fill(f"+ {common.plain(str(step['effect']))}", _LABEL) for step in steps[1:]]
+    axes.set_yticks(
+        range(left.size + 1), ["nominal model", *names, textwrap.fill(_rest_name(document), _LABEL)]
+    )
     axes.invert_yaxis()
-    axes.set_xlabel("excess: mean squared residual over noise variance, minus one")
-    fig.legend(loc="outside upper left", ncols=2, fontsize=8, frameon=False)
-    grid(axes)
+    fig.legend(loc="outside upper left", ncols=2)
+    grid(axes, "x")
     return fig
 
 
-def _bars(axes: Axes, left: Array, floor: float) -> None:
-    """The nominal gap, what each cause closes (or opens), and the rest, with their values."""
+def _steps(axes: Axes, left: Array, floor: float) -> None:
+    """What each cause closes (or opens) as a bar between two values; the first and the last value as dots."""
     shown = np.maximum(left, floor)
-    starts = np.array([floor, *np.minimum(shown[:-1], shown[1:]), floor])
-    ends = np.array([shown[0], *np.maximum(shown[:-1], shown[1:]), shown[-1]])
-    steps = [common.AFTER if after <= before else common.BEFORE for before, after in pairwise(left)]
+    starts, ends = np.minimum(shown[:-1], shown[1:]), np.maximum(shown[:-1], shown[1:])
+    colours = [common.AFTER if after <= before else common.BEFORE for before, after in pairwise(left)]
     rows = np.arange(left.size + 1)
-    axes.barh(rows, ends - starts, left=starts, color=[common.BEFORE, *steps, common.ACCENT], height=0.6)
+    axes.barh(rows[1:-1], ends - starts, left=starts, color=colours, height=0.55)
+    for row, value, colour in ((0, shown[0], common.BEFORE), (rows[-1], shown[-1], common.ACCENT)):
+        axes.plot(value, row, "o", color=colour, ms=8)
     axes.vlines(shown, rows[:-1], rows[1:], color=common.QUIET, linewidth=0.8)
     texts = [held_out_excess(value) for value in left.tolist()]
     words = [texts[0], *(f"leaves {text}" for text in texts[1:]), texts[-1]]
-    for row, text in enumerate(words):
-        place = (float(ends[row]), float(row))
-        axes.annotate(text, place, (7, 0), textcoords="offset points", va="center", fontsize=9)
+    for row, (text, end) in enumerate(zip(words, [shown[0], *ends, shown[-1]], strict=True)):
+        axes.annotate(text, (float(end), row), (7, 0), textcoords="offset points", va="center")
 
 
-def _alone(axes: Axes, document: common.Document, floor: float) -> float:
-    """Mark what is left without each cause alone, where there are several; returns the greatest."""
+def _alone(axes: Axes, document: common.Document, floor: float) -> None:
+    """Mark what is left without each cause alone, where there are several."""
     without = document.get("without", {})
     rows = {step["effect"]: row for row, step in enumerate(document["waterfall"])}
     if len(without) < 2:
-        return 0.0
+        return
     values = np.maximum(list(without.values()), floor)
     places = [rows[name] for name in without]
-    axes.plot(values, places, "o", color="0.25", mfc="white", ms=6, label="without it alone")
-    return float(values.max())
+    axes.plot(values, places, "o", color=common.INK, mfc=common.PAPER, ms=5, label="without it alone")
 
 
 def _rest_name(document: common.Document) -> str:
@@ -83,11 +84,3 @@ def _rest_name(document: common.Document) -> str:
     if not rest.get("significant"):
         return "the rest: within the noise"
     return "the rest: material" if rest.get("material") else "the rest: immaterial"
-
-
-def _noise(document: common.Document) -> float:
-    """Standard deviation of the campaign's excess by chance, in noise powers."""
-    runs = (document.get("maps") or {"runs": []})["runs"]
-    if not runs:
-        return _LEAST_NOISE
-    return float(np.sqrt(np.mean([run["std"] ** 2 for run in runs]) / len(runs)))

@@ -1,4 +1,4 @@
-"""The words and numbers of the page, formatted from the document; nothing is computed here."""
+"""The words and numbers of the summary and of the answers, formatted from the document."""
 
 from __future__ import annotations
 
@@ -8,22 +8,21 @@ from typing import Any
 
 from diagnosis.names import plain as words
 from diagnosis.policy import LISTED_PROBABILITY
-from diagnosis.printing import held_out_excess
+from diagnosis.printing import run_words
 from identification.printing.numbers import (
-    COEFFICIENTS,
     UNDETERMINED,
     at_bound,
+    coefficient_label,
     significant,
     unit_mark,
     with_std,
 )
 from tunnel_lab.diagnosis_view.figures_common import plain
 from tunnel_sim.effects import effect_class, known_effects
-from tunnel_sim.vocabulary.campaign import Campaign
 
 Document = Mapping[str, Any]
-_UNDETERMINED = "cannot be determined from these runs"
-_CONDITIONS = {"always": "with or without wind", "wind_on": "only with the wind on", None: _UNDETERMINED}
+UNDETERMINED_PLACE = "cannot be determined from these runs"
+CONDITIONS = {"always": "with or without wind", "wind_on": "only with the wind on", None: UNDETERMINED_PLACE}
 
 
 @dataclass(frozen=True)
@@ -65,8 +64,8 @@ def facts(document: Document) -> list[Fact]:
         found += [left, Fact("Share closed", percent(gap["closed"]), gap["closed_on"])]
     if document["causes"]:
         found += [
-            Fact("Channel", where["channel"] or _UNDETERMINED),
-            Fact("Condition", _CONDITIONS.get(where["condition"], str(where["condition"]))),
+            Fact("Channel", where["channel"] or UNDETERMINED_PLACE),
+            Fact("Condition", CONDITIONS.get(where["condition"], str(where["condition"]))),
         ]
     if document["candidates"]:
         first = document["candidates"][0]
@@ -99,50 +98,17 @@ def excess(value: float) -> str:
     Returns:
         Three significant digits, or three decimals where it is small.
     """
-    return _minus(f"{value:.3f}" if abs(value) < 1.0 else significant(value, 3))
+    return minus(f"{value:.3f}" if abs(value) < 1.0 else significant(value, 3))
 
 
-def _minus(text: str) -> str:
-    """A minus sign in place of a leading hyphen."""
+def minus(text: str) -> str:
+    """A number's text with a minus sign in place of a leading hyphen."""
     return "−" + text[1:] if text.startswith("-") else text
 
 
-def interval(values: list[float] | None, unit: str) -> str:
-    """An interval in words.
-
-    Args:
-        values: its ends, or None.
-
-    Returns:
-        Text such as ``0.00 to 4.20 s``; a dash where there is none.
-    """
-    if values is None:
-        return "–"
-    return f"{significant(values[0], 3)} to {significant(values[1], 3)} {unit}"
-
-
-def place_rows(document: Document) -> list[tuple[str, str]]:
-    """Where the gap is, field by field."""
-    where = document["where"]
+def candidate_rows(document: Document) -> list[dict[str, Any]]:
+    """The probable answers, at least three, formatted."""
     return [
-        ("Runs that show it", ", ".join(where["runs"]) or "–"),
-        ("Time", interval(where["time_s"], "s")),
-        ("Amplitude", interval(where["amplitude_rad"], "rad")),
-        ("Frequency", interval(where["frequency_hz"], "Hz")),
-        ("Channel", where["channel"] or _UNDETERMINED),
-        ("Condition", _CONDITIONS.get(where["condition"], str(where["condition"]))),
-    ]
-
-
-def candidate_rows(document: Document) -> tuple[list[dict[str, Any]], int]:
-    """The answers considered.
-
-    Returns:
-        The probable ones (at least three), formatted, and the number of the others.
-    """
-    candidates = document["candidates"]
-    count = max(3, sum(c["probability"] >= LISTED_PROBABILITY for c in candidates))
-    rows = [
         {
             "name": plain(c["effect"]),
             "probability": percent(c["probability"]),
@@ -150,26 +116,23 @@ def candidate_rows(document: Document) -> tuple[list[dict[str, Any]], int]:
             "excess": excess(c["excess_after"]),
             "parameters": [(plain(n).replace(".", ": "), estimate(v)) for n, v in c["parameters"].items()],
         }
-        for c in candidates[:count]
+        for c in document["candidates"][: _listed(document)]
     ]
-    return rows, max(len(candidates) - count, 0)
 
 
-def step_rows(document: Document) -> list[dict[str, str]]:
-    """The gap as the causes are added.
+def others(document: Document) -> str:
+    """The answers that are not listed, in words; empty where all are."""
+    left = [c["probability"] for c in document["candidates"][_listed(document) :]]
+    if not left:
+        return ""
+    count = "1 more answer has" if len(left) == 1 else f"{len(left)} more answers have together"
+    each = "" if len(left) == 1 else f", none of them more than {percent(max(left))}"
+    return f"{count} a probability of {percent(sum(left))}{each}. The JSON document lists all."
 
-    Returns:
-        What is added, what is left, and what is left without it alone; none where no cause is named.
-    """
-    steps, without = document.get("waterfall", []), document.get("without", {})
-    return [
-        {
-            "name": plain(step["effect"] or "nominal model"),
-            "left": _minus(held_out_excess(step["excess"])),
-            "without": _minus(held_out_excess(without[step["effect"]])) if step["effect"] in without else "",
-        }
-        for step in (steps if len(steps) > 1 else ())
-    ]
+
+def _listed(document: Document) -> int:
+    probable = [c for c in document["candidates"] if c["probability"] >= LISTED_PROBABILITY]
+    return max(3, len(probable))
 
 
 def estimate(values: Document) -> str:
@@ -181,15 +144,18 @@ def estimate(values: Document) -> str:
     Returns:
         Text such as ``0.00401 ± 0.00002 N m``.
     """
-    unit = str(values.get("unit", ""))
     if not values.get("determined", True):
         return UNDETERMINED
-    number = (
-        with_std(values["value"], values["std"])
-        if values["std"]
-        else significant(values["value"], 5) + (" (held)" if values["std"] == 0.0 else at_bound(values))
-    )
-    return _minus(f"{number} {'' if unit == '1' else unit_mark(unit)}".strip()).replace(" ", "\u00a0")
+    unit = str(values.get("unit", ""))
+    return f"{_number(values)} {'' if unit == '1' else unit_mark(unit)}".strip().replace(" ", "\u00a0")
+
+
+def _number(values: Document) -> str:
+    if not values.get("determined", True):
+        return UNDETERMINED
+    if values["std"]:
+        return minus(with_std(values["value"], values["std"]))
+    return minus(significant(values["value"], 5)) + (" (held)" if values["std"] == 0.0 else at_bound(values))
 
 
 def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
@@ -210,7 +176,7 @@ def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
                 "meaning": (kind.__doc__ or "").split("\n")[0],
                 "equation": kind.equation,
                 "signature": kind.signature,
-                "where": f"{kind.channel}, {_CONDITIONS[kind.condition]}",
+                "where": f"{kind.channel}, {CONDITIONS[kind.condition]}",
                 "references": kind.references,
             }
         )
@@ -221,14 +187,14 @@ def coefficient_rows(document: Document) -> list[dict[str, str]]:
     """The coefficients before and after.
 
     Returns:
-        Symbol, both estimates and the 95 % interval after.
+        Symbol with unit, both estimates and the 95 % interval after.
     """
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
     return [
         {
-            "symbol": COEFFICIENTS.get(name, name),
-            "before": estimate(before[name]) if name in before else "–",
-            "after": estimate(after[name]) if name in after else "–",
+            "label": coefficient_label(name, (before.get(name) or after[name])["unit"]),
+            "before": _number(before[name]) if name in before else "–",
+            "after": _number(after[name]) if name in after else "–",
             "interval": _interval95(after.get(name) or before[name]),
         }
         for name in [*before, *(n for n in after if n not in before)]
@@ -236,35 +202,51 @@ def coefficient_rows(document: Document) -> list[dict[str, str]]:
 
 
 def _interval95(values: Document) -> str:
-    if values["std"] is None:
+    """The interval, to as many digits as its width deserves."""
+    if not values["std"]:
         return "–"
     reach = 1.96 * values["std"]
-    return f"{_minus(significant(values['value'] - reach))} to {_minus(significant(values['value'] + reach))}"
+    width = with_std(values["value"], reach).partition("± ")[2]
+    places = len(width.partition(".")[2])
+    ends = (values["value"] - reach, values["value"] + reach)
+    texts = [
+        significant(end) if not width.replace(".", "").isdigit() else f"{end:.{places}f}" for end in ends
+    ]
+    return " to ".join(map(minus, texts))
 
 
-def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
-    """Every run with its conditions and excess before and after.
+def next_steps(document: Document) -> list[str]:
+    """What to do next, in the order in which to do it.
 
     Returns:
-        Formatted rows in the campaign's order.
+        Sentences.
     """
-    gap = {run["id"]: run for run in document["gap"]["runs"]}
-    rows = []
-    for run in campaign.runs:
-        own = gap.get(run.id)
-        rows.append(
-            {
-                "id": run.id,
-                "spring": "–" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
-                "wind": f"{run.wind_speed:g}" if run.wind_on else "off",
-                "duration": f"{run.record.duration:.3g}",
-                "rate": f"{run.record.sample_rate:.4g}",
-                "before": "–" if own is None else excess(own["before"]),
-                "after": "–" if own is None else excess(own["after"]),
-                "named": "yes" if run.id in document["where"]["runs"] else "",
-            }
+    causes, rest = document["causes"], document.get("rest") or {}
+    steps = [
+        f"{', '.join(remark['runs']) or 'The campaign'}: {remark['remedy']}."
+        for remark in document.get("remarks", ())
+        if remark["outcome"] != "noted"
+    ]
+    if document["next_run"] is not None and document["ambiguous_with"]:
+        steps.append(
+            f"Make the run that distinguishes the answers: {run_words(document['next_run'])}. "
+            "Add it to the campaign and diagnose again."
         )
-    return rows
+    if not causes:
+        return [*steps, "Use the coefficients of the nominal model, within their intervals."]
+    if causes == ["unknown"]:
+        steps.append("Read where the model departs from the runs, and examine the rig there.")
+        steps.append("State the effect that you suspect in a file, and diagnose again with --effects-file.")
+    else:
+        steps.append(
+            f"Repair the rig ({words(causes)}), measure again, and compare the two diagnoses (tunnel compare)."
+        )
+        steps.append("Until then use the coefficients with the causes, not those of the nominal model.")
+    if rest.get("material"):
+        steps.append(
+            "Do not trust the coefficients beyond their intervals: what remains of the gap moves them."
+        )
+    return steps
 
 
 def next_run_rows(document: Document) -> list[tuple[str, str]]:
@@ -285,21 +267,4 @@ def next_run_rows(document: Document) -> list[tuple[str, str]]:
         (plain(name).capitalize(), f"{significant(value, 3)} {units.get(name, '')}".strip())
         for name, value in run.items()
         if isinstance(value, int | float)
-    ]
-
-
-def line_rows(document: Document) -> list[dict[str, str]]:
-    """Narrow lines in the residuals.
-
-    Returns:
-        Run, frequency, amplitude and share, formatted.
-    """
-    return [
-        {
-            "run": line["run"],
-            "frequency": significant(line["frequency_hz"], 4),
-            "amplitude": significant(1e3 * line["amplitude_rad"], 2),
-            "share": percent(min(line["share"], 1.0)),
-        }
-        for line in (document.get("maps") or {}).get("lines", [])
     ]

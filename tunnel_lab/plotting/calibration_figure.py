@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tunnel_lab.plotting.common import figure, grid
+from tunnel_lab.plotting.common import figure, grid, styled
 from tunnel_lab.plotting.plots import BLUE
 
 if TYPE_CHECKING:
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from diagnosis.blind.smooth import SmoothCalibration
 
 
+@styled
 def calibration_figure(found: SmoothCalibration) -> Figure:
     """How often effects act, against the stated probability that they do.
 
@@ -29,6 +30,6 @@ def calibration_figure(found: SmoothCalibration) -> Figure:
         xlabel="stated probability that an effect is among the causes", ylabel="share of them that are",
         title=f"smooth calibration error {found.error:.3f}",
     )  # fmt: skip
-    axes.legend(loc="upper left", frameon=False)
+    axes.legend(loc="upper left")
     grid(axes)
     return fig

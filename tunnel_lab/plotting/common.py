@@ -2,11 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable
+from functools import wraps
+from importlib import resources
+from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def styled(draw: Callable[P, R]) -> Callable[P, R]:
+    """A function that draws in the style of `figures.mplstyle`, without changing the settings of the process."""
+
+    @wraps(draw)
+    def drawn(*args: P.args, **named: P.kwargs) -> R:
+        from matplotlib import style
+
+        file = resources.files("tunnel_lab.plotting") / "figures.mplstyle"
+        with resources.as_file(file) as path, style.context(path):
+            return draw(*args, **named)
+
+    return drawn
 
 
 def figure(width: float, height: float) -> Figure:
@@ -23,9 +43,7 @@ def figure(width: float, height: float) -> Figure:
 
 def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
     """A quiet grid behind the data."""
-    axes.grid(visible=True, axis=axis, color="0.88", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(visible=True, axis=axis)
 
 
 def figure_text(text: str) -> str:

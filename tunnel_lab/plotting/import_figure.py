@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tunnel_lab.plotting.common import figure_text
+from tunnel_lab.plotting.common import figure_text, styled
 from tunnel_lab.plotting.plots import BLUE, COLOURS, VERMILION
 from tunnel_sim.vocabulary.record import Array
 
@@ -22,6 +22,7 @@ _POINTS = 2000  # least and greatest readings of as many stretches are drawn
 _GREY = "0.6"
 
 
+@styled
 def import_picture(imported: Imported) -> bytes:
     """Draw what was read.
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification.printing.numbers import SYMBOLS, unit
-from tunnel_lab.plotting.common import figure, figure_text, grid
+from tunnel_lab.plotting.common import figure, figure_text, grid, styled
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
@@ -37,6 +37,7 @@ RUNS_PER_PLOT = 6
 """More lines than colours cannot be distinguished in one plot."""
 
 
+@styled
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure as a PNG, completely or not at all.
 
@@ -65,6 +66,7 @@ def run_label(run: Run) -> str:
     return " · ".join(parts)
 
 
+@styled
 def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
     """Angle against time, one panel for each run.
 
@@ -93,6 +95,7 @@ def _trace_page(runs: Sequence[Run]) -> Figure:
     return fig
 
 
+@styled
 def wind_off_on_figure(off: Run, on: Run) -> Figure:
     """One run with the wind off above one with the wind on, on the same axes.
 
@@ -113,6 +116,7 @@ def wind_off_on_figure(off: Run, on: Run) -> Figure:
     return fig
 
 
+@styled
 def spectrum_figure(runs: Sequence[Run]) -> Figure:
     """Power spectral density of the angle, averaged over sixtieths of a decade to reduce the noise.
 
@@ -142,6 +146,7 @@ def spectrum_figure(runs: Sequence[Run]) -> Figure:
     return fig
 
 
+@styled
 def windows_figure(estimate: Estimate) -> Figure:
     """ζ and ωn of the windows of each run against the amplitude, with 95 % intervals.
 
@@ -179,6 +184,7 @@ def windows_figure(estimate: Estimate) -> Figure:
     return fig
 
 
+@styled
 def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Figure:
     """Estimates of each estimator against the injected values.
 

@@ -9,6 +9,7 @@ import numpy as np
 from rich.text import Text
 
 from identification.printing.numbers import significant
+from tunnel_lab.plotting.common import styled
 from tunnel_lab.scoring.breakdown import NO_EFFECT, Bias
 from tunnel_lab.scoring.tables import NAMES
 from tunnel_lab.terminal.tables import table
@@ -62,6 +63,7 @@ def _compact(value: float) -> str:
     return f"{'−' if value < 0 else '+'}{text}"
 
 
+@styled
 def breakdown_figure(found: Sequence[Bias]) -> Figure:
     """The bias as a colour map: in % above and in reported standard deviations below.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification.scoring.accuracy import INTERVAL, NOMINAL_COVERAGE, Score, score
-from tunnel_lab.plotting.common import figure, grid
+from tunnel_lab.plotting.common import figure, grid, styled
 from tunnel_lab.plotting.plots import COLOURS, MARKERS
 from tunnel_lab.scoring.grid import NO_EFFECT
 from tunnel_lab.scoring.results import Results
@@ -21,6 +21,7 @@ STYLES = tuple((colour, marker) for marker in MARKERS for colour in COLOURS)
 _SHOWN = ("zeta", "omega_n", "cn_beta", "cn_r")
 
 
+@styled
 def score_figure(results: Results) -> Figure:
     """RMSE over the bound above, coverage of 95 % intervals below, cell by cell, with 95 % intervals.
 
@@ -50,7 +51,7 @@ def score_figure(results: Results) -> Figure:
     panels[0, 0].set_ylabel("RMSE over the Cramér–Rao bound")
     panels[1, 0].set_ylabel("95 % intervals that contain the truth [%]")
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 8), frameon=False)
+    fig.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 8))
     return fig
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from identification.printing.numbers import SYMBOLS, concise, significant, unit
-from tunnel_lab.plotting.common import figure, grid
+from tunnel_lab.plotting.common import figure, grid, styled
 from tunnel_lab.plotting.plots import COLOURS, MARKERS
 from tunnel_lab.sweep.summary import AXES, OVERALL, SEVERITY, Line, Pace
 from tunnel_lab.terminal.tables import table
@@ -42,6 +42,7 @@ def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
     return found
 
 
+@styled
 def error_figure(lines: Sequence[Line]) -> Figure | None:
     """RMSE and bias along one axis, a column of panels for each quantity, a colour for each estimator.
 

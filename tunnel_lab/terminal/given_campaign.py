@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,3 +42,27 @@ def given_campaign(path: Path) -> Campaign:
     for line in imported.remarks():
         say(f"Note: {line}", stderr=True)
     return imported.campaign
+
+
+def file_hashes(path: Path) -> dict[str, str]:
+    """SHA-256 of the files that a campaign was read from.
+
+    Args:
+        path: as for `given_campaign`, which has read it.
+
+    Returns:
+        Hexadecimal digests by name in the campaign's folder: ``campaign.toml`` and the runs, or the one file.
+    """
+    from tunnel_sim.files.campaign_schema import CAMPAIGN_FILE, read_document
+    from tunnel_sim.vocabulary.errors import one_line
+
+    if path.is_file() and path.name != CAMPAIGN_FILE:
+        return {one_line(path.name): _sha256(path)}
+    folder = path.parent if path.is_file() else path
+    names = dict.fromkeys([CAMPAIGN_FILE, *(run.file for run in read_document(folder / CAMPAIGN_FILE).runs)])
+    return {name: _sha256(folder / name) for name in names}
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

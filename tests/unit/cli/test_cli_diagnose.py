@@ -5,6 +5,7 @@ Truth: closed forms, and friction planted by the project's own simulator (what i
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -204,3 +205,19 @@ def test_records_without_noise_are_said_to_test_the_numerics(
     status, out, _ = tunnel("diagnose", folder, "--effects", "sensor_drift")
     assert status == 0
     assert "almost no noise" in out
+
+
+def test_the_files_are_hashed(tunnel: Tunnel, gap_free: Path, tmp_path: Path) -> None:
+    author, page = "A. Smith", tmp_path / "report.html"
+    words = ("--effects", "sensor_drift", "--json", tmp_path / "a.json", "--report", page, "--author", author)
+    assert tunnel("diagnose", gap_free, *words)[0] == 0
+    text = (tmp_path / "a.json").read_text(encoding="utf-8")
+    hashes = json.loads(text)["provenance"]["sha256"]
+    files = [path for path in gap_free.rglob("*") if path.is_file()]
+    assert hashes == {
+        path.relative_to(gap_free).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files
+    }
+    assert author not in text
+    shown = page.read_text(encoding="utf-8")
+    assert author in shown
+    assert all(digest in shown for digest in hashes.values())

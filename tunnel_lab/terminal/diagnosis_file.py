@@ -1,0 +1,82 @@
+"""What ``tunnel compare`` reads of the JSON document of a diagnosis."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+from tunnel_sim.files.reading import read_json
+from tunnel_sim.files.toml_input import OneLine, StrictModel, check_version, validate
+
+REMEDY = "give a file that tunnel diagnose --json wrote"
+Excess = Annotated[float, Field(description="a number of noise powers")]
+Share = Annotated[float, Field(ge=0.0, le=1.0, description="a number from 0 to 1")]
+
+
+class _Part(StrictModel):
+    """A part of the document; fields that are not compared are left alone."""
+
+    model_config = ConfigDict(extra="ignore")
+
+
+class _Estimate(_Part):
+    value: float
+    std: Annotated[float, Field(ge=0.0)] | None
+    unit: OneLine
+    bound: OneLine | None = None
+    determined: bool = True
+
+
+class _Gap(_Part):
+    excess_before: Excess
+    excess_after: Excess
+    closed: Share
+
+
+class _Candidate(_Part):
+    probability: Share
+    effect: OneLine
+    parameters: dict[OneLine, _Estimate]
+
+
+class _Coefficients(_Part):
+    before: dict[OneLine, _Estimate]
+    after: dict[OneLine, _Estimate]
+
+
+class _Run(_Part):
+    std: Annotated[float, Field(ge=0.0)]
+
+
+class _Maps(_Part):
+    runs: list[_Run]
+
+
+class _Document(_Part):
+    schema_version: int
+    campaign: OneLine
+    causes: list[OneLine]
+    ambiguous_with: list[OneLine]
+    gap: _Gap
+    candidates: Annotated[list[_Candidate], Field(min_length=1)]
+    coefficients: _Coefficients
+    maps: _Maps | None = None
+
+
+def read_diagnosis(path: Path) -> dict[str, Any]:
+    """Read the document of a diagnosis.
+
+    Args:
+        path: a file that ``tunnel diagnose --json`` wrote.
+
+    Returns:
+        The fields that are compared, in JSON's types.
+
+    Raises:
+        TunnelError: when it is missing, is not JSON, or is not a diagnosis.
+    """
+    document = read_json(path, remedy=REMEDY)
+    check_version(document, path)
+    return validate(_Document, document, path).model_dump()
