@@ -105,7 +105,7 @@ class Path:
     def _filter(self, interval: float) -> tuple[Array, Array]:
         """Numerator and denominator of the reading's response to a moment that is linear in between."""
         numerator = [1.0] + [0.0] * self.run.derivative
-        found = cont2discrete((numerator, linear_coefficients(self.fit, self.index)), interval, "foh")
+        found = cont2discrete((numerator, list(linear_coefficients(self.fit, self.index))), interval, "foh")
         return np.ravel(found[0]), found[1]
 
     def response(self, moment: Array) -> Array:
