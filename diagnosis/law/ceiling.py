@@ -108,7 +108,7 @@ class Rest:
     def size(self) -> Array:
         """Scale of the model's own columns, shape (common,)."""
         sizes = [np.max(np.abs(path.nominal), axis=0) for path in self.paths]
-        return np.maximum(np.max(sizes, axis=0), 1e-300)
+        return np.asarray(np.maximum(np.max(sizes, axis=0), 1e-300))
 
     @cached_property
     def _free(self) -> list[Array]:

@@ -59,7 +59,8 @@ def explain(left: Fit, similarity: Similarity, *, named: bool) -> Closable:
     single = {kind: rest.single(kind) for kind in bases.SINGLE}
     kind = chosen_kind(common, single)
     ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
-    law, shape, where = None, None, ()
+    law, shape = None, None
+    where: tuple[Mapping[str, Any], ...] = ()
     if kind in common:
         shape = _own_curve(curve(rest, common[kind]), similarity)
         law = _law(rest, kind, common[kind].drop, similarity)
@@ -186,8 +187,8 @@ def _words(
     if alike:
         said.append(f"These runs cannot tell it from {' or '.join(KINDS[one.kind] for one in alike)}.")
     elif others:
-        most = max(one.closed for one in others)
-        said.append(f"No other kind would close more than {percent(max(most, 0.0))}.")
+        others_most = max(one.closed for one in others)
+        said.append(f"No other kind would close more than {percent(max(others_most, 0.0))}.")
     if where:
         said.append(f"Most of it is in {_places(where)}.")
     if law is not None:

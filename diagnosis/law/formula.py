@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -62,7 +63,7 @@ class Proposal:
     """
 
     kind: type[Effect]
-    table: dict[str, object]
+    table: dict[str, Any]
     fit: Fit
 
 
@@ -126,7 +127,7 @@ def _with_factors(rest: Rest, kind: str) -> list[Term]:
 def _columns(rest: Rest, candidates: Sequence[Term], index: int, of_reading: bool) -> Array:
     """Responses to every term in one run, shape (rows, terms)."""
     path = rest.paths[index]
-    places = {
+    places: dict[str, float | Array] = {
         "b": path.angle, "y": path.angle, "r": path.rate, "t": path.time, "V": path.speed,
         "Kr": path.stiffness, "omega": path.still_omega,
     }  # fmt: skip
@@ -196,7 +197,7 @@ def propose(rest: Rest, formula: Formula, kind: str) -> Proposal | None:
     except TunnelError:
         return None
     base = rest.fit
-    start_of = {name: float(q["default"] or q["scale"]) for name, q in table["parameters"].items()}  # type: ignore[attr-defined]
+    start_of = {name: float(q["default"] or q["scale"]) for name, q in table["parameters"].items()}
     problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, effect))
     own = np.array([start_of[name.split(".")[1]] for name in problem.names[len(base.problem.names) :]])
     common = base.point.common + formula.delta
@@ -217,7 +218,7 @@ def _free_name(name: str) -> str:
     return next(free for free in chain((name,), numbered) if free not in taken)
 
 
-def effect_table(formula: Formula, name: str) -> dict[str, object]:
+def effect_table(formula: Formula, name: str) -> dict[str, Any]:
     """A formula as the table of an effects file.
 
     Args:
@@ -275,7 +276,7 @@ def _inner(value: float, unit: str) -> dict[str, object]:
     return {"unit": unit, "scale": value, "lower": ends[0], "upper": ends[1], "default": value}
 
 
-def effect_of(table: dict[str, object]) -> type[Effect]:
+def effect_of(table: dict[str, Any]) -> type[Effect]:
     """The class of an effect that a table of an effects file states.
 
     Args:
@@ -291,6 +292,6 @@ def effect_of(table: dict[str, object]) -> type[Effect]:
     name = str(given.pop("name"))
     parameters = {
         own: Quantity(**{**values, "meaning": f"parameter {own}"})
-        for own, values in given.pop("parameters").items()  # type: ignore[attr-defined]
+        for own, values in given.pop("parameters").items()
     }
-    return expression_effect(name, parameters=parameters, **given)  # type: ignore[arg-type]
+    return expression_effect(name, parameters=parameters, **given)

@@ -104,8 +104,9 @@ class Path:
 
     def _filter(self, interval: float) -> tuple[Array, Array]:
         """Numerator and denominator of the reading's response to a moment that is linear in between."""
-        numerator = [1.0] + [0.0] * self.run.derivative
-        found = cont2discrete((numerator, linear_coefficients(self.fit, self.index)), interval, "foh")
+        numerator = np.array([1.0] + [0.0] * self.run.derivative)
+        denominator = np.array(linear_coefficients(self.fit, self.index))
+        found = cont2discrete((numerator, denominator), interval, "foh")
         return np.ravel(found[0]), found[1]
 
     def response(self, moment: Array) -> Array:

@@ -151,7 +151,8 @@ def run(
         return
     show(document)
     if propose is not None and proposed is None:
-        say("No formula is proposed: " + ("none is supported" if document["closable"] else "nothing remains"))
+        nothing = "nothing remains beyond chance, or beside a random moment"
+        say(f"No formula is proposed: {'none is supported' if document['closable'] else nothing}")
     say_written(json, report, patch, proposed)
 
 

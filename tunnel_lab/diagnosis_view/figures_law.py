@@ -44,7 +44,12 @@ def law_figure(document: common.Document) -> Figure | None:
     reach = float(np.max(np.abs(values))) or 1.0
     shown = np.where(np.abs(values) > _BAND * std, values, np.nan)
     mesh = axes.pcolormesh(
-        *curve["places"], shown.T, cmap=common.faded(common.AFTER, common.BEFORE), vmin=-reach, vmax=reach, shading="nearest"
+        *curve["places"],
+        shown.T,
+        cmap=common.faded(common.AFTER, common.BEFORE),
+        vmin=-reach,
+        vmax=reach,
+        shading="nearest",
     )
     axes.set_ylabel(_AXES[curve["over"][1]])
     fig.colorbar(mesh, ax=axes, label=name)
