@@ -95,13 +95,15 @@ class Noise:
         return self.relative if self.colour is None else self.colour.spread(frequency)
 
 
-def estimate_variance(record: Record) -> tuple[float, float]:
+def estimate_variance(record: Record, fastest: float | None = None) -> tuple[float, float]:
     """Variance of the white noise, from the median of the periodogram above the motion.
 
     Where the samples are not evenly spaced, `scattered_variance` measures it.
 
     Args:
         record: a run's reading.
+        fastest: frequency of the campaign's fastest motion, Hz, so that coloured noise is measured in the same band
+            in all runs; None: the record's own.
 
     Returns:
         Variance of one sample, rad², and its relative standard deviation. Lines such as the mains' harmonics
@@ -109,7 +111,7 @@ def estimate_variance(record: Record) -> tuple[float, float]:
     """
     if not record.uniform:
         block = max(1, round(BLOCK_INTERVAL * record.sample_rate))
-        return scattered_variance(record, frequency(record), block)
+        return scattered_variance(record, fastest or frequency(record), block)
     rate = record.sample_rate
     low = min(_FLOOR_FROM, 0.25 * rate)
     places, power = floor_periodogram(record.yaw_rad, rate)
@@ -147,7 +149,8 @@ def campaign_noise(campaign: Campaign) -> Noise:
     """
     # however slow the motion, the error of a rounded reading is that large
     rounded = lattice_step(campaign) ** 2 / 12.0
-    measured = {run.id: estimate_variance(run.record) for run in campaign.runs}
+    fastest = max((frequency(run.record) for run in campaign.runs if not run.record.uniform), default=None)
+    measured = {run.id: estimate_variance(run.record, fastest) for run in campaign.runs}
     estimates = {run: (max(value, rounded), std) for run, (value, std) in measured.items()}
     variances = np.array([value for value, _ in estimates.values()])
     relative = np.array([std for _, std in estimates.values()])
