@@ -24,7 +24,7 @@ from tunnel_sim.files.campaign_io import read_campaign
 
 STATE = ("angle", "rate", "state")
 TIME = ("time", "event")
-#: Kinds that are right, by form of the truth (written before the set that is reported was drawn).
+#: Kinds that are right, by form of the truth; written before the first answer to the set that is reported.
 RIGHT: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("magnetic_detent", "scraping", "stops", "one_stop", "cogging", "centre_damper",
                      "widening_damping", "one_way_damper", "hysteresis_loop"), STATE),

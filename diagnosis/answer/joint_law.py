@@ -12,42 +12,11 @@ from tunnel_sim.engine.joint_patch import JointPatch, Start
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.moment_law import operation_names
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.term_expressions import OF_ANGLE, OF_RATE, TEXTBOOK_POWERS
 from tunnel_sim.vocabulary.record import Array
 
 _FAITHFUL = 0.02  # of a moment's greatest value: what a polynomial may miss of it
 _GRID = 201
-
-#: Terms of the moment law: the coefficient without which there is none, the effect in words, the moment.
-_OF_ANGLE = (
-    (
-        "stiffness_cubic",
-        "cubic stiffness",
-        "-Kr*stiffness_cubic*0.2^3*abs(b/0.2)^stiffness_cubic_exponent*sign(b)",
-    ),
-    (
-        "stiffness_quadratic",
-        "asymmetric stiffness",
-        "-Kr*stiffness_quadratic*0.2^2*abs(b/0.2)^stiffness_quadratic_exponent",
-    ),
-    ("free_play", "free play", "Kr*max(-free_play, min(free_play, b))"),
-    (
-        "gravity_stiffness",
-        "gravity stiffness",
-        "-gravity_stiffness*sin(b-gravity_angle)",
-    ),
-)
-_OF_RATE = (
-    (
-        "quadratic_damping",
-        "quadratic damping",
-        "-quadratic_damping*2^2*abs(r/2)^quadratic_damping_exponent*sign(r)",
-    ),
-)
-_TEXTBOOK = {
-    "stiffness_cubic_exponent": 3.0,
-    "stiffness_quadratic_exponent": 2.0,
-    "quadratic_damping_exponent": 2.0,
-}
 
 
 @dataclass(frozen=True)
@@ -94,8 +63,8 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
     damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
     program = _further(physics.program, data.program)
     for terms, name, grid, forms, native in (
-        (_OF_ANGLE, "b", b, (b**0, b, b**2, b**3), spring),
-        (_OF_RATE, "r", r, (r, np.abs(r) * r, r**3), damping),
+        (OF_ANGLE, "b", b, (b**0, b, b**2, b**3), spring),
+        (OF_RATE, "r", r, (r, np.abs(r) * r, r**3), damping),
     ):
         for coefficient, words, text in terms:
             if physics.parameters.get(coefficient, 0.0) == 0.0:
@@ -139,14 +108,16 @@ def start_of(problem: Problem, own: Array, index: int) -> Start:
 
 
 _NAMES = frozenset(
-    {"b", "r", "Kr", "gravity_angle", *_TEXTBOOK, *(name for name, *_ in (*_OF_ANGLE, *_OF_RATE))}
+    {"b", "r", "Kr", "gravity_angle", *TEXTBOOK_POWERS, *(name for name, *_ in (*OF_ANGLE, *OF_RATE))}
 )
 
 
 def _values(formula: Expression, physics: RunSettings) -> dict[str, float]:
     """Values of the constants in an expression."""
     known = {"Kr": physics.spring_stiffness, **physics.parameters}
-    return {name: known.get(name, 0.0) or _TEXTBOOK.get(name, 0.0) for name in formula.names - {"b", "r"}}
+    return {
+        name: known.get(name, 0.0) or TEXTBOOK_POWERS.get(name, 0.0) for name in formula.names - {"b", "r"}
+    }
 
 
 def _polynomial(forms: tuple[Array, ...], wanted: Array) -> tuple[Array, float]:

@@ -105,7 +105,7 @@ def test_the_page_and_the_figure_show_the_calibration_of_inclusion():
     assert "## Calibration of inclusion" in page
     assert "](inclusion.png)" in page
     assert "5/5, 100.0 %" in page
-    title = calibration_figure(score.inclusion()).axes[0].get_title()
+    title = calibration_figure(score.inclusion()).axes[0].get_title("left")
     assert title == f"smooth calibration error {score.inclusion().error:.3f}"
     assert score.to_json_dict()["inclusion_calibration"]["statements"] == 5
     assert "Calibration of inclusion" not in blind_page.markdown(Score(CASES, (), "", "", {}, False), "set")

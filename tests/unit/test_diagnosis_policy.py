@@ -23,8 +23,10 @@ def test_the_probabilities_are_those_of_the_decision(share, excess):
         TEXTBOOK: weight(share, 0.005, excess, chance),
         EXACT: weight(0.3, 0.001, excess, chance),
         PAIR: weight(0.05, 0.005, excess, chance, effects=2, forms=2),
-        ("unknown",): weight(0.2, 0.005, excess, chance),
     }
-    total = sum(weights.values())
-    expected = {names: 0.97 * value / total + 0.03 / 4 for names, value in weights.items()}
+    of_unknown = [weight(0.2 * 0.7 ** (n - 1), 0.005, excess, chance, effects=n) for n in (1, 1, 2)]
+    odds = sum(value / other for value, other in zip(weights.values(), of_unknown, strict=True))
+    share_known = odds / (1.0 + odds) / sum(weights.values())
+    expected = {names: 0.97 * share_known * value + 0.03 / 4 for names, value in weights.items()}
+    expected[("unknown",)] = 0.97 / (1.0 + odds) + 0.03 / 4
     assert {answer.effects: answer.probability for answer in found} == pytest.approx(expected)
