@@ -105,7 +105,8 @@ def test_recovers_the_truth_from_noise_free_records(name):
 
 
 @each_estimator
-@pytest.mark.parametrize("nominal", [pytest.param(None, marks=pytest.mark.slow), 0.13])
+@pytest.mark.slow
+@pytest.mark.parametrize("nominal", [None, 0.13])
 def test_nominal_inertia_decides_nothing(name, nominal, noisy, of_noisy):
     told = replace(noisy, rig=replace(noisy.rig, yaw_inertia=nominal))
     assert identify(told, name) == of_noisy(name)

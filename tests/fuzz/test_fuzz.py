@@ -19,10 +19,11 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
 SEED = 1
-READER_TRIALS, IDENTIFY_TRIALS = 200, 12
-"""A share that the quick suite can afford; continuous integration runs 2,000 trials beside it."""
+READER_TRIALS, IDENTIFY_TRIALS = 1000, 60
+"""Beside them, continuous integration runs 2,000 trials by the command."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("group", "count"), [("readers", READER_TRIALS), ("identify", IDENTIFY_TRIALS)])
 def test_nothing_but_one_line_errors(group, count):
     outcomes = run_trials(SEED, range(count), shares={group: 1.0})

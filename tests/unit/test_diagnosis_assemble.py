@@ -195,7 +195,12 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+_LONG = ("pair", "hum only", "hum and an effect", "normalised, named")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in _LONG else name for name in CASES]
+)
 def test_every_kind_of_answer_is_a_document_of_the_schema(name):
     make, causes = CASES[name]
     data = make()

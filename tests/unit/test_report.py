@@ -181,7 +181,7 @@ def test_what_could_be_closed_is_on_the_page_only_where_something_remains(page, 
     assert "What could be closed: A moment." in text
     assert "a moment of the angle alone 41.7 ± 2.3 %" in text
     assert "0.0 ± 100.0 %" in text  # worse than nothing, and beyond any meaning
-    assert "What could be closed" not in render_report(document | {"closable": None}, data)
+    assert "What could be closed" not in render_report(document | {"closable": None, "maps": None}, data)
 
 
 def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, document, data):
@@ -237,7 +237,7 @@ def test_figures_take_the_colours_of_the_theme(document, data):
 
 
 def test_date_and_author_are_of_the_page_and_not_of_the_document(document, data, page):
-    text = Page(render_report(document, data, Byline("2026-05-31", "A. Smith <b>"))).text
+    text = Page(render_report(document | {"maps": None}, data, Byline("2026-05-31", "A. Smith <b>"))).text
     assert "2026-05-31 · A. Smith <b>" in text
     assert "A. Smith" not in page
 
