@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from diagnosis.answer.assemble import assemble
 from diagnosis.answer.limit_cycles import limit_cycle_answer, refused_limit_cycles
 from diagnosis.answer.other_modes import second_modes
@@ -111,11 +113,20 @@ def _diagnose(
         return limit_cycle_answer(answer, found.remarks)
     if progress is not None:
         progress("what no effect explains")
-    significant = answer.rest is not None and answer.rest.significant
-    answer = replace(answer, closable=closable(study, significant=significant))
+    answer = _with_closable(answer, study)
     if answer.causes == ("unknown",):
         return replace(answer, cautions=(*answer.cautions, *second_modes(campaign)))
     return answer
+
+
+def _with_closable(answer: Diagnosis, study: Study) -> Diagnosis:
+    """The answer with what could be closed of what remains, or a caution that it was not found."""
+    significant = answer.rest is not None and answer.rest.significant
+    try:
+        return replace(answer, closable=closable(study, significant=significant))
+    except np.linalg.LinAlgError:  # the answer stands without it
+        said = "How much of what remains could be closed was not found: its equations cannot be solved."
+        return replace(answer, cautions=(*answer.cautions, said))
 
 
 def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tuple[str, ...]]:

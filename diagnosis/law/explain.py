@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -35,15 +34,16 @@ def closable(study: Study, *, significant: bool) -> Closable | None:
     Returns:
         In the measured campaign's units; None where nothing remains beyond chance, or a random moment is part of
         the answer, beside which anything would be closed.
+
+    Raises:
+        LinAlgError: when the equations of a kind cannot be solved.
     """
     left = study.chosen
     if not study.causes or not significant or study.random_answer(study.fitted) is not None:
         return None
     if left.excess <= 0.0:
         return None
-    with suppress(np.linalg.LinAlgError):  # the answer stands without it
-        return explain(left, study.similarity, named=study.causes != ("unknown",))
-    return None
+    return explain(left, study.similarity, named=study.causes != ("unknown",))
 
 
 def explain(left: Fit, similarity: Similarity, *, named: bool) -> Closable:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import tomli_w
 
+from diagnosis import _diagnose, diagnose
 from diagnosis.closable import KINDS, Ceiling, closable_table, closable_words
 from diagnosis.investigate import investigate
 from diagnosis.law.ceiling import Evidence
@@ -17,12 +18,14 @@ from diagnosis.law.library import terms
 from diagnosis.law.paths import paths
 from diagnosis.law.ridge import Rows, best_ridge, held_out, normal, total
 from tests.reference.rigs import rig
+from tests.unit.gap_campaigns import campaign
 from tunnel_lab.commands.diagnose import write_proposal
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.make import as_campaign
 from tunnel_reference.outside import OUTSIDE_FORMS
 from tunnel_reference.outside_laws import LAW_FORMS
 from tunnel_reference.severity import read_and_fit, simulate_motions
+from tunnel_sim.effects import effect_class
 from tunnel_sim.effects.effects_file import read_effects
 from tunnel_sim.vocabulary.units import dimension, dimension_text
 
@@ -124,6 +127,16 @@ def test_nothing_is_proposed_without_a_gap(tmp_path):
     assert not (tmp_path / "law.toml").exists()
     assert closable_words({"closable": None}) == ""
     assert closable_table({"closable": None}).rows == ()
+
+
+def test_equations_that_cannot_be_solved_are_said(monkeypatch):
+    def unsolvable(*_, **__):
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr(_diagnose, "closable", unsolvable)
+    found = diagnose(campaign(), kinds=[effect_class("coulomb_friction")])
+    assert found.closable is None
+    assert any("was not found" in caution for caution in found.cautions)
 
 
 def test_the_table_names_every_kind(detent):
