@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -140,7 +140,7 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
 
 
 def _restricted(problem: Problem, ids: list[str]) -> Problem:
-    return Problem(problem.data.subset(tuple(ids)), problem.effects, problem.fixed, problem.free_forms)
+    return replace(problem, data=problem.data.subset(tuple(ids)))
 
 
 def fit_seen(whole: Fit, seen: Sequence[NDArray[np.bool_]]) -> tuple[Point, list[Array]]:

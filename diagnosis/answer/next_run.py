@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from diagnosis.fitting.least_squares import Fit, project_release
-from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.problem import Point
 from diagnosis.fitting.run_data import RunData
 from tunnel_sim.vocabulary.record import Array
 
@@ -138,9 +138,7 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
 
     The response to a periodic effect is of first order in its size, so that it rotates with its phase.
     """
-    problem = Problem(
-        fit.problem.data.with_runs((run,)), fit.problem.effects, fit.problem.fixed, fit.problem.free_forms
-    )
+    problem = dataclasses.replace(fit.problem, data=fit.problem.data.with_runs((run,)))
     turns = np.array([bool(kind.line) for kind in problem.effects if kind.name in problem.phased], bool)
     count = int(turns.sum())
     steps = np.array([1e-4 * angle, 1e-3 * angle])

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.fitting.least_squares import Fit, FitError, fit
+from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.spectra import resonance
 from diagnosis.policy import FORM_SHARE, FREED_FROM, FREED_HYPOTHESES
 from tunnel_sim.effects.parameters import ParameterInfo
 
 _POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
+_SAME_READING = 0.2  # noise standard deviations of a block mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +72,7 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
         tuple(kind for kind in large.effects if kind.name in names),
         tuple((name, value) for name, value in large.fixed if name.split(".")[0] in names),
         tuple(name for name in large.free_forms if name in names),
+        large.rod_followed,
     )
     common = [large.names.index(name) for name in problem.names]
     places = large.own_places(whole.point.release.shape[1])
@@ -119,21 +121,36 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     Returns:
         The same effects with a χ² no larger; as given where the fit cannot go on.
     """
-    better = _free_forms(chosen.fit, tolerance=_POLISH)
+    first = _rod_followed(chosen.fit)
+    better = _free_forms(first, tolerance=_POLISH)
     if better is None:
         with suppress(FitError, np.linalg.LinAlgError):
-            better = fit(chosen.fit.problem, chosen.fit.point, tolerance=_POLISH)
-    if better is None or better.total > chosen.fit.total:
-        better = chosen.fit
-    textbook = _textbook(better, chosen.fit) if better.problem.free_forms else None
+            better = fit(first.problem, first.point, tolerance=_POLISH)
+    if better is None or better.total > first.total:
+        better = first
+    textbook = _textbook(better, first) if better.problem.free_forms else None
     return Hypothesis(chosen.effects, better, textbook)
+
+
+def _rod_followed(fitted: Fit) -> Fit:
+    """The fit with the rod's ringing integrated, where adding it to the slow motion is not exact enough."""
+    problem = dataclasses.replace(fitted.problem, rod_followed=True)
+    differences = [
+        one - other
+        for one, other in zip(scaled_residuals(problem, fitted.point), fitted.residuals, strict=True)
+    ]
+    if max(float(np.max(np.abs(d))) for d in differences) < _SAME_READING:
+        return fitted
+    with suppress(FitError, np.linalg.LinAlgError):
+        return fit(problem, fitted.point)
+    return fitted
 
 
 def _textbook(freed: Fit, first: Fit) -> Fit | None:
     """The same effects in textbook form: the first fit where it had that, else one from the freed values."""
     if not first.problem.free_forms:
         return first
-    problem = Problem(freed.problem.data, freed.problem.effects, freed.problem.fixed)
+    problem = dataclasses.replace(freed.problem, free_forms=())
     values = dict(zip(freed.problem.names, freed.point.common.tolist(), strict=True))
     start = Point(np.array([values[name] for name in problem.names]), freed.point.release)
     with suppress(FitError, np.linalg.LinAlgError):
@@ -147,7 +164,7 @@ def _free_forms(fitted: Fit, tolerance: float = 1e-4) -> Fit | None:
     kinds = [kind for kind in problem.effects if any(info.form for info in kind.parameters())]
     if not kinds:
         return None
-    freed = Problem(problem.data, problem.effects, problem.fixed, tuple(kind.name for kind in kinds))
+    freed = dataclasses.replace(problem, free_forms=tuple(kind.name for kind in kinds))
     values = dict(zip(problem.names, fitted.point.common.tolist(), strict=True))
     defaults = {f"{k.name}.{i.name}": _within(i) for k in kinds for i in k.parameters() if i.form}
     start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)

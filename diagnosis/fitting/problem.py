@@ -18,8 +18,9 @@ from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.motion import Motion
 from tunnel_sim.physics.release import released_by_spring_end
+from tunnel_sim.physics.rod_modes import slow_motion
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.steps import compensated, fit_substeps
+from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps
 from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
@@ -54,12 +55,15 @@ class Problem:
         effects: effect classes whose parameters are free.
         fixed: value of effect parameters that are held, as ``effect.parameter``.
         free_forms: names of the effects whose form parameters are free; the others keep the textbook form.
+        rod_followed: whether a flexible rod is integrated with its ringing; else the ringing is added to the slow
+            motion, which is much faster and exact as far as the rig is linear.
     """
 
     data: Data
     effects: tuple[type[Effect], ...] = ()
     fixed: tuple[tuple[str, float], ...] = ()
     free_forms: tuple[str, ...] = ()
+    rod_followed: bool = False
 
     @cached_property
     def nominal_names(self) -> tuple[str, ...]:
@@ -241,17 +245,29 @@ class _Job:
         self.run = run
         self.zero = problem.zero(point.common, point.release[run_index])
         self.chain = problem.chain(point.common, point.release[run_index], run, effects)
-        physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
-        self.row, self.keep_alive = forward_run(physics)
+        rig = campaign_rig(problem.data)
+        physics = released_by_spring_end(self.chain.physics())
+        if problem.rod_followed:
+            physics = condensed(physics, problem.data)
+        slow = None if problem.rod_followed else slow_motion(physics, rig)
+        self.ringing = None if slow is None else slow.ringing
+        if slow is None:
+            self.row, self.keep_alive = forward_run(physics)
+        else:
+            physics = slow.run
+            self.row, self.keep_alive = slow.forward_run()
         self.blocks = run.reading.size + blocks_beyond(physics, run)
         substeps = fit_substeps(physics, run.interval)
-        law = physics.law(campaign_rig(problem.data))
-        law, step = compensated(law, run.wind_speed, run.interval / substeps)
-        self.row["step"], self.row["steps"] = step, substeps
+        stride = fit_stride(physics, run.interval) if substeps == 1 and physics.rod_twist is None else 1
+        law = physics.law(rig)
+        law, step = compensated(law, run.wind_speed, stride * run.interval / substeps)
+        self.row["step"], self.row["steps"], self.row["stride"] = step / stride, substeps, stride
         self.law = parameter_vector(law)
 
     def reading(self, angle: Array, rate: Array) -> Array:
         """Block means of the reading from angle and rate at the blocks' ends."""
+        if self.ringing is not None:
+            angle, rate = self.ringing.added(angle, rate, self.run.interval)
         if self.chain.skips:
             ends = np.arange(angle.size, dtype=np.float64) * self.run.interval
             return sample_means(self.chain, Motion(ends, angle, rate), self.run, self.zero)

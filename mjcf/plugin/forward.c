@@ -6,6 +6,12 @@ typedef struct {
   double angle, rate, twist, twist_rate;
 } Motion;
 
+// Weights of the lag's advance over the two lengths that a step of the Runge-Kutta method uses.
+typedef struct {
+  double z[2], w[2][4];
+  int last;
+} LagWeights;
+
 // The quantities that are constant during a step: the law, the run, and the step's start for lag and friction.
 typedef struct {
   const vwt_parameters* p;
@@ -16,27 +22,48 @@ typedef struct {
   int slip;            // sign of the slip under Coulomb friction; 0: at rest
   double range;        // of Dahl's friction, rad; 0: none
   double deflection;   // Dahl's state at the start, rad
+  LagWeights* weights;
 } Step;
 
 static double wind_at(const vwt_run* run, double time) {
   return fmax(0, vwt_series(run->wind, (int)run->wind_count, run->wind_interval, time));
 }
 
-static double body_angle(const Motion* y) { return y->angle + y->twist; }
-static double body_rate(const Motion* y) { return y->rate + y->twist_rate; }
+static double body_angle(const vwt_run* run, const Motion* y) { return (1 + run->lead) * y->angle + y->twist; }
+static double body_rate(const vwt_run* run, const Motion* y) { return (1 + run->lead) * y->rate + y->twist_rate; }
+
+static const double* lag_weights(LagWeights* known, double z) {
+  for (int i = 0; i < 2; i++) {
+    if (known->z[i] == z) {
+      return known->w[i];
+    }
+  }
+  known->last = !known->last;
+  known->z[known->last] = z;
+  vwt_lag_weights(z, known->w[known->last]);
+  return known->w[known->last];
+}
 
 static double lagged_at(const Step* s, double time, const Motion* y) {
   const double lag = vwt_lag_time(s->p, wind_at(s->run, 0.5 * (s->start + time)));
-  return vwt_lag_advance(lag, s->lagged, time - s->start, body_angle(&s->from), body_rate(&s->from),
-                         body_angle(y), body_rate(y));
+  const double duration = time - s->start;
+  if (lag == 0) {
+    return body_angle(s->run, y);
+  }
+  if (!(duration > 0)) {
+    return s->lagged;
+  }
+  return vwt_lag_weighted(lag_weights(s->weights, duration / fabs(lag)), s->lagged, duration,
+                          body_angle(s->run, &s->from), body_rate(s->run, &s->from), body_angle(s->run, y),
+                          body_rate(s->run, y));
 }
 
 static double air_at(const Step* s, double time, const Motion* y) {
   const vwt_air_state air = {
       .time = time,
       .wind_speed = wind_at(s->run, time),
-      .angle = body_angle(y),
-      .rate = body_rate(y),
+      .angle = body_angle(s->run, y),
+      .rate = body_rate(s->run, y),
       .lagged = s->p->aero_lag != 0 ? lagged_at(s, time, y) : 0,
       .forcing = s->run->forcing_count > 0 ? vwt_series(s->run->forcing, (int)s->run->forcing_count,
                                                         s->run->forcing_interval, time)
@@ -63,7 +90,7 @@ static double other_moment(const Step* s, double air, double time, const Motion*
   if (s->run->twist_stiffness > 0) {
     return mechanism + s->run->twist_stiffness * y->twist + s->run->twist_damping * y->twist_rate;
   }
-  return mechanism + air;
+  return mechanism + (1 + s->run->lead) * air - s->run->rod_stiffness * y->angle;
 }
 
 static double deflection_at(const Step* s, double time, const Motion* y) {
@@ -181,8 +208,19 @@ static void step_with_friction(Step* s, double h) {
   }
 }
 
+// The motion at a share u of a step of length h, cubic (Hermite).
+static void between(const Motion* from, const Motion* to, double h, double u, double* angle, double* rate) {
+  const double change = to->angle - from->angle;
+  const double c1 = h * from->rate;
+  const double c2 = 3 * change - h * (2 * from->rate + to->rate);
+  const double c3 = h * (from->rate + to->rate) - 2 * change;
+  *angle = from->angle + u * (c1 + u * (c2 + u * c3));
+  *rate = (c1 + u * (2 * c2 + u * 3 * c3)) / h;
+}
+
 static int integrate(const vwt_parameters* p, const vwt_run* run, double* angle, double* rate) {
-  Step s = {p, run, 0, {run->angle, run->rate, run->twist, run->twist_rate}, run->lagged, 0, 0, 0};
+  LagWeights weights = {{0}, {{0}}, 0};
+  Step s = {p, run, 0, {run->angle, run->rate, run->twist, run->twist_rate}, run->lagged, 0, 0, 0, &weights};
   const int samples = (int)run->samples, steps = (int)run->steps;
   const int coulomb = p->friction_moment > 0 && !(p->presliding > 0);
   if (p->presliding > 0) {
@@ -190,17 +228,23 @@ static int integrate(const vwt_parameters* p, const vwt_run* run, double* angle,
     s.range = vwt_presliding_range(p, share * p->yaw_inertia, run->step);
   }
   s.slip = run->rate > 0 ? 1 : run->rate < 0 ? -1 : 0;
-  for (int i = 0; i < samples; i++) {
-    angle[i] = s.from.angle;
-    rate[i] = s.from.rate;
+  const int stride = run->stride > 1 && steps == 1 ? (int)run->stride : 1;
+  const double h = stride * run->step;
+  for (int i = 0; i < samples; i += stride) {
+    const Motion before = s.from;
+    angle[i] = before.angle;
+    rate[i] = before.rate;
     for (int k = 0; k < steps; k++) {
       if (coulomb) {
-        step_with_friction(&s, run->step);
+        step_with_friction(&s, h);
       } else {
-        const Motion y = runge_kutta(&s, run->step);
-        move(&s, run->step, &y);
+        const Motion y = runge_kutta(&s, h);
+        move(&s, h, &y);
       }
-      s.start = (i * (double)steps + k + 1) * run->step;  // no drift of the clock
+      s.start = (i * (double)steps + stride * (k + 1)) * run->step;  // no drift of the clock
+    }
+    for (int k = 1; k < stride && i + k < samples; k++) {
+      between(&before, &s.from, h, k / (double)stride, &angle[i + k], &rate[i + k]);
     }
     if (!(fabs(s.from.angle) < 1e6)) {
       return 1;

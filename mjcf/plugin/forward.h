@@ -33,8 +33,11 @@
   NUMBER(twist_stiffness)  /* N m/rad; 0: the rod is rigid */                       \
   NUMBER(twist_damping)    /* N m s/rad */                                          \
   NUMBER(inertia_share)    /* of Izz at the rod's upper end */                      \
+  NUMBER(lead)             /* rigid rod: of the body before the upper end, a share */ \
+  NUMBER(rod_stiffness)    /* rigid rod: added to the spring's, N m/rad */          \
   NUMBER(step)             /* s */                                                  \
   NUMBER(steps)            /* between samples */                                    \
+  NUMBER(stride)           /* samples that one step covers, where steps is 1; 0: one */ \
   NUMBER(samples)          /* the first at time 0 */
 
 typedef struct {

@@ -128,7 +128,7 @@ double vwt_presliding_advance(double range, double deflection, double duration, 
 // Moments of the lag's kernel, w[n] = integral of z exp(-z (1 - u)) u^n over u from 0 to 1, n = 0..3.
 // Integration by parts gives w[n] = 1 - n w[n-1]/z. The recursion runs upwards for large z, and downwards from a
 // series for small z, so that no digits are lost for any step.
-static void kernel_moments(double z, double w[4]) {
+void vwt_lag_weights(double z, double w[4]) {
   if (z > 1) {
     w[0] = -expm1(-z);
     for (int n = 1; n < 4; n++) {
@@ -155,13 +155,18 @@ double vwt_lag_advance(double lag_time, double lagged, double duration, double a
   if (!(duration > 0)) {
     return lagged;
   }
+  double w[4];
+  vwt_lag_weights(duration / fabs(lag_time), w);
+  return vwt_lag_weighted(w, lagged, duration, angle0, rate0, angle1, rate1);
+}
+
+double vwt_lag_weighted(const double w[4], double lagged, double duration, double angle0, double rate0,
+                        double angle1, double rate1) {
   // the path as a function of u = time/duration: angle0 + c1 u + c2 u^2 + c3 u^3 (Hermite)
   const double h = duration, change = angle1 - angle0;
   const double c1 = h * rate0;
   const double c2 = 3 * change - h * (2 * rate0 + rate1);
   const double c3 = h * (rate0 + rate1) - 2 * change;
-  double w[4];
-  kernel_moments(h / fabs(lag_time), w);
   return lagged + w[0] * (angle0 - lagged) + w[1] * c1 + w[2] * c2 + w[3] * c3;
 }
 

@@ -109,6 +109,11 @@ double vwt_presliding_advance(double range, double deflection, double duration, 
 double vwt_lag_advance(double lag_time, double lagged, double duration, double angle0, double rate0,
                        double angle1, double rate1);
 
+// The same in two parts, for steps of equal length: weights from duration/|lag_time| > 0, and the state with them.
+void vwt_lag_weights(double z, double w[4]);
+double vwt_lag_weighted(const double w[4], double lagged, double duration, double angle0, double rate0,
+                        double angle1, double rate1);
+
 // Linear interpolation in `count` samples at `interval` s from time 0; constant beyond the ends.
 double vwt_series(const double* values, int count, double interval, double time);
 

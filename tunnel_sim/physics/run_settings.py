@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from math import inf, isfinite, sqrt
 from types import MappingProxyType
 
@@ -26,6 +27,12 @@ def _check(name: str, value: float, *, above: float = -inf, least: float = -inf)
         raise TunnelError(
             f"{name} = {value!r} must be a finite number{bound}", remedy="correct the run's settings"
         )
+
+
+@cache
+def _further() -> frozenset[str]:
+    """Names of the law's parameters that have no field of their own."""
+    return frozenset(parameter_names()) - _OWNED
 
 
 @dataclass(frozen=True)
@@ -162,12 +169,11 @@ class RunSettings:
         wind = self.series.get("wind_speed")
         if wind is not None:
             _check("least wind_speed of the series", min(wind.values), least=0.0)
-        known = [name for name in parameter_names() if name not in _OWNED]
-        for name in self.parameters:
-            if name not in known:
-                raise TunnelError(
-                    f"unknown parameter {name!r} of the moment law", remedy=did_you_mean(name, known)
-                )
+        if not self.parameters.keys() <= _further():
+            name = next(name for name in self.parameters if name not in _further())
+            raise TunnelError(
+                f"unknown parameter {name!r} of the moment law", remedy=did_you_mean(name, sorted(_further()))
+            )
 
     def with_moment(self, program: tuple[float, ...]) -> RunSettings:
         """A copy with a moment on the rod's upper end added.

@@ -44,6 +44,9 @@ REPORT_STEP = 2e-3
 
 _FIT_STEP = 4.001e-3  # s: no shorter than a block mean, whatever its last digit
 _FIT_BODY_TURN = 0.11  # rad: once `compensated`, some 1e-6 rad over 10 s
+_FIT_MOST_STRIDE = 3  # block means per step
+#: Parameters of moments that a long step of a fit does not follow: kinks, and a spring that is not linear.
+_ROUGH = ("friction_moment", "free_play", "gravity_stiffness")
 _FIT_KINKED_TURN = 0.055  # rad: where the spring has a kink, which leaves an error of second order
 _FIT_SHORTEST = 2e-4  # s, however stiff the rod
 _FIT_MOST_TURN = pi  # rad from one block mean to the next: no record shows a faster oscillation
@@ -83,6 +86,22 @@ def fit_substeps(run: RunSettings, interval: float) -> int:
         rod = run.rod_twist.free_frequency(run.yaw_inertia)
         longest = min(longest, max(ROD_TURN / rod, _FIT_SHORTEST))
     return ceil(interval / longest)
+
+
+def fit_stride(run: RunSettings, interval: float) -> int:
+    """How many block means one step of a fit covers; the motion between its ends is cubic.
+
+    Args:
+        run: the run's physics, its rod rigid.
+        interval: between block means, s.
+
+    Returns:
+        1 where a moment has a kink, is sampled, or is not mostly linear.
+    """
+    if run.series or run.program or any(run.parameters.get(name) for name in _ROUGH):
+        return 1
+    body = sqrt(max(_spring(run), 1e-9) / run.yaw_inertia)
+    return max(1, min(_FIT_MOST_STRIDE, int(_FIT_BODY_TURN / (body * interval))))
 
 
 def compensated(law: Mapping[str, float], wind_speed: float, step: float) -> tuple[dict[str, float], float]:

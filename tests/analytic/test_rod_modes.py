@@ -1,0 +1,119 @@
+"""The slow motion with the ringing added, against the integration of both inertias in short steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from law_cases import RIG
+
+from tunnel_sim.physics.forward import forward_run, integrate
+from tunnel_sim.physics.moment_law import parameter_vector
+from tunnel_sim.physics.release import spring_end_angle
+from tunnel_sim.physics.rod_modes import slow_motion
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings
+from tunnel_sim.physics.steps import compensated, fit_stride
+from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.record import Array
+
+INTERVAL = 4e-3
+SAMPLES = 2501
+
+
+def run(compliance=1e-3, share=0.3, speed=25.0, spring=44.84, **terms: float) -> RunSettings:
+    rod = RodTwist(compliance, share)
+    body = 0.35 * (1.0 + spring * compliance)
+    return RunSettings(
+        spring, AeroDerivatives(0.49, -0.11), 0.1014, 0.012, speed, 1.2, body, parameters=terms, rod_twist=rod
+    )
+
+
+def followed(settings: RunSettings) -> Array:
+    """The upper end's angle in steps that follow the rod."""
+    row, keep_alive = forward_run(settings)
+    row["steps"] = steps = 160
+    row["step"] = INTERVAL / steps
+    angle, _, status = integrate(parameter_vector(settings.law(RIG))[None], row, SAMPLES)
+    del keep_alive
+    assert status == 0
+    return angle[0]
+
+
+def separated(settings: RunSettings) -> Array:
+    """The upper end's angle as slow motion and ringing."""
+    slow = slow_motion(settings, RIG)
+    assert slow is not None
+    row, keep_alive = slow.forward_run()
+    row["steps"], row["step"] = 4, INTERVAL / 4
+    angle, rate, _ = integrate(parameter_vector(slow.run.law(RIG))[None], row, SAMPLES)
+    del keep_alive
+    return slow.ringing.added(angle[0], rate[0], INTERVAL)[0]
+
+
+@pytest.mark.parametrize("speed", [0.0, 25.0])
+@pytest.mark.parametrize("share", [0.05, 0.3, 0.8])
+@pytest.mark.parametrize("compliance", [1e-4, 1e-3, 5e-3])
+def test_a_linear_rig_is_separated_exactly(compliance, share, speed):
+    settings = run(compliance, share, speed)
+    assert np.max(np.abs(separated(settings) - followed(settings))) < 5e-7
+    rigid = replace(settings, rod_twist=None, release_angle=spring_end_angle(settings))
+    assert np.max(np.abs(followed(rigid) - followed(settings))) > 1e-3  # the rod does matter
+
+
+@pytest.mark.parametrize(
+    ("terms", "tolerance"),
+    [
+        ({"gravity_stiffness": 2.0}, 2e-5),
+        ({"moment_cubic": 2.0}, 2e-4),
+        ({"aero_lag": 1.0}, 2e-4),
+        ({"friction_moment": 0.02}, 2e-4),
+        ({"stiffness_cubic": -0.1}, 4e-4),
+    ],
+)
+def test_nonlinear_terms_err_far_less_than_the_rod_does(terms, tolerance):
+    settings = run(**terms)
+    error = np.max(np.abs(separated(settings) - followed(settings)))
+    rigid = replace(settings, rod_twist=None, release_angle=spring_end_angle(settings))
+    assert error < tolerance < 0.02 * np.max(np.abs(followed(rigid) - followed(settings)))
+
+
+def test_a_rod_almost_rigid_has_a_smooth_first_order_effect():
+    """Fits take differences of predictions at tiny compliances."""
+    rigid = separated(run(1e-14, speed=25.0))
+    first, second = (
+        (separated(run(c, speed=25.0)) - rigid)[50:] for c in (5e-9, 1e-8)
+    )  # the ringing is over
+    np.testing.assert_allclose(second, 2.0 * first, rtol=1e-5, atol=5e-11)
+    assert np.max(np.abs(second)) > 1e-8
+
+
+def test_a_rod_that_swings_almost_like_the_body_is_not_separated():
+    assert slow_motion(run(0.05, 0.5), RIG) is None
+    assert slow_motion(replace(run(), rod_twist=None), RIG) is None
+
+
+@pytest.mark.parametrize(
+    "terms", [{}, {"stiffness_cubic": -0.2}, {"quadratic_damping": 0.02}, {"aero_lag": 1.0}]
+)
+def test_a_step_over_several_blocks_moves_as_short_steps_do(terms):
+    settings = replace(run(spring=15.0, **terms), rod_twist=None)
+    stride = fit_stride(settings, INTERVAL)
+    assert stride == 2
+    law, step = compensated(settings.law(RIG), settings.wind_speed, stride * INTERVAL)
+    row, keep_alive = forward_run(settings)
+    row["stride"], row["step"] = stride, step / stride
+    for samples in (SAMPLES, SAMPLES - 1):  # the last step may cover more than is asked for
+        angle, rate, status = integrate(parameter_vector(law)[None], row, samples)
+        assert status == 0
+        assert np.max(np.abs(angle[0] - followed(settings)[:samples])) < 5e-6
+        slope = np.gradient(angle[0], INTERVAL, edge_order=2)
+        assert np.max(np.abs(rate[0] - slope)) < 0.02
+    del keep_alive
+
+
+@pytest.mark.parametrize(
+    "rough", [{"friction_moment": 0.01}, {"free_play": 0.01}, {"gravity_stiffness": 1.0}]
+)
+def test_kinks_and_curved_springs_keep_short_steps(rough):
+    assert fit_stride(replace(run(spring=15.0, **rough), rod_twist=None), INTERVAL) == 1
