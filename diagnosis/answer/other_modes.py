@@ -13,6 +13,7 @@ from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
 _MOST = 1024  # thinned readings used: fifty cycles
 _LEAST = 64
+_PARTS = (1.0, 0.5, 0.25)  # of these, from the start: a mode that decays sooner is lost in the whole
 _ROWS = 1.0 / 3.0  # of a Hankel matrix over the readings, as in the matrix pencil
 
 
@@ -40,8 +41,9 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
         campaign: the runs.
 
     Returns:
-        A sentence for each run in which two decaying oscillations are farther apart than the sum of their
-        half-power widths and halve what one leaves.
+        A sentence for each run in which two decaying oscillations halve what one leaves and are farther apart than
+        the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first half or
+        its first quarter.
     """
     return tuple(words for run in campaign.runs if (words := _second_mode(run.id, run.record)))
 
@@ -79,16 +81,23 @@ def _second_mode(name: str, record: Record) -> str:
     if frequency is None:
         return ""
     reading = thinned_reading(evenly_spaced(record), frequency)
-    values = reading.yaw[:_MOST]
-    if values.size < _LEAST:
-        return ""
     interval = float(reading.time[-1]) / (reading.time.size - 1)
+    for part in _PARTS:
+        values = reading.yaw[: int(part * min(reading.yaw.size, _MOST))]
+        if values.size >= _LEAST and (words := _two_modes(name, values, interval)):
+            return words
+    return ""
+
+
+def _two_modes(name: str, values: Array, interval: float) -> str:
     one, two = fit_modes(values, interval, 1), fit_modes(values, interval, 2)
     if one is None or two is None or two.left > SECOND_MODE_LEFT * one.left or two.rate.min() < 0.0:
         return ""
-    if np.ptp(two.frequency) < float(two.rate.sum()) / np.pi:
-        return ""
     order = np.argsort(np.abs(two.frequency - one.frequency[0]))
+    resolution = float(two.rate.sum()) / np.pi
+    turns = max(1, round(two.frequency[order[1]] / two.frequency[order[0]]))
+    if abs(two.frequency[order[1]] - turns * two.frequency[order[0]]) < resolution:
+        return ""  # not resolved, or a harmonic of the motion
     main, second = (
         f"{two.amplitude[i]:.2g} rad at {two.frequency[i]:.3g} Hz, which decays at {two.rate[i]:.2g} 1/s"
         for i in order
