@@ -13,6 +13,7 @@ from diagnosis.answer.assemble import assemble
 from diagnosis.answer.limit_cycles import limit_cycle_answer, refused_limit_cycles
 from diagnosis.answer.other_modes import second_modes
 from diagnosis.answer.own_units import in_own_units
+from diagnosis.attribution.decide import UNKNOWN
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.limit_cycles import diagnosable
 from diagnosis.detection.noise_remarks import noise_remarks
@@ -114,7 +115,7 @@ def _diagnose(
     if progress is not None:
         progress("what no effect explains")
     answer = _with_closable(answer, study)
-    if answer.causes == ("unknown",):
+    if answer.causes == UNKNOWN:
         return replace(answer, cautions=(*answer.cautions, *second_modes(campaign)))
     return answer
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.attribution.decide import Weighed, weigh
+from diagnosis.attribution.decide import UNKNOWN, Weighed, weigh
 from diagnosis.attribution.grow import InStretches, grow, grow_in_stretches, prune
 from diagnosis.attribution.hypothesis import Hypothesis, polish
 from diagnosis.attribution.outsiders import weigh_outsiders
@@ -112,14 +112,14 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     found = replace(found, random=tuple(random), outsider=weigh_outsiders(found.nominal))
     found = _pruned(found, found.nominal, clock)
     weighed = _weighed(found, found.nominal)
-    if weighed[0].effects == ("unknown",) and _read_off_explains(found):
+    if weighed[0].effects == UNKNOWN and _read_off_explains(found):
         weighed = []  # what is left belongs to the cause read off the records
-    elif weighed[0].effects != ("unknown",):
+    elif weighed[0].effects != UNKNOWN:
         with clock.step("polishing"):
             found = replace(found, hypotheses=_polished(found.hypotheses, weighed[0], random))
     if weighed and _noise_explains(found):
-        named = [replace(w, probability=0.0) for w in weighed if w.effects != ("unknown",)]
-        weighed = [Weighed(("unknown",), 1.0, 1.0), *named]
+        named = [replace(w, probability=0.0) for w in weighed if w.effects != UNKNOWN]
+        weighed = [Weighed(UNKNOWN, 1.0, 1.0), *named]
     return replace(found, weighed=tuple(weighed))
 
 
@@ -142,7 +142,7 @@ def _with_whole_runs(found: Study, grown: InStretches) -> Study:
         polished = _polished(found.hypotheses, weighed[0], ())
         whole = [grown.whole(h, data) if answer.issuperset(h.names) else h for h in polished]
         kept = replace(found, hypotheses=tuple(h for h in whole if h is not None), weighed=tuple(weighed))
-        if weighed[0].effects == ("unknown",) or kept.hypothesis(weighed[0].effects) is not None:
+        if weighed[0].effects == UNKNOWN or kept.hypothesis(weighed[0].effects) is not None:
             return kept
         left = tuple(h for h in found.hypotheses if h.names != weighed[0].effects)
         found = replace(found, hypotheses=left)

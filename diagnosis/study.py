@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.decide import UNKNOWN, Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.outsiders import Outsider
 from diagnosis.attribution.random_moments import RandomAnswer
@@ -76,9 +76,14 @@ class Study:
     @property
     def causes(self) -> tuple[str, ...]:
         """All causes, sorted; ``unknown`` alone where nothing in the vocabulary explains the gap."""
-        if self.fitted == ("unknown",):
-            return ("unknown",)
+        if self.fitted == UNKNOWN:
+            return UNKNOWN
         return tuple(sorted({*self.read_off, *self.fitted}))
+
+    @property
+    def named(self) -> bool:
+        """Whether there is a gap and a cause of it is named."""
+        return self.causes not in ((), UNKNOWN)
 
     @property
     def chosen(self) -> Fit:

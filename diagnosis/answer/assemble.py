@@ -24,7 +24,7 @@ from diagnosis.answer.rest import rest
 from diagnosis.answer.small_swings import coefficient_names
 from diagnosis.answer.verdict import blind_spots, cnr_note, verdict
 from diagnosis.answer.waterfall import waterfall
-from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.decide import UNKNOWN, Weighed
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.localisation.maps import Maps
 from diagnosis.patch import PatchedModel
@@ -77,7 +77,7 @@ def assemble(
     begun = time.perf_counter()
     steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
     gap = on_stretches(gap, steps)
-    if patched is not None and study.causes not in ((), ("unknown",)):
+    if patched is not None and study.named:
         on = f"{patched.closure.on}, simulated with the patched model"
         gap = replace(gap, closed=patched.closure.native_closed, closed_on=on)
     seconds["waterfall"] = time.perf_counter() - begun
@@ -120,7 +120,7 @@ def assemble(
                 study.noise,
                 gap.runs,
                 shown.confirmation,
-                named=bool(study.causes) and study.causes != ("unknown",),
+                named=study.named,
             ),
             *((_LATE_START,) if study.started_late else ()),
             *_outside(study),
@@ -146,7 +146,7 @@ def _in_own_units(
 def _outside(study: Study) -> tuple[str, ...]:
     """The cause outside the vocabulary that would explain a gap of unknown cause."""
     outsider = study.outsider
-    if study.causes != ("unknown",) or outsider is None or outsider.share >= UNKNOWN_SHARE:
+    if study.causes != UNKNOWN or outsider is None or outsider.share >= UNKNOWN_SHARE:
         return ()
     closed = 100.0 * (1.0 - outsider.share)
     words = outsider.words[0].upper() + outsider.words[1:]
@@ -173,9 +173,9 @@ def _rivals(study: Study) -> list[Weighed]:
         answer
         for answer in study.weighed[1:]
         if answer.probability >= RIVAL_PROBABILITY
-        and answer.effects != ("unknown",)
+        and answer.effects != UNKNOWN
         and not chosen <= set(answer.effects)
-        and study.causes != ("unknown",)
+        and study.named
     ]
 
 

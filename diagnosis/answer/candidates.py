@@ -11,7 +11,7 @@ from diagnosis.answer.determined import meant_parameter
 from diagnosis.answer.own_units import own_parameters
 from diagnosis.answer.reference_sizes import parameter_unit
 from diagnosis.answer.reported import Base
-from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.decide import UNKNOWN, Weighed
 from diagnosis.attribution.process_noise import LONGEST_BANDWIDTH
 from diagnosis.attribution.random_moments import RandomAnswer
 from diagnosis.policy import EVEN_SHARE, GAP_FALSE_ALARM_RATE
@@ -39,7 +39,7 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         )
     before = max(study.nominal.excess, 1e-9)
     for answer in study.weighed:
-        if answer.effects == ("unknown",):
+        if answer.effects == UNKNOWN:
             found.append(Candidate("unknown", answer.probability, before / _block(study), 0.0))
             continue
         name = " + ".join(sorted({*study.read_off, *answer.effects}))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from diagnosis.attribution.decide import UNKNOWN
 from diagnosis.result import Candidate, Coefficients, Diagnosis, Where
 from identification.examination.self_excited import in_limit_cycle
 from identification.remark import Remark
@@ -26,7 +27,7 @@ def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnos
     excess = nominal.gap.excess_before
     return replace(
         nominal,
-        causes=("unknown",),
+        causes=UNKNOWN,
         verdict=f"No run is a free decay, so no cause is named. {_recognised(remarks)}.",
         where=Where(None, None, tuple(run.id for run in nominal.gap.runs)),
         candidates=(Candidate("unknown", 1.0, excess, 0.0),),

@@ -148,14 +148,13 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     weight = np.array(sizes) / np.sum(sizes)
     total_before = float(weight @ [run.before for run in runs])
     total_after = float(weight @ [run.after for run in runs])
-    named = bool(study.causes) and study.causes != ("unknown",)
     return GapSummary(
         detected=bool(study.causes),
         excess_before=total_before,
-        excess_after=total_after if named else total_before,
-        closed=_closed(sum(before_out), sum(after_out), total_before, total_after) if named else 0.0,
+        excess_after=total_after if study.named else total_before,
+        closed=_closed(sum(before_out), sum(after_out), total_before, total_after) if study.named else 0.0,
         closed_on=HELD_OUT if before_out else FITTED,
-        runs=tuple(runs) if named else tuple(replace(run, after=run.before) for run in runs),
+        runs=tuple(runs) if study.named else tuple(replace(run, after=run.before) for run in runs),
         false_alarm_rate=GAP_FALSE_ALARM_RATE,
         p_value=0.0 if study.read_off else study.test.p_value,
         tests=study.test.tests,

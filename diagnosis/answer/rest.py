@@ -77,23 +77,22 @@ def _words(
     """What remains, in a sentence or two."""
     if not study.causes:
         return "No gap: nothing remains beyond the noise."
-    named = study.causes != ("unknown",)
-    left = f"what remains ({_noise_powers(excess)})" if named else "it"
+    left = f"what remains ({_noise_powers(excess)})" if study.named else "it"
     if not significant:
         return f"Explained; {left} is within the noise."
     if material:
         moved = _each(material, lambda name: _sized(moves[name].value, stated[name]))
-        start = f"Not all is explained: {left}" if named else "It"
+        start = f"Not all is explained: {left}" if study.named else "It"
         return f"{start} could move {moved}. Do not trust the coefficients beyond the intervals given."
     known = [name for name, move in moves.items() if move.std is not None]
     if not known:
-        start = f"Explained; {left}" if named else "It"
+        start = f"Explained; {left}" if study.named else "It"
         return f"{start} concerns no coefficient that these runs determine."
     bounds = _each(
         known,
         lambda name: f"less than {_sized(max(moves[name].value, moves[name].std or 0.0), stated[name])}",
     )
-    return f"Explained; {left} moves {bounds}." if named else f"It hardly matters: it moves {bounds}."
+    return f"Explained; {left} moves {bounds}." if study.named else f"It hardly matters: it moves {bounds}."
 
 
 def _each(names: list[str], size: Callable[[str], str]) -> str:

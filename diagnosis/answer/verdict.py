@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from diagnosis.attribution.decide import UNKNOWN
 from diagnosis.names import plain
 from identification.printing.numbers import significant
 from tunnel_sim.effects import effect_class
@@ -46,7 +47,7 @@ def verdict(
             f"No gap: the nominal model explains the runs down to their noise "
             f"(mean squared residual over noise variance, minus one: {before:+.3f})."
         )
-    if tuple(causes) == ("unknown",):
+    if tuple(causes) == UNKNOWN:
         return (
             f"There is a gap ({_times(before)} the noise power), and no effect of the vocabulary explains it. "
             f"{rest}"

@@ -54,9 +54,8 @@ class _Models:
 
     def __init__(self, study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> None:
         self._study, self._base, self._known = study, base, dict(known)
-        named = study.causes != ("unknown",)
         powers = {HUM.name: base.hum, COARSE_STEP.name: base.extra}
-        self.read_off = {name: powers[name] for name in study.read_off if named}  # and what each adds
+        self.read_off = {name: powers[name] for name in study.read_off if study.named}  # and what each adds
         self._ratio = 1.0 + base.extra  # of the estimated noise to the base
         self._always = base.hum + base.extra - sum(self.read_off.values())
         self._fit = Subsets(study)

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-UNKNOWN = ("unknown",)
+from diagnosis.attribution.decide import UNKNOWN
+
 _KINDS = ("none", "single", "pair", "three", "four")
 NAMES = ("cn_beta", "cn_r")
 MODERATE = (1.0, 10.0)
@@ -128,7 +129,7 @@ class Case:
         """``none``, ``single``, ``pair``, ``three``, ``four``, ``outside`` or ``withheld``."""
         if self.withheld:
             return "withheld"
-        if self.truth == ("unknown",):
+        if self.truth == UNKNOWN:
             return "outside"
         return _KINDS[min(len(self.truth), 4)]
 
@@ -144,7 +145,7 @@ class Case:
     @property
     def named_rightly(self) -> bool:
         """Whether effects act, and exactly these are named."""
-        return self.right and self.truth not in ((), ("unknown",))
+        return self.right and self.truth not in ((), UNKNOWN)
 
     @property
     def probability(self) -> float | None:
@@ -204,7 +205,7 @@ def case(
     withheld = bool(set(effects) & set(excluded))
     return Case(
         name=name,
-        truth=("unknown",) if withheld else effects,
+        truth=UNKNOWN if withheld else effects,
         withheld=withheld,
         severity=stated.severity,
         coefficients={key: float(truth[key]) for key in NAMES if key in truth},

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from diagnosis.blind.cases import UNKNOWN, Case
+from diagnosis.attribution.decide import UNKNOWN
+from diagnosis.blind.cases import Case
 from diagnosis.blind.statistics import Share, share_of
 
 MIDDLE = (1.0 / 3.0, 3.0)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from diagnosis.attribution.decide import UNKNOWN
 from diagnosis.blind.answer import answers_folder
 from diagnosis.blind.cases import NAMES, Case, case, label
 from diagnosis.blind.files import (
@@ -142,7 +143,7 @@ class Score:
         groups: dict[str, Callable[[Case], bool]] = {
             "named rightly": lambda c: c.named_rightly,
             "none, rightly": lambda c: c.kind == "none" and c.right,
-            "unknown, rightly": lambda c: c.right and c.truth == ("unknown",),
+            "unknown, rightly": lambda c: c.right and c.truth == UNKNOWN,
             "wrong": lambda c: not c.right,
             "all": lambda _: True,
         }

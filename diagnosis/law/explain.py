@@ -43,7 +43,7 @@ def closable(study: Study, *, significant: bool) -> Closable | None:
         return None
     if left.excess <= 0.0:
         return None
-    return explain(left, study.similarity, named=study.causes != ("unknown",))
+    return explain(left, study.similarity, named=study.named)
 
 
 def explain(left: Fit, similarity: Similarity, *, named: bool) -> Closable:
