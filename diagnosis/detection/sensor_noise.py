@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -300,11 +300,12 @@ def noise_trend(campaign: Campaign) -> NoiseTrend:
     return NoiseTrend(amplitude, rate, spread, step=reading_step(campaign))
 
 
-def trend_statistics(readings: Sequence[tuple[Array, float]]) -> Array | None:
+def trend_statistics(readings: Iterable[tuple[Array, float]]) -> Array | None:
     """The statistics of `NoiseTrend`.
 
     Args:
-        readings: by run, readings of any number of repetitions, shape (repetitions, n), rad, and their rate, Hz.
+        readings: by run, readings of any number of repetitions, shape (repetitions, n), rad, and their rate, Hz;
+            taken one after another, so that a generator holds those of one run at a time.
 
     Returns:
         Shape (repetitions, 3): ``amplitude_z``, ``rate_z`` and ``spread``; None where none is fast enough.
