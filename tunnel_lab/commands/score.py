@@ -245,8 +245,11 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
     found = work.biases(rows)
     written = []
     if out is not None:
-        written.append(write_whole(out / "breakdown.parquet", parquet(work.breakdown_frame(found))))
-        written += save_both(view.breakdown_figure(found), out / "breakdown.png")
+        frame = work.breakdown_frame(found)
+        written.append(write_whole(out / "breakdown.parquet", parquet(frame)))
+        for quantity in view.SHOWN:
+            path = out / f"breakdown-{quantity.replace('_', '-')}.png"
+            written += save_both(view.breakdown_figure(frame, quantity), path)
         shutil.rmtree(out / "parts", ignore_errors=True)
     show_tables(*(one for quantity in view.SHOWN for one in view.breakdown_tables(found, quantity)))
     say(view.ABOUT)

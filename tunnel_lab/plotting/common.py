@@ -8,6 +8,8 @@ from importlib import resources
 from math import log10
 from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
 
+import numpy as np
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -74,7 +76,9 @@ def log_axis(axes: Axes, which: Literal["x", "y"]) -> None:
     else:
         steps = (1.0, 2.0, 5.0) if decades > 1.0 else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
         axis.set_major_locator(LogLocator(10.0, steps))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        plain = min(limits) >= 1e-4 and max(limits) < 1e5
+        powers = LogFormatterMathtext(10.0, minor_thresholds=(np.inf, np.inf))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}") if plain else powers)
 
 
 def figure_text(text: str) -> str:
