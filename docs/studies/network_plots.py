@@ -9,6 +9,7 @@ import numpy as np
 
 from docs.studies.network_study import HeldOutErrors, regenerated
 from identification.estimate import Estimate, WindowEstimate
+from tunnel_lab.plotting.common import WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.plotting.plots import BLUE, COLOURS, MARKERS, VERMILION
 from tunnel_sim.vocabulary.campaign import Run
 
@@ -18,62 +19,63 @@ if TYPE_CHECKING:
     from identification.datasets import WindowRow
 
 
+@styled
 def error_figure(errors: HeldOutErrors) -> Figure:
     """Fig. 3: the error of ζ against ζ and of ωn against ωn.
 
     Args:
         errors: in %, on responses that were not trained on.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    left.semilogx(errors.zeta, errors.zeta_percent, ".", ms=2, color=BLUE)
-    left.set_xlabel("damping ratio ζ")
-    left.set_ylabel("error of ζ [%]")
-    right.semilogx(errors.omega_n, errors.omega_percent, ".", ms=2, color=VERMILION)
-    right.set_xlabel("natural frequency ωn [rad/s]")
-    right.set_ylabel("error of ωn [%]")
-    for axis in (left, right):
-        axis.grid(alpha=0.3)
-    return figure
+    fig = figure(WIDTH, 2.9)
+    left, right = fig.subplots(1, 2)
+    left.plot(errors.zeta, errors.zeta_percent, ".", ms=1.5, color=BLUE)
+    left.set(xlabel="damping ratio ζ [1]", ylabel="error of ζ [%]")
+    right.plot(errors.omega_n, errors.omega_percent, ".", ms=1.5, color=VERMILION)
+    right.set(xlabel="natural frequency ωn [rad/s]", ylabel="error of ωn [%]")
+    for axes in (left, right):
+        axes.axhline(0.0, color="0.4", lw=0.8, zorder=1)
+        log_axis(axes, "x")
+        grid(axes)
+    return fig
 
 
+@styled
 def table3_figure(rows: Sequence[WindowRow], shown: Mapping[str, Sequence[WindowEstimate]]) -> Figure:
     """Table III beside windows of simulated runs.
 
     Returns:
-        The figure: ζ on the left, ωn on the right, against the window's number.
+        The figure: ζ on the left, ωn on the right, against the window's number; 95 % intervals.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10.0, 4.5), layout="constrained")
-    axes = figure.subplots(1, 2)
+    fig = figure(WIDTH, 3.4)
+    panels = fig.subplots(1, 2)
     number = np.array([row.number for row in rows])
-    axes[0].plot(number, [row.zeta for row in rows], "ko-", label="the paper's Table III")
-    axes[1].plot(number, [row.omega_n_rad_per_s for row in rows], "ko-", label="the paper's Table III")
-    for (label, windows), colour, marker in zip(shown.items(), COLOURS, MARKERS, strict=False):
+    label = "the paper's Table III"
+    panels[0].plot(number, [row.zeta for row in rows], "o-", color="black", ms=4, label=label)
+    panels[1].plot(number, [row.omega_n_rad_per_s for row in rows], "o-", color="black", ms=4)
+    for place, (label, windows) in enumerate(shown.items()):
         kept = list(windows)[: number.size]
-        for axis, name in zip(axes, ("zeta", "omega_n"), strict=True):
+        aside = 0.14 * (place - 0.5 * (len(shown) - 1))  # intervals must not hide each other
+        for axes, name in zip(panels, ("zeta", "omega_n"), strict=True):
             values = [getattr(window, name) for window in kept]
-            axis.errorbar(
-                number[: len(kept)],
+            axes.errorbar(
+                number[: len(kept)] + aside,
                 [value.value for value in values],
                 [1.96 * value.std for value in values],
-                fmt=f"{marker}--",
-                color=colour,
-                capsize=3,
+                fmt=f"{MARKERS[place + 1]}-",
+                color=COLOURS[place],
+                lw=0.8,
+                ms=4,
                 label=label,
             )
-    for axis, label in zip(axes, ("damping ratio ζ", "natural frequency ωn [rad/s]"), strict=True):
-        axis.set_xlabel("window of three cycles")
-        axis.set_ylabel(label)
-        axis.grid(alpha=0.3)
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
-    return figure
+    for axes, label in zip(panels, ("damping ratio ζ [1]", "natural frequency ωn [rad/s]"), strict=True):
+        axes.set(xlabel="window of three cycles", ylabel=label)
+        axes.set_xticks(number)
+        grid(axes)
+    fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    return fig
 
 
+@styled
 def response_figure(run: Run, estimates: Sequence[Estimate], *, magnified: tuple[float, float]) -> Figure:
     """Figs 4 to 6: the record and the responses regenerated from each method's ζ and ωn.
 
@@ -84,33 +86,27 @@ def response_figure(run: Run, estimates: Sequence[Estimate], *, magnified: tuple
     Returns:
         The figure: the whole record above, the stretch in the middle, what is left of it below.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10.0, 8.0), layout="constrained")
-    whole, part, left = figure.subplots(3, 1)
+    fig = figure(WIDTH, 6.4)
+    whole, part, left = fig.subplots(3, 1)
     time = run.record.time_s - run.record.time_s[0]
-    for axis in (whole, part):
-        axis.plot(time, np.degrees(run.record.yaw_rad), color="black", lw=1.0, label="record")
-    for estimate, colour in zip(estimates, COLOURS, strict=False):
+    whole.axvspan(*magnified, color="#e6e9ec", lw=0)
+    whole.plot(time, np.degrees(run.record.yaw_rad), color="black", lw=0.8)
+    inside = (time >= magnified[0]) & (time <= magnified[1])
+    part.plot(time[inside], np.degrees(run.record.yaw_rad[inside]), color="black", lw=2.0, label="record")
+    for estimate, colour, dash in zip(estimates, COLOURS, ("--", "-.", ":"), strict=False):
         found = next(one for one in estimate.runs if one.id == run.id)
         if found.omega_n is None or found.zeta is None:
             continue
         again = regenerated(run, found.omega_n.value, found.zeta.value)
-        part.plot(time, np.degrees(again), color=colour, ls="--", label=estimate.estimator)
-        left.plot(
-            time, np.degrees(run.record.yaw_rad - again), color=colour, lw=1.0, label=estimate.estimator
-        )
-    whole.axvspan(*magnified, color="grey", alpha=0.2)
-    part.set_xlim(*magnified)
-    inside = (time >= magnified[0]) & (time <= magnified[1])
-    reach = 1.2 * float(np.abs(np.degrees(run.record.yaw_rad[inside])).max())
-    part.set_ylim(-reach, reach)
-    part.legend(loc="upper right", ncols=4, frameon=False)
-    for axis, label in zip(
-        (whole, part, left), ("yaw [°]", "magnified [°]", "record − response [°]"), strict=True
-    ):
-        axis.set_ylabel(label)
-        axis.grid(alpha=0.3)
-    left.set_xlabel("time [s]")
-    left.legend(loc="upper right", ncols=3, frameon=False)
-    return figure
+        label = estimate.estimator.replace("_", " ")
+        part.plot(time[inside], np.degrees(again[inside]), color=colour, ls=dash, lw=1.4, label=label)
+        left.plot(time, np.degrees(run.record.yaw_rad - again), color=colour, lw=0.7)
+    names = ("angle β [°]", "angle β, shaded part [°]", "record − response [°]")
+    for axes, name in zip((whole, part, left), names, strict=True):
+        axes.set_ylabel(name)
+        axes.margins(x=0.01)
+        grid(axes)
+    fig.align_ylabels((whole, part, left))
+    left.set_xlabel("time since the start of the record [s]")
+    fig.legend(*part.get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    return fig

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from docs.studies.window_rivals import Explanation, WindowDiagnosis
+from tunnel_lab.plotting.common import WIDTH, figure, grid, styled
 from tunnel_lab.plotting.plots import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 3)))
+_TITLE = 16  # characters in a line
 
 
+@styled
 def window_figure(found: WindowDiagnosis, shown: Sequence[Explanation]) -> Figure:
     """Both columns of a table of windows, and explanations of it.
 
@@ -24,29 +27,26 @@ def window_figure(found: WindowDiagnosis, shown: Sequence[Explanation]) -> Figur
         shown: explanations, six at most.
 
     Returns:
-        The figure: damping on the left, frequency on the right, against the window's number.
+        The figure: a column of panels for each explanation, damping above and frequency below, against the
+        window's number, each with the table and its scatter.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10.0, 5.0), layout="constrained")
-    axes = figure.subplots(1, 2)
+    fig = figure(WIDTH, 3.9)
+    panels = fig.subplots(2, len(shown), sharex=True, sharey="row", squeeze=False)
     window = np.arange(1, found.measured.zeta.size + 1)
-    for axis, column, label in zip(
-        axes, ("zeta", "omega_n"), ("damping ratio ζ", "natural frequency ωn [rad/s]"), strict=True
-    ):
-        for e, colour, dash in zip(shown, COLOURS, _DASHES, strict=False):
-            axis.plot(window, getattr(e.columns, column), color=colour, ls=dash, label=e.name)
-        axis.errorbar(
-            window,
-            getattr(found.measured, column),
-            getattr(found.std, column),
-            fmt="ko",
-            capsize=3,
-            label="measured, ± scatter",
-        )
-        axis.set_xlabel("window of three cycles")
-        axis.set_ylabel(label)
-        axis.grid(alpha=0.3)
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
-    return figure
+    for (above, below), explanation, colour in zip(panels.T, shown, COLOURS, strict=False):
+        for axes, column in ((above, "zeta"), (below, "omega_n")):
+            axes.errorbar(
+                window, getattr(found.measured, column), getattr(found.std, column),
+                fmt="o", color="black", ms=2.5, elinewidth=0.8,
+            )  # fmt: skip
+            axes.plot(window, getattr(explanation.columns, column), color=colour, lw=1.6)
+            grid(axes)
+        words = explanation.name.replace("_", " ").split(" + ")
+        title = " +\n".join(textwrap.fill(name, _TITLE) for name in words)
+        above.set_title(title, loc="center", fontsize=7.5)
+        below.set_xticks(window[::3])
+    panels[0, 0].set_ylabel("damping ratio ζ [1]")
+    panels[1, 0].set_ylabel("natural frequency ωn [rad/s]")
+    fig.align_ylabels(panels[:, 0])
+    fig.supxlabel("window of three cycles", fontsize=9)
+    return fig
