@@ -15,7 +15,7 @@ from tunnel_lab.plotting.plots import COLOURS
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_TITLE = 16  # characters in a line
+_TITLE = 17  # characters in a line
 
 
 @styled
@@ -45,8 +45,8 @@ def window_figure(found: WindowDiagnosis, shown: Sequence[Explanation]) -> Figur
         title = " +\n".join(textwrap.fill(name, _TITLE) for name in words)
         above.set_title(title, loc="center", fontsize=7.5)
         below.set_xticks(window[::3])
-    panels[0, 0].set_ylabel("damping ratio ζ [1]")
-    panels[1, 0].set_ylabel("natural frequency ωn [rad/s]")
+    panels[0, 0].set_ylabel("ζ [1]")
+    panels[1, 0].set_ylabel("ωn [rad/s]")
     fig.align_ylabels(panels[:, 0])
     fig.supxlabel("window of three cycles", fontsize=9)
     return fig
