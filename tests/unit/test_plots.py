@@ -13,7 +13,7 @@ import pytest
 
 from identification.estimate import Quantity
 from tunnel_lab.plotting import plots
-from tunnel_lab.plotting.common import figure, log_axis, styled
+from tunnel_lab.plotting.common import figure, limit_to_known, log_axis, styled
 from tunnel_lab.plotting.window_figure import deviations, windows_figure
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Record
@@ -57,6 +57,12 @@ def test_windows_of_one_rig_are_drawn_as_they_are() -> None:
     zeta, omega = windows_figure(estimate((window(0.3, 0.01, 1e-4), window(0.1, 0.02, 1e-4, 11.0)))).axes
     assert list(zeta.lines[0].get_ydata()) == [0.01, 0.02]
     assert list(omega.lines[0].get_ydata()) == [10.0, 11.0]
+
+
+def test_what_is_known_far_worse_does_not_set_the_axis() -> None:
+    axes = figure(3.0, 2.0).add_subplot()
+    limit_to_known(axes, np.array([1.0, 2.0, 3.0, 90.0]), np.array([0.1, 0.1, 0.5, 40.0]))
+    assert axes.get_ylim() == pytest.approx((0.8 - 0.16, 4.0 + 0.16))
 
 
 def test_no_windows_no_curves() -> None:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
 
 import numpy as np
 
+from tunnel_sim.vocabulary.record import Array
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 WIDTH = 7.2
 """Width of a figure that fills a page, inches."""
 _FEW_DECADES = 2.5
+_WIDE = 5.0  # times the median standard deviation
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -79,6 +82,22 @@ def log_axis(axes: Axes, which: Literal["x", "y"]) -> None:
         plain = min(limits) >= 1e-4 and max(limits) < 1e5
         powers = LogFormatterMathtext(10.0, minor_thresholds=(np.inf, np.inf))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}") if plain else powers)
+
+
+def limit_to_known(axes: Axes, values: Array, stds: Array) -> None:
+    """Limit the vertical axis to the values that are known as well as most, with their 95 % intervals.
+
+    The few that are known far worse, such as those of the last cycles of a decay, would set the scale otherwise.
+    Their intervals cross the axis.
+
+    Args:
+        values: shape (n,), in the axis' unit.
+        stds: their standard deviations, shape (n,), in the same unit.
+    """
+    known = stds <= _WIDE * np.median(stds)
+    low, high = np.min((values - 2.0 * stds)[known]), np.max((values + 2.0 * stds)[known])
+    margin = 0.05 * (high - low) or 0.1 * abs(high) or 1.0
+    axes.set_ylim(low - margin, high + margin)
 
 
 def figure_text(text: str) -> str:

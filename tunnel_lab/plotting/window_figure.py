@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.estimate import Quantity
-from tunnel_lab.plotting.common import WIDTH, figure, figure_text, grid, log_axis, styled
+from tunnel_lab.plotting.common import WIDTH, figure, figure_text, grid, limit_to_known, log_axis, styled
 from tunnel_lab.plotting.plots import COLOURS, MARKERS, RUNS_PER_PLOT
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 ONE_RIG = 1.5
 """Frequencies within this factor share one plot in absolute units."""
-_WIDE = 5.0  # intervals this many times as wide as the median one do not set the axis
 _INTERVAL = 1.96
 
 
@@ -48,7 +47,8 @@ def windows_figure(estimate: Estimate) -> Figure:
             amplitude = [window.amplitude.value for window in run.windows]
             _intervals(axes, amplitude, quantities, index, figure_text(run.id))
         if runs:
-            _limit(axes, [quantity for quantities in shown for quantity in quantities])
+            drawn = [quantity for quantities in shown for quantity in quantities]
+            limit_to_known(axes, np.array([q.value for q in drawn]), np.array([q.std for q in drawn]))
             log_axis(axes, "x")
         if not one_rig:
             axes.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
@@ -100,13 +100,3 @@ def _intervals(
     style: dict[str, Any] = {"color": COLOURS[index], "marker": MARKERS[index], "label": label}
     spans = [_INTERVAL * q.std for q in quantities]
     axes.errorbar(x, [q.value for q in quantities], yerr=spans, linewidth=0.8, markersize=3.5, **style)
-
-
-def _limit(axes: Axes, quantities: Sequence[Quantity]) -> None:
-    """Limit the vertical axis to all values and to the intervals that are not far wider than the others."""
-    typical = float(np.median([q.std for q in quantities]))
-    reach = [_INTERVAL * q.std if q.std <= _WIDE * typical else 0.0 for q in quantities]
-    low = min(q.value - r for q, r in zip(quantities, reach, strict=True))
-    high = max(q.value + r for q, r in zip(quantities, reach, strict=True))
-    margin = 0.06 * (high - low) or 0.1 * abs(high) or 1.0
-    axes.set_ylim(low - margin, high + margin)
