@@ -14,6 +14,7 @@ from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 WIDTH = 7.2
@@ -65,6 +66,7 @@ def log_axis(axes: Axes, which: Literal["x", "y"]) -> None:
     """
     from matplotlib.ticker import FuncFormatter, LogFormatterMathtext, LogLocator, NullFormatter
 
+    axis: Axis
     if which == "x":
         axes.set_xscale("log")
         axis, limits = axes.xaxis, axes.get_xlim()

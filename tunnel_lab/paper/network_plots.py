@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from docs.studies.network_study import HeldOutErrors, regenerated
 from identification.estimate import Estimate, WindowEstimate
+from tunnel_lab.paper.network_study import HeldOutErrors, regenerated
 from tunnel_lab.plotting.common import WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.plotting.plots import BLUE, COLOURS, MARKERS, VERMILION
 from tunnel_sim.vocabulary.campaign import Run

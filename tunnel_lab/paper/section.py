@@ -1,0 +1,51 @@
+"""A section of the page on the paper: words, a table and pictures."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Outcome = Literal["reproduced", "in part", "not reproducible", "corrected"]
+
+
+class Picture(BaseModel):
+    """A picture of the page.
+
+    Args:
+        file: its name in the page's folder, a PNG; a PDF of that name stands beside figures.
+        caption: what it shows.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    file: Annotated[str, Field(pattern=r"^[a-z0-9-]+\.png$")]
+    caption: str
+
+
+class Section(BaseModel):
+    """What one table or figure of the paper says, and what is found here.
+
+    Args:
+        title: such as ``Table II``.
+        about: what it is of.
+        theirs: the paper's result in a line.
+        ours: ours in a line.
+        outcome: whether the paper's result is found here too.
+        words: paragraphs.
+        headings: of the table's columns; none where there is no table.
+        rows: cells as text.
+        pictures: below the table.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    title: str
+    about: str
+    theirs: str
+    ours: str
+    outcome: Outcome
+    words: tuple[str, ...]
+    headings: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    pictures: tuple[Picture, ...] = ()
