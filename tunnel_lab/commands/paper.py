@@ -24,9 +24,9 @@ def run(
     FOLDER gets a page (index.html) with a summary, Tables I to IV, Figs 1 to 6
     and the slips of the equations, and its figures as pictures (PNG) and for
     print (PDF). It says what cannot be reproduced, and why. The runs are
-    simulated, and identified by the paper's two methods; this takes about two
-    minutes. What is finished is kept: after an interruption the same command
-    does the rest. Delete the folder to compute everything again.
+    simulated, and identified by the paper's two methods, in a minute or two.
+    What is finished is kept: after an interruption the same command does the
+    rest. Delete the folder to compute everything again.
 
     [bold]Examples[/bold]
       tunnel paper
@@ -44,9 +44,8 @@ def run(
     for name in only or ():
         if name not in known:
             raise TunnelError(f"no part '{name}'", where="--only", remedy=did_you_mean(name, tuple(known)))
-    chosen = {name: part for name, part in known.items() if only is None or name in only}
-    with bar("paper", len(chosen)) as tell:
-        page, sections = write_paper(out, chosen, progress=tell)
+    with bar("paper") as tell:
+        page, sections = write_paper(out, list(dict.fromkeys(only or known)), progress=tell)
     summary = table("The paper, ours beside theirs", "item", "paper", "here", "outcome")
     for section in sections.values():
         summary.add_row(section.title, section.theirs, section.ours, section.outcome)

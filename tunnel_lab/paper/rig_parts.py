@@ -9,10 +9,10 @@ from pathlib import Path
 from identification import identify
 from identification.campaign.springs import fit_springs
 from identification.datasets import paper_springs
-from identification.printing.numbers import significant, with_std
+from identification.printing.numbers import concise, significant, with_std
 from tunnel_lab.paper import figures
 from tunnel_lab.paper.equations import eq7, eq8, known_run, printed_transfer_function
-from tunnel_lab.paper.section import Picture, Section
+from tunnel_lab.paper.section import Picture, Section, scaled, signed
 from tunnel_lab.plotting.plots import save_both
 from tunnel_sim import simulate_campaign
 from tunnel_sim.files.plan_file import paper_plan
@@ -60,16 +60,14 @@ def table_2(folder: Path) -> Section:
     theirs = fit_springs(stiffness, [spring.frequency_hz for spring in springs])
     campaign = simulate_campaign(springs_plan(stiffness))
     runs = identify(campaign, "conventional", throw=False).runs
-    found = [run.omega_n.value / (2.0 * pi) if run.omega_n else None for run in runs]
-    known = [
-        value if value is not None else spring.frequency_hz
-        for value, spring in zip(found, springs, strict=True)
-    ]
-    ours = fit_springs(stiffness, known)
+    found = [scaled(run.omega_n, 1.0 / (2.0 * pi)) for run in runs]
+    kept = [(own.value, value) for own, value in zip(found, stiffness, strict=True) if own is not None]
+    ours = fit_springs([value for _, value in kept], [own for own, _ in kept])
     rows = tuple(
         (
             str(spring.number), f"{spring.stiffness_n_m_per_rad:g}", f"{spring.frequency_hz:g}",
-            "–" if own is None else f"{own:.4f}", f"{residual:+.1f}", "off the line" if flag else "",
+            "–" if own is None else concise(own.value, own.std), signed(residual, 1),
+            "off the line" if flag else "",
         )
         for spring, own, residual, flag in zip(springs, found, theirs.residual_percent, theirs.flagged, strict=True)
     )  # fmt: skip
@@ -134,7 +132,7 @@ def equations(_: Path) -> Section:
         ("text after 6", "N̂β = −Ka/Izz, N̂r = −Ca/Izz", "N̂β = +Ka/Izz, N̂r = +Ca/Izz",
          f"Cnβ {-known.cn_beta:g}, Cnr {-known.cn_r:g}: both signs reversed"),
         ("7", "as it should be", "ωn² = ωd² + σ², σ = ln 2/t½", f"Cnβ {significant(beta, 4)}: right"),
-        ("8", "1/t½² − 1/t½₀", "1/t½ − 1/t½₀", f"Cnr {significant(wrong, 4)}; mended: {significant(right, 4)}"),
+        ("8", "1/t½² − 1/t½₀", "1/t½ − 1/t½₀", f"Cnr {significant(wrong, 4)}; corrected: {significant(right, 4)}"),
         ("9", "s² + 2ζωn + ωn² = Δs", "characteristic polynomial s² + 2ζωn s + ωn²", "the units do not agree"),
         ("12", "2ζωn in the denominator", "2ζωn s", undamped),
         ("16", "2ζωn in the denominator", "2ζωn s in the denominator; the numerator is right", undamped),
@@ -143,7 +141,7 @@ def equations(_: Path) -> Section:
         title="Equations 6 to 18",
         about="slips of the printed equations",
         theirs="eqs 8, 9, 12 and 16 and the text after eq. 6 as printed",
-        ours="mended; the paper's own numbers show that it used the mended ones",
+        ours="corrected; the paper's results cannot come from eqs 8 and 12 as printed",
         outcome="corrected",
         words=(
             f"The truth of this example is {truth} 1/rad, of spring 5 at 10 m/s (an inference). The last "

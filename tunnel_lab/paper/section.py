@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from identification.estimate import Quantity
+
 Outcome = Literal["reproduced", "in part", "not reproducible", "corrected"]
 
 
@@ -49,3 +51,22 @@ class Section(BaseModel):
     headings: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
     pictures: tuple[Picture, ...] = ()
+
+
+def signed(value: float, digits: int) -> str:
+    """A number with its sign; zero has none.
+
+    Args:
+        digits: after the point.
+    """
+    rounded = round(value, digits)
+    return f"{rounded:+.{digits}f}".replace("-", "−") if rounded else f"{0.0:.{digits}f}"
+
+
+def scaled(quantity: Quantity | None, factor: float) -> Quantity | None:
+    """An estimate in another unit.
+
+    Args:
+        factor: the old unit in new ones.
+    """
+    return None if quantity is None else Quantity(factor * quantity.value, factor * quantity.std, "")

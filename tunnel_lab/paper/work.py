@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import json
+from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
+from importlib.metadata import version
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -17,6 +19,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 Part = Callable[[Path], Section]
 PAGE = "index.html"
 _PARTS = "parts"
+_PACKAGE = "virtual-wind-tunnel"
 _REMEDY = "delete it, and the part is computed again"
 
 
@@ -33,53 +36,57 @@ def parts() -> dict[str, Part]:
         "figure-3": network_parts.figure_3,
         "table-3": network_parts.table_3,
         "table-4": network_parts.table_4,
+        "figures-4-to-6": network_parts.figures_4_to_6,
     }
 
 
 def write_paper(
-    folder: Path, found: Mapping[str, Part], *, progress: Callable[[int, int, str], None] = lambda *_: None
+    folder: Path, names: Sequence[str], *, progress: Callable[[int, int, str], None] = lambda *_: None
 ) -> tuple[Path, dict[str, Section]]:
     """Compute what is missing, and write the page.
 
     Args:
         folder: of the page, its pictures and finished parts; made where it does not exist.
-        found: parts by name.
+        names: parts to compute where they are not finished; finished ones stay in the page.
         progress: called with the number finished, of how many, and the next part's name.
 
     Returns:
-        The page, and the sections by name.
+        The page, and its sections by name.
 
     Raises:
-        TunnelError: when the folder cannot be written to, or holds a part that is not of this version.
+        TunnelError: when the folder cannot be written to, or a kept part is damaged.
     """
     kept = output_folder(output_folder(folder) / _PARTS)
     for place in (folder, kept):
         clear_leftovers(place)
-    sections = {}
-    for number, (name, part) in enumerate(found.items()):
-        progress(number, len(found), name)
-        sections[name] = _section(kept / f"{name}.json", folder, part)
-    progress(len(found), len(found), "")
+    sections: dict[str, Section] = {}
+    for name, part in parts().items():
+        path = kept / f"{name}.json"
+        section = _finished(path, folder)
+        if section is None and name in names:
+            progress(len([one for one in names if one in sections]), len(names), name)
+            section = part(folder)
+            write_json(path, {"version": version(_PACKAGE), "section": section.model_dump(mode="json")})
+        if section is not None:
+            sections[name] = section
+    progress(len(names), len(names), "")
     page = write_encoded(folder / PAGE, lambda stream: stream.write(render(sections).encode()))
     return page, sections
 
 
-def _section(path: Path, folder: Path, part: Part) -> Section:
-    """A part that is kept with its pictures, or computed and kept; the pictures are written first."""
-    if path.exists():
-        document = read_json(path, remedy=_REMEDY)
-        try:
-            section = Section.model_validate_json(path.read_bytes())
-        except ValidationError as error:
-            reason = error.errors()[0]["msg"]
-            raise TunnelError(
-                f"is not a part of this page ({reason})", where=str(path), remedy=_REMEDY
-            ) from None
-        if document and all((folder / picture.file).is_file() for picture in section.pictures):
-            return section
-    section = part(folder)
-    write_json(path, section.model_dump(mode="json"))
-    return section
+def _finished(path: Path, folder: Path) -> Section | None:
+    """A part of this version that is kept with all its pictures."""
+    if not path.exists():
+        return None
+    document = read_json(path, remedy=_REMEDY)
+    if document.get("version") != version(_PACKAGE):
+        return None
+    try:
+        section = Section.model_validate_json(json.dumps(document.get("section")))
+    except ValidationError as error:
+        reason = error.errors()[0]["msg"]
+        raise TunnelError(f"is not a part of the page ({reason})", where=str(path), remedy=_REMEDY) from None
+    return section if all((folder / picture.file).is_file() for picture in section.pictures) else None
 
 
 def render(sections: Mapping[str, Section]) -> str:
