@@ -96,6 +96,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
         Markdown, tables and the full confusion matrix included.
     """
     withheld = "".join(f" --exclude {name}" for name in score.excluded)
+    drawn = f" --figure docs/{figures[0]}" if figures[0] else ""
     lines = [
         "# Blind check",
         "",
@@ -111,7 +112,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
         "```bash",
         *_commands(score, folder),
         f"tunnel blind diagnose {folder}{withheld}",
-        f"tunnel blind score {folder}{withheld} --markdown docs/blind-check.md",
+        f"tunnel blind score {folder}{withheld} --markdown docs/blind-check.md{drawn}",
         "```",
         "",
         *(f"    {line}" for line in origin_lines(score)),
