@@ -133,6 +133,10 @@ def test_a_damaged_part_is_one_line(tmp_path: Path, called: list[str], damage: s
         work.write_paper(tmp_path, ("one",))
 
 
-def test_a_picture_stays_in_its_folder() -> None:
-    with pytest.raises(ValueError, match="pattern"):
-        Picture(file="../a.png", caption="")
+def test_a_picture_stays_in_its_folder(tmp_path: Path, called: list[str]) -> None:
+    work.write_paper(tmp_path, ("two",))
+    kept = tmp_path / "parts" / "two.json"
+    kept.write_text(kept.read_text().replace("b.png", "../b.png"))
+    with pytest.raises(TunnelError, match="pattern"):
+        work.write_paper(tmp_path, ("two",))
+    assert called == ["two"]

@@ -89,8 +89,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
     """The page.
 
     Args:
-        figures: addresses of the figures of the calibration and of the confusion, relative to the page; none
-            when empty.
+        figures: addresses of the calibration and of the confusion, relative to the page; empty: not drawn.
 
     Returns:
         Markdown, tables and the full confusion matrix included.
@@ -255,11 +254,7 @@ def _time(score: Score) -> Section:
 
 
 def confusion(score: Score) -> tuple[list[str], list[str], NDArray[np.int_]]:
-    """The confusion matrix.
-
-    Returns:
-        True causes in rows, answers in columns, and the counts, shape (rows, columns).
-    """
+    """True causes in rows, answers in columns, and the counts, shape (rows, columns)."""
     found = score.confusion()
     names = sorted({*found, *(name for row in found.values() for name in row)}, key=_order)
     rows, columns = [name for name in names if name in found], [name for name in names if name != "withheld"]
@@ -271,15 +266,15 @@ def _matrix(score: Score, figure: str) -> list[str]:
     rows, columns, counts = confusion(score)
     numbers = {name: str(index) for index, name in enumerate(columns, 1)}
     cells = [
-        [name, numbers.get(name, ""), *(str(count) if count else "·" for count in own)]
+        [name, numbers.get(name, ""), *(str(count or "·") for count in own)]
         for name, own in zip(rows, counts.tolist(), strict=True)
     ]
-    key = ", ".join(f"{number} {name}" for name, number in numbers.items())
-    drawn = [f"![Answers in columns by true causes in rows]({figure})", ""] if figure else []
     return [
         "## Confusion matrix", "",
-        "True causes in rows, answers in columns; `two or more` counts any set of effects.", "", *drawn,
-        *_rows(["truth", "", *numbers.values()], cells), "", f"Columns: {key}.",
+        "True causes in rows, answers in columns; `two or more` counts any set of effects.", "",
+        *([f"![Answers in columns by true causes in rows]({figure})", ""] if figure else []),
+        *_rows(["truth", "", *numbers.values()], cells), "",
+        f"Columns: {', '.join(f'{number} {name}' for name, number in numbers.items())}.",
     ]  # fmt: skip
 
 

@@ -27,7 +27,6 @@ from tunnel_lab.paper.window_plots import window_figure
 from tunnel_lab.paper.window_rivals import diagnose_windows
 from tunnel_lab.paper.window_table import infer_springs
 from tunnel_lab.plotting.plots import save_both
-from tunnel_sim import simulate_campaigns
 from tunnel_sim.effects import effect_class
 
 _SEED = 1
@@ -65,6 +64,8 @@ def figure_3(folder: Path) -> Section:
 
 def table_3(folder: Path) -> Section:
     """Windows of three cycles: the paper's run, and simulated ones."""
+    from tunnel_sim import simulate_campaigns
+
     plans = {"linear": paper_run_plan(_SEED), "softening": paper_run_plan(_SEED, effects=SOFTENING)}
     campaigns = dict(zip(plans, simulate_campaigns(list(plans.values())), strict=True))
     windows = {name: identify(c, NETWORK).runs[1].windows for name, c in campaigns.items()}
@@ -120,6 +121,8 @@ def _inference() -> str:
 
 def table_4(_: Path) -> Section:
     """Cnβ and Cnr by both methods."""
+    from tunnel_sim import simulate_campaigns
+
     kinds = {"linear": (), "softening": SOFTENING}
     plans = {
         f"{name}, {'noise' if noisy else 'no noise'}": paper_run_plan(_SEED, noisy=noisy, effects=effects)
@@ -171,6 +174,8 @@ def table_4(_: Path) -> Section:
 
 def figures_4_to_6(folder: Path) -> Section:
     """The record, and the responses regenerated from each method's ζ and ωn."""
+    from tunnel_sim import simulate_campaigns
+
     plan = paper_run_plan(_SEED, effects=SOFTENING)
     (campaign,) = simulate_campaigns([plan])
     estimates = [identify(campaign, method) for method in METHODS]

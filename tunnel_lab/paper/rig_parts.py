@@ -14,7 +14,6 @@ from tunnel_lab.paper import figures
 from tunnel_lab.paper.equations import eq7, eq8, known_run, printed_transfer_function
 from tunnel_lab.paper.section import Picture, Section, scaled, signed
 from tunnel_lab.plotting.plots import save_both
-from tunnel_sim import simulate_campaign
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -55,6 +54,8 @@ def table_1(_: Path) -> Section:
 
 def table_2(folder: Path) -> Section:
     """Springs, frequencies and the inertia; ours from wind-off runs of the virtual rig."""
+    from tunnel_sim import simulate_campaign
+
     springs = paper_springs()
     stiffness = [spring.stiffness_n_m_per_rad for spring in springs]
     theirs = fit_springs(stiffness, [spring.frequency_hz for spring in springs])
@@ -160,7 +161,8 @@ def figure_1(folder: Path) -> Section:
     from tunnel_lab.show.film import Look, write_still
     from tunnel_lab.show.request import Request
 
-    words, pictures = "The paper shows a photograph. This is the virtual rig of the same sizes.", ()
+    words = "The paper shows a photograph. This is the virtual rig of the same sizes."
+    pictures: tuple[Picture, ...] = ()
     try:
         write_still(Request(), Look(height=600, trace=False), folder / "rig.png", 0.0)
         pictures = (

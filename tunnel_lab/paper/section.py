@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from identification.estimate import Quantity
 
+_STRICT = ConfigDict(extra="forbid")
 Outcome = Literal["reproduced", "in part", "not reproducible", "corrected"]
 
 
-class Picture(BaseModel):
+@dataclass(frozen=True)
+class Picture:
     """A picture of the page.
 
     Args:
@@ -19,13 +22,14 @@ class Picture(BaseModel):
         caption: what it shows.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    __pydantic_config__ = _STRICT
 
     file: Annotated[str, Field(pattern=r"^[a-z0-9-]+\.png$")]
     caption: str
 
 
-class Section(BaseModel):
+@dataclass(frozen=True)
+class Section:
     """What one table or figure of the paper says, and what is found here.
 
     Args:
@@ -40,7 +44,7 @@ class Section(BaseModel):
         pictures: below the table.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    __pydantic_config__ = _STRICT
 
     title: str
     about: str
@@ -57,6 +61,7 @@ def signed(value: float, digits: int) -> str:
     """A number with its sign; zero has none.
 
     Args:
+        value: in any unit.
         digits: after the point.
     """
     rounded = round(value, digits)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from importlib import resources
 from importlib.metadata import version
 from pathlib import Path
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from tunnel_lab.paper.section import Section
 from tunnel_sim.files.leftovers import clear_leftovers
@@ -66,7 +67,7 @@ def write_paper(
         if section is None and name in names:
             progress(len([one for one in names if one in sections]), len(names), name)
             section = part(folder)
-            write_json(path, {"version": version(_PACKAGE), "section": section.model_dump(mode="json")})
+            write_json(path, {"version": version(_PACKAGE), "section": asdict(section)})
         if section is not None:
             sections[name] = section
     progress(len(names), len(names), "")
@@ -82,7 +83,7 @@ def _finished(path: Path, folder: Path) -> Section | None:
     if document.get("version") != version(_PACKAGE):
         return None
     try:
-        section = Section.model_validate_json(json.dumps(document.get("section")))
+        section = TypeAdapter(Section).validate_json(json.dumps(document.get("section")))
     except ValidationError as error:
         reason = error.errors()[0]["msg"]
         raise TunnelError(f"is not a part of the page ({reason})", where=str(path), remedy=_REMEDY) from None

@@ -89,7 +89,9 @@ def breakdown_figure(frame: pl.DataFrame, quantity: str) -> Figure:
         place = severities.index(severity) * width if severity else 0.0
         shade = float(np.sign(stds) * np.log10(abs(stds)))
         corner = (names.index(name) + place, effects.index(effect) - 0.5)
-        axes.add_patch(Rectangle(corner, width, 1.0, color=colours.cmap(colours.norm(shade)), linewidth=0.0))
+        axes.add_patch(
+            Rectangle(corner, width, 1.0, color=colours.to_rgba(np.array([shade]))[0], linewidth=0.0)
+        )
         axes.text(
             corner[0] + 0.5 * width, effects.index(effect), _compact(percent), ha="center", va="center",
             fontsize=6, color="white" if abs(shade) > _DARK else "black",
