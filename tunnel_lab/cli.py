@@ -23,6 +23,7 @@ from tunnel_lab.commands import (
     export,
     identify,
     importing,
+    paper,
     plot,
     render,
     score,
@@ -90,6 +91,7 @@ def tunnel(
       tunnel view                        the rig in real time, in a window or browser
       tunnel render                      a film of a run, and a picture
       tunnel train w.safetensors         train the paper's networks from a seed
+      tunnel paper                       the paper's tables and figures
       tunnel docs                        the documentation, in a browser
 
     [bold]Units[/bold]
@@ -120,6 +122,7 @@ COMMANDS = (
     view,
     render,
     train,
+    paper,
     docs,
 )
 """Every command that is one function, in the order of the help."""

@@ -86,9 +86,16 @@ class Score:
         """Numbers by truth and answer; pairs and ``no answer`` are rows and columns of their own."""
         found: dict[str, dict[str, int]] = {}
         for c in self.cases:
-            row = found.setdefault("withheld" if c.withheld else label(c.truth), {})
+            row = found.setdefault(_truth(c), {})
             row[label(c.causes)] = row.get(label(c.causes), 0) + 1
         return found
+
+    def right_by_truth(self) -> dict[str, Share]:
+        """How many answers are right, by truth as in the rows of `confusion`."""
+        found: dict[str, list[bool]] = {}
+        for c in self.cases:
+            found.setdefault(_truth(c), []).append(c.right)
+        return {name: share_of(flags) for name, flags in found.items()}
 
     def pairs(self) -> dict[str, int]:
         """The answers where two effects act."""
@@ -316,6 +323,10 @@ def _checked_key(
             "is not the key that was sealed", where=str(source), remedy="name the right one: --key"
         )
     return document, key_sha256
+
+
+def _truth(c: Case) -> str:
+    return "withheld" if c.withheld else label(c.truth)
 
 
 def _pair_outcome(c: Case) -> str:

@@ -11,10 +11,10 @@ import argparse
 import csv
 import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import binom
@@ -25,8 +25,13 @@ from tunnel_lab.envs.campaign import CampaignEnv, reached
 from tunnel_lab.envs.picture import beliefs
 from tunnel_lab.envs.policies import POLICIES, run_campaign
 from tunnel_lab.envs.session import Knowledge, answers, probabilities
+from tunnel_lab.plotting.common import WIDTH, figure, grid, log_axis, styled
+from tunnel_lab.plotting.plots import COLOURS, MARKERS
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CONTESTS = {"identification": ("scripted", "greedy"), "diagnosis": ("scripted", "separating")}
 SEEDS = {"identification": 50, "diagnosis": 50}
@@ -40,6 +45,8 @@ ARGUMENTS: dict[str, dict[str, Any]] = {
 }
 """What the environments are made with; two rivals instead of four, and noise that leaves run one short."""
 _CONFIDENCE = 0.95
+_COLOUR = {"scripted": 0, "greedy": 1, "separating": 2}
+_GOAL = 0.05  # relative standard deviation of Cnr at which an identification ends
 
 
 @dataclass(frozen=True)
@@ -205,36 +212,50 @@ def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """The figure of the page."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    """Draw the figure of the page."""
+    from tunnel_lab.plotting.plots import save
 
-    from tunnel_lab.plotting.plots import COLOURS, save
+    save(policies_figure(rows, example()), path)
 
-    figure = Figure(figsize=(10.0, 3.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(1, 3)
-    for place, (policy, (spent, spread)) in enumerate(example().items()):
-        panels[0].semilogy(spent / 60.0, 100.0 * spread, "o-", color=COLOURS[place], label=policy)
-    panels[0].axhline(5.0, color="0.5", linestyle="--", linewidth=1)
+
+@styled
+def policies_figure(rows: Sequence[Row], followed: Mapping[str, tuple[Array, Array]]) -> Figure:
+    """One campaign of each policy, and how many of all have reached the goal, against the rig time.
+
+    Args:
+        followed: of `example`.
+    """
+    fig = figure(WIDTH, 2.9)
+    panels = fig.subplots(1, 3)
+    for place, (policy, (spent, spread)) in enumerate(followed.items()):
+        style: dict[str, Any] = {"color": COLOURS[_COLOUR[policy]], "marker": MARKERS[place], "label": policy}
+        panels[0].plot(spent / 60.0, 100.0 * spread, ms=3.5, **style)
+    panels[0].axhline(100.0 * _GOAL, color="0.4", linestyle="--", linewidth=0.8, label="goal")
+    log_axis(panels[0], "y")
     panels[0].set_ylabel("standard deviation of Cnr [%]")
-    panels[0].set_title("identification, seed 0", fontsize=10)
+    panels[0].set_title("identification, seed 0")
     for axes, (preset, policies) in zip(panels[1:], CONTESTS.items(), strict=True):
+        longest = max(row.rig_time_s for row in rows if row.preset == preset) / 60.0
         for place, policy in enumerate(policies):
             own = _of(rows, preset, policy)
-            spent = np.sort([row.rig_time_s if row.reached else np.inf for row in own]) / 60.0
-            share = np.arange(1, len(own) + 1) / len(own)
-            axes.step(
-                np.append(0.0, spent), np.append(0.0, share), where="post", color=COLOURS[place], label=policy
-            )
-        axes.set_ylim(0.0, 1.02)
-        axes.set_ylabel("share of campaigns at the goal")
-        axes.set_title(f"{preset}, {len(own)} seeds", fontsize=10)
+            spent = np.sort([row.rig_time_s / 60.0 for row in own if row.reached])
+            share = 100.0 * np.arange(1, spent.size + 1) / len(own)
+            # the last share holds to the end: the campaigns that are left stopped short of the goal
+            x, y = np.concatenate(([0.0], spent, [longest])), np.concatenate(([0.0], share, share[-1:]))
+            dash = ("-", "--", "-.")[place]
+            axes.step(x, y, dash, where="post", color=COLOURS[_COLOUR[policy]], label=policy)
+        axes.set_ylim(0.0, 102.0)
+        axes.set_ylabel("campaigns at the goal [%]")
+        axes.set_title(f"{preset}, {len(own)} seeds")
     for axes in panels:
         axes.set_xlabel("rig time [min]")
-        axes.legend(fontsize=8)
-        axes.grid(alpha=0.3)
-    save(figure, path)
+        axes.set_xlim(0.0, None)
+        grid(axes)
+    known: dict[str, Any] = {}
+    for axes in panels[::-1]:  # a policy of the first panel is shown by that panel's line
+        known |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    fig.legend(known.values(), known.keys(), loc="outside upper center", ncols=4)
+    return fig
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -15,6 +15,7 @@ from typing import Any
 from diagnosis import diagnose
 from identification.datasets import MEASURED_CAMPAIGNS, measured_campaign
 from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
+from tunnel_lab.plotting.plots import save
 from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -134,7 +135,7 @@ def section(name: str, document: Mapping[str, Any] | str, images: Path) -> tuple
     figure = waterfall_figure(document)
     if figure is not None:
         path = images / f"real-records-{name}.png"
-        figure.savefig(path, dpi=80)
+        save(figure, path)
         parts.append(f"\n![The gap of {name} as the causes are added](images/{path.name})")
     return row, "\n".join(parts) + "\n"
 

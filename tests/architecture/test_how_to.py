@@ -34,6 +34,7 @@ INDEX = ROOT / "docs" / "README.md"
             ["effects", "simulate", "diagnose", "diagnose", "diagnose"],
             marks=pytest.mark.slow,
         ),
+        pytest.param("the-paper", ["paper"], marks=pytest.mark.slow),
     ],
 )
 def test_shown_output_is_real_output(page: str, typed: list[str], tmp_path: Path) -> None:
@@ -61,6 +62,7 @@ def test_every_page_with_output_is_run() -> None:
         "identify-a-record",
         "run-the-demo",
         "state-uncertainties",
+        "the-paper",
     ]
 
 

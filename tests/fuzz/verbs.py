@@ -51,12 +51,13 @@ def draw(campaign: Campaign, found: Any, folder: Path) -> None:
     """The figures of ``tunnel plot``."""
     from tunnel_lab.commands.plot import spread
     from tunnel_lab.plotting import plots
+    from tunnel_lab.plotting.window_figure import windows_figure
 
     for page in plots.trace_pages(campaign):
         plots.save(page, folder / "traces.png")
     plots.save(plots.spectrum_figure(spread(campaign)), folder / "spectrum.png")
     if any(run.windows for run in found.runs):
-        plots.save(plots.windows_figure(found), folder / "windows.png")
+        plots.save(windows_figure(found), folder / "windows.png")
 
 
 def diagnose_campaign(folder: Path, rng: Rng) -> None:

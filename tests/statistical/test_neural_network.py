@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-from docs.studies.network_study import CONVENTIONAL, NETWORK, closeness, reference_campaigns, verdict
+from docs.studies.reference_campaigns import reference_campaigns
 from identification import identify
 from tests.reference.free_decays import damped_cosine
+from tunnel_lab.paper.network_study import CONVENTIONAL, NETWORK, closeness, verdict
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 

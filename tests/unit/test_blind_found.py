@@ -12,7 +12,7 @@ from diagnosis.blind.smooth import smooth_calibration
 from diagnosis.blind.statistics import Share
 from tests.unit.test_blind import document
 from tunnel_lab.diagnosis_view import blind_page
-from tunnel_lab.plotting.calibration_figure import calibration_figure
+from tunnel_lab.diagnosis_view.blind_figures import calibration_figure, confusion_figure
 
 THREE = ["coulomb_friction", "gravity_stiffness", "quadratic_damping"]
 
@@ -98,14 +98,56 @@ def test_certain_and_wrong_is_the_whole_error():
     assert smooth_calibration([]) is None
 
 
+def stated(effect, said, probability):
+    """A campaign of one effect, answered with a probability."""
+    answer = document(said) | {
+        "candidates": [{"effect": "+".join(said) or "none", "probability": probability}]
+    }
+    return case("c", {"effects": effect}, answer)
+
+
+ANSWERED = tuple(
+    stated(["free_play"], ["free_play"] if right else ["mains_hum"], probability)
+    for probability, right in ((0.55, True), (0.57, False), (0.96, True), (0.98, True), (1.0, False))
+)
+
+
+def test_the_calibration_of_the_answers_is_drawn_in_bins_with_wilsons_intervals():
+    score = Score(ANSWERED, (), "", "", {}, False)
+    (axes,) = calibration_figure(score).axes
+    (container,) = axes.containers
+    line, _, (bars,) = container.lines
+    x, y = line.get_data()
+    assert list(x) == pytest.approx([0.56, 0.98])
+    assert list(y) == pytest.approx([1 / 2, 2 / 3])
+    ends = [segment[:, 1].tolist() for segment in bars.get_segments()]
+    assert ends == [pytest.approx(Share(1, 2).interval), pytest.approx(Share(2, 3).interval)]
+    assert [text.get_text() for text in axes.texts] == ["2", "3"]
+
+
+def test_the_confusion_is_drawn_as_counted():
+    score = Score((*ANSWERED, CASES[0], CASES[6]), (), "", "", {}, False)
+    (axes,) = confusion_figure(score).axes
+    names = ["free play  1", "mains hum  2", "two or more  3", "none  4"]
+    assert [label.get_text() for label in axes.get_yticklabels()] == names
+    places = {text.get_position(): text.get_text() for text in axes.texts}
+    assert places[0, 0] == "3"
+    assert places[1, 0] == "2"  # mains hum answered where free play acts
+    assert places[2, 2] == places[3, 3] == "1"
+    assert places[4, 0].startswith("3/5 ")
+    assert (0, 1) not in places
+    assert [(p.get_x() + 0.5, p.get_y() + 0.5) for p in axes.patches] == [(0, 0), (1, 0), (2, 2), (3, 3)]
+    assert [p.get_alpha() for p in axes.patches] == pytest.approx([0.6, 0.4, 1.0, 1.0])
+
+
 def test_the_page_and_the_figure_show_the_calibration_of_inclusion():
     cases = tuple(made(["free_play"], ["free_play"], inclusion={"free_play": 0.9}) for _ in range(5))
     score = Score(cases, (), "", "", {}, False)
-    page = blind_page.markdown(score, "set", "inclusion.png")
+    page = blind_page.markdown(score, "set", ("inclusion.png", "confusion.png"))
     assert "## Calibration of inclusion" in page
-    assert "](inclusion.png)" in page
+    assert page.index("](inclusion.png)") < page.index("](confusion.png)")
     assert "5/5, 100.0 %" in page
-    title = calibration_figure(score.inclusion()).axes[0].get_title("left")
-    assert title == f"smooth calibration error {score.inclusion().error:.3f}"
+    title = calibration_figure(score).axes[1].get_title("left")
+    assert title == f"5 effects: smooth calibration error {score.inclusion().error:.3f}"
     assert score.to_json_dict()["inclusion_calibration"]["statements"] == 5
     assert "Calibration of inclusion" not in blind_page.markdown(Score(CASES, (), "", "", {}, False), "set")

@@ -56,7 +56,7 @@ def test_the_map_is_a_table_and_a_figure(found):
     assert frame["bias_percent"].is_finite().all()
     assert [one.row_count for one in view.breakdown_tables(found, "cn_r")] == [3]
     buffer = io.BytesIO()
-    view.breakdown_figure(found).savefig(buffer, format="png")
+    view.breakdown_figure(frame, "cn_r").savefig(buffer, format="png")
     assert buffer.getvalue()[:4] == b"\x89PNG"
     assert pl.DataFrame(frame).columns[:2] == ["effect", "severity_noise_powers"]
 

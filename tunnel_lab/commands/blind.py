@@ -148,7 +148,11 @@ def score(
     ] = None,
     figure: Annotated[
         Path | None,
-        typer.Option("--figure", metavar="FILE", help="Also draw the calibration of inclusion."),
+        typer.Option(
+            "--figure",
+            metavar="FILE.png",
+            help="Also draw the calibration, and the confusion beside it; PDF too.",
+        ),
     ] = None,
     effects_file: EffectsFileOption = None,
 ) -> None:
@@ -170,20 +174,22 @@ def score(
     from tunnel_lab.terminal.options import refuse_unwritable_files
     from tunnel_lab.terminal.tables import say_written
     from tunnel_sim.files.writing import write_json, write_whole
+    from tunnel_sim.vocabulary.errors import TunnelError
 
     names = split_names(exclude)
     vocabulary(exclude=names)
     refuse_unwritable_files(markdown, json, figure)
+    if figure is not None and figure.suffix != ".png":
+        raise TunnelError("is not a .png", where=f"--figure {figure}", remedy="name a file that ends in .png")
     found = score_set(folder, excluded=names, key=key, effects_file=effects_file)
-    if figure is not None:
-        _draw(found, figure)
+    drawn = () if figure is None else _draw(found, figure)
     if markdown is not None:
-        address = "" if figure is None else os.path.relpath(figure, markdown.parent)
-        write_whole(markdown, blind_page.markdown(found, str(folder), address).encode())
+        addresses = [os.path.relpath(path, markdown.parent) for path in drawn[::2]] or ("", "")
+        write_whole(markdown, blind_page.markdown(found, str(folder), addresses).encode())
     if json is not None:
         write_json(json, found.to_json_dict())
     _show(found)
-    say_written(markdown, json, figure)
+    say_written(markdown, json, *drawn)
 
 
 def _show(found: Score) -> None:
@@ -200,13 +206,10 @@ def _show(found: Score) -> None:
             say(section.note + "\n")
 
 
-def _draw(found: Score, path: Path) -> None:
-    """Draw the calibration of inclusion; refuse where no answer states these probabilities."""
-    from tunnel_lab.plotting.calibration_figure import calibration_figure
-    from tunnel_lab.plotting.plots import save
-    from tunnel_sim.vocabulary.errors import TunnelError
+def _draw(found: Score, path: Path) -> tuple[Path, ...]:
+    """Draw the calibration and the confusion, each as a picture and for print."""
+    from tunnel_lab.diagnosis_view.blind_figures import calibration_figure, confusion_figure
+    from tunnel_lab.plotting.plots import save_both
 
-    calibration = found.inclusion()
-    if calibration is None:
-        raise TunnelError("no answer states inclusion", where="--figure", remedy="diagnose the set again")
-    save(calibration_figure(calibration), path)
+    beside = path.with_name(f"{path.stem}-confusion.png")
+    return (*save_both(calibration_figure(found), path), *save_both(confusion_figure(found), beside))

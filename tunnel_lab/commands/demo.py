@@ -36,7 +36,7 @@ def run(
     The paper's rig is simulated with the wind off and on. Three estimators give
     Cnβ and Cnr (1/rad), Izz (kg m²) and Cr (N m s/rad), shown beside the injected
     values. Measured swings of a pendulum follow, by windows of a few cycles.
-    Campaign, estimates (JSON) and figures (PNG) are kept in FOLDER.
+    Campaign, estimates (JSON) and figures (PNG, PDF) are kept in FOLDER.
 
     [bold]Examples[/bold]
       tunnel demo
@@ -60,7 +60,7 @@ def run(
     problem = draw(folder, campaign, estimates, plan, measured[1])
     show_simulated(campaign, estimates, plan)
     show_measured(*measured)
-    say("\nFigures: traces.png, spectrum.png, windows.png, estimates.png")
+    say("\nFigures (.png and .pdf): traces, spectrum, windows, estimates")
     say(f"No picture of the rig: {problem}" if problem else "Picture of the rig: rig.png")
     say(f"Campaign, estimates (JSON) and figures are in {folder}")
     if missed := misses(estimates, plan):
@@ -176,16 +176,17 @@ def draw(
         Why there is no picture of the rig; empty where there is one.
     """
     from tunnel_lab.plotting import plots
+    from tunnel_lab.plotting.window_figure import windows_figure
     from tunnel_lab.show.film import Look, write_still
     from tunnel_lab.show.request import Request
     from tunnel_lab.terminal.tables import console
     from tunnel_sim.vocabulary.errors import TunnelError
 
     off, on = wind_off_on_pair(campaign)
-    plots.save(plots.wind_off_on_figure(off, on), folder / "traces.png")
-    plots.save(plots.spectrum_figure((off, on)), folder / "spectrum.png")
-    plots.save(plots.windows_figure(measured), folder / "windows.png")
-    plots.save(plots.truth_figure(estimates, truth_of(plan)), folder / "estimates.png")
+    plots.save_both(plots.wind_off_on_figure(off, on), folder / "traces.png")
+    plots.save_both(plots.spectrum_figure((off, on)), folder / "spectrum.png")
+    plots.save_both(windows_figure(measured), folder / "windows.png")
+    plots.save_both(plots.truth_figure(estimates, truth_of(plan)), folder / "estimates.png")
     with console(stderr=True).status("rendering the rig"):
         try:
             write_still(Request(), Look(height=800, trace=False), folder / "rig.png", 0.0)

@@ -24,35 +24,34 @@ def run(
 ) -> None:
     """Draw a campaign: angle traces, spectra, and ζ and ωn against the amplitude.
 
-    Writes traces-1.png (twelve runs to a page), spectrum.png and windows.png
-    into FOLDER/<name of the campaign's folder>. Angles in rad, times in s,
-    spectral density in rad²/Hz.
+    Writes traces-1 (twelve runs to a page), spectrum and windows, each as a
+    picture (PNG) and for print (PDF), into FOLDER/<name of the campaign's
+    folder>. Angles in rad, times in s, spectral density in rad²/Hz.
 
     [bold]Examples[/bold]
       tunnel plot my-campaign
       tunnel plot my-campaign --out figures
 
     [bold]Exit status[/bold]
-      0 drawn, 1 no run could be identified (windows.png is left out), 2 bad
+      0 drawn, 1 no run could be identified (windows is left out), 2 bad
       input.
     """
     from identification import identify
     from tunnel_lab.plotting import plots
+    from tunnel_lab.plotting.window_figure import windows_figure
     from tunnel_lab.terminal.given_campaign import given_campaign
     from tunnel_lab.terminal.tables import say, say_written
     from tunnel_sim.files.writing import output_folder
 
     data = given_campaign(campaign)
     folder = output_folder(out / campaign.resolve().name)
-    written = [
-        plots.save(page, folder / f"traces-{number}.png")
-        for number, page in enumerate(plots.trace_pages(data), 1)
-    ]
-    written.append(plots.save(plots.spectrum_figure(spread(data)), folder / "spectrum.png"))
+    drawn = {f"traces-{number}": page for number, page in enumerate(plots.trace_pages(data), 1)}
+    drawn["spectrum"] = plots.spectrum_figure(spread(data))
     estimate = identify(data, "output_error", throw=False)
     if any(found.windows for found in estimate.runs):
-        written.append(plots.save(plots.windows_figure(estimate), folder / "windows.png"))
-    say_written(*written)
+        drawn["windows"] = windows_figure(estimate)
+    written = [plots.save_both(figure, folder / f"{name}.png") for name, figure in drawn.items()]
+    say_written(*(path for pair in written for path in pair))
     if estimate.status.failed:
         say(f"Note: {estimate.status.value}", stderr=True)
         raise typer.Exit(1)

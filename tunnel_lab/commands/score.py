@@ -28,7 +28,9 @@ def run(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FOLDER", help="Keep trials and scores (Parquet) and a figure here."),
+        typer.Option(
+            "--out", metavar="FOLDER", help="Keep trials and scores (Parquet) and a figure (PNG, PDF) here."
+        ),
     ] = None,
     trials: Annotated[
         int | None, typer.Option("--trials", min=2, help="Records in each cell; overrides the grid's.")
@@ -185,7 +187,7 @@ def _rows(grid: Grid, names: tuple[str, ...], jobs: int, out: Path | None) -> li
 def _keep(out: Path, results: Results) -> list[Path]:
     import shutil
 
-    from tunnel_lab.plotting.plots import save
+    from tunnel_lab.plotting.plots import save_both
     from tunnel_lab.scoring.figures import score_figure
     from tunnel_lab.scoring.results import parquet, scores_frame, write_trials
     from tunnel_sim.files.writing import write_whole
@@ -193,7 +195,7 @@ def _keep(out: Path, results: Results) -> list[Path]:
     written = [
         write_trials(out / "trials.parquet", results),
         write_whole(out / "scores.parquet", parquet(scores_frame(results))),
-        save(score_figure(results), out / "score.png"),
+        *save_both(score_figure(results), out / "score.png"),
     ]
     shutil.rmtree(out / "parts", ignore_errors=True)
     return written
@@ -227,7 +229,7 @@ def _refuse_of_the_grid(given: dict[str, object]) -> None:
 def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, trials: int | None) -> None:
     import shutil
 
-    from tunnel_lab.plotting.plots import save
+    from tunnel_lab.plotting.plots import save_both
     from tunnel_lab.scoring import breakdown as work
     from tunnel_lab.scoring import breakdown_view as view
     from tunnel_lab.scoring.results import parquet
@@ -243,8 +245,11 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
     found = work.biases(rows)
     written = []
     if out is not None:
-        written.append(write_whole(out / "breakdown.parquet", parquet(work.breakdown_frame(found))))
-        written.append(save(view.breakdown_figure(found), out / "breakdown.png"))
+        frame = work.breakdown_frame(found)
+        written.append(write_whole(out / "breakdown.parquet", parquet(frame)))
+        for quantity in view.SHOWN:
+            path = out / f"breakdown-{quantity.replace('_', '-')}.png"
+            written += save_both(view.breakdown_figure(frame, quantity), path)
         shutil.rmtree(out / "parts", ignore_errors=True)
     show_tables(*(one for quantity in view.SHOWN for one in view.breakdown_tables(found, quantity)))
     say(view.ABOUT)

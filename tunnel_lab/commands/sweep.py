@@ -167,7 +167,7 @@ def show_summary(folder: Path) -> None:
     for name, part in grouped.items():
         drawn = figures.error_figure(part)
         if drawn is not None:
-            written.append(plots.save(drawn, target / f"{name}.png"))
+            written += plots.save_both(drawn, target / f"{name}.png")
     done, shards = len(store.finished()), store.sweep.shards
     if done < shards:
         say(f"Finished: {done} of {shards} shards; run the same command again for the rest\n")

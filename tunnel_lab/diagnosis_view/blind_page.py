@@ -6,13 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from rich.table import Table
 
     from diagnosis.blind import Score
     from diagnosis.blind.statistics import Share
 
 INCLUSION = "Calibration of inclusion"
+CALIBRATION = "Calibration"
 NAMES = {"cn_beta": "Cnβ", "cn_r": "Cnr"}
 KINDS = {
     "single": "one effect",
@@ -81,16 +85,17 @@ def origin_lines(score: Score) -> list[str]:
     return lines
 
 
-def markdown(score: Score, folder: str, figure: str = "") -> str:
+def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> str:
     """The page.
 
     Args:
-        figure: address of the figure of the calibration of inclusion, relative to the page; none when empty.
+        figures: addresses of the calibration and of the confusion, relative to the page; empty: not drawn.
 
     Returns:
         Markdown, tables and the full confusion matrix included.
     """
     withheld = "".join(f" --exclude {name}" for name in score.excluded)
+    drawn = f" --figure docs/{figures[0]}" if figures[0] else ""
     lines = [
         "# Blind check",
         "",
@@ -106,7 +111,7 @@ def markdown(score: Score, folder: str, figure: str = "") -> str:
         "```bash",
         *_commands(score, folder),
         f"tunnel blind diagnose {folder}{withheld}",
-        f"tunnel blind score {folder}{withheld} --markdown docs/blind-check.md",
+        f"tunnel blind score {folder}{withheld} --markdown docs/blind-check.md{drawn}",
         "```",
         "",
         *(f"    {line}" for line in origin_lines(score)),
@@ -115,9 +120,9 @@ def markdown(score: Score, folder: str, figure: str = "") -> str:
         lines += ["", f"## {section.title}", "", *_rows(section.headings, section.rows)]
         if section.note:
             lines += ["", section.note]
-        if figure and section.title == INCLUSION:
-            lines += ["", f"![Stated and observed probability that an effect is among the causes]({figure})"]
-    return "\n".join([*lines, "", *_matrix(score), ""])
+        if figures[0] and section.title == CALIBRATION:
+            lines += ["", f"![Share that is right against the probability stated]({figures[0]})"]
+    return "\n".join([*lines, "", *_matrix(score, figures[1]), ""])
 
 
 def _commands(score: Score, folder: str) -> list[str]:
@@ -184,7 +189,7 @@ def _calibration(score: Score) -> Section:
     rows = tuple((f"{b.low:.1f} to {b.high:.1f}", f"{b.mean:.3f}", *_share(b.right)) for b in bins)
     headings = ("probability stated", "mean", "right", "of", "share", "95 %")
     note = f"Expected calibration error of the answer given, {len(rows)} bins in use: {error:.3f}"
-    return Section("Calibration", headings, rows, note)
+    return Section(CALIBRATION, headings, rows, note)
 
 
 def _closure(score: Score) -> Section:
@@ -233,13 +238,12 @@ def _pairs(score: Score) -> Section:
 
 def _answers(score: Score) -> Section:
     rows = []
+    right = score.right_by_truth()
     for truth, answers in sorted(score.confusion().items(), key=lambda item: _order(item[0])):
-        total = sum(answers.values())
-        right = sum(c.right for c in score.cases if _row(c.withheld, c.truth) == truth)
         wrong = sorted(answers.items(), key=lambda item: -item[1])
         own = {"withheld": "unknown"}.get(truth, truth)
         others = ", ".join(f"{name} {number}" for name, number in wrong if name != own)
-        rows.append((truth, str(total), str(right), others))
+        rows.append((truth, str(right[truth].total), str(right[truth].count), others))
     return Section("Answers by truth", ("truth", "number", "right", "answered otherwise"), tuple(rows))
 
 
@@ -249,30 +253,29 @@ def _time(score: Score) -> Section:
     return Section("Seconds for each campaign", ("median", "90th percentile", "largest"), rows)
 
 
-def _matrix(score: Score) -> list[str]:
-    """The full confusion matrix: true causes in rows, answers in columns."""
+def confusion(score: Score) -> tuple[list[str], list[str], NDArray[np.int_]]:
+    """True causes in rows, answers in columns, and the counts, shape (rows, columns)."""
     found = score.confusion()
     names = sorted({*found, *(name for row in found.values() for name in row)}, key=_order)
-    across = [name for name in names if name != "withheld"]
-    numbers = {name: str(index) for index, name in enumerate(across, 1)}
-    headings = ["truth", "", *numbers.values()]
-    rows = [
-        [name, numbers.get(name, ""), *(str(found.get(name, {}).get(other, "·")) for other in across)]
-        for name in names
-        if name in found
+    rows, columns = [name for name in names if name in found], [name for name in names if name != "withheld"]
+    return rows, columns, np.array([[found[row].get(column, 0) for column in columns] for row in rows])
+
+
+def _matrix(score: Score, figure: str) -> list[str]:
+    """The full confusion matrix: true causes in rows, answers in columns."""
+    rows, columns, counts = confusion(score)
+    numbers = {name: str(index) for index, name in enumerate(columns, 1)}
+    cells = [
+        [name, numbers.get(name, ""), *(str(count or "·") for count in own)]
+        for name, own in zip(rows, counts.tolist(), strict=True)
     ]
-    key = ", ".join(f"{number} {name}" for name, number in numbers.items())
     return [
         "## Confusion matrix", "",
         "True causes in rows, answers in columns; `two or more` counts any set of effects.", "",
-        *_rows(headings, rows), "", f"Columns: {key}.",
+        *([f"![Answers in columns by true causes in rows]({figure})", ""] if figure else []),
+        *_rows(["truth", "", *numbers.values()], cells), "",
+        f"Columns: {', '.join(f'{number} {name}' for name, number in numbers.items())}.",
     ]  # fmt: skip
-
-
-def _row(withheld: bool, truth: Sequence[str]) -> str:
-    from diagnosis.blind.cases import label
-
-    return "withheld" if withheld else label(truth)
 
 
 def _order(name: str) -> tuple[int, str]:

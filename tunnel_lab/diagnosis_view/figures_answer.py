@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,13 +18,12 @@ from tunnel_lab.diagnosis_view.figures_common import (
     QUIET,
     SIGMAS,
     SOFT,
-    WIDTH,
     Document,
     array,
     noise_axis,
     plain,
 )
-from tunnel_lab.plotting.common import figure, figure_text, grid, styled
+from tunnel_lab.plotting.common import WIDTH, figure, figure_text, grid, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 SHOWN = 8
 """Most answers drawn."""
 _DRAWN_TRACES = 2
+_LABEL = 40  # characters in a line of a label
 _LEAST_NOISE = 0.03  # noise variances, three standard deviations: where the document has no maps
 
 
@@ -46,13 +47,14 @@ def candidates_figure(document: Document) -> Figure | None:
     shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= LISTED_PROBABILITY]
     if len(shown) < 2:
         return None
-    fig = figure(WIDTH, 0.7 + 0.3 * len(shown))
+    names = [textwrap.fill(plain(candidate["effect"]), _LABEL) for candidate in shown]
+    fig = figure(WIDTH, 0.7 + 0.3 * len(shown) + 0.15 * sum(name.count("\n") for name in names))
     axes = fig.add_subplot()
     values = [candidate["probability"] for candidate in shown]
     axes.barh(range(len(shown)), values, color=[ACCENT, *[QUIET] * (len(shown) - 1)], height=0.6)
     for index, value in enumerate(values):
         axes.text(value + 0.01, index, _percent(value), va="center")
-    axes.set_yticks(range(len(shown)), [plain(candidate["effect"]) for candidate in shown])
+    axes.set_yticks(range(len(shown)), names)
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.12)
     axes.set_xticks(np.linspace(0.0, 1.0, 6), [f"{v:.0%}" for v in np.linspace(0.0, 1.0, 6)])

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.diagnosis_view.figures_common import INK, MARKERS, WIDTH, Document, array, drawn_label
-from tunnel_lab.plotting.common import figure, grid, styled
+from tunnel_lab.diagnosis_view.figures_common import INK, Document, array, drawn_label
+from tunnel_lab.plotting.common import WIDTH, figure, grid, limit_to_known, log_axis, styled
+from tunnel_lab.plotting.plots import MARKERS
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -35,20 +36,29 @@ def backbone_figure(document: Document) -> Figure:
     labels = {run["id"]: drawn_label(run) for run in maps["runs"]}
     fig = figure(WIDTH, 4.6)
     frequency, damping = fig.subplots(1, 2)
+    shifts, changes = [], []
     for index, curve in enumerate(chosen):
         amplitude = array(curve["amplitude_rad"])
         nominal = curve["nominal_frequency_hz"]
         style = {"color": f"C{index}", "marker": MARKERS[(index + index // len(MARKERS)) % len(MARKERS)]}
         shift = 100.0 * (array(curve["frequency_hz"]) / nominal - 1.0)
-        _curve(frequency, amplitude, shift, 100.0 * array(curve["frequency_std"]) / nominal, style)
+        shift_std = 100.0 * array(curve["frequency_std"]) / nominal
+        _curve(frequency, amplitude, shift, shift_std, style)
         change = 1e3 * (array(curve["zeta"]) - curve["nominal_zeta"])
-        _curve(damping, amplitude, change, 1e3 * array(curve["zeta_std"]), style, labels[curve["id"]])
+        change_std = 1e3 * array(curve["zeta_std"])
+        _curve(damping, amplitude, change, change_std, style, labels[curve["id"]])
+        shifts.append((shift, shift_std))
+        changes.append((change, change_std))
     for axes, name in ((frequency, "frequency against the nominal model [%]"),
                        (damping, "damping ratio minus the nominal one [10⁻³]")):  # fmt: skip
         axes.axhline(0.0, color=INK, linewidth=1.0)
         axes.set_xlabel("amplitude [rad]")
         axes.set_ylabel(name)
         grid(axes)
+    for axes, pairs in ((frequency, shifts), (damping, changes)):
+        if pairs:
+            limit_to_known(axes, *(np.concatenate(column) for column in zip(*pairs, strict=True)))
+            log_axis(axes, "x")
     if chosen:
         fig.legend(loc="outside lower center", ncols=3)
     return fig

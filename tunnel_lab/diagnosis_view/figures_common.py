@@ -22,9 +22,7 @@ THEMED = {
     BEFORE: "before", AFTER: "after", ACCENT: "accent",
 }  # fmt: skip
 """Custom properties of the style sheet by colour of the figures."""
-WIDTH = 7.2  # inches
 NARROW = 4.4  # inches: legible on a phone without scrolling
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
 SIGMAS = 3.0
 """Standard deviations within which values count as noise in the figures."""
 _FAINTEST = 0.12

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tunnel_lab.diagnosis_view import figures_common as common
-from tunnel_lab.plotting.common import figure, grid
+from tunnel_lab.plotting.common import WIDTH, figure, grid, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,6 +16,7 @@ _AXES = {"angle": "angle [rad]", "rate": "rate [rad/s]", "time": "time since the
 _BAND = 1.96
 
 
+@styled
 def law_figure(document: common.Document) -> Figure | None:
     """The law without a formula.
 
@@ -29,7 +30,7 @@ def law_figure(document: common.Document) -> Figure | None:
     values, std = (np.reshape(curve[name], shape) for name in ("values", "std"))
     unit = "rad" if curve["unit"] == "rad" else "N m" if curve["unit"] == "N m" else "rad/s²"
     name = f"{'error of the reading' if unit == 'rad' else 'missing moment'} [{unit}]"
-    fig = figure(common.WIDTH, 3.2)
+    fig = figure(WIDTH, 3.2)
     axes = fig.add_subplot()
     axes.set_xlabel(_AXES[curve["over"][0]])
     if len(shape) == 1:

@@ -13,14 +13,13 @@ from tunnel_lab.diagnosis_view.figures_common import (
     NOISE,
     QUIET,
     SIGMAS,
-    WIDTH,
     Document,
     array,
     drawn_label,
     faded,
     shade,
 )
-from tunnel_lab.plotting.common import figure, grid, styled
+from tunnel_lab.plotting.common import WIDTH, figure, grid, styled
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:

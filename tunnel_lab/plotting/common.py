@@ -5,12 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 from importlib import resources
+from math import log10
 from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
+
+import numpy as np
+
+from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
+WIDTH = 7.2
+"""Width of a figure that fills a page, inches."""
+_FEW_DECADES = 2.5
+_WIDE = 5.0  # times the median standard deviation
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -44,6 +54,52 @@ def figure(width: float, height: float) -> Figure:
 def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
     """A quiet grid behind the data."""
     axes.grid(visible=True, axis=axis)
+
+
+def log_axis(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Make an axis logarithmic, with labels that are few enough not to touch.
+
+    Matplotlib labels the ticks between the powers of ten as well, as 6×10⁰, where an axis is short.
+
+    Args:
+        axes: whose data are drawn, because the labels depend on the limits.
+    """
+    from matplotlib.ticker import FuncFormatter, LogFormatterMathtext, LogLocator, NullFormatter
+
+    axis: Axis
+    if which == "x":
+        axes.set_xscale("log")
+        axis, limits = axes.xaxis, axes.get_xlim()
+    else:
+        axes.set_yscale("log")
+        axis, limits = axes.yaxis, axes.get_ylim()
+    decades = log10(max(limits) / min(limits))
+    axis.set_minor_formatter(NullFormatter())
+    if decades > _FEW_DECADES:
+        axis.set_major_locator(LogLocator(10.0, (1.0,), numticks=8))
+        axis.set_major_formatter(LogFormatterMathtext(10.0))
+    else:
+        steps = (1.0, 2.0, 5.0) if decades > 1.0 else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+        axis.set_major_locator(LogLocator(10.0, steps))
+        plain = min(limits) >= 1e-4 and max(limits) < 1e5
+        powers = LogFormatterMathtext(10.0, minor_thresholds=(np.inf, np.inf))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}") if plain else powers)
+
+
+def limit_to_known(axes: Axes, values: Array, stds: Array) -> None:
+    """Limit the vertical axis to the values that are known as well as most, with their 95 % intervals.
+
+    The few that are known far worse, such as those of the last cycles of a decay, would set the scale otherwise.
+    Their intervals cross the axis.
+
+    Args:
+        values: shape (n,), in the axis' unit.
+        stds: their standard deviations, shape (n,), in the same unit.
+    """
+    known = stds <= _WIDE * np.median(stds)
+    low, high = np.min((values - 2.0 * stds)[known]), np.max((values + 2.0 * stds)[known])
+    margin = 0.05 * (high - low) or 0.1 * abs(high) or 1.0
+    axes.set_ylim(low - margin, high + margin)
 
 
 def figure_text(text: str) -> str:

@@ -1,4 +1,4 @@
-"""The breakdown map as tables and as a figure. matplotlib is imported inside the functions."""
+"""The breakdown map as tables and as figures. matplotlib is imported inside the functions."""
 
 from __future__ import annotations
 
@@ -9,18 +9,15 @@ import numpy as np
 from rich.text import Text
 
 from identification.printing.numbers import significant
-from tunnel_lab.plotting.common import styled
-from tunnel_lab.scoring.breakdown import NO_EFFECT, Bias
+from tunnel_lab.plotting.common import figure, styled
+from tunnel_lab.scoring.breakdown import Bias
 from tunnel_lab.scoring.tables import NAMES
 from tunnel_lab.terminal.tables import table
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    import polars as pl
     from matplotlib.figure import Figure
-    from matplotlib.image import AxesImage
     from rich.table import Table
-
-    from tunnel_sim.vocabulary.record import Array
 
 SHOWN = ("cn_beta", "cn_r")
 ABOUT = (
@@ -28,7 +25,8 @@ ABOUT = (
     "the nominal refit, in noise powers."
 )
 _SIDE_BY_SIDE = 3  # estimators in one table of a terminal of 80 columns
-_TINY, _HUGE = 1e-3, 1e2  # % at the ends of the colours
+_DECADES = 2.0  # of standard deviations above one, at the ends of the colours
+_DARK = 1.2  # decades from which white text is legible
 
 
 def breakdown_tables(found: Sequence[Bias], quantity: str) -> list[Table]:
@@ -64,76 +62,72 @@ def _compact(value: float) -> str:
 
 
 @styled
-def breakdown_figure(found: Sequence[Bias]) -> Figure:
-    """The bias as a colour map: in % above and in reported standard deviations below.
+def breakdown_figure(frame: pl.DataFrame, quantity: str) -> Figure:
+    """The biases of one quantity that exceed one reported standard deviation.
+
+    Args:
+        frame: of `breakdown_frame`.
+        quantity: ``cn_beta`` or another of the frame.
 
     Returns:
-        Four panels, for Cnβ and Cnr, with effects in rows, estimators and severities in columns.
+        Effects in rows and estimators in columns, each with its severities side by side. The colour is the bias
+        in reported standard deviations, the number the bias in %; smaller biases stay empty.
     """
-    from matplotlib.figure import Figure
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.patches import Rectangle
 
-    names = list(dict.fromkeys(one.estimator for one in found))
-    effects = list(dict.fromkeys(one.effect for one in found))
-    severities = sorted({one.severity for one in found if one.effect != NO_EFFECT})
-    width = 4.0 + 0.95 * len(names) * len(severities)
-    figure = Figure(figsize=(2.0 * max(width / 2.0, 5.0), 1.0 + 0.52 * len(effects)), layout="constrained")
-    panels = figure.subplots(2, 2, sharex=True, sharey=True)
-    for row, in_percent in enumerate((True, False)):
-        image = None
-        for column, quantity in enumerate(SHOWN):
-            values = _grid(found, quantity, effects, names, severities, in_percent=in_percent)
-            image = _panel(panels[row, column], values)
-            of = "% of the truth" if in_percent else "reported standard deviations"
-            panels[row, column].set_title(f"bias of {NAMES[quantity]}, {of}", fontsize=10)
-        if image is not None:
-            figure.colorbar(image, ax=panels[row], shrink=0.7, label="size of the bias")
-    labels = [f"{name}, {severity:g}×" for name in names for severity in severities]
-    for axes in panels[1]:
-        axes.set_xticks(range(len(labels)), labels, rotation=90, fontsize=8)
-    for axes in panels[:, 0]:
-        axes.set_yticks(range(len(effects)), [effect.replace("_", " ") for effect in effects], fontsize=8)
-    return figure
-
-
-def _grid(
-    found: Sequence[Bias],
-    quantity: str,
-    effects: Sequence[str],
-    names: Sequence[str],
-    severities: Sequence[float],
-    *,
-    in_percent: bool,
-) -> Array:
-    """Biases by effect (rows) and by estimator and severity (columns); NaN where there is none."""
-    values = np.full((len(effects), len(names), len(severities)), np.nan)
-    for one in found:
-        figure = one.score.relative_bias if in_percent else one.score.bias_in_stds
-        if one.quantity != quantity or figure is None:
-            continue
-        row, column = effects.index(one.effect), names.index(one.estimator)
-        if one.effect == NO_EFFECT:  # has no severity: shown in all columns of its estimator
-            values[row, column, :] = figure.value
-        else:
-            values[row, column, severities.index(one.severity)] = figure.value
-    return values.reshape(len(effects), -1)
-
-
-def _panel(axes: Axes, values: Array) -> AxesImage:
-    from matplotlib.colors import LogNorm
-
-    image = axes.imshow(
-        np.clip(np.abs(values), _TINY, _HUGE),
-        norm=LogNorm(_TINY, _HUGE),
-        cmap="cividis_r",
-        aspect="auto",
+    cells = exceeding(frame, quantity)
+    mine = frame.filter(frame["quantity"] == quantity)
+    effects, names = (mine[key].unique(maintain_order=True).to_list() for key in ("effect", "estimator"))
+    severities = sorted(set(mine["severity_noise_powers"]) - {0.0})
+    fig = figure(1.6 + 0.42 * len(names) * max(len(severities), 2), 1.3 + 0.2 * len(effects))
+    axes = fig.add_subplot()
+    colours = ScalarMappable(Normalize(-_DECADES, _DECADES), "RdBu_r")
+    for (effect, severity, name), (percent, stds) in cells.items():
+        width = 1.0 / len(severities) if severity else 1.0
+        place = severities.index(severity) * width if severity else 0.0
+        shade = float(np.sign(stds) * np.log10(abs(stds)))
+        corner = (names.index(name) + place, effects.index(effect) - 0.5)
+        axes.add_patch(
+            Rectangle(corner, width, 1.0, color=colours.to_rgba(np.array([shade]))[0], linewidth=0.0)
+        )
+        axes.text(
+            corner[0] + 0.5 * width, effects.index(effect), _compact(percent), ha="center", va="center",
+            fontsize=6, color="white" if abs(shade) > _DARK else "black",
+        )  # fmt: skip
+    for edge in range(1, len(names)):
+        axes.axvline(edge, color="0.75", linewidth=0.6)
+    for edge in range(1, len(effects)):
+        axes.axhline(edge - 0.5, color="0.9", linewidth=0.4, zorder=0)
+    labels = [name.replace("_", "\n") for name in names]
+    axes.set_xticks(np.arange(len(names)) + 0.5, labels)
+    axes.set_yticks(range(len(effects)), [effect.replace("_", " ") for effect in effects])
+    axes.set(xlim=(0.0, len(names)), ylim=(len(effects) - 0.5, -0.5))
+    axes.tick_params(length=0)
+    each = ", ".join(f"{severity:g}" for severity in severities)
+    axes.set_title(
+        f"Bias of {NAMES[quantity]} in % where it exceeds one σ; from left to right: {each} × noise power"
     )
-    for (row, column), value in np.ndenumerate(values):
-        if np.isfinite(value):
-            dark = abs(value) > 1.0
-            axes.text(
-                column, row, _compact(float(value)), ha="center", va="center", fontsize=6.5,
-                color="white" if dark else "black",
-            )  # fmt: skip
-        else:
-            axes.text(column, row, "failed", ha="center", va="center", fontsize=6, color="0.4")
-    return image
+    bar = fig.colorbar(colours, ax=axes, location="bottom", aspect=60, shrink=0.6)
+    bar.set_ticks([-2, -1, 0, 1, 2], labels=["≤ −100", "−10", "±1", "10", "≥ 100"])
+    bar.set_label("bias in reported standard deviations σ")
+    return fig
+
+
+def exceeding(frame: pl.DataFrame, quantity: str) -> dict[tuple[str, float, str], tuple[float, float]]:
+    """Biases that are larger than one reported standard deviation.
+
+    Args:
+        frame: of `breakdown_frame`.
+
+    Returns:
+        By effect, severity in noise powers (a ratio) and estimator: the bias in % of the truth and in reported
+        standard deviations (a ratio).
+    """
+    found = {}
+    for row in frame.filter(frame["quantity"] == quantity).iter_rows(named=True):
+        percent, stds = row["bias_percent"], row["bias_in_stds"]
+        if percent is not None and stds is not None and abs(stds) > 1.0:
+            found[row["effect"], row["severity_noise_powers"], row["estimator"]] = (percent, stds)
+    return found

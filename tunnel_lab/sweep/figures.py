@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from identification.printing.numbers import SYMBOLS, concise, significant, unit
-from tunnel_lab.plotting.common import figure, grid, styled
+from tunnel_lab.plotting.common import WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.plotting.plots import COLOURS, MARKERS
 from tunnel_lab.sweep.summary import AXES, OVERALL, SEVERITY, Line, Pace
 from tunnel_lab.terminal.tables import table
@@ -24,6 +24,7 @@ DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "
 NAMES: Mapping[str, str] = {**DRAWN, **SYMBOLS, "sensor_zero": "zero"}
 BRACKETS = "In brackets: the standard error in the last digits, from the number of trials; of shares 95 %."
 _INTERVAL = 1.96
+_ASIDE = 0.012  # of the axis, between two estimators
 _LOGARITHMIC = ("noise_std", "spring_stiffness")
 _WIDE = 10.0  # ratio of the largest to the least value from which an axis is drawn logarithmic
 
@@ -44,7 +45,7 @@ def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
 
 @styled
 def error_figure(lines: Sequence[Line]) -> Figure | None:
-    """RMSE and bias along one axis, a column of panels for each quantity, a colour for each estimator.
+    """RMSE and bias along one axis, a row of panels for each quantity, a colour for each estimator.
 
     Args:
         lines: of one axis, and of one effect where that is severity.
@@ -56,66 +57,65 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
     if not quantities:
         return None
     estimators = list(dict.fromkeys(line.estimator for line in lines))
-    fig = figure(max(6.4, 3.1 * len(quantities) + 0.6), 6.2)
-    for column, name in enumerate(quantities, 1):
+    fig = figure(WIDTH, 1.2 + 1.6 * len(quantities))
+    panels = fig.subplots(len(quantities), 2, sharex=True, squeeze=False)
+    logarithmic = _is_logarithmic(lines)
+    for name, (left, right) in zip(quantities, panels, strict=True):
         mine = [line for line in lines if line.quantity == name and line.score.rmse and line.score.bias]
-        top = fig.add_subplot(2, len(quantities), column)
-        bottom = fig.add_subplot(2, len(quantities), len(quantities) + column, sharex=top)
         for place, estimator in enumerate(estimators):
-            shown = [line for line in mine if line.estimator == estimator]
-            _errorbars(top, shown, [line.score.rmse for line in shown], place, len(estimators))
-            _errorbars(bottom, shown, [line.score.bias for line in shown], place, len(estimators))
-        _dress(top, bottom, mine, name, first=column == 1)
-    handles, labels = fig.axes[0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)), fontsize=9)
+            shown = [line for line in mine if line.estimator == estimator and line.at is not None]
+            aside = (place - (len(estimators) - 1) / 2.0) * _ASIDE
+            at = _moved(shown, aside, logarithmic=logarithmic)
+            _errorbars(left, at, [line.score.rmse for line in shown], place, estimator)
+            _errorbars(right, at, [line.score.bias for line in shown], place, estimator)
+        _dress(left, right, mine[0], name)
+    if logarithmic:
+        for axes in panels[-1]:
+            log_axis(axes, "x")
+    for column in panels.T:
+        fig.align_ylabels(column)
+    one = lines[0]
+    label = one.effect.replace("_", " ") if one.axis == SEVERITY else AXES[one.axis][0]
+    fig.supxlabel(f"{label} [{one.at_unit}]", fontsize=9)
+    handles, names = panels[0, 0].get_legend_handles_labels()
+    fig.legend(handles, names, loc="outside upper center", ncols=min(4, len(names)))
     return fig
 
 
+def _moved(lines: Sequence[Line], aside: float, *, logarithmic: bool) -> list[float]:
+    """Where the lines stand on the axis, a little aside, so that intervals do not hide each other."""
+    at = [float(line.at) for line in lines if line.at is not None]
+    if logarithmic:
+        return [x * (max(at) / min(at)) ** aside for x in at]
+    return [x + aside * (max(at) - min(at)) for x in at]
+
+
 def _errorbars(
-    axes: Axes, lines: Sequence[Line], figures: Sequence[Quantity | None], place: int, count: int
+    axes: Axes, at: Sequence[float], figures: Sequence[Quantity | None], place: int, label: str
 ) -> None:
-    pairs = [
-        (line.at, figure)
-        for line, figure in zip(lines, figures, strict=True)
-        if figure and line.at is not None
-    ]
+    pairs = [(x, found) for x, found in zip(at, figures, strict=True) if found is not None]
     if not pairs:
         return
-    at = [float(x) for x, _ in pairs]
-    aside = (place - (count - 1) / 2.0) * 0.012  # intervals of several estimators must not hide each other
-    if _is_logarithmic(lines):
-        at = [x * (1.0 + aside * 3.0) for x in at]
-    else:
-        at = [x + aside * (max(at) - min(at)) for x in at]
     axes.errorbar(
-        at,
-        [figure.value for _, figure in pairs],
-        yerr=[_INTERVAL * figure.std for _, figure in pairs],
+        [x for x, _ in pairs],
+        [found.value for _, found in pairs],
+        yerr=[_INTERVAL * found.std for _, found in pairs],
         color=COLOURS[place % len(COLOURS)],
         marker=MARKERS[place % len(MARKERS)],
-        markersize=4.5,
+        markersize=4.0,
         linewidth=1.0,
-        capsize=2.5,
-        label=lines[0].estimator,
+        label=label.replace("_", " "),
     )
 
 
-def _dress(top: Axes, bottom: Axes, lines: Sequence[Line], name: str, *, first: bool) -> None:
-    one = lines[0]
-    label = one.effect.replace("_", " ") if one.axis == SEVERITY else AXES[one.axis][0]
+def _dress(left: Axes, right: Axes, one: Line, name: str) -> None:
     scale = one.score.rmse.unit if one.score.rmse else ""
     per = "% of truth" if scale == "%" else scale
-    top.set_title(NAMES[name], fontsize=11)
-    top.set_yscale("log")
-    if _is_logarithmic(lines):
-        top.set_xscale("log")
-    bottom.axhline(0.0, color="black", linewidth=0.8)
-    bottom.set_xlabel(f"{label} [{one.at_unit}]")
-    top.tick_params(labelbottom=False)
-    if first or scale != "%":
-        top.set_ylabel(f"RMSE [{per}]")
-        bottom.set_ylabel(f"bias, estimate − truth [{per}]")
-    for axes in (top, bottom):
+    log_axis(left, "y")
+    right.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
+    left.set_ylabel(f"{NAMES[name]}: RMSE [{per}]")
+    right.set_ylabel(f"bias [{per}]")
+    for axes in (left, right):
         grid(axes)
 
 

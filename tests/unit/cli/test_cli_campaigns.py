@@ -92,9 +92,10 @@ def test_plot_writes_whole_figures(tunnel: Tunnel, tiny_campaign: Path, tmp_path
     status, out, err = tunnel("plot", tiny_campaign, "--out", tmp_path / "figures")
     assert (status, err) == (0, "")
     files = sorted((tmp_path / "figures" / "tiny").iterdir())
-    assert [path.name for path in files] == ["spectrum.png", "traces-1.png", "windows.png"]
+    names = ("spectrum", "traces-1", "windows")
+    assert [path.name for path in files] == [f"{name}.{form}" for name in names for form in ("pdf", "png")]
     for path in files:
-        assert path.read_bytes().startswith(PNG)
+        assert path.read_bytes().startswith(PNG if path.suffix == ".png" else b"%PDF")
         assert f"Written: {path}" in out
 
 

@@ -38,7 +38,7 @@ def test_plot(tunnel: Tunnel, folder: Path, tmp_path: Path) -> None:
     status, out, err = tunnel("plot", folder, "--out", tmp_path / "figures")
     assert (status, err) == (0, "")
     assert r"[c] $\bar$/windows.png" in out
-    assert len(list((tmp_path / "figures" / folder.name).iterdir())) == 3
+    assert len(list((tmp_path / "figures" / folder.name).iterdir())) == 6
 
 
 def test_identify(tunnel: Tunnel, folder: Path) -> None:
@@ -85,5 +85,5 @@ def test_a_figure_shows_a_name_as_it_is(name: str) -> None:
 def test_a_legend_leaves_no_run_out() -> None:
     data = hostile()
     figure = spectrum_figure(data.runs)
-    labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == [run_label(run) for run in data.runs]

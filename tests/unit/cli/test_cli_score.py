@@ -72,7 +72,8 @@ def test_figures_come_with_their_sampling_errors_and_are_kept(
     assert (status, err) == (0, "")
     assert "Single decays (4 cells)" in out
     assert out.count("ζ 0.05, 3 Hz, S/A 0.5 %, 5 s") == 1
-    assert {path.name for path in folder.iterdir()} == {"trials.parquet", "scores.parquet", "score.png"}
+    written = {"trials.parquet", "scores.parquet", "score.png", "score.pdf"}
+    assert {path.name for path in folder.iterdir()} == written
     assert (folder / "score.png").read_bytes()[:4] == b"\x89PNG"
     frame = pl.read_parquet(folder / "scores.parquet")
     assert frame.height == 4 * 2

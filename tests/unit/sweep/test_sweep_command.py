@@ -118,7 +118,7 @@ def test_the_summary_of_a_sweep(
 ) -> None:
     run_sweep(sweep, tmp_path / "out", here)
     assert unheard("sweep", "--summary", tmp_path / "out") == 0
-    assert len(list((tmp_path / "out" / "summary").iterdir())) == 4  # written before the first word
+    assert len(list((tmp_path / "out" / "summary").iterdir())) == 7  # written before the first word
     shutil.rmtree(tmp_path / "out" / "summary")
     assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
@@ -130,9 +130,9 @@ def test_the_summary_of_a_sweep(
     ):
         assert part in said
     files = {path.name: path for path in (tmp_path / "out" / "summary").iterdir()}
-    assert set(files) == {
-        "summary.csv", "error-by-noise-std.png", "error-by-wind-speed.png", "error-by-coulomb-friction.png",
-    }  # fmt: skip
+    names = ("noise-std", "wind-speed", "coulomb-friction")
+    drawn = {f"error-by-{name}.{form}" for name in names for form in ("png", "pdf")}
+    assert set(files) == {"summary.csv"} | drawn
     assert all(path.read_bytes()[:4] == b"\x89PNG" for name, path in files.items() if name.endswith("png"))
     table = pl.read_csv(files["summary.csv"])
     friction = table.filter((pl.col("axis") == "severity") & (pl.col("quantity") == "zeta"))

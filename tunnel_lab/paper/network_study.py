@@ -1,6 +1,6 @@
 """The paper's networks against known truth: Fig. 3, Tables III and IV, Figs 4 to 6, and noise against the bound.
 
-Nothing is printed or drawn here; the page ``the-papers-networks`` and `docs.studies.network_plots` show it.
+Nothing is printed or drawn here; the page ``the-papers-networks`` and `tunnel_lab.paper.network_plots` show it.
 """
 
 from __future__ import annotations
@@ -265,30 +265,3 @@ def verdict(rows: Sequence[Mapping[str, Closeness]], quantity: str) -> Verdict:
         int(np.sum(np.abs(values[NETWORK]) < np.abs(values[CONVENTIONAL]))),
         len(whole),
     )
-
-
-def reference_campaigns(count: int, seed: int, *, softening: bool) -> list[tuple[Campaign, Truth]]:
-    """Campaigns of the reference simulator, whose integrator and laws are not those of the virtual rig.
-
-    Args:
-        count: number of campaigns, of conditions and truth of their own.
-        softening: with a spring that softens and a damping that grows with the amplitude, as in `SOFTENING`.
-    """
-    from tunnel_reference.draw import CampaignDraw, EffectDraw, draw_conditions
-    from tunnel_reference.forms import forms_of
-    from tunnel_reference.make import as_campaign
-    from tunnel_reference.severity import read_and_fit, simulate_motions
-
-    rng = np.random.default_rng(seed)
-    sized = (("cubic_stiffness", -1, 0.39), ("quadratic_damping", 1, 0.0038)) if softening else ()
-    effects = tuple(EffectDraw(forms_of(family)[0], {}, sign, 0.0, value) for family, sign, value in sized)
-    kind = "pair" if softening else "none"
-    draws = [
-        CampaignDraw(kind, draw_conditions(rng), effects, int(rng.integers(2**31))) for _ in range(count)
-    ]
-    found = []
-    for number, (draw, motion) in enumerate(zip(draws, simulate_motions(draws, fine=False), strict=True)):
-        c = draw.conditions
-        truth = Truth(c.cn_beta, c.cn_r, c.yaw_inertia, c.mechanical_damping)
-        found.append((as_campaign(read_and_fit(draw, motion), f"reference-{number + 1}"), truth))
-    return found

@@ -1,7 +1,7 @@
 """A table of windows, as the paper's Table III, and the simulation of one.
 
 Such a table holds damping ratio and natural frequency of one wind-on run, three cycles at a time. The linear
-model leaves both columns constant; ``docs.studies.window_rivals`` weighs what makes them drift. The paper does
+model leaves both columns constant; ``tunnel_lab.paper.window_rivals`` weighs what makes them drift. The paper does
 not name the run behind its table: `RigState` is an inference, see `infer_springs` and `rig_state`.
 """
 

@@ -15,8 +15,8 @@ from math import log
 import numpy as np
 from scipy.optimize import least_squares
 
-from docs.studies.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
 from identification.datasets import WindowRow, paper_windows
+from tunnel_lab.paper.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
