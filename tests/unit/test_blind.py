@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -356,7 +357,11 @@ def test_the_commands_agree_with_one_another(blind, quick, capsys, tmp_path):
     assert unheard("blind", "score", blind, "--markdown", page, "--json", figures) == 0
     assert page.exists()
     assert figures.exists()
-    assert main(["blind", "score", str(blind), "--markdown", str(page), "--json", str(figures)]) == 0
+    words = ["blind", "score", str(blind), "--markdown", str(page), "--json", str(figures)]
+    assert main([*words, "--figure", str(tmp_path / "f.png")]) == 0
+    drawn = {path.name for path in tmp_path.iterdir() if path.stem.startswith("f")}
+    assert drawn == {"f.png", "f.pdf", "f-confusion.png", "f-confusion.pdf"}
+    assert {"](f.png)", "](f-confusion.png)"} <= set(re.findall(r"\]\(f.*?\)", page.read_text("utf-8")))
     out = capsys.readouterr().out
     for text in (sealed, "verified", "Causes exactly right", "Calibration", "Seconds"):
         assert text in out
@@ -386,6 +391,10 @@ def test_an_open_set_is_scored_and_said_to_be_open(blind, quick, capsys):
         (["diagnose", "SET", "--exclude", "mains_hmu"], "did you mean 'mains_hum'?"),
         (["score", "SET"], "answer the set first"),
         (["score", "SET", "--markdown", "no/page.md"], "its folder does not exist"),
+        (
+            ["score", "SET", "--figure", "a.jpg"],
+            "--figure a.jpg: is not a .png; name a file that ends in .png",
+        ),
     ],
 )
 def test_bad_input_is_one_line(blind, capsys, words, part):

@@ -54,7 +54,7 @@ def test_the_rig_has_the_sizes_of_table_1_and_the_inertia_of_table_2(tmp_path: P
 def test_the_equations_say_what_is_printed_and_what_it_gives(tmp_path: Path) -> None:
     rows = {row[0]: row[3] for row in rig_parts.equations(tmp_path).rows}
     assert set(rows) == {"text after 6", "7", "8", "9", "12", "16"}
-    assert "0.08425" in rows["8"]
+    assert rows["8"] == "Cnr +0.0842; corrected: −0.1033"
     assert "no damping" in rows["12"]
 
 

@@ -13,7 +13,7 @@ NAME = "paper"
 def run(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="FOLDER", help="Where the page and its figures go.")
-    ] = Path("tunnel-paper"),
+    ] = Path("tunnel-output/paper"),
     only: Annotated[
         list[str] | None,
         typer.Option("--only", metavar="PART", help="Only this part, such as table-2. May be repeated."),

@@ -9,7 +9,7 @@ from pathlib import Path
 from identification import identify
 from identification.campaign.springs import fit_springs
 from identification.datasets import paper_springs
-from identification.printing.numbers import concise, significant, with_std
+from identification.printing.numbers import concise, with_std
 from tunnel_lab.paper import figures
 from tunnel_lab.paper.equations import eq7, eq8, known_run, printed_transfer_function
 from tunnel_lab.paper.section import Picture, Section, scaled, signed
@@ -125,15 +125,15 @@ def equations(_: Path) -> Section:
     right, wrong = (known.cn_r_of(eq8(known.on, known.off, printed=printed)) for printed in (False, True))
     zeta = known.on.rate / known.on.omega_n
     turned = printed_transfer_function(zeta, known.on.omega_n)
-    truth = f"Cnβ {known.cn_beta:g}, Cnr {known.cn_r:g}"
+    truth = f"Cnβ {signed(known.cn_beta, 4)}, Cnr {signed(known.cn_r, 4)}"
     undamped = (
         f"no damping at all (ζ 0 for {zeta:.4f}), at {turned.omega_n:.3f} for {known.on.omega_n:.3f} rad/s"
     )
     rows = (
         ("text after 6", "N̂β = −Ka/Izz, N̂r = −Ca/Izz", "N̂β = +Ka/Izz, N̂r = +Ca/Izz",
-         f"Cnβ {-known.cn_beta:g}, Cnr {-known.cn_r:g}: both signs reversed"),
-        ("7", "as it should be", "ωn² = ωd² + σ², σ = ln 2/t½", f"Cnβ {significant(beta, 4)}: right"),
-        ("8", "1/t½² − 1/t½₀", "1/t½ − 1/t½₀", f"Cnr {significant(wrong, 4)}; corrected: {significant(right, 4)}"),
+         f"Cnβ {signed(-known.cn_beta, 4)}, Cnr {signed(-known.cn_r, 4)}: both signs reversed"),
+        ("7", "as it should be", "ωn² = ωd² + σ², σ = ln 2/t½", f"Cnβ {signed(beta, 4)}: right"),
+        ("8", "1/t½² − 1/t½₀", "1/t½ − 1/t½₀", f"Cnr {signed(wrong, 4)}; corrected: {signed(right, 4)}"),
         ("9", "s² + 2ζωn + ωn² = Δs", "characteristic polynomial s² + 2ζωn s + ωn²", "the units do not agree"),
         ("12", "2ζωn in the denominator", "2ζωn s", undamped),
         ("16", "2ζωn in the denominator", "2ζωn s in the denominator; the numerator is right", undamped),
