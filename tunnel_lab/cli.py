@@ -19,12 +19,14 @@ from tunnel_lab.commands import (
     demo,
     diagnose,
     docs,
+    doctor,
     effects,
     export,
     identify,
     importing,
     plot,
     render,
+    schema,
     score,
     simulate,
     springs,
@@ -91,6 +93,8 @@ def tunnel(
       tunnel render                      a film of a run, and a picture
       tunnel train w.safetensors         train the paper's networks from a seed
       tunnel docs                        the documentation, in a browser
+      tunnel doctor                      what is installed, and a self-check
+      tunnel schema campaign             JSON schemas, for editors
 
     [bold]Units[/bold]
       SI and radians throughout.
@@ -121,10 +125,12 @@ COMMANDS = (
     render,
     train,
     docs,
+    doctor,
+    schema,
 )
 """Every command that is one function, in the order of the help."""
 
-WITHOUT_TABLES = (simulate, plot, export, view, render, docs)
+WITHOUT_TABLES = (simulate, plot, export, view, render, docs, schema)
 
 for _command in COMMANDS:
     app.command(_command.NAME)(_command.run if _command in WITHOUT_TABLES else with_format(_command.run))
