@@ -34,7 +34,7 @@ from tunnel_lab.commands import (
     train,
     view,
 )
-from tunnel_lab.terminal.table_format import with_format
+from tunnel_lab.terminal.table_format import with_format, with_quiet
 from tunnel_sim.vocabulary.errors import TunnelError
 
 BAD_INPUT = 2
@@ -133,7 +133,8 @@ COMMANDS = (
 WITHOUT_TABLES = (simulate, plot, export, view, render, docs, schema)
 
 for _command in COMMANDS:
-    app.command(_command.NAME)(_command.run if _command in WITHOUT_TABLES else with_format(_command.run))
+    _wider = with_quiet if _command in WITHOUT_TABLES else with_format
+    app.command(_command.NAME)(_wider(_command.run))
 app.add_typer(blind.app, name=blind.NAME)
 
 

@@ -35,7 +35,7 @@ def run() -> None:
       tunnel doctor --format json
 
     [bold]Exit status[/bold]
-      0 all works, 1 the self-check failed, 2 bad input.
+      0 healthy, 1 the self-check failed, 2 bad input.
     """
     from tunnel_lab.terminal.tables import show_tables, table
 
