@@ -49,8 +49,8 @@ def linear_run(
     """The estimate of a run to first order in its noise.
 
     Args:
-        link: as in `LinearRun`.
-        time: as in `LinearRun`.
+        link: from φ to (a, k), shape (2, 4).
+        time: its sample times since the release, shape (n,), s.
         decay: the true one.
         angle: of the release, rad.
         zero: the true one, rad.

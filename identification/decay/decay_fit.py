@@ -221,6 +221,9 @@ def linearised_at(
     """JᵀJ as in `information_at`, and the score Jᵀ residual.
 
     Args:
+        time: since the initial state, shape (n,), s.
+        angle: initial angle, rad.
+        rate: initial rate, rad/s.
         residual: reading less model, shape (n,), rad.
 
     Returns:

@@ -143,8 +143,8 @@ def self_check() -> Iterator[tuple[str, str, bool]]:
         if quantity is None:
             yield name, estimate.status.value, False
             continue
-        error = (quantity.value - truth) / quantity.std
-        yield name, f"{error:+.1f} standard deviations from the truth", abs(error) <= LARGEST_ERROR
+        away = (quantity.value - truth) / quantity.std
+        yield name, f"{away:+.1f} standard deviations from the truth", abs(away) <= LARGEST_ERROR
     yield "time", f"{time.perf_counter() - begun:.1f} s", True
 
 

@@ -57,14 +57,14 @@ class _Maps(Part):
 class Document(Part):
     """The fields that are compared."""
 
-    schema_version: int
-    campaign: OneLine
-    causes: list[OneLine]
-    ambiguous_with: list[OneLine]
-    gap: _Gap
-    candidates: Annotated[list[_Candidate], Field(min_length=1)]
-    coefficients: _Coefficients
-    maps: _Maps | None = None
+    schema_version: int = Field(description="1")
+    campaign: OneLine = Field(description="the campaign's name")
+    causes: list[OneLine] = Field(description="effect names; empty: no gap; unknown: no effect explains it")
+    ambiguous_with: list[OneLine] = Field(description="effects that the runs cannot tell from the causes")
+    gap: _Gap = Field(description="the gap before and after the causes are added")
+    candidates: list[_Candidate] = Field(min_length=1, description="answers, most probable first")
+    coefficients: _Coefficients = Field(description="estimates before and after, and a note")
+    maps: _Maps | None = Field(default=None, description="data of the figures")
 
 
 def read_diagnosis(path: Path) -> dict[str, Any]:

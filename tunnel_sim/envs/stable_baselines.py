@@ -81,7 +81,7 @@ class BaselinesVecEnv(VecEnv):
         observations, infos = self._inner.reset(options={**self._common, "reset_mask": done})
         fresh = observations[done]
         if self._normal is not None:
-            statistics = self._normal.obs_rms
+            statistics: Any = self._normal.obs_rms  # Gymnasium's class is typed in parts only
             if self._normal.update_running_mean:
                 statistics.update(fresh)
             fresh = (fresh - statistics.mean) / np.sqrt(statistics.var + self._normal.epsilon)
