@@ -120,12 +120,12 @@ def self_check() -> Iterator[tuple[str, str, bool]]:
     Yields:
         What was checked, the result in words, and whether it is as it should be.
     """
-    from identification import identify
-    from tunnel_sim import simulate_campaign
-
     begun = time.perf_counter()
-    plan = small_plan()
     try:
+        from identification import identify
+        from tunnel_sim import simulate_campaign
+
+        plan = small_plan()
         campaign = simulate_campaign(plan)
     except Exception as error:
         yield "simulate", f"{type(error).__name__}: {error}", False

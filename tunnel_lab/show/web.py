@@ -55,7 +55,8 @@ def view_in_browser(
     config = viewer_protocol.ViewerConfig(
         gfx="web", http_port=port, open_browser=open_browser, title="virtual wind tunnel"
     )
-    plugins = [app.App(), puppet_master(live), overlay(live, address)]
+    # The inspector lies where the trace is, and shows the copy rather than the physics.
+    plugins = [app.App(app.Config(show_inspector=False)), puppet_master(live), overlay(live, address)]
     begun = time.monotonic()
     try:
         with launch_web.launch(config, plugins=plugins) as handle:
