@@ -1,4 +1,4 @@
-"""Steps per second of FreeDecay-v0: the native vector environment against bare mujoco.batch and Gymnasium's async.
+"""Steps per second of FreeDecay-v0, native against bare mujoco.batch and Gymnasium's async, and of Campaign-v0.
 
 Run as ``python -m benchmarks.envs``; see README.md beside it. Both sides of a ratio are measured in turn.
 """
@@ -82,6 +82,20 @@ def vector(count: int, mode: str, preset: str) -> Any:
     return gymnasium.make_vec(NAME, num_envs=count, vectorization_mode=mode, **arguments)
 
 
+def campaigns(table: Table) -> None:
+    """Runs per second of processor time of Campaign-v0, with sampled actions."""
+    for kind, count, aim in (("full", 20, ""), ("linear", 400, "≥ 100")):
+        env = gymnasium.make("tunnel_sim/Campaign-v0", simulation=kind)
+        env.action_space.seed(1)
+        env.reset(seed=1)
+        begin = time.process_time()
+        for _ in range(count):
+            *_, terminated, truncated, _ = env.step(env.action_space.sample())
+            if terminated or truncated:
+                env.reset()
+        table.add_row(kind, str(count), f"{count / (time.process_time() - begin):.0f}", aim)
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -125,6 +139,9 @@ def main() -> None:
             line("the same by processor time", options.workers, timed[0], timed[1], "")
         workers.close()
         native.close()
+    Console(width=118).print(table)
+    table = Table("simulation", "runs", "runs per second of processor time", "target", title="Campaign-v0")
+    campaigns(table)
     Console(width=118).print(table)
 
 

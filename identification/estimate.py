@@ -287,6 +287,19 @@ class Estimate:
             return found
 
 
+def estimate_schema() -> dict[str, Any]:
+    """The JSON schema of `Estimate.to_json_dict`."""
+    found = _adapter().json_schema()
+    for part in (found, found["$defs"]["RunEstimate"]):  # statuses are written by name, beside their text
+        names = {"type": "string", "enum": [status.name.lower() for status in Status]}
+        part["properties"] |= {
+            "status": names,
+            "message": {"type": "string", "description": "the first status in words"},
+            "statuses": {"type": "array", "items": names},
+        }
+    return found
+
+
 @cache
 def _adapter() -> TypeAdapter[Estimate]:
     return TypeAdapter(Estimate)

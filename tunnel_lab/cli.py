@@ -19,6 +19,7 @@ from tunnel_lab.commands import (
     demo,
     diagnose,
     docs,
+    doctor,
     effects,
     export,
     identify,
@@ -26,6 +27,7 @@ from tunnel_lab.commands import (
     paper,
     plot,
     render,
+    schema,
     score,
     simulate,
     springs,
@@ -33,7 +35,7 @@ from tunnel_lab.commands import (
     train,
     view,
 )
-from tunnel_lab.terminal.table_format import with_format
+from tunnel_lab.terminal.table_format import with_format, with_quiet
 from tunnel_sim.vocabulary.errors import TunnelError
 
 BAD_INPUT = 2
@@ -93,6 +95,8 @@ def tunnel(
       tunnel train w.safetensors         train the paper's networks from a seed
       tunnel paper                       the paper's tables and figures
       tunnel docs                        the documentation, in a browser
+      tunnel doctor                      what is installed, and a self-check
+      tunnel schema campaign             JSON schemas, for editors
 
     [bold]Units[/bold]
       SI and radians throughout.
@@ -124,13 +128,16 @@ COMMANDS = (
     train,
     paper,
     docs,
+    doctor,
+    schema,
 )
 """Every command that is one function, in the order of the help."""
 
-WITHOUT_TABLES = (simulate, plot, export, view, render, docs)
+WITHOUT_TABLES = (simulate, plot, export, view, render, docs, schema)
 
 for _command in COMMANDS:
-    app.command(_command.NAME)(_command.run if _command in WITHOUT_TABLES else with_format(_command.run))
+    _wider = with_quiet if _command in WITHOUT_TABLES else with_format
+    app.command(_command.NAME)(_wider(_command.run))
 app.add_typer(blind.app, name=blind.NAME)
 
 

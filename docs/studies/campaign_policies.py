@@ -22,7 +22,6 @@ from scipy.stats import binom
 from identification.estimate import PARAMETERS
 from identification.statistics.wilson import wilson_interval
 from tunnel_lab.envs.campaign import CampaignEnv, reached
-from tunnel_lab.envs.picture import beliefs
 from tunnel_lab.envs.policies import POLICIES, run_campaign
 from tunnel_lab.envs.session import Knowledge, answers, probabilities
 from tunnel_lab.plotting.common import WIDTH, figure, grid, log_axis, styled
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
 CONTESTS = {"identification": ("scripted", "greedy"), "diagnosis": ("scripted", "separating")}
 SEEDS = {"identification": 50, "diagnosis": 50}
 ARGUMENTS: dict[str, dict[str, Any]] = {
-    "identification": {},
+    "identification": {"simulation": "full"},
     "diagnosis": {
         "severities": {"cubic_stiffness": (0.2, 0.4), "nonlinear_yaw_moment": (4.0, 8.0)},
         "noise_std": 0.015,
@@ -143,26 +142,31 @@ def median_interval(values: Array) -> tuple[float, float, float]:
     return float(np.median(ordered)), float(low), float(high)
 
 
-def table(rows: Sequence[Row], preset: str) -> str:
-    """The comparison as a table in Markdown."""
-    first, second = CONTESTS[preset]
+def table(rows: Sequence[Row], preset: str, policies: Sequence[str] | None = None) -> str:
+    """The comparison as a table in Markdown.
+
+    Args:
+        policies: the others are compared with the first, seed by seed; those of `CONTESTS` where None.
+    """
+    first, *others = CONTESTS[preset] if policies is None else policies
     lines = [
         "| policy | runs, median (95 %) | rig time, median (95 %) [min] | goal reached | with run one | right |",
         "|---|---|---|---|---|---|",
     ]
-    for policy in (first, second):
+    for policy in (first, *others):
         own = _of(rows, preset, policy)
         lines.append(
             f"| {policy} | {_shown(_values(own, 'runs'), 1.0, 0)} | "
             f"{_shown(_values(own, 'rig_time_s'), 60.0, 1)} | "
             f"{_share(own, 'reached')} | {_share(own, 'on_first')} | {_share(own, 'right')} |"
         )
-    a, b = _of(rows, preset, first), _of(rows, preset, second)
-    runs = _values(b, "runs") - _values(a, "runs")
-    spent = _values(b, "rig_time_s") - _values(a, "rig_time_s")
-    lines.append(
-        f"| {second} less {first}, seed by seed | {_shown(runs, 1.0, 0)} | {_shown(spent, 60.0, 1)} | | | |"
-    )
+    for other in others:
+        a, b = _of(rows, preset, first), _of(rows, preset, other)
+        runs = _values(b, "runs") - _values(a, "runs")
+        spent = _values(b, "rig_time_s") - _values(a, "rig_time_s")
+        lines.append(
+            f"| {other} less {first}, seed by seed | {_shown(runs, 1.0, 0)} | {_shown(spent, 60.0, 1)} | | | |"
+        )
     return "\n".join(lines)
 
 
@@ -188,12 +192,17 @@ def _share(rows: Sequence[Row], name: str) -> str:
 
 
 def fill(page: str, rows: Sequence[Row]) -> str:
-    """A page with its tables replaced: what stands between ``<!-- NAME -->`` and ``<!-- end -->``."""
+    """A page with its tables replaced."""
     for preset in CONTESTS:
-        head, mark, rest = page.partition(f"<!-- {preset} -->\n")
-        _, end, tail = rest.partition("<!-- end -->")
-        page = f"{head}{mark}{table(rows, preset)}\n{end}{tail}"
+        page = replaced(page, preset, table(rows, preset))
     return page
+
+
+def replaced(page: str, name: str, text: str) -> str:
+    """A page with the text between ``<!-- NAME -->`` and ``<!-- end -->`` replaced."""
+    head, mark, rest = page.partition(f"<!-- {name} -->\n")
+    _, end, tail = rest.partition("<!-- end -->")
+    return f"{head}{mark}{text}\n{end}{tail}"
 
 
 def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
@@ -204,9 +213,9 @@ def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
     """
     found = {}
     for policy in CONTESTS["identification"]:
-        env = CampaignEnv()
+        env = CampaignEnv(**ARGUMENTS["identification"])
         run_campaign(env, POLICIES[policy], seed=seed)
-        spread = np.array([belief.relative_std("cn_r") for belief in beliefs(env.known)])
+        spread = np.array([belief.relative_std("cn_r") for belief in env.known.beliefs])
         found[policy] = (np.concatenate(([0.0], np.cumsum(env.known.costs))), spread)
     return found
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 
 import numpy as np
@@ -43,18 +44,18 @@ class Belief:
     shared: Array
     information: Array
 
-    @property
+    @cached_property
     def values(self) -> Array:
         """Cnβ [1/rad], Cnr [1/rad], Izz [kg m²], Cr [N m s/rad], shape (4,)."""
         return derivatives(_DESIGN, self.shared).values
 
-    @property
+    @cached_property
     def covariance(self) -> Array:
         """Of ``values``, in the products of their units, shape (4, 4)."""
         jacobian = derivatives(_DESIGN, self.shared).jacobian
         return np.asarray(jacobian @ self.shared_covariance @ jacobian.T)
 
-    @property
+    @cached_property
     def shared_covariance(self) -> Array:
         """Of φ with the zero eliminated, shape (4, 4)."""
         return inverse(_without_zero(self.information))
@@ -88,14 +89,25 @@ def prior_belief(mean: Mapping[str, float], std: Mapping[str, float]) -> Belief:
     Returns:
         The belief before any run; nothing is known of the sensor's zero.
     """
-    inertia = mean["yaw_inertia"]
-    scaled = [1.0, mean["cn_beta"], mean["mechanical_damping"], mean["cn_r"]]
-    shared = np.array(scaled) / inertia
+    shared = shared_parameters(mean)
     jacobian = derivatives(_DESIGN, shared).jacobian
     variance = np.array([std[name] ** 2 for name in PARAMETERS])
     information = np.zeros((5, 5))
     information[:4, :4] = jacobian.T @ (jacobian / variance[:, None])
     return Belief(shared, information)
+
+
+def shared_parameters(values: Mapping[str, float]) -> Array:
+    """φ = (1/Izz, Cnβ/Izz, Cr/Izz, Cnr/Izz) of coefficients.
+
+    Args:
+        values: by name, in the units of `identification.estimate.UNITS`.
+
+    Returns:
+        Shape (4,), SI.
+    """
+    scaled = [1.0, values["cn_beta"], values["mechanical_damping"], values["cn_r"]]
+    return np.array(scaled) / values["yaw_inertia"]
 
 
 def run_link(run: Run, rig: RigProperties) -> Array:

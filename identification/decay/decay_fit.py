@@ -212,9 +212,26 @@ def information_at(time: Array, decay: Decay, angle: float, rate: float) -> Arra
     Returns:
         Shape (5, 5); divided by the noise variance it is Fisher's information.
     """
+    return linearised_at(time, decay, angle, rate, np.zeros(time.size))[0]
+
+
+def linearised_at(
+    time: Array, decay: Decay, angle: float, rate: float, residual: Array
+) -> tuple[Array, Array]:
+    """JᵀJ as in `information_at`, and the score Jᵀ residual.
+
+    Args:
+        time: since the initial state, shape (n,), s.
+        angle: initial angle, rad.
+        rate: initial rate, rad/s.
+        residual: reading less model, shape (n,), rad.
+
+    Returns:
+        Shapes (5, 5) and (5,).
+    """
     rows = _rows(time, decay)
     weights = _local_weights(decay, angle, rate)
-    return np.asarray(weights @ (rows @ rows.T) @ weights.T)
+    return weights @ (rows @ rows.T) @ weights.T, weights @ (rows @ residual)
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,9 +80,3 @@ def test_the_prior_is_that_of_the_code() -> None:
     assert shown["`yaw_inertia`, `mechanical_damping`"].startswith("10⁻⁴ Izz, 10⁻³ Cr")
     assert (prior.release_angle, prior.release_rate, prior.sensor_zero) == (0.01, 0.02, 0.01)
     assert (shown["`release_angle`, `release_rate`"], shown["`sensor_zero`"]) == ("0.01, 0.02", "0.01")
-
-
-def test_the_links_lead_somewhere() -> None:
-    links = [link for link in re.findall(r"\]\(([^)]+)\)", TEXT) if "://" not in link]
-    assert len(links) >= 4
-    assert [link for link in links if not (PAGE.parent / link.partition("#")[0]).exists()] == []

@@ -1,4 +1,4 @@
-"""The how-to pages: what they show is what the tool does, and their links lead somewhere."""
+"""The how-to pages: what they show is what the tool does."""
 
 from __future__ import annotations
 
@@ -98,12 +98,6 @@ def test_every_estimator_that_is_scored_has_its_line() -> None:
     scored = packaged_baseline().estimators
     assert len(scored) >= 8
     assert [name for name in scored if f"| `{name}` |" not in page] == []
-
-
-@pytest.mark.parametrize("page", [INDEX, *sorted(PAGES.glob("*.md"))], ids=lambda page: page.stem)
-def test_the_links_lead_somewhere(page: Path) -> None:
-    links = [link for link in re.findall(r"\]\(([^)]+)\)", page.read_text()) if "://" not in link]
-    assert [link for link in links if not (page.parent / link.partition("#")[0]).exists()] == []
 
 
 def test_the_index_names_every_page() -> None:

@@ -28,6 +28,7 @@ sys.exit(lint_imports(no_cache=True))
 ENGINE_ROOMS = (
     "tunnel_lab.envs.",
     "tunnel_lab.show.live",
+    "tunnel_lab.show.overlay",
     "tunnel_lab.show.stepper",
     "tunnel_lab.show.web",
     "tunnel_lab.show.window",
@@ -110,7 +111,7 @@ def test_mujoco_is_imported_only_where_the_engine_runs() -> None:
     assert "tunnel_sim.engine.simulate" in importers
     outside = {name for name in importers if not name.startswith("tunnel_sim.")}
     # Inside functions, in a process of their own where they draw; live, the engine runs in front of the user.
-    shown = {f"tunnel_lab.show.{name}" for name in ("film", "live", "stepper", "web", "window")}
+    shown = {f"tunnel_lab.show.{name}" for name in ("film", "live", "overlay", "stepper", "web", "window")}
     # A model of one's own, with the causes written into it, is simulated by the engine itself.
     assert outside <= shown | {"diagnosis.patch", "diagnosis.answer.patched_model"}
 

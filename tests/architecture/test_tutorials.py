@@ -67,10 +67,3 @@ def test_every_page_is_executed() -> None:
         "measured-records",
         "the-papers-networks",
     }
-
-
-@pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=lambda page: page.stem)
-def test_the_links_lead_somewhere(page: Path) -> None:
-    links = [link for link in re.findall(r"\]\(([^)]+)\)", page.read_text()) if "://" not in link]
-    assert links
-    assert [link for link in links if not (page.parent / link.partition("#")[0]).exists()] == []

@@ -103,7 +103,7 @@ def test_the_truth_is_hidden_unless_asked_for():
     info = shown.reset(seed=1, options=options)[1]
     assert info["truth"] == {**TRUTH, "effects": {}}
     for env in (hidden, shown):
-        equal(env.step(OFF)[0], env.unwrapped._observation())
+        equal(env.step(OFF)[0], env.unwrapped.known.observation())
     assert "truth" not in hidden.step(ON)[-1]
     found = list(reachable(shown.unwrapped.known))
     assert len(found) > 50
@@ -120,10 +120,12 @@ def test_the_reward_is_information_less_rig_time():
     before = env.known.belief
     _, reward, *_, info = env.step(ON)
     gain = information_gain(before, env.known.belief)
-    assert info["information_gain_nats"] == gain > 0.0
+    assert info["step_information_nats"] == info["total_information_nats"] == gain > 0.0
     assert info["rig_time_s"] == 60.0 + 300.0 + 60.0 + 5.0
     assert reward == pytest.approx(gain - 425.0 / 500.0)
-    assert env.step(ON)[-1]["rig_time_s"] == 425.0 + 65.0
+    again = env.step(ON)[-1]
+    assert again["rig_time_s"] == 425.0 + 65.0
+    assert again["total_information_nats"] == gain + again["step_information_nats"]
     assert env.step(OFF)[-1]["rig_time_s"] == 425.0 + 65.0 + 125.0
 
 
@@ -216,6 +218,8 @@ def test_an_option_leaves_the_other_draws_as_they_are():
     ("arguments", "said"),
     [
         ({"preset": "diagnosys"}, "did you mean 'diagnosis'"),
+        ({"simulation": "linaer"}, "unknown simulation 'linaer'"),
+        ({"preset": "diagnosis", "simulation": "linear"}, "needs the full simulation"),
         ({"springs": ()}, "springs"),
         ({"springs": (99,)}, "there is no spring 99"),
         ({"wind_speeds": (-1.0,)}, "wind_speeds"),
@@ -252,6 +256,7 @@ def test_a_bad_argument_is_one_clear_line(arguments, said):
         ({"truth": 3}, "not a mapping"),
         ({"effects": "cubic_stiffness"}, "not a mapping"),
         ({"effects": {"coulomb": {}}}, "coulomb"),
+        ({"effects": {"cubic_stiffness": {"coefficient": 0.1}}}, "simulation='full'"),
         ({"effects": {"cubic_stiffness": {"coeff": 1.0}}}, "coeff"),
     ],
 )

@@ -71,7 +71,7 @@ def test_greedy_brings_what_it_promises():
         env = begun((0, 1, 1, 1), seed=seed, **SMALL)
         action = greedy(env.known)
         promised.append(expected_gain(env.known, env.known.conditions.menu.choice(action)))
-        brought.append(env.step(np.array(action))[-1]["information_gain_nats"])
+        brought.append(env.step(np.array(action))[-1]["step_information_nats"])
     assert np.mean(brought) == pytest.approx(np.mean(promised), rel=0.2)
 
 

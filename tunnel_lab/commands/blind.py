@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tunnel_lab.terminal.options import EffectsFileOption, split_names
-from tunnel_lab.terminal.table_format import with_format
+from tunnel_lab.terminal.table_format import with_format, with_quiet
 
 if TYPE_CHECKING:
     from diagnosis.blind import Score
@@ -41,6 +41,7 @@ KeyFile = Annotated[
 
 
 @app.command("make")
+@with_quiet
 def make(
     out: Annotated[Path, typer.Argument(help="Folder to make.")],
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything drawn.")],
@@ -105,6 +106,7 @@ def make(
 
 
 @app.command("diagnose")
+@with_quiet
 def diagnose(
     folder: Folder,
     exclude: Excluded = None,

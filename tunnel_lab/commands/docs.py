@@ -33,17 +33,13 @@ def run(
     """
     from tunnel_lab.terminal import tables
     from tunnel_sim.vocabulary.errors import TunnelError, shown
+    from tunnel_sim.vocabulary.extras import library
 
     if not (source / "conf.py").is_file():
         raise TunnelError(
             "no documentation here", where=shown(source), remedy="run it in the source tree, or give --source"
         )
-    try:
-        from sphinx.cmd.build import main as build
-    except ImportError:
-        raise TunnelError(
-            "the documentation needs Sphinx", remedy="run: pip install 'virtual-wind-tunnel[docs]'"
-        ) from None
+    build = library("sphinx.cmd.build", "the documentation", "docs").main
     site = source / "_build" / "html"
     if build(["-q", "-W", "--keep-going", "-b", "html", str(source), str(site)]):
         raise typer.Exit(1)

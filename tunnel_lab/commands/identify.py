@@ -117,7 +117,8 @@ def run(
     else:
         if json is not None:
             write_json(json, document)
-        show_estimate(data, estimate, windows=len(data.runs) <= FEW_RUNS if windows is None else windows)
+        detailed = len(data.runs) <= FEW_RUNS if windows is None else windows
+        show_estimate(data, estimate, windows=detailed, source=campaign)
         if found is not None:
             show_budget(found)
         if json is not None:

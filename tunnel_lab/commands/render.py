@@ -91,11 +91,14 @@ def _targets(out: list[Path] | None) -> list[Path]:
     """The files to write; those that cannot be written are refused before the work."""
     from tunnel_sim.files.writing import output_folder
     from tunnel_sim.vocabulary.errors import TunnelError
+    from tunnel_sim.vocabulary.extras import library
 
     targets = out if out else list(_DEFAULT)
     for path in targets:
         if path.suffix.lower() not in (".mp4", ".png"):
             raise TunnelError("is neither .mp4 nor .png", where=f"--out {path}", remedy="name one of these")
+        if path.suffix.lower() == ".mp4":
+            library("imageio_ffmpeg", "a film", "film", f"--out {path}")
         if path.is_dir():
             raise TunnelError("is a folder", where=f"--out {path}", remedy="name a file")
         if not out:

@@ -26,7 +26,7 @@ def run(
         float, typer.Option("--speed", min=0.01, max=100.0, help="Factor on real time; window only.")
     ] = 1.0,
     camera: Annotated[
-        str, typer.Option("--camera", help="overview, above or side; window only.")
+        str, typer.Option("--camera", help="overview, above or side: where the view begins.")
     ] = "overview",
     web: Annotated[bool, typer.Option("--web", help="Show it in a browser instead of a window.")] = False,
     port: Annotated[
@@ -41,7 +41,8 @@ def run(
     mouse turns the view; a figure shows the angle. The window needs a display.
 
     --web serves the same to a browser (MuJoCo Studio's web viewer, WebGL 2), which
-    has controls for pause, speed and reset. It needs no display. It listens on
+    has controls for pause, speed and reset, and shows trace, wind speed and its
+    address. It needs no display. It listens on
     all network interfaces, asks for no password and does not check the Origin of
     a page: use it only in a network that you trust.
 
@@ -67,7 +68,7 @@ def run(
     if web:
         from tunnel_lab.show.web import view_in_browser
 
-        view_in_browser(shown, port=port, open_browser=browser)
+        view_in_browser(shown, port=port, camera=name, open_browser=browser)
     else:
         from tunnel_lab.show.window import view_in_window
 

@@ -16,6 +16,7 @@ from identification.estimate import PARAMETERS
 from tunnel_lab.envs.menu import Costs, make_menu
 from tunnel_lab.envs.presets import PRESETS, Preset, preset_sensor
 from tunnel_lab.envs.session import (
+    LARGE,
     Conditions,
     Knowledge,
     Session,
@@ -32,7 +33,6 @@ from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
 
 Observation = dict[str, Array]
-_LARGE = 1e4  # bound of estimates and covariances in the observation space
 
 
 class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
@@ -42,6 +42,8 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
 
     Args:
         preset: ``identification`` or ``diagnosis``.
+        simulation: ``linear``: runs by the closed form of the linear model, their estimate to first order in the
+            noise; ``full``: runs in MuJoCo, estimated by a fit. None: ``full`` for a diagnosis, else ``linear``.
         springs: numbers of the available springs in the rig's table.
         wind_speeds: m/s; 0 is wind-off.
         release_angles_deg: degrees.
@@ -68,6 +70,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         self,
         *,
         preset: str = "identification",
+        simulation: str | None = None,
         springs: Sequence[int] | None = None,
         wind_speeds: Sequence[float] | None = None,
         release_angles_deg: Sequence[float] | None = None,
@@ -107,6 +110,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             ),
             costs=Costs() if costs is None else costs,
             effects=tuple(self.severities),
+            linear=_is_linear(simulation, bool(self.severities)),
         )
         self.targets = (float(targets[0]), float(targets[1]))
         self.probability = float(probability)
@@ -118,6 +122,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         self.observation_space = _observation_space(self.conditions, self.max_runs)
         self.known: Knowledge = first_knowledge(self.conditions)
         self._session: Session | None = None
+        self._total_gain = 0.0
 
     @property
     def campaign(self) -> Campaign:
@@ -139,11 +144,15 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         """
         super().reset(seed=seed)
         truth = draw_truth(self.np_random, self.severities, options)
+        if self.conditions.linear and truth.effects:
+            remedy = "make the environment with simulation='full'"
+            raise TunnelError("effects are not part of linear theory", where="option effects", remedy=remedy)
         self._session = Session(self.conditions, truth, self.np_random.spawn(1)[0])
         self.known = first_knowledge(self.conditions)
         if self.render_mode == "human":
             self.render()
-        return self._observation(), self._info(0.0)
+        self._total_gain = 0.0
+        return self.known.observation(), self._info(0.0)
 
     def step(self, action: Iterable[int]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Make a run.
@@ -163,6 +172,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         before = self.known
         self.known = self._session.perform(before, self.conditions.menu.choice(action))
         gain = self._gain(before)
+        self._total_gain += gain
         reward = gain - self.known.costs[-1] / self.seconds_per_nat
         done = reached(self.known, self.targets, self.probability)
         truncated = not done and len(self.known.choices) >= self.max_runs
@@ -171,7 +181,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         info = self._info(gain)
         if done or truncated:
             info["campaign"] = self.campaign
-        return self._observation(), float(reward), done, truncated, info
+        return self.known.observation(), float(reward), done, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """The last run and the progress of the campaign.
@@ -196,28 +206,14 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             return diagnostic_information(self.known) - diagnostic_information(before)
         return information_gain(before.belief, self.known.belief)
 
-    def _observation(self) -> Observation:
-        known, last = self.known, self.known.last
-        run = (0.0,) * 4 if last is None else (
-            last.spring_stiffness, last.wind_speed, last.release_angle, last.duration
-        )  # fmt: skip
-        found = {
-            "estimate": np.clip(known.belief.values, -_LARGE, _LARGE),
-            "covariance": np.clip(known.belief.covariance.ravel(), -_LARGE, _LARGE),
-            "last_run": np.array(run),
-            "progress": np.array([float(len(known.choices)), known.rig_time]),
-        }
-        if self.conditions.effects:
-            found["probabilities"] = probabilities(known)
-        return found
-
     def _info(self, gain: float) -> dict[str, Any]:
         known = self.known
         info: dict[str, Any] = {
             "status": known.status,
             "runs": len(known.choices),
             "rig_time_s": known.rig_time,
-            "information_gain_nats": float(gain),
+            "step_information_nats": float(gain),
+            "total_information_nats": float(self._total_gain),
             "relative_std": {name: known.belief.relative_std(name) for name in PARAMETERS},
         }
         if self.conditions.effects:
@@ -243,14 +239,27 @@ def reached(known: Knowledge, targets: tuple[float, float], probability: float) 
     return belief.relative_std("cn_beta") <= targets[0] and belief.relative_std("cn_r") <= targets[1]
 
 
+def _is_linear(simulation: str | None, diagnoses: bool) -> bool:
+    """Whether runs come from linear theory."""
+    if simulation not in (None, "linear", "full"):
+        raise TunnelError(
+            f"unknown simulation {simulation!r}", where="Campaign-v0", remedy="give 'linear' or 'full'"
+        )
+    if simulation == "linear" and diagnoses:
+        raise TunnelError(
+            "a diagnosis needs the full simulation", where="Campaign-v0", remedy="leave simulation out"
+        )
+    return simulation == "linear" or (simulation is None and not diagnoses)
+
+
 def _observation_space(conditions: Conditions, max_runs: int) -> spaces.Space[Observation]:
     menu = conditions.menu
     stiffest = max(stiffness for _, stiffness in menu.springs)
     highest = [stiffest, max(menu.wind_speeds), max(menu.release_angles), max(menu.durations)]
     longest = conditions.costs.setup + conditions.costs.spring_change + conditions.costs.speed_change
     parts: dict[str, spaces.Space[Any]] = {
-        "estimate": spaces.Box(-_LARGE, _LARGE, (4,), np.float64),
-        "covariance": spaces.Box(-_LARGE, _LARGE, (16,), np.float64),
+        "estimate": spaces.Box(-LARGE, LARGE, (4,), np.float64),
+        "covariance": spaces.Box(-LARGE, LARGE, (16,), np.float64),
         "last_run": spaces.Box(np.zeros(4), np.array(highest), dtype=np.float64),
         "progress": spaces.Box(
             np.zeros(2), np.array([max_runs, max_runs * (longest + highest[3])]), dtype=np.float64

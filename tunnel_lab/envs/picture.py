@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.campaign.belief import Belief, update_belief
 from identification.printing.numbers import SYMBOLS
 from tunnel_lab.envs.session import Knowledge, answers, probabilities
 
@@ -77,7 +76,7 @@ def _draw_record(axes: Axes, known: Knowledge) -> None:
 def _draw_spread(axes: Axes, known: Knowledge, targets: tuple[float, float]) -> None:
     from tunnel_lab.plotting.plots import COLOURS
 
-    history = beliefs(known)
+    history = known.beliefs
     for place, (name, target) in enumerate(zip(("cn_beta", "cn_r"), targets, strict=True)):
         spread = [100.0 * belief.relative_std(name) for belief in history]
         axes.semilogy(range(len(spread)), spread, "o-", color=COLOURS[place], label=SYMBOLS[name])
@@ -99,14 +98,3 @@ def _draw_probabilities(axes: Axes, known: Knowledge, probability: float) -> Non
     axes.set_ylabel("probability")
     axes.tick_params(axis="x", labelsize=7)
     axes.set_title(f"{known.rig_time / 60.0:.0f} min of rig time; dashed: the goal", fontsize=10)
-
-
-def beliefs(known: Knowledge) -> list[Belief]:
-    """The belief before the first run and after each informative run."""
-    noise = known.conditions.noise_std
-    history = [known.prior]
-    for count in range(1, len(known.fits) + 1):
-        part = known.fits[:count]
-        pairs = [(reading, fit) for _, reading, fit in part]
-        history.append(update_belief(known.prior, [link for link, _, _ in part], pairs, noise))
-    return history

@@ -16,6 +16,7 @@ from diagnosis.attribution.decide import Weighed
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.study import Study
 from identification.campaign.belief import expected_belief, information_gain
+from tunnel_lab.envs.agent import trained
 from tunnel_lab.envs.menu import Choice
 from tunnel_lab.envs.session import Knowledge
 
@@ -133,7 +134,12 @@ def _longest(known: Knowledge) -> int:
     return int(np.argmax(known.conditions.menu.durations))
 
 
-POLICIES: dict[str, Policy] = {"scripted": scripted, "greedy": greedy, "separating": separating}
+POLICIES: dict[str, Policy] = {
+    "scripted": scripted,
+    "greedy": greedy,
+    "separating": separating,
+    "trained": trained,
+}
 """By name."""
 
 

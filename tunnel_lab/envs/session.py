@@ -13,7 +13,9 @@ import numpy as np
 from diagnosis.investigate import investigate
 from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from diagnosis.study import Study
-from identification.campaign.belief import Belief, prior_belief, run_link, update_belief
+from identification.campaign.belief import Belief, prior_belief, run_link, shared_parameters, update_belief
+from identification.campaign.linear_belief import LinearRun, linear_belief, linear_run, shows_a_decay
+from identification.decay.damped_oscillation import Decay, free_decay
 from identification.decay.decay_fit import Reading, RunFit
 from identification.decay.residual_noise import stated_noise
 from identification.decay.run_fit import identify_run
@@ -25,10 +27,12 @@ from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.engine.virtual_campaign import run_settings, stated_run
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.plan import Condition, SensorModel
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
 
+LARGE = 1e4
+"""Bound of estimates and covariances in the observation, in their units."""
 _EMPTY = Record(np.arange(2.0), np.zeros(2))  # of a run that is only planned
 
 
@@ -40,6 +44,7 @@ class Conditions:
         rig: geometry, springs, air.
         sensor: noise, rate and resolution; its zero is not used, because each episode has its own.
         effects: the vocabulary of the diagnosis; empty where the campaign only identifies.
+        linear: whether runs come from linear theory instead of MuJoCo and a fit; without effects only.
     """
 
     rig: Rig
@@ -47,6 +52,7 @@ class Conditions:
     menu: Menu
     costs: Costs
     effects: tuple[str, ...] = ()
+    linear: bool = False
 
     @property
     def rig_properties(self) -> RigProperties:
@@ -82,24 +88,35 @@ class Knowledge:
 
     Args:
         conditions: rig, sensor, menu and costs.
-        prior: the belief before the first run.
+        beliefs: before the first run and after each informative one.
         choices: the runs requested so far, including lost ones.
         costs: rig time of each, s.
         runs: the runs made.
-        fits: reading and fit of the runs that the belief uses, with their links.
+        fits: reading and fit of the runs that the belief uses, with their links; empty where ``linear``.
+        told: what these runs tell, where ``linear``.
         study: the last diagnosis; None before the first, or where there is no vocabulary.
         status: of the last run, ``ok`` or what went wrong.
     """
 
     conditions: Conditions
-    prior: Belief
-    belief: Belief
+    beliefs: tuple[Belief, ...]
     choices: tuple[Choice, ...] = ()
     costs: tuple[float, ...] = ()
     runs: tuple[Run, ...] = ()
     fits: tuple[tuple[Array, Reading, RunFit], ...] = ()
+    told: tuple[LinearRun, ...] = ()
     study: Study | None = None
     status: str = "ok"
+
+    @property
+    def prior(self) -> Belief:
+        """The belief before the first run."""
+        return self.beliefs[0]
+
+    @property
+    def belief(self) -> Belief:
+        """The present belief."""
+        return self.beliefs[-1]
 
     @property
     def last(self) -> Choice | None:
@@ -121,11 +138,26 @@ class Knowledge:
         """Cost of a further run, s."""
         return self.conditions.costs.of(choice, self.last)
 
+    def observation(self) -> dict[str, Array]:
+        """What the environment shows of it; docs/reference/envs/campaign.md lists the keys."""
+        last = self.last
+        run = (0.0,) * 4 if last is None else (
+            last.spring_stiffness, last.wind_speed, last.release_angle, last.duration
+        )  # fmt: skip
+        found = {
+            "estimate": np.clip(self.belief.values, -LARGE, LARGE),
+            "covariance": np.clip(self.belief.covariance.ravel(), -LARGE, LARGE),
+            "last_run": np.array(run),
+            "progress": np.array([float(len(self.choices)), self.rig_time]),
+        }
+        if self.conditions.effects:
+            found["probabilities"] = probabilities(self)
+        return found
+
 
 def first_knowledge(conditions: Conditions) -> Knowledge:
     """Before the first run: the prior is the distribution the truth is drawn from."""
-    prior = prior_belief(MEAN, STD)
-    return Knowledge(conditions, prior, prior)
+    return Knowledge(conditions, (prior_belief(MEAN, STD),))
 
 
 class Session:
@@ -156,24 +188,45 @@ class Session:
             status="ok",
         )
         rng = self._rng.spawn(1)[0]
+        condition = choice.condition(f"r{len(known.choices):02d}", self._conditions.rig.air.density)
+        if self._conditions.linear:
+            return self._linear(known, choice, condition, rng)
         try:
-            run = self._run(choice, f"r{len(known.choices):02d}", rng)
+            run = self._run(condition, rng)
         except TunnelError as error:
             return replace(known, status=f"lost: {error.what}")
         known = _identified(replace(known, runs=(*known.runs, run)), choice)
         return _diagnosed(known) if self._conditions.effects else known
 
-    def _run(self, choice: Choice, name: str, rng: np.random.Generator) -> Run:
-        rig = self._conditions.rig
-        condition = choice.condition(name, rig.air.density)
+    def _run(self, condition: Condition, rng: np.random.Generator) -> Run:
         record = simulate(
-            rig,
+            self._conditions.rig,
             run_settings(self.truth.coefficients, condition),
             replace(self._conditions.sensor, zero=self.truth.sensor_zero),
             rng,
             effects=self.truth.effects,
         )
         return stated_run(condition, record)
+
+    def _linear(
+        self, known: Knowledge, choice: Choice, condition: Condition, rng: np.random.Generator
+    ) -> Knowledge:
+        """Make a run by the closed form of the linear model, and update the belief to first order."""
+        conditions, zero = self._conditions, self.truth.sensor_zero
+        link, time = conditions.link(choice), conditions.sample_times(choice.duration)
+        decay = Decay(*map(float, link @ shared_parameters(self.truth.values)))
+        if decay.stiffness <= 0.0 or decay.rate <= 0.0:
+            return replace(known, status="lost: the motion grows without bound")
+        motion = free_decay(time, decay, choice.release_angle, 0.0)
+        noise = conditions.noise_std * rng.standard_normal(time.size)
+        run = stated_run(condition, Record(time, motion + zero + noise))
+        known = replace(known, runs=(*known.runs, run))
+        told = linear_run(link, time, decay, choice.release_angle, zero, noise)
+        if told is None or not shows_a_decay(motion, conditions.noise_std):
+            return replace(known, status="no information: no oscillation exceeds the noise")
+        runs = (*known.told, told)
+        belief = linear_belief(known.prior, runs, conditions.noise_std)
+        return replace(known, told=runs, beliefs=(*known.beliefs, belief))
 
 
 def _identified(known: Knowledge, choice: Choice) -> Knowledge:
@@ -188,7 +241,7 @@ def _identified(known: Knowledge, choice: Choice) -> Knowledge:
         belief = update_belief(known.prior, links, pairs, conditions.noise_std)
     except ValueError as error:
         return replace(known, status=f"no information: {error}")
-    return replace(known, fits=fits, belief=belief)
+    return replace(known, fits=fits, beliefs=(*known.beliefs, belief))
 
 
 def _diagnosed(known: Knowledge) -> Knowledge:

@@ -35,10 +35,15 @@ class RigTruth:
     effects: tuple[Effect, ...] = field(default=())
     sensor_zero: float = 0.0
 
+    @property
+    def values(self) -> dict[str, float]:
+        """The coefficients by name, in the units of `identification.estimate.UNITS`."""
+        return {name: float(getattr(self.coefficients, name)) for name in PARAMETERS}
+
     def to_json_dict(self) -> dict[str, Any]:
         """Coefficients by name, effects with their parameters, the sensor's zero; SI."""
         return {
-            **{name: float(getattr(self.coefficients, name)) for name in PARAMETERS},
+            **self.values,
             "sensor_zero": self.sensor_zero,
             "effects": {effect.name: effect.to_json_dict()["parameters"] for effect in self.effects},
         }

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from tunnel_lab.sweep.processes import Said
 from tunnel_sim.files.toml_input import one_line
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.extras import library
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -52,13 +53,12 @@ def on_cluster(
 def _work(
     address: str, workers: int, say: Said, poll_s: float, sweep: str, shards: Sequence[int]
 ) -> Iterator[Finished]:
-    from distributed import CancelledError
-    from distributed.comm.core import CommClosedError
-
+    distributed = library("distributed", "--scheduler", "cluster")
+    gone = distributed.CancelledError, distributed.comm.core.CommClosedError
     with _client(address, workers) as client:
         try:
             yield from _Crew(client, sweep, say, poll_s).work(shards)
-        except (CancelledError, CommClosedError):
+        except gone:
             raise _gone() from None
 
 

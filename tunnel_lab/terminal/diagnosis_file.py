@@ -15,13 +15,13 @@ Excess = Annotated[float, Field(description="a number of noise powers")]
 Share = Annotated[float, Field(ge=0.0, le=1.0, description="a number from 0 to 1")]
 
 
-class _Part(StrictModel):
+class Part(StrictModel):
     """A part of the document; fields that are not compared are left alone."""
 
     model_config = ConfigDict(extra="ignore")
 
 
-class _Estimate(_Part):
+class _Estimate(Part):
     value: float
     std: Annotated[float, Field(ge=0.0)] | None
     unit: OneLine
@@ -29,40 +29,42 @@ class _Estimate(_Part):
     determined: bool = True
 
 
-class _Gap(_Part):
+class _Gap(Part):
     excess_before: Excess
     excess_after: Excess
     closed: Share
 
 
-class _Candidate(_Part):
+class _Candidate(Part):
     probability: Share
     effect: OneLine
     parameters: dict[OneLine, _Estimate]
 
 
-class _Coefficients(_Part):
+class _Coefficients(Part):
     before: dict[OneLine, _Estimate]
     after: dict[OneLine, _Estimate]
 
 
-class _Run(_Part):
+class _Run(Part):
     std: Annotated[float, Field(ge=0.0)]
 
 
-class _Maps(_Part):
+class _Maps(Part):
     runs: list[_Run]
 
 
-class _Document(_Part):
-    schema_version: int
-    campaign: OneLine
-    causes: list[OneLine]
-    ambiguous_with: list[OneLine]
-    gap: _Gap
-    candidates: Annotated[list[_Candidate], Field(min_length=1)]
-    coefficients: _Coefficients
-    maps: _Maps | None = None
+class Document(Part):
+    """The fields that are compared."""
+
+    schema_version: int = Field(description="1")
+    campaign: OneLine = Field(description="the campaign's name")
+    causes: list[OneLine] = Field(description="effect names; empty: no gap; unknown: no effect explains it")
+    ambiguous_with: list[OneLine] = Field(description="effects that the runs cannot tell from the causes")
+    gap: _Gap = Field(description="the gap before and after the causes are added")
+    candidates: list[_Candidate] = Field(min_length=1, description="answers, most probable first")
+    coefficients: _Coefficients = Field(description="estimates before and after, and a note")
+    maps: _Maps | None = Field(default=None, description="data of the figures")
 
 
 def read_diagnosis(path: Path) -> dict[str, Any]:
@@ -79,4 +81,4 @@ def read_diagnosis(path: Path) -> dict[str, Any]:
     """
     document = read_json(path, remedy=REMEDY)
     check_version(document, path)
-    return validate(_Document, document, path).model_dump()
+    return validate(Document, document, path).model_dump()

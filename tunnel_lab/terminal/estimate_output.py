@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tunnel_lab.terminal import tables
@@ -11,13 +13,22 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
-def show_estimate(campaign: Campaign, estimate: Estimate, *, windows: bool) -> None:
-    """Print an estimate."""
+DIAGNOSE = "run the diagnosis"
+"""How notes end whose remedy is the diagnosis."""
+
+
+def show_estimate(
+    campaign: Campaign, estimate: Estimate, *, windows: bool, source: Path | None = None
+) -> None:
+    """Print an estimate.
+
+    Args:
+        source: what the campaign was read from, for commands to copy; None: nowhere.
+    """
     tables.show_tables(tables.coefficients_table(estimate), tables.runs_table(campaign, estimate))
     if windows:
         tables.show_tables(*map(tables.windows_table, estimate.runs))
     tables.say(tables.BRACKETS)
-    for remark in estimate.remarks:
-        tables.say(f"Note: {remark}")
-    for line in tables.status_lines(estimate):
-        tables.say(f"Note: {line}")
+    command = DIAGNOSE if source is None else f"run: tunnel diagnose {shlex.quote(str(source))}"
+    for line in (*map(str, estimate.remarks), *tables.status_lines(estimate)):
+        tables.say(f"Note: {line.replace(DIAGNOSE, command)}")

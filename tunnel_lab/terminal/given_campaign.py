@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,10 +31,16 @@ def given_campaign(path: Path) -> Campaign:
     from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.campaign_schema import CAMPAIGN_FILE
     from tunnel_sim.files.importing.records import read_records
-    from tunnel_sim.vocabulary.errors import TunnelError
+    from tunnel_sim.vocabulary.errors import TunnelError, shown
 
     if not path.is_file() or path.name == CAMPAIGN_FILE:
         return read_campaign(path)
+    if path.suffix.lower() == ".toml":
+        raise TunnelError(
+            f"is neither a record nor a {CAMPAIGN_FILE}",
+            where=shown(path),
+            remedy=f"if it is a plan: tunnel simulate {shlex.quote(str(path))} --out FOLDER",
+        )
     try:
         imported = read_records([path])
     except TunnelError as error:

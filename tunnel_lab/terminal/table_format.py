@@ -1,4 +1,4 @@
-"""Tables as CSV, Markdown or JSON in place of text; the option ``--format`` of every command that prints tables."""
+"""The options of every command: ``--quiet``, and ``--format`` where it prints tables, as CSV, Markdown or JSON."""
 
 from __future__ import annotations
 
@@ -28,32 +28,52 @@ class TableFormat(StrEnum):
 
 
 HELP = "Of the tables; json: one object a line. Other lines then go to standard error."
+QUIET_HELP = "Print errors only. Files and --json - are written all the same."
 chosen: ContextVar[TableFormat] = ContextVar("table format", default=TableFormat.TEXT)
 """The format of this command's tables."""
+quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+"""Whether this command prints errors only."""
 _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 
 
 def with_format(run: Callable[..., None]) -> Callable[..., None]:
-    """A command with the option ``--format`` for the tables that it prints.
+    """A command with ``--quiet``, and ``--format`` for the tables that it prints.
 
     Args:
         run: the command.
     """
+    kind = Annotated[TableFormat, typer.Option("--format", help=HELP)]
+    return _with_option(with_quiet(run), "table_format", kind, chosen)
+
+
+def with_quiet(run: Callable[..., None]) -> Callable[..., None]:
+    """A command with the option ``--quiet``.
+
+    Args:
+        run: the command.
+    """
+    return _with_option(run, "quiet", Annotated[bool, typer.Option("--quiet", "-q", help=QUIET_HELP)], quiet)
+
+
+def _with_option(
+    run: Callable[..., None], name: str, kind: Any, variable: ContextVar[Any]
+) -> Callable[..., None]:
+    """A command with one more option, whose value a variable has while it runs."""
+    default = variable.get()
 
     @wraps(run)
-    def formatted(*args: Any, table_format: TableFormat, **named: Any) -> None:
-        token = chosen.set(table_format)
+    def wider(*args: Any, **named: Any) -> None:
+        token = variable.set(named.pop(name, default))
         try:
             run(*args, **named)
         finally:
-            chosen.reset(token)
+            variable.reset(token)
 
-    kind = Annotated[TableFormat, typer.Option("--format", help=HELP)]
-    option = Parameter("table_format", Parameter.KEYWORD_ONLY, default=TableFormat.TEXT, annotation=kind)
+    option = Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
     given = signature(run, eval_str=True)  # Typer finds its own annotations only where they are not texts
-    vars(formatted)["__signature__"] = given.replace(parameters=[*given.parameters.values(), option])
-    formatted.__annotations__ = {**run.__annotations__, "table_format": kind}
-    return formatted
+    vars(wider)["__signature__"] = given.replace(parameters=[*given.parameters.values(), option])
+    wider.__annotations__ = {**run.__annotations__, name: kind}
+    return wider
 
 
 def rendered(table: Table, kind: TableFormat) -> str:

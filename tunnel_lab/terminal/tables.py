@@ -12,7 +12,8 @@ from rich.text import Text
 
 from identification.printing import estimate_tables as printing
 from identification.printing.numbers import SYMBOLS, concise, in_stds, significant, unit, with_std
-from tunnel_lab.terminal.table_format import TableFormat, chosen, rendered
+from tunnel_lab.terminal.stacked import is_too_wide, stacked
+from tunnel_lab.terminal.table_format import TableFormat, chosen, quiet, rendered
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,12 +36,12 @@ class _Console(Console):
 
 
 def console(*, stderr: bool = False) -> Console:
-    """A console without highlighting and markup: text is printed unchanged.
+    """A console without highlighting and markup: text is printed unchanged, or not at all with ``--quiet``.
 
     Args:
         stderr: print to standard error, where progress and status lines go.
     """
-    return _Console(stderr=stderr, highlight=False, markup=False, emoji=False)
+    return _Console(stderr=stderr, quiet=quiet.get(), highlight=False, markup=False, emoji=False)
 
 
 def say(line: str, *, stderr: bool = False) -> None:
@@ -61,6 +62,8 @@ def say_written(*paths: Path | None) -> None:
 def show_tables(*tables: Table) -> None:
     """Print tables, each followed by an empty line, in the format of ``--format``.
 
+    A table of text that is wider than the terminal is printed row by row.
+
     Args:
         tables: those without rows are left out.
     """
@@ -68,7 +71,9 @@ def show_tables(*tables: Table) -> None:
     for one in tables:
         if not one.row_count:
             continue
-        if chosen.get() is TableFormat.TEXT:
+        if chosen.get() is TableFormat.TEXT and is_too_wide(one, out.width):
+            out.print(stacked(one), soft_wrap=True)
+        elif chosen.get() is TableFormat.TEXT:
             out.print(one)
         else:
             out.print(rendered(one, chosen.get()), soft_wrap=True, end="")

@@ -27,6 +27,7 @@ from tunnel_sim.files.campaign_schema import (
 )
 from tunnel_sim.files.json_text import json_text
 from tunnel_sim.files.leftovers import clear_leftovers
+from tunnel_sim.files.nearby import nearest, nearest_campaign
 from tunnel_sim.files.plausible import plausible_run
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.run_checks import enough_cycles, increasing_times, same_unit
@@ -60,7 +61,10 @@ def read_campaign(folder: Path | str) -> Campaign:
     if folder.name == CAMPAIGN_FILE and folder.is_file():
         folder = folder.parent
     if not folder.is_dir():
-        raise TunnelError("no such folder", where=shown(folder), remedy=NO_CAMPAIGN)
+        raise TunnelError("no such folder", where=shown(folder), remedy=nearest(folder) or NO_CAMPAIGN)
+    if not (folder / CAMPAIGN_FILE).exists():
+        remedy = nearest_campaign(folder) or nearest(folder / CAMPAIGN_FILE) or NO_CAMPAIGN
+        raise TunnelError("no such file", where=shown(folder / CAMPAIGN_FILE), remedy=remedy)
     document = read_document(folder / CAMPAIGN_FILE)
     sensor = sensor_properties(document.sensor)
     return Campaign(

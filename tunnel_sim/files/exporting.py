@@ -9,12 +9,12 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 import polars as pl
 
-from tunnel_sim.files.importing.extras import library
 from tunnel_sim.files.run_table import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.extras import library
 
 _CONDITIONS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
 _RIG = ("yaw_inertia", "frontal_area", "reference_length", "width")
@@ -82,7 +82,7 @@ def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
 
 def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
     """A group for each run, with its conditions as attributes."""
-    h5py = library("h5py", "HDF5", where)
+    h5py = library("h5py", "HDF5", "import", where)
     with h5py.File(stream, "w") as file:
         file.attrs.update({"name": campaign.name, **_stated(campaign.rig, _RIG)})
         for run in campaign.runs:
@@ -94,7 +94,7 @@ def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
 
 def _as_xlsx(campaign: Campaign, stream: BinaryIO, where: str) -> None:
     """A sheet of conditions, and one for each run."""
-    xlsxwriter = library("xlsxwriter", "Excel", where)
+    xlsxwriter = library("xlsxwriter", "Excel", "import", where)
     for run in campaign.runs:
         if run.record.time_s.size >= _SHEET_ROWS:
             raise TunnelError(

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tunnel_sim.files.nearby import inside, nearest
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 
@@ -48,11 +49,13 @@ def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", 
         # O_NONBLOCK: otherwise opening a FIFO without a writer would wait for ever.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except (FileNotFoundError, NotADirectoryError):
-        raise TunnelError("no such file", where=where, remedy=missing or "check the path") from None
+        remedy = nearest(path) or missing or "check the path"
+        raise TunnelError("no such file", where=where, remedy=remedy) from None
     except (OSError, ValueError) as error:
         raise _unreadable(error, where, readable) from None
     try:
-        _check_kind(os.fstat(descriptor), limit, where, readable)
+        state = os.fstat(descriptor)
+        _check_kind(state, limit, where, (stat.S_ISDIR(state.st_mode) and inside(path)) or readable)
         return _content(descriptor, limit, where)
     except OSError as error:
         raise _unreadable(error, where, readable) from None

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.arrays import check_size, tables_of
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.extras import faults, library
+from tunnel_sim.files.importing.faults import faults
 from tunnel_sim.files.importing.source import Table
 from tunnel_sim.files.importing.units import known_unit
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.extras import library
 
 LIMIT = limits.DATA_BYTES
 """Largest file, bytes."""
@@ -26,7 +27,7 @@ KIND = "an HDF5 file"
 
 def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
     """The tables of an HDF5 file; arguments as in `source.Reader`."""
-    h5py = library("h5py", "HDF5 (also MAT 7.3)", where)
+    h5py = library("h5py", "HDF5 (also MAT 7.3)", "import", where)
     with faults(KIND, where), h5py.File(io.BytesIO(content), "r") as file:
         datasets: dict[str, Any] = {}
         attributes: dict[str, NDArray[np.generic]] = {}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tunnel_sim.files.importing import hdf5
 from tunnel_sim.files.importing.arrays import check_size, tables_of
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.extras import faults
+from tunnel_sim.files.importing.faults import faults
 from tunnel_sim.files.importing.source import Table
 from tunnel_sim.vocabulary import limits
 

@@ -8,11 +8,12 @@ import numpy as np
 
 from tunnel_sim.files.importing.arrays import check_size
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.extras import faults, library
+from tunnel_sim.files.importing.faults import faults
 from tunnel_sim.files.importing.source import Channel, Table
 from tunnel_sim.files.importing.units import known_unit, split_unit
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.extras import library
 
 LIMIT = limits.DATA_BYTES
 """Largest file, bytes."""
@@ -24,7 +25,7 @@ KIND = "a TDMS file"
 
 def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
     """The tables of a TDMS file, one for each group; arguments as in `source.Reader`."""
-    nptdms = library("nptdms", "TDMS", where)
+    nptdms = library("nptdms", "TDMS", "import", where)
     tables = []
     with faults(KIND, where), nptdms.TdmsFile.open(io.BytesIO(content)) as file:
         groups = file.groups()

@@ -6,13 +6,14 @@ import io
 import zipfile
 
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.extras import faults, library
+from tunnel_sim.files.importing.faults import faults
 from tunnel_sim.files.importing.layout import find_layout
 from tunnel_sim.files.importing.source import Table
 from tunnel_sim.files.importing.text import channels_of
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.extras import library
 
 LIMIT = limits.DATA_BYTES
 """Largest file, bytes."""
@@ -25,7 +26,7 @@ _HEAD = 400
 
 def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
     """The tables of a workbook, one for each sheet; arguments as in `source.Reader`."""
-    fastexcel = library("fastexcel", "Excel", where)
+    fastexcel = library("fastexcel", "Excel", "import", where)
     tables = []
     with faults(KIND, where):
         _check_archive(content, where)

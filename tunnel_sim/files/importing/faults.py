@@ -1,34 +1,11 @@
-"""The libraries of the extra ``import``, and their faults as one line."""
+"""Faults of the libraries of the extra ``import`` as one line."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
-from typing import Any
 
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
-
-
-def library(name: str, kind: str, where: str) -> Any:
-    """A library that reads or writes a format.
-
-    Args:
-        name: of its module.
-        kind: the format, for messages.
-        where: the file.
-
-    Raises:
-        TunnelError: when it is not installed; the remedy is the command that installs it.
-    """
-    try:
-        return import_module(name)
-    except ImportError:
-        raise TunnelError(
-            f"{kind} needs the package {name}",
-            where=where,
-            remedy="run: pip install 'virtual-wind-tunnel[import]'",
-        ) from None
 
 
 @contextmanager

@@ -1,0 +1,149 @@
+"""Train an agent for ``Campaign-v0`` with Stable-Baselines3, and score it; docs/how-to/train-an-agent.md.
+
+``python -m docs.studies.campaign_agent train OUT.safetensors`` trains on one thread, in linear theory.
+``python -m docs.studies.campaign_agent score docs`` plays 50 campaigns in the full simulation and writes the page's
+table. Training needs the extra ``train``; the score does not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.wrappers.vector import NormalizeObservation
+
+import tunnel_sim.envs  # noqa: F401  registers the environments
+from docs.studies.campaign_policies import Row, from_csv, play, replaced, table, to_csv
+from tunnel_lab.envs.agent import FEATURES, LAYERS, Agent, features, menu_text
+from tunnel_lab.envs.campaign import CampaignEnv
+from tunnel_sim.files.writing import write_whole
+from tunnel_sim.vocabulary.record import Array
+
+SEEDS = 50  # of the score: 0 to 49, as in docs/campaign-design.md
+TRAINED_FROM = 1_000_000  # first seed of the training, far from those of the score
+STEPS = 90_000
+CAMPAIGNS = 16  # in parallel, so that the network is evaluated for all of them at once
+TRAINING: dict[str, Any] = {"sample_rate": 25.0, "noise_std": 0.025, "max_runs": 12}
+"""A quarter of the samples with half the noise hold the same information and take a quarter of the time. Campaigns
+of an untrained agent are cut off earlier."""
+
+
+def make(count: int, **arguments: Any) -> NormalizeObservation:
+    """Campaigns in parallel with the agent's features, normalised by Gymnasium's wrapper.
+
+    Args:
+        count: number of campaigns.
+        **arguments: of ``Campaign-v0``.
+    """
+    space = gymnasium.spaces.Box(-np.inf, np.inf, (FEATURES,), np.float64)
+
+    def one() -> Any:
+        env = gymnasium.make("tunnel_sim/Campaign-v0", **arguments)
+        return gymnasium.wrappers.TransformObservation(env, features, space)
+
+    return NormalizeObservation(gymnasium.vector.SyncVectorEnv([one] * count))
+
+
+def train(steps: int, seed: int) -> Agent:
+    """Train by proximal policy optimisation (Schulman et al., arXiv 1707.06347).
+
+    Args:
+        steps: runs to make in all (number).
+    """
+    import torch
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    from tunnel_sim.envs.stable_baselines import BaselinesVecEnv
+
+    torch.set_num_threads(1)  # the network is so small that a second thread only costs time
+    envs = make(CAMPAIGNS, **TRAINING)
+    model = PPO(
+        "MlpPolicy",
+        VecMonitor(BaselinesVecEnv(envs)),
+        n_steps=128,
+        batch_size=256,
+        n_epochs=10,
+        learning_rate=lambda left: 1e-3 * (0.25 + 0.75 * left),
+        gamma=1.0,  # an episode ends within 12 runs
+        gae_lambda=0.95,
+        ent_coef=0.005,
+        policy_kwargs={"net_arch": [64, 64]},
+        seed=TRAINED_FROM + seed,
+        verbose=1,
+        device="cpu",
+    )
+    model.learn(steps)
+    menu = CampaignEnv(**TRAINING).conditions.menu
+    return Agent(envs.obs_rms.mean, envs.obs_rms.var, _layers(model), menu_text(menu))
+
+
+def _layers(model: Any) -> tuple[tuple[Array, Array], ...]:
+    """Weights and biases of the policy's network."""
+    linear = [part for part in (*model.policy.mlp_extractor.policy_net, model.policy.action_net)]
+    pairs = [
+        (part.weight.detach().numpy(), part.bias.detach().numpy())
+        for part in linear
+        if hasattr(part, "weight")
+    ]
+    assert len(pairs) == LAYERS
+    return tuple(pairs)
+
+
+def score() -> list[Row]:
+    """Play the seeds of the score with the trained agent in the full simulation."""
+    rows = []
+    for seed in range(SEEDS):
+        rows.append(play("identification", "trained", seed))
+        print(f"\rtrained {seed + 1}/{SEEDS}  ", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    return rows
+
+
+def write_score(docs: Path, rows: Sequence[Row]) -> None:
+    """Write the episodes as CSV and fill the page's table.
+
+    Args:
+        docs: the folder docs of the source tree.
+    """
+    write_whole(docs / "how-to" / "train-an-agent.csv", to_csv(rows).encode())
+    page = docs / "how-to" / "train-an-agent.md"
+    write_whole(page, fill(page.read_text(encoding="utf-8"), docs).encode())
+
+
+def fill(page: str, docs: Path) -> str:
+    """The page with the table of the stored episodes of all three policies."""
+    stored = (docs / "campaign-design.csv", docs / "how-to" / "train-an-agent.csv")
+    rows = [row for file in stored for row in from_csv(file.read_text(encoding="utf-8"))]
+    return replaced(page, "score", table(rows, "identification", ("scripted", "greedy", "trained")))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train or score.
+
+    Args:
+        arguments: those of the process when None.
+    """
+    parser = argparse.ArgumentParser(description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    training = commands.add_parser("train", help="train an agent and write it")
+    training.add_argument("out", type=Path, help="file to write (.safetensors)")
+    training.add_argument("--steps", type=int, default=STEPS, help="runs to make")
+    training.add_argument("--seed", type=int, default=0, help="of network and environment")
+    scoring = commands.add_parser("score", help="score the packaged agent in the full simulation")
+    scoring.add_argument("docs", type=Path, help="the folder docs of the source tree")
+    given = parser.parse_args(arguments)
+    if given.command == "train":
+        write_whole(given.out, train(given.steps, given.seed).to_bytes())
+    else:
+        write_score(given.docs, score())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

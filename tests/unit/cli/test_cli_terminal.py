@@ -1,0 +1,108 @@
+"""Narrow terminals, ``--quiet``, commands to copy, and what lies beside a path that is wrong."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tunnel_lab.terminal.stacked import is_too_wide, stacked
+from tunnel_lab.terminal.tables import table
+from tunnel_sim.files.nearby import inside, nearest
+
+Tunnel = Callable[..., tuple[int, str, str]]
+
+
+def two_columns():
+    rows = table("Title", "run", "value\n[N m]", "remark")
+    rows.add_row("first", "12.5 ± 0.1", "")
+    rows.add_row("second", "3", "a remark of more than thirty characters is a sentence")
+    return rows
+
+
+def test_a_table_is_stacked_where_a_cell_would_be_broken() -> None:
+    # 6 + 10 + 10 columns of content, two beside each, one between.
+    assert [is_too_wide(two_columns(), width) for width in (33, 34)] == [True, False]
+
+
+def test_a_stacked_table_has_every_cell_with_its_heading() -> None:
+    assert stacked(two_columns()).splitlines() == [
+        "Title",
+        " run first",
+        "   value [N m]  12.5 ± 0.1",
+        " run second",
+        "   value [N m]  3",
+        "   remark       a remark of more than thirty characters is a sentence",
+    ]
+
+
+@pytest.mark.parametrize("width", [60, 70, 80])
+def test_no_number_is_broken_in_a_narrow_terminal(
+    tunnel: Tunnel, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    whole = json.loads(tunnel("springs", "--format", "json")[1].splitlines()[0])["rows"]
+    monkeypatch.setenv("COLUMNS", str(width))
+    status, out, _ = tunnel("springs")
+    assert status == 0
+    assert max(map(len, out.splitlines())) <= width
+    for row in whole:
+        assert "off the line" not in row[""] or "off the line" in out
+        assert f"{row['ωn² [rad²/s²]']:.2f}" in out
+
+
+def test_quiet_prints_nothing_but_errors_and_writes_all_the_same(
+    tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path
+) -> None:
+    assert tunnel("identify", tiny_campaign, "--quiet", "--json", tmp_path / "e.json") == (0, "", "")
+    assert json.loads((tmp_path / "e.json").read_text())["campaign"] == "tiny"
+    status, out, err = tunnel("identify", tiny_campaign, "-q", "--json", "-")
+    assert (status, json.loads(out)["campaign"], err) == (0, "tiny", "")
+    status, out, err = tunnel("identify", tmp_path / "nowhere", "-q")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert tunnel("springs")[1] != ""
+
+
+def test_a_note_shows_the_command_of_its_remedy(tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path) -> None:
+    bent = tmp_path / "my rig"
+    shutil.copytree(tiny_campaign, bent)
+    run = bent / "runs" / "r01.csv"
+    lines = run.read_text().splitlines()
+    cubic = [
+        f"{t},{float(y) * (1.0 + 3.0 * float(y) ** 2)}" for t, y in (line.split(",") for line in lines[1:])
+    ]
+    run.write_text("\n".join([lines[0], *cubic]))
+    out = tunnel("identify", bent)[1]
+    assert f"run: tunnel diagnose '{bent}'" in out
+    assert "run the diagnosis" not in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("identify", "tinny"), "no such folder; did you mean the folder 'tiny'?"),
+        (("identify", "tiny/campain.toml"), "did you mean the file 'tiny/campaign.toml'?"),
+        (("identify", "tiny/runs"), "no such file; did you mean the folder 'tiny'?"),
+        (("identify", "plan.toml"), "if it is a plan: tunnel simulate plan.toml --out FOLDER"),
+        (("simulate", "plam.toml", "--out", "x"), "no such file; did you mean the file 'plan.toml'?"),
+        (
+            ("simulate", "tiny", "--out", "x"),
+            "it is a campaign, which tunnel identify and tunnel diagnose take",
+        ),
+        (("springs", "tiny/runs"), "name a file in it, such as 'tiny/runs/r01.csv'"),
+    ],
+)
+def test_a_path_that_is_wrong_gets_the_one_beside_it(
+    tunnel: Tunnel, tiny_campaign: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], said: str
+) -> None:
+    monkeypatch.chdir(tiny_campaign.parent)
+    Path("plan.toml").write_text("name = 'x'\n")
+    status, out, err = tunnel(*words)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert said in err
+
+
+def test_where_nothing_is_similar_nothing_is_suggested(tmp_path: Path) -> None:
+    assert nearest(tmp_path / "anything") == nearest(tmp_path / "no" / "such") == inside(tmp_path) == ""

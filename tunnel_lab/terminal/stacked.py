@@ -1,0 +1,50 @@
+"""Tables for narrow terminals: every row as a block of lines, so that no number or word is broken."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from rich.cells import cell_len
+
+if TYPE_CHECKING:
+    from rich.table import Column, Table
+
+PROSE = 30
+"""Columns: a longer cell is a sentence, which may go over several lines."""
+_PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
+
+
+def is_too_wide(table: Table, width: int) -> bool:
+    """Whether cells other than sentences would be broken.
+
+    Args:
+        width: of the terminal, columns (count).
+    """
+    needed = sum(_least_width(column) + _PADDING for column in table.columns)
+    return needed + _BETWEEN * (len(table.columns) - 1) > width
+
+
+def _least_width(column: Column) -> int:
+    return max(map(_unbroken, (column.header, *column.cells)), default=0)
+
+
+def _unbroken(cell: object) -> int:
+    """Columns that a cell takes: its longest line, or the longest word of a sentence."""
+    longest = max(map(cell_len, str(cell).splitlines()), default=0)
+    return longest if longest <= PROSE else max(map(cell_len, str(cell).split()))
+
+
+def stacked(table: Table) -> str:
+    """A table row by row: its first cell, and below it the others with their headings; empty ones are left out."""
+    return "\n".join((str(table.title or ""), *_lines(table)))
+
+
+def _lines(table: Table) -> Iterator[str]:
+    heads = [" ".join(str(column.header).split()) for column in table.columns]
+    room = max(map(cell_len, heads[1:]), default=0)
+    for first, *others in zip(*(column.cells for column in table.columns), strict=True):
+        yield f" {heads[0]} {first}".rstrip()
+        for head, cell in zip(heads[1:], others, strict=True):
+            if str(cell):
+                yield f"   {head}{' ' * (room - cell_len(head))}  {' '.join(str(cell).split())}"
