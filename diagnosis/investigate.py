@@ -48,11 +48,28 @@ def investigate(
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    clock = _Clock(progress)
-    found = _test(*similar_campaign(campaign), {kind.name for kind in kinds}, clock)
+    clock = Clock(progress)
+    found = tested(campaign, kinds, clock)
     if found.test.detected:
         found = _weigh_effects(found, kinds, clock)
     return replace(found, seconds=clock.seconds)
+
+
+def tested(campaign: Campaign, kinds: Sequence[type[Effect]], clock: Clock | None = None) -> Study:
+    """Test a campaign for a gap, and fit no effect.
+
+    Args:
+        campaign: the runs.
+        kinds: the effects that may be read off the records.
+        clock: times the steps.
+
+    Returns:
+        The study up to the fit of the nominal model.
+
+    Raises:
+        TunnelError: when the nominal model cannot be fitted to the runs.
+    """
+    return _test(*similar_campaign(campaign), {kind.name for kind in kinds}, clock or Clock(None))
 
 
 def fit_nominal(data: Data) -> Fit:
@@ -78,7 +95,7 @@ def fit_nominal(data: Data) -> Fit:
     return found
 
 
-def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: _Clock) -> Study:
+def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: Clock) -> Study:
     """The study up to the test of the gap: noise, hum and nominal fit."""
     with clock.step("noise"):
         noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
@@ -100,7 +117,7 @@ def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: 
     return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
 
 
-def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: Clock) -> Study:
     """The study with sets of effects, random moments and outsiders fitted and weighed."""
     fitted = [kind for kind in kinds if kind.fitted]
     if fitted and is_gross(found.nominal):
@@ -123,7 +140,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     return replace(found, weighed=tuple(weighed))
 
 
-def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: Clock) -> Study:
     """The study where the nominal model misses the motion itself: sets are weighed by their fits to stretches."""
     with clock.step("effects"):
         grown = grow_in_stretches(found.nominal.problem.data, fit_nominal, kinds, clock.progress)
@@ -148,7 +165,7 @@ def _with_whole_runs(found: Study, grown: InStretches) -> Study:
         found = replace(found, hypotheses=left)
 
 
-def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
+def _pruned(found: Study, base: Fit, clock: Clock) -> Study:
     """The study with every set that has one effect less than the answer."""
     best = found.hypothesis(_weighed(found, base)[0].effects)
     if best is None or len(best.effects) == 1:
@@ -203,7 +220,7 @@ def _noise_explains(found: Study) -> bool:
     return found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block
 
 
-class _Clock:
+class Clock:
     """Wall time by step, and the progress call."""
 
     def __init__(self, progress: Progress | None) -> None:

@@ -14,6 +14,7 @@ from typing import Annotated, cast
 import typer
 
 from tunnel_lab.commands import (
+    bench,
     blind,
     compare,
     demo,
@@ -91,6 +92,7 @@ def tunnel(
       tunnel render                      a film of a run, and a picture
       tunnel train w.safetensors         train the paper's networks from a seed
       tunnel docs                        the documentation, in a browser
+      tunnel bench                       all of it by hand and eye, in a browser
 
     [bold]Units[/bold]
       SI and radians throughout.
@@ -121,10 +123,11 @@ COMMANDS = (
     render,
     train,
     docs,
+    bench,
 )
 """Every command that is one function, in the order of the help."""
 
-WITHOUT_TABLES = (simulate, plot, export, view, render, docs)
+WITHOUT_TABLES = (simulate, plot, export, view, render, docs, bench)
 
 for _command in COMMANDS:
     app.command(_command.NAME)(_command.run if _command in WITHOUT_TABLES else with_format(_command.run))

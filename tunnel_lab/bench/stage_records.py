@@ -1,0 +1,230 @@
+"""The stage Records: what the dropped files hold, what is stated about them, and the campaign that they become."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from nicegui import events, run, ui
+
+from tunnel_lab.bench import preview
+from tunnel_lab.bench.chart import Chart
+from tunnel_lab.bench.parts import Fault, Frame, address, button, show_command, show_parts
+from tunnel_lab.bench.start import drop_zone, keep
+from tunnel_lab.bench.workspace import Session
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from tunnel_sim.files.importing.records import Imported
+
+_TIME = "time [s], from the record's first sample"
+
+
+def build(session: Session, frame: Frame) -> None:
+    """Build the page."""
+    _Records(session, frame)
+
+
+class _Records:
+    """The page: it reads the files again whenever a choice changes."""
+
+    def __init__(self, session: Session, frame: Frame) -> None:
+        self._session, self._frame = session, frame
+        self._imported: Imported | None = None
+        if not preview.files_of(session):
+            _as_it_is(session)
+            frame.way_on()
+            return
+        self._files = ui.element("div")
+        self._fault = Fault()
+        self._found = ui.element("div").props("aria-live=polite")
+        with self._found:
+            ui.label("Reading the files …").classes("soft")
+        self._written = Fault()
+        with ui.element("p").classes("buttons"):
+            button("Write the campaign", self._write, main=True)
+            if session.imported:
+                frame.way_on()
+        self._columns: list[str] = []
+        self._form_place = ui.expansion("What the files do not say, or was found wrongly").classes("choices")
+        ui.timer(0.0, self._first, once=True)
+
+    async def _first(self) -> None:
+        self._columns = await run.io_bound(preview.column_names, self._session)
+        with self._form_place:
+            _Choices(self._session, self._columns, self._changed)
+        await self._read()
+        if self._imported is None:
+            self._form_place.open()
+
+    async def _changed(self, key: str, value: Any) -> None:
+        with self._fault.around():
+            preview.state(self._session, {key: value})
+            await self._read()
+
+    async def _read(self) -> None:
+        self._show_files()
+        self._imported = None
+        try:
+            self._imported = await run.io_bound(preview.read, self._session)
+        except TunnelError as error:
+            self._fault.show(error)
+            self._found.clear()
+            return
+        self._fault.clear()
+        self._found.clear()
+        with self._found:
+            self._show(self._imported)
+
+    def _show_files(self) -> None:
+        self._files.clear()
+        with self._files:
+            names = ", ".join(path.name for path in preview.files_of(self._session))
+            ui.label(f"{names}; kept in {self._session.uploads}").classes("soft")
+            with ui.expansion("Add files"):
+                fault = Fault()
+
+                async def dropped(given: events.MultiUploadEventArguments) -> None:
+                    with fault.around():
+                        await keep(self._session, given)
+                        await self._read()
+
+                drop_zone(dropped, fault)
+
+    def _show(self, imported: Imported) -> None:
+        from tunnel_lab.terminal.import_output import parts_table
+
+        for one in preview.drawn(imported):
+            self._chart(one)
+        left = len({id(part.raw) for part in imported.parts}) - preview.MOST_RECORDS
+        if left > 0:
+            ui.label(f"{left} more records are not drawn.").classes("soft")
+        show_parts([parts_table(imported)])
+        with ui.element("ul").classes("notes"):
+            for line in imported.remarks():
+                with ui.element("li"):
+                    ui.label(line)
+
+    def _chart(self, one: preview.Drawn) -> None:
+        marks = {f"{mark.run} {kind}": (mark, kind) for mark in one.marks for kind in ("start", "end")}
+
+        async def moved(name: str, at: float) -> None:
+            mark, kind = marks[name]
+            with self._fault.around():
+                preview.move(self._session, mark, **{kind: at})
+                await self._read()
+
+        chart = Chart(
+            f"{one.title}: drag a mark to where a run is released or has come to rest; drag in the chart to zoom, "
+            "double-click to see all of it.",
+            _TIME,
+            f"reading [{one.unit}]",
+            [("reading", "after")],
+            [one.time, one.reading],
+            moved,
+        )
+        words = {"start": "release", "end": "rest"}
+        chart.mark(
+            [
+                {"id": name, "at": getattr(mark, kind), "kind": kind, "label": f"{words[kind]} of {mark.run}"}
+                for name, (mark, kind) in marks.items()
+            ],
+            [{"from": mark.start, "to": mark.end, "at": mark.rest} for mark in one.marks],
+        )
+
+    async def _write(self) -> None:
+        with self._written.around():
+            if self._imported is None:
+                raise TunnelError("the files cannot be read yet", remedy="state what is asked for above")
+            await run.io_bound(write, self._session, self._imported)
+            ui.navigate.to(address(self._session, "conditions"))
+
+
+def write(session: Session, imported: Imported) -> None:
+    """Write the campaign, as ``tunnel import`` does; conditions that were stated before are kept.
+
+    Args:
+        session: whose campaign it is.
+        imported: what was read.
+
+    Raises:
+        TunnelError: when the folder cannot be written.
+    """
+    from tunnel_lab.bench import conditions
+    from tunnel_lab.plotting.import_figure import import_picture
+    from tunnel_sim.files.importing.writing import write_imported
+
+    before = conditions.stated(session) if session.imported else None
+    write_imported(imported, session.campaign, overwrite=True, picture=import_picture)
+    if before is not None:
+        conditions.restore(session, before)
+
+
+class _Choices:
+    """Fields for what can be stated about the files, as the options of ``tunnel import``."""
+
+    def __init__(self, session: Session, columns: list[str], changed: Any) -> None:
+        from tunnel_sim.files.importing.units import UNITS
+
+        self._now = preview.choices_of(session)
+        self._changed = changed
+        angle = [unit for kind, units in UNITS.items() if kind != "time" for unit in units]
+        with ui.element("div").classes("fields"):
+            self._select("angle", "Column of the angle", columns, several=True)
+            self._select("unit", "Unit of the angle", angle)
+            self._select("time", "Column of the times", columns)
+            self._select("time_unit", "Unit of the times", list(UNITS["time"]))
+            self._number("rate", "Sample rate, where there are no times [Hz]")
+            self._number("counts_per_turn", "Counts of an encoder per turn")
+            self._text("calibration", "Angle of a voltage, such as 0.1 + 20*V")
+            self._number("start", "Leave out what is earlier [s]")
+            self._number("end", "Leave out what is later [s]")
+            self._text("name", "Conditions in the file names, such as S{spring}_V{wind_speed}_*")
+            ui.checkbox("Cut records at releases", value=self._now.cut, on_change=lambda e: changed("cut", e.value))
+        show_command(
+            f"tunnel import {session.uploads}/* --recipe {session.choices} --out {session.campaign} --yes --overwrite"
+        )
+
+    def _select(self, key: str, label: str, options: list[str], *, several: bool = False) -> None:
+        now = getattr(self._now, key)
+        value = list(now) if several else now
+        shown = [*options, *(one for one in (value if several else [value]) if one and one not in options)]
+
+        async def change(event: events.ValueChangeEventArguments[Any]) -> None:
+            await self._changed(key, event.value or (() if several else None))
+
+        ui.select(shown, label=label, value=value, multiple=several, clearable=True, on_change=change).props("dense")
+
+    def _number(self, key: str, label: str) -> None:
+        async def change(event: events.GenericEventArguments) -> None:
+            await self._changed(key, field.value)
+
+        field = ui.number(label, value=getattr(self._now, key)).props("dense step=any")
+        field.on("change", change)
+
+    def _text(self, key: str, label: str) -> None:
+        async def change(event: events.GenericEventArguments) -> None:
+            await self._changed(key, field.value or None)
+
+        field = ui.input(label, value=getattr(self._now, key) or "").props("dense")
+        field.on("change", change)
+
+
+def _as_it_is(session: Session) -> None:
+    """A campaign that was not made of dropped files: its runs, as they are."""
+    ui.label(f"The campaign in {session.campaign}, as it is.").classes("soft")
+    fault = Fault()
+    place = ui.element("div")
+
+    async def show() -> None:
+        from tunnel_lab.plotting.import_figure import thinned
+        from tunnel_sim.files.campaign_io import read_campaign
+
+        with fault.around():
+            campaign = await run.io_bound(read_campaign, session.campaign)
+            with place:
+                for one in campaign.runs[: preview.MOST_RECORDS]:
+                    time, reading = thinned(one.record.time_s, one.record.yaw_rad)
+                    label = f"reading [{campaign.sensor.unit}]"
+                    Chart(one.id, "time [s]", label, [("reading", "after")], [time.tolist(), reading.tolist()])
+
+    ui.timer(0.0, show, once=True)
