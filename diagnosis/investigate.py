@@ -48,20 +48,22 @@ def investigate(
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    clock = Clock(progress)
-    found = tested(campaign, kinds, clock)
+    clock = _Clock(progress)
+    found = _test(*similar_campaign(campaign), {kind.name for kind in kinds}, clock)
     if found.test.detected:
         found = _weigh_effects(found, kinds, clock)
     return replace(found, seconds=clock.seconds)
 
 
-def tested(campaign: Campaign, kinds: Sequence[type[Effect]], clock: Clock | None = None) -> Study:
+def nominal_study(
+    campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progress | None = None
+) -> Study:
     """Test a campaign for a gap, and fit no effect.
 
     Args:
         campaign: the runs.
         kinds: the effects that may be read off the records.
-        clock: times the steps.
+        progress: called with the name of each step.
 
     Returns:
         The study up to the fit of the nominal model.
@@ -69,7 +71,9 @@ def tested(campaign: Campaign, kinds: Sequence[type[Effect]], clock: Clock | Non
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    return _test(*similar_campaign(campaign), {kind.name for kind in kinds}, clock or Clock(None))
+    clock = _Clock(progress)
+    found = _test(*similar_campaign(campaign), {kind.name for kind in kinds}, clock)
+    return replace(found, seconds=clock.seconds)
 
 
 def fit_nominal(data: Data) -> Fit:
@@ -95,7 +99,7 @@ def fit_nominal(data: Data) -> Fit:
     return found
 
 
-def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: Clock) -> Study:
+def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: _Clock) -> Study:
     """The study up to the test of the gap: noise, hum and nominal fit."""
     with clock.step("noise"):
         noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
@@ -117,7 +121,7 @@ def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: 
     return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
 
 
-def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: Clock) -> Study:
+def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
     """The study with sets of effects, random moments and outsiders fitted and weighed."""
     fitted = [kind for kind in kinds if kind.fitted]
     if fitted and is_gross(found.nominal):
@@ -140,7 +144,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: Clock) ->
     return replace(found, weighed=tuple(weighed))
 
 
-def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: Clock) -> Study:
+def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
     """The study where the nominal model misses the motion itself: sets are weighed by their fits to stretches."""
     with clock.step("effects"):
         grown = grow_in_stretches(found.nominal.problem.data, fit_nominal, kinds, clock.progress)
@@ -165,7 +169,7 @@ def _with_whole_runs(found: Study, grown: InStretches) -> Study:
         found = replace(found, hypotheses=left)
 
 
-def _pruned(found: Study, base: Fit, clock: Clock) -> Study:
+def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
     """The study with every set that has one effect less than the answer."""
     best = found.hypothesis(_weighed(found, base)[0].effects)
     if best is None or len(best.effects) == 1:
@@ -220,7 +224,7 @@ def _noise_explains(found: Study) -> bool:
     return found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block
 
 
-class Clock:
+class _Clock:
     """Wall time by step, and the progress call."""
 
     def __init__(self, progress: Progress | None) -> None:

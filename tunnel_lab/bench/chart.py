@@ -41,12 +41,14 @@ class Chart(ui.element, component="static/chart.js"):
         self._props["data"] = data
         self.update()
 
-    def mark(self, marks: Sequence[Mapping[str, Any]], levels: Sequence[Mapping[str, Any]] = ()) -> None:
+    def show_marks(
+        self, marks: Sequence[Mapping[str, Any]], levels: Sequence[Mapping[str, Any]] = ()
+    ) -> None:
         """Show marks.
 
         Args:
-            marks: ``id``, ``at`` (in the unit of the abscissa), ``label`` and ``kind`` (``start`` or ``end``) of each.
-            levels: ``from`` and ``to`` (in the unit of the abscissa), ``at`` (in that of the ordinate) and ``label``.
+            marks: ``id``, ``label``, ``kind`` (``start`` or ``end``) and ``at`` (in the abscissa's unit) of each.
+            levels: ``from`` and ``to`` (in the abscissa's unit) and ``at`` (in the ordinate's) of each.
         """
         self._props.update(marks=[dict(one) for one in marks], levels=[dict(one) for one in levels])
         self.update()

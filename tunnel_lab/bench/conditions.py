@@ -77,11 +77,12 @@ def typed(session: Session) -> Cells:
     }
 
 
-def faults(cells: Cells) -> dict[tuple[str, str], str]:
+def faults(cells: Cells, *, plausible: bool = True) -> dict[tuple[str, str], str]:
     """What is wrong, by row and key.
 
     Args:
         cells: as typed.
+        plausible: whether values that look like a wrong unit are wrong.
 
     Returns:
         One line for each cell, as a command would print it; empty where the campaign can be read.
@@ -94,14 +95,16 @@ def faults(cells: Cells) -> dict[tuple[str, str], str]:
                 value = number(text, f"{where}, {key}")
                 if value is not None:
                     validate(Conditions, {key: value}, Path(where))
-                    plausible_values({key: value}, where)
+                    plausible_values({key: value} if plausible else {}, where)
             except TunnelError as error:
                 found[row, key] = str(error)
         if not row or texts["air_density"].strip() or (row, "wind_speed") in found:
             continue
         if (number(texts["wind_speed"], where) or 0.0) > 0.0:
             remedy = "give it in kg/m3 (about 1.2 for air)"
-            found[row, "air_density"] = str(TunnelError("wind-on without air_density", where=where, remedy=remedy))
+            found[row, "air_density"] = str(
+                TunnelError("wind-on without air_density", where=where, remedy=remedy)
+            )
     return found
 
 
@@ -138,20 +141,46 @@ def save(session: Session, cells: Cells) -> dict[tuple[str, str], str]:
     Raises:
         TunnelError: when the campaign would not be readable for another reason.
     """
-    wrong = faults(cells)
+    document = _document(session)
+    wrong = faults(cells, plausible=_is_judged(document))
     if wrong:
         write_json(session.draft, cells)
         return wrong
-    path = session.campaign / CAMPAIGN_FILE
-    document = _document(session)
     document["rig"] = _with(document.get("rig", {}), cells[RIG], RIG_KEYS)
     document["runs"] = [_with(run, cells[run["id"]], RUN_KEYS) for run in document["runs"]]
-    parse_document(document, path)
     if stated(session) != cells:
-        comments = [line for line in path.read_text("utf-8").splitlines() if line.startswith(ORIGINAL)]
-        write_whole(path, campaign_text(document, comments).encode())
+        _write(session, document)
     session.draft.unlink(missing_ok=True)
     return {}
+
+
+def judge(session: Session, plausible: bool) -> None:
+    """State whether values that look like a wrong unit are refused.
+
+    Raises:
+        TunnelError: when a value that is kept would then be refused.
+    """
+    document = _document(session)
+    document["sensor"] = {**document.get("sensor", {}), "plausible": False}
+    if plausible:
+        del document["sensor"]["plausible"]
+    _write(session, document)
+
+
+def is_judged(session: Session) -> bool:
+    """Whether values that look like a wrong unit are refused."""
+    return _is_judged(_document(session))
+
+
+def _is_judged(document: Mapping[str, Any]) -> bool:
+    return document.get("sensor", {}).get("plausible") is not False
+
+
+def _write(session: Session, document: dict[str, Any]) -> None:
+    path = session.campaign / CAMPAIGN_FILE
+    parse_document(document, path)
+    comments = [line for line in path.read_text("utf-8").splitlines() if line.startswith(ORIGINAL)]
+    write_whole(path, campaign_text(document, comments).encode())
 
 
 def restore(session: Session, before: Cells) -> None:
@@ -165,7 +194,10 @@ def restore(session: Session, before: Cells) -> None:
         TunnelError: as `save`.
     """
     now = stated(session)
-    kept = {row: {key: before.get(row, {}).get(key) or text for key, text in cells.items()} for row, cells in now.items()}
+    kept = {
+        row: {key: before.get(row, {}).get(key) or text for key, text in cells.items()}
+        for row, cells in now.items()
+    }
     save(session, kept)
 
 

@@ -26,14 +26,18 @@ def side_by_side(documents: Sequence[Document]) -> list[str | TextTable]:
     names = tuple(str(document["estimator"]) for document in documents)
     given = [name for name in UNITS if any(document[name] for document in documents)]
     rows = tuple(
-        (f"{SYMBOLS[name]} {unit(UNITS[name])}", *(_cell(document[name]) for document in documents)) for name in given
+        (f"{SYMBOLS[name]} {unit(UNITS[name])}", *(_cell(document[name]) for document in documents))
+        for name in given
     )
-    notes = {line: None for document in documents for line in _notes(document)}
+    notes: dict[str, list[str]] = {}
+    for document in documents:
+        for line in _notes(document):
+            notes.setdefault(line, []).append(document["estimator"])
     return [
         TextTable("Coefficients ± one standard deviation", ("quantity", *names), rows),
         _runs("ωn [rad/s] of the runs ± one standard deviation", "omega_n", documents, names),
         _runs("ζ [1] of the runs ± one standard deviation", "zeta", documents, names),
-        *notes,
+        *(f"{', '.join(names)}: {line}" for line, names in notes.items()),
     ]
 
 
@@ -53,7 +57,7 @@ def _notes(document: Document) -> list[str]:
     from identification.remark import Remark
 
     said = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
-    return [f"{document['estimator']}: {line}" for line in (*said, *status_lines(document))]
+    return [*said, *status_lines(document)]
 
 
 def budget_parts(document: Document) -> list[str | TextTable]:

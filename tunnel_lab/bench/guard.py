@@ -68,12 +68,16 @@ class Guard:
     def _refusal(self, headers: Mapping[str, str], query: Mapping[str, str]) -> Refusal | None:
         host, origin = headers.get("host", ""), headers.get("origin")
         if host not in self._hosts:
-            return Refusal(421, "This is the bench of another address; use the one that tunnel bench printed.")
+            return Refusal(
+                421, "This is the bench of another address; use the one that tunnel bench printed."
+            )
         if origin is not None and origin != f"http://{host}":
             return Refusal(403, "The request comes from another page; use the bench itself.")
         given = query.get("token") or _cookies(headers.get("cookie", "")).get(self._cookie, "")
         if not hmac.compare_digest(given.encode(), self._token.encode()):
-            return Refusal(403, "The token is missing or old; use the whole address that tunnel bench printed.")
+            return Refusal(
+                403, "The token is missing or old; use the whole address that tunnel bench printed."
+            )
         length = headers.get("content-length", "0")
         if "transfer-encoding" in headers or not length.isdigit():
             return Refusal(411, "The length of the request is not stated.")

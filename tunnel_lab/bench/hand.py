@@ -19,17 +19,18 @@ Parameters = ParamSpec("Parameters")
 ResultT = TypeVar("ResultT")
 
 
-async def closure(campaign: Path, effects: Sequence[str]) -> Closure:
+async def closure(campaign: Path, effects: Sequence[str], *, converged: bool) -> Closure:
     """How far the gap closes with effects chosen by hand.
 
     Args:
         campaign: its folder.
         effects: their names.
+        converged: whether the fit frees their forms and goes on until it has converged.
 
     Raises:
         TunnelError: when the campaign cannot be read, or an effect cannot be fitted to it.
     """
-    return await _elsewhere(_closure, str(campaign), _state(campaign), tuple(sorted(effects)))
+    return await _elsewhere(_closure, str(campaign), _state(campaign), tuple(sorted(effects)), converged)
 
 
 async def next_run(campaign: Path, first: Sequence[str], second: Sequence[str]) -> dict[str, Any] | None:
@@ -43,10 +44,14 @@ async def next_run(campaign: Path, first: Sequence[str], second: Sequence[str]) 
     Raises:
         TunnelError: as `closure`.
     """
-    return await _elsewhere(_next_run, str(campaign), _state(campaign), tuple(sorted(first)), tuple(sorted(second)))
+    return await _elsewhere(
+        _next_run, str(campaign), _state(campaign), tuple(sorted(first)), tuple(sorted(second))
+    )
 
 
-async def _elsewhere(work: Callable[Parameters, ResultT], *given: Parameters.args, **_: Parameters.kwargs) -> ResultT:
+async def _elsewhere(
+    work: Callable[Parameters, ResultT], *given: Parameters.args, **_: Parameters.kwargs
+) -> ResultT:
     return await asyncio.get_running_loop().run_in_executor(_pool(), work, *given)
 
 
@@ -76,8 +81,8 @@ def _by_hand(campaign: str, state: tuple[int, ...]) -> ByHand:
     return ByHand(read_campaign(campaign))
 
 
-def _closure(campaign: str, state: tuple[int, ...], effects: tuple[str, ...]) -> Closure:
-    return _by_hand(campaign, state).closure(effects)
+def _closure(campaign: str, state: tuple[int, ...], effects: tuple[str, ...], converged: bool) -> Closure:
+    return _by_hand(campaign, state).closure(effects, converged=converged)
 
 
 def _next_run(

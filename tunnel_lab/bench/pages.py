@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
 from fastapi.responses import FileResponse
 from nicegui import app, ui
 
-from tunnel_lab.bench import stage_conditions, stage_diagnose, stage_identify, stage_next_run, stage_records
-from tunnel_lab.bench import stage_report, start, try_it
+from tunnel_lab.bench import start
 from tunnel_lab.bench.parts import Frame, address
 from tunnel_lab.bench.stages import STAGES, closed
 from tunnel_lab.bench.workspace import open_session
 from tunnel_sim.vocabulary.errors import TunnelError
-
-_BUILDERS = {
-    "records": stage_records.build,
-    "conditions": stage_conditions.build,
-    "identify": stage_identify.build,
-    "diagnose": stage_diagnose.build,
-    "next-run": stage_next_run.build,
-    "report": stage_report.build,
-}
 
 
 def add_pages(folder: Path) -> None:
@@ -41,7 +32,7 @@ def add_pages(folder: Path) -> None:
     def rig() -> None:
         frame = Frame("Try it")
         with frame.main:
-            try_it.build(folder)
+            import_module("tunnel_lab.bench.try_it").build(folder)
 
     @app.get("/{name}/report.html")
     def report(name: str) -> FileResponse:
@@ -60,7 +51,9 @@ def add_pages(folder: Path) -> None:
                     ui.label(why).classes("fault")
                     ui.link("Back to the records", address(session, "records")).classes("button")
                 else:
-                    _BUILDERS[found.key](session, frame)
+                    # Only here: the first page need not wait for what the stages load.
+                    module = f"tunnel_lab.bench.stage_{found.key.replace('-', '_')}"
+                    import_module(module).build(session, frame)
         except TunnelError as error:
             ui.label(f"tunnel: {error}").classes("fault")
             ui.link("All campaigns", "/")

@@ -41,9 +41,10 @@ class Frame:
     def __init__(self, title: str, session: Session | None = None, stage: str = "") -> None:
         self._session, self._stage = session, stage
         ui.add_head_html(_HEAD)
+        ui.colors(primary="var(--link)")
         ui.page_title(f"{title} · {session.name}" if session else title)
         with ui.element("header").classes("top"):
-            ui.html('<a class="skip" href="#main">Skip to the page</a>', sanitize=False)
+            ui.link("Skip to the page", "#main").classes("skip")
             ui.link("Bench", "/").classes("brand")
             if session is not None:
                 ui.label(session.name).classes("name")
@@ -71,7 +72,9 @@ class Frame:
         keys = [stage.key for stage in STAGES]
         after = keys.index(self._stage) + 1
         if after < len(keys) and not _closed(self._session, keys[after]):
-            ui.link(f"Continue: {STAGES[after].title}", address(self._session, keys[after])).classes("button go")
+            ui.link(f"Continue: {STAGES[after].title}", address(self._session, keys[after])).classes(
+                "button go"
+            )
 
 
 def _closed(session: Session, key: str) -> str:

@@ -90,7 +90,9 @@ def state(session: Session, changes: Mapping[str, Any]) -> None:
     now = choices_of(session).model_dump(exclude_defaults=True) | dict(changes)
     kept = {key: value for key, value in now.items() if value is not None}
     stated = validate(ImportChoices, kept, Path("choices")).model_dump(mode="json", exclude_defaults=True)
-    write_whole(session.choices, tomli_w.dumps({"schema_version": 1, "choices": _without_none(stated)}).encode())
+    write_whole(
+        session.choices, tomli_w.dumps({"schema_version": 1, "choices": _without_none(stated)}).encode()
+    )
 
 
 def move(session: Session, mark: Mark, *, start: float | None = None, end: float | None = None) -> None:

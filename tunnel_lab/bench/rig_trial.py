@@ -94,7 +94,9 @@ def _read(stated: RunSettings, effects: tuple[Effect, ...]) -> tuple[Array, Arra
     try:
         motion = forward_motion(rig, follow_fastest(rig, chain.physics()), RATE)
     except ValueError as error:
-        raise TunnelError(str(error), where="the rig", remedy="choose a stiffer spring or a smaller Cnβ") from error
+        raise TunnelError(
+            str(error), where="the rig", remedy="choose a stiffer spring or a smaller Cnβ"
+        ) from error
     record = read_motion(motion, SensorModel(RATE, noise_std=0.0, resolution=0.0), rng, chain)
     return record.time_s, record.yaw_rad
 
@@ -112,7 +114,7 @@ def plan_text(trial: Trial, name: str) -> str:
         {
             "name": name,
             "seed": 1,
-            "spring_stiffnesses": [trial.spring_stiffness, 2.0 * trial.spring_stiffness],
+            "spring_stiffness": [trial.spring_stiffness, 2.0 * trial.spring_stiffness],
             "wind_speeds": [0.0, trial.wind_speed] if trial.wind_speed > 0.0 else [0.0],
             "release_angles_deg": [trial.release_angle_deg],
             "duration": trial.duration,

@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import secrets
 import socket
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 
 from nicegui import app, core, ui
 
-from tunnel_lab.bench import work
+from tunnel_lab.bench import hand, work
 from tunnel_lab.bench.guard import Guard
 from tunnel_lab.bench.pages import add_pages
 from tunnel_lab.terminal.tables import say
@@ -39,16 +40,30 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
     for name, place in (("bench", "bench/static"), ("uplot", "diagnosis_view/vendor")):
         app.add_static_files(f"/static/{name}", str(static.joinpath(place)))
     add_pages(folder)
-    app.on_startup(lambda: say(f"The bench: http://{HOST}:{port}{address}\nCampaigns: {folder}\nCtrl-C ends it."))
-    app.on_shutdown(lambda: asyncio.to_thread(work.stop_all))
+    app.on_startup(
+        lambda: say(f"The bench: http://{HOST}:{port}{address}\nCampaigns: {folder}\nCtrl-C ends it.")
+    )
+    app.on_shutdown(_end)
+    with suppress(KeyboardInterrupt):  # the usual end
+        _run(port, address if browser else "")
+
+
+async def _end() -> None:
+    """End what was started: the user has ended the bench, it has not crashed."""
+    hand.end()
+    await asyncio.to_thread(work.stop_all)
+
+
+def _run(port: int, shown: str) -> None:
+    icon = resources.files("tunnel_lab").joinpath("bench/static/favicon.svg")
     ui.run(
         host=HOST,
         port=port,
         title="Bench of the virtual wind tunnel",
-        favicon=static.joinpath("bench/static/favicon.svg").read_text("utf-8"),
+        favicon=icon.read_text("utf-8"),
         dark=None,
         reload=False,
-        show=address if browser else False,
+        show=shown or False,
         show_welcome_message=False,
         tailwind=False,
         storage_secret=None,

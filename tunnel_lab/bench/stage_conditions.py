@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from nicegui import events, ui
@@ -11,8 +12,8 @@ from tunnel_lab.bench.conditions import MISSING, RIG, UNITS, WORDS
 from tunnel_lab.bench.parts import Fault, Frame
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.choices import RUN_KEYS
-from tunnel_sim.vocabulary.errors import TunnelError
 
+_MOST_ROWS = 20  # of a table without a scroll bar
 _MOST_LINES = 8  # of faults that are listed
 
 _PASTE = """(event) => {
@@ -22,6 +23,10 @@ _PASTE = """(event) => {
   event.preventDefault();
   emit({row: cell.rowIndex, key: cell.column.getColId(), text: event.clipboardData.getData("text/plain")});
 }"""
+
+_SHORT = (
+    "(cell) => (cell.value === '' || isNaN(cell.value) ? cell.value : String(+(+cell.value).toPrecision(6)))"
+)
 
 
 def build(session: Session, frame: Frame) -> None:
@@ -43,13 +48,20 @@ class _Conditions:
         self._all_runs()
         self._grid = self._table()
         self._rig = self._sizes()
+        ui.checkbox(
+            "Keep values that look like a wrong unit",
+            value=not conditions.is_judged(session),
+            on_change=self._judge,
+        )
         self._fault = Fault()
         self._lines = ui.element("ul").classes("notes").props("role=status aria-live=polite")
         self._on = ui.element("p").classes("buttons")
         self._check()
 
     def _table(self) -> ui.aggrid:
-        columns: list[dict[str, Any]] = [{"field": "run", "headerName": "run", "pinned": "left", "minWidth": 120}]
+        columns: list[dict[str, Any]] = [
+            {"field": "run", "headerName": "run", "pinned": "left", "minWidth": 120}
+        ]
         for key in RUN_KEYS:
             columns.append(
                 {
@@ -64,6 +76,7 @@ class _Conditions:
                         "missing": "data.missing.includes(colDef.field)",
                     },
                     "tooltipField": f"{key}_why",
+                    ":valueFormatter": _SHORT,
                 }
             )
         grid = ui.aggrid(
@@ -76,11 +89,13 @@ class _Conditions:
                 "stopEditingWhenCellsLoseFocus": True,
                 "enterNavigatesVerticallyAfterEdit": True,
                 "enterNavigatesVertically": True,
-                "domLayout": "autoHeight" if len(self._runs) <= 20 else "normal",
+                "domLayout": "autoHeight" if len(self._runs) <= _MOST_ROWS else "normal",
                 "tooltipShowDelay": 300,
             }
         )
-        grid.classes("grid").props('aria-label="Conditions of the runs"')
+        grid.classes("grid" if len(self._runs) <= _MOST_ROWS else "grid tall").props(
+            'aria-label="Conditions of the runs"'
+        )
         grid.on("cellValueChanged", self._edited, ["data", "colId", "newValue"])
         grid.on("paste", self._pasted, js_handler=_PASTE)
         return grid
@@ -103,7 +118,9 @@ class _Conditions:
             return
         with ui.element("div").classes("fields"):
             key = ui.select(
-                {key: f"{WORDS[key]} [{UNITS[key]}]" for key in RUN_KEYS}, label="Same for all runs", value="air_density"
+                {key: f"{WORDS[key]} [{UNITS[key]}]" for key in RUN_KEYS},
+                label="Same for all runs",
+                value="air_density",
             ).props("dense")
             value = ui.input("Value").props("dense")
 
@@ -122,21 +139,23 @@ class _Conditions:
             for key, text in self._cells[RIG].items():
                 field = ui.input(f"{WORDS[key]} [{UNITS[key]}]", value=text).props("dense bottom-slots")
 
-                def change(event: events.GenericEventArguments, key: str = key, field: ui.input = field) -> None:
-                    self._cells[RIG][key] = str(field.value or "")
-                    self._check()
-
-                found[key] = field.on("change", change)
+                found[key] = field.on("change", partial(self._resize, key, field))
         return found
+
+    def _resize(self, key: str, field: ui.input) -> None:
+        self._cells[RIG][key] = str(field.value or "")
+        self._check()
+
+    def _judge(self, event: events.ValueChangeEventArguments[bool | None]) -> None:
+        with self._fault.around():
+            conditions.judge(self._session, not event.value)
+        self._check()
 
     def _check(self) -> None:
         """Save what is right, and mark what is not."""
         wrong: dict[tuple[str, str], str] = {}
-        self._fault.clear()
-        try:
+        with self._fault.around():
             wrong = conditions.save(self._session, self._cells)
-        except TunnelError as error:
-            self._fault.show(error)
         missing = _missing(self._cells)
         self._grid.options["rowData"] = [self._row(run, wrong, missing) for run in self._runs]
         self._grid.update()
@@ -149,7 +168,9 @@ class _Conditions:
         with self._on:
             self._frame.way_on()
 
-    def _row(self, run: str, wrong: dict[tuple[str, str], str], missing: dict[tuple[str, str], str]) -> dict[str, Any]:
+    def _row(
+        self, run: str, wrong: dict[tuple[str, str], str], missing: dict[tuple[str, str], str]
+    ) -> dict[str, Any]:
         why = wrong or {}
         return {
             "run": run,

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import os
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import tomli_w
-from nicegui import background_tasks, events, ui
+from nicegui import background_tasks, ui
 
 from identification.estimators import ALL_ESTIMATORS, SUMMARIES
 from tunnel_lab.bench import work
@@ -46,11 +48,16 @@ class _Identify:
         with ui.element("fieldset"):
             with ui.element("legend"):
                 ui.html("Estimators", sanitize=False, tag="span")
-            self._chosen = {name: ui.checkbox(f"{name}: {SUMMARIES[name]}", value=name in _FIRST) for name in ALL_ESTIMATORS}
+            self._chosen = {
+                name: ui.checkbox(f"{name}: {SUMMARIES[name]}", value=name in _FIRST)
+                for name in ALL_ESTIMATORS
+            }
         self._fault = Fault()
         with ui.element("p").classes("buttons"):
             button("Identify", self._start, main=True)
-        show_command(f"tunnel identify {session.campaign} --estimator {ESTIMATOR} --json {session.estimate(ESTIMATOR)}")
+        show_command(
+            f"tunnel identify {session.campaign} --estimator {ESTIMATOR} --json {session.estimate(ESTIMATOR)}"
+        )
         self._progress = ui.element("ul").classes("progress").props("role=status aria-live=polite")
         self._result = ui.element("div")
         self._on = ui.element("p").classes("buttons")
@@ -63,24 +70,29 @@ class _Identify:
         names = [name for name, box in self._chosen.items() if box.value]
         with self._fault.around():
             if ESTIMATOR not in names:
-                raise TunnelError(f"{ESTIMATOR} is not chosen", remedy="choose it: its estimate opens the diagnosis")
-            orders = [(name, ("--estimator", name, "--json", str(self._session.estimate(name)))) for name in names]
+                raise TunnelError(
+                    f"{ESTIMATOR} is not chosen", remedy="choose it: its estimate opens the diagnosis"
+                )
+            orders = [
+                (name, ("--estimator", name, "--json", str(self._session.estimate(name)))) for name in names
+            ]
             for name, _ in orders:
                 if work.work_of(self._session.log(name)).running:
                     raise TunnelError(f"{name} is running already", remedy="wait for it")
             background_tasks.create(run_commands(self._session, orders), name="identify")
 
     def _budget(self) -> None:
-        ui.label("Standard uncertainties of what is stated, in per cent; an empty field is exact.").classes("soft")
+        ui.label("Standard uncertainties of what is stated, in per cent; an empty field is exact.").classes(
+            "soft"
+        )
         self._stated = _stated(self._session)
         with ui.element("div").classes("fields"):
             for key, words in _INPUTS.items():
-                field = ui.number(f"{words} [%]", value=self._stated.get(key), min=0.0).props("dense step=any")
+                field = ui.number(f"{words} [%]", value=self._stated.get(key), min=0.0).props(
+                    "dense step=any"
+                )
 
-                def change(event: events.GenericEventArguments, key: str = key, field: ui.number = field) -> None:
-                    self._stated[key] = field.value
-
-                field.on("change", change)
+                field.on("change", partial(self._state, key, field))
         fault = Fault()
 
         def start() -> None:
@@ -96,6 +108,9 @@ class _Identify:
 
         with ui.element("p").classes("buttons"):
             button("Make the budget", start)
+
+    def _state(self, key: str, field: ui.number) -> None:
+        self._stated[key] = field.value
 
     def _look(self) -> None:
         works = {name: work.work_of(self._session.log(name)) for name in (*ALL_ESTIMATORS, _BUDGET)}
@@ -124,7 +139,11 @@ class _Identify:
             if shown:
                 show_parts(side_by_side(shown))
             budget = read_result(self._session.estimate(_BUDGET))
-            if budget is not None and "budget" in budget and is_current(self._session, self._session.estimate(_BUDGET)):
+            if (
+                budget is not None
+                and "budget" in budget
+                and is_current(self._session, self._session.estimate(_BUDGET))
+            ):
                 show_parts(budget_parts(budget))
 
 
@@ -132,10 +151,12 @@ def _progress(name: str, one: work.Work) -> None:
     if not one.running and not one.error:
         return
     with ui.element("li"):
-        ui.label(f"{name}: {'running …' if one.running else one.error}").classes("" if one.running else "fault")
+        ui.label(f"{name}: {'running …' if one.running else one.error}").classes(
+            "" if one.running else "fault"
+        )
 
 
-async def run_commands(session: Session, orders: list[tuple[str, tuple[str, ...]]]) -> None:
+async def run_commands(session: Session, orders: Sequence[tuple[str, tuple[str, ...]]]) -> None:
     """Run ``tunnel identify`` several times, as many at a time as there are processors.
 
     Args:

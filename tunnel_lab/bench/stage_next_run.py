@@ -44,13 +44,18 @@ class _Rivals:
 
         self._session = session
         fitted = {kind.name: kind.name.replace("_", " ") for kind in known_effects() if kind.fitted}
-        answers = [[name for name in one["effect"].split(" + ") if name in fitted] for one in document["candidates"]]
+        answers = [
+            [name for name in one["effect"].split(" + ") if name in fitted] for one in document["candidates"]
+        ]
         answers = [answer for answer in answers if answer] or [[next(iter(fitted))]]
         ui.html("Which run would tell two answers apart?", sanitize=False, tag="h2")
         with ui.element("div").classes("fields"):
             self._first, self._second = (
                 ui.select(fitted, label=label, value=answer, multiple=True).props("dense use-chips")
-                for label, answer in (("This answer", answers[0]), ("or that one", answers[min(1, len(answers) - 1)]))
+                for label, answer in (
+                    ("This answer", answers[0]),
+                    ("or that one", answers[min(1, len(answers) - 1)]),
+                )
             )
         self._fault = Fault()
         with ui.element("p").classes("buttons"):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import TYPE_CHECKING, Any
 
-from nicegui import events, run, ui
+from nicegui import events, ui
 
 from tunnel_lab.bench import preview
 from tunnel_lab.bench.chart import Chart
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from tunnel_sim.files.importing.records import Imported
 
 _TIME = "time [s], from the record's first sample"
+_HELP = (
+    "Drag a mark, or move it with the arrow keys, to where a run is released (circle) or has come to rest "
+    "(square). Drag in a chart to zoom; double-click to see all of it."
+)
 
 
 def build(session: Session, frame: Frame) -> None:
@@ -36,22 +41,21 @@ class _Records:
             return
         self._files = ui.element("div")
         self._fault = Fault()
-        self._found = ui.element("div").props("aria-live=polite")
-        with self._found:
-            ui.label("Reading the files …").classes("soft")
-        self._written = Fault()
         with ui.element("p").classes("buttons"):
             button("Write the campaign", self._write, main=True)
             if session.imported:
                 frame.way_on()
-        self._columns: list[str] = []
+        self._written = Fault()
         self._form_place = ui.expansion("What the files do not say, or was found wrongly").classes("choices")
+        self._found = ui.element("div").props("aria-live=polite")
+        with self._found:
+            ui.label("Reading the files …").classes("soft")
         ui.timer(0.0, self._first, once=True)
 
     async def _first(self) -> None:
-        self._columns = await run.io_bound(preview.column_names, self._session)
+        columns = await asyncio.to_thread(preview.column_names, self._session)
         with self._form_place:
-            _Choices(self._session, self._columns, self._changed)
+            _Choices(self._session, columns, self._changed)
         await self._read()
         if self._imported is None:
             self._form_place.open()
@@ -65,15 +69,16 @@ class _Records:
         self._show_files()
         self._imported = None
         try:
-            self._imported = await run.io_bound(preview.read, self._session)
+            imported = await asyncio.to_thread(preview.read, self._session)
         except TunnelError as error:
             self._fault.show(error)
             self._found.clear()
             return
+        self._imported = imported
         self._fault.clear()
         self._found.clear()
         with self._found:
-            self._show(self._imported)
+            self._show(imported)
 
     def _show_files(self) -> None:
         self._files.clear()
@@ -93,8 +98,10 @@ class _Records:
     def _show(self, imported: Imported) -> None:
         from tunnel_lab.terminal.import_output import parts_table
 
-        for one in preview.drawn(imported):
-            self._chart(one)
+        ui.label(_HELP).classes("soft")
+        with ui.element("div").classes("charts"):
+            for one in preview.drawn(imported):
+                self._chart(one)
         left = len({id(part.raw) for part in imported.parts}) - preview.MOST_RECORDS
         if left > 0:
             ui.label(f"{left} more records are not drawn.").classes("soft")
@@ -114,8 +121,7 @@ class _Records:
                 await self._read()
 
         chart = Chart(
-            f"{one.title}: drag a mark to where a run is released or has come to rest; drag in the chart to zoom, "
-            "double-click to see all of it.",
+            one.title,
             _TIME,
             f"reading [{one.unit}]",
             [("reading", "after")],
@@ -123,7 +129,7 @@ class _Records:
             moved,
         )
         words = {"start": "release", "end": "rest"}
-        chart.mark(
+        chart.show_marks(
             [
                 {"id": name, "at": getattr(mark, kind), "kind": kind, "label": f"{words[kind]} of {mark.run}"}
                 for name, (mark, kind) in marks.items()
@@ -135,7 +141,7 @@ class _Records:
         with self._written.around():
             if self._imported is None:
                 raise TunnelError("the files cannot be read yet", remedy="state what is asked for above")
-            await run.io_bound(write, self._session, self._imported)
+            await asyncio.to_thread(write, self._session, self._imported)
             ui.navigate.to(address(self._session, "conditions"))
 
 
@@ -179,9 +185,11 @@ class _Choices:
             self._number("start", "Leave out what is earlier [s]")
             self._number("end", "Leave out what is later [s]")
             self._text("name", "Conditions in the file names, such as S{spring}_V{wind_speed}_*")
-            ui.checkbox("Cut records at releases", value=self._now.cut, on_change=lambda e: changed("cut", e.value))
+            ui.checkbox(
+                "Cut records at releases", value=self._now.cut, on_change=lambda e: changed("cut", e.value)
+            )
         show_command(
-            f"tunnel import {session.uploads}/* --recipe {session.choices} --out {session.campaign} --yes --overwrite"
+            f"tunnel import {session.uploads}/* --recipe {session.choices} --out {session.campaign} --yes"
         )
 
     def _select(self, key: str, label: str, options: list[str], *, several: bool = False) -> None:
@@ -192,17 +200,19 @@ class _Choices:
         async def change(event: events.ValueChangeEventArguments[Any]) -> None:
             await self._changed(key, event.value or (() if several else None))
 
-        ui.select(shown, label=label, value=value, multiple=several, clearable=True, on_change=change).props("dense")
+        ui.select(shown, label=label, value=value, multiple=several, clearable=True, on_change=change).props(
+            "dense"
+        )
 
     def _number(self, key: str, label: str) -> None:
-        async def change(event: events.GenericEventArguments) -> None:
+        async def change() -> None:
             await self._changed(key, field.value)
 
         field = ui.number(label, value=getattr(self._now, key)).props("dense step=any")
         field.on("change", change)
 
     def _text(self, key: str, label: str) -> None:
-        async def change(event: events.GenericEventArguments) -> None:
+        async def change() -> None:
             await self._changed(key, field.value or None)
 
         field = ui.input(label, value=getattr(self._now, key) or "").props("dense")
@@ -220,11 +230,13 @@ def _as_it_is(session: Session) -> None:
         from tunnel_sim.files.campaign_io import read_campaign
 
         with fault.around():
-            campaign = await run.io_bound(read_campaign, session.campaign)
-            with place:
+            campaign = await asyncio.to_thread(read_campaign, session.campaign)
+            with place.classes("charts"):
                 for one in campaign.runs[: preview.MOST_RECORDS]:
                     time, reading = thinned(one.record.time_s, one.record.yaw_rad)
                     label = f"reading [{campaign.sensor.unit}]"
-                    Chart(one.id, "time [s]", label, [("reading", "after")], [time.tolist(), reading.tolist()])
+                    Chart(
+                        one.id, "time [s]", label, [("reading", "after")], [time.tolist(), reading.tolist()]
+                    )
 
     ui.timer(0.0, show, once=True)

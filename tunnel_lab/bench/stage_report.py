@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from datetime import datetime
 
-from nicegui import run, ui
+from nicegui import ui
 
 from tunnel_lab.bench.parts import Fault, Frame, address, button, show_command
 from tunnel_lab.bench.stages import read_result
@@ -30,9 +31,9 @@ class _Report:
             stated |= read_json(session.byline, remedy="delete it")
         with ui.element("div").classes("fields wide"):
             self._author = ui.input("Author", value=str(stated["author"])).props("dense")
-            self._notes = ui.textarea("Notes, shown at the head of the report", value=str(stated["notes"])).props(
-                "dense autogrow"
-            )
+            self._notes = ui.textarea(
+                "Notes, shown at the head of the report", value=str(stated["notes"])
+            ).props("dense autogrow")
         self._author.on("change", self._write)
         self._notes.on("change", self._write)
         self._fault = Fault()
@@ -40,7 +41,9 @@ class _Report:
             button("Download the report", self._download, main=True)
             ui.link("Open in a tab", address(session, "report.html"), new_tab=True).classes("button")
         ui.label(f"Written: {session.report}").classes("soft")
-        show_command(f"tunnel diagnose {session.campaign} --report {session.report} --author NAME --notes TEXT")
+        show_command(
+            f"tunnel diagnose {session.campaign} --report {session.report} --author NAME --notes TEXT"
+        )
         self._place = ui.element("div").classes("preview")
         ui.timer(0.0, self._write, once=True)
 
@@ -48,7 +51,7 @@ class _Report:
         author, notes = str(self._author.value or ""), str(self._notes.value or "")
         with self._fault.around():
             write_json(self._session.byline, {"author": author, "notes": notes})
-            await run.io_bound(write, self._session, author, notes)
+            await asyncio.to_thread(write, self._session, author, notes)
             self._place.clear()
             source = f"{address(self._session, 'report.html')}?{time.time_ns()}"
             with self._place:

@@ -10,7 +10,6 @@ from tunnel_lab.bench.guard import UPLOAD_BYTES, too_large
 from tunnel_lab.bench.parts import Fault, address
 from tunnel_lab.bench.stages import STAGES, closed
 from tunnel_lab.bench.workspace import Session, new_session, safe_name, sessions
-from tunnel_sim.files.writing import output_folder, write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -20,7 +19,9 @@ def build(folder: Path) -> None:
     Args:
         folder: the workspace.
     """
-    ui.label("Drop the files of a data logger. Every step writes the files that the commands write.").classes("lede")
+    ui.label("Drop the files of a data logger. Every step writes the files that the commands write.").classes(
+        "lede"
+    )
     fault = Fault()
 
     async def dropped(given: events.MultiUploadEventArguments) -> None:
@@ -30,7 +31,9 @@ def build(folder: Path) -> None:
             ui.navigate.to(address(session, "records"))
 
     drop_zone(dropped, fault)
-    ui.label(f"Dropped files are kept in {folder}, in a folder of their own beside the campaign.").classes("soft")
+    ui.label(f"Dropped files are kept in {folder}, in a folder of their own beside the campaign.").classes(
+        "soft"
+    )
     found = sessions(folder)
     if found:
         with ui.element("h2"):
@@ -72,6 +75,8 @@ async def keep(session: Session, given: events.MultiUploadEventArguments) -> Non
         session: whose files they are.
         given: the drop.
     """
+    from tunnel_sim.files.writing import output_folder, write_whole
+
     target = output_folder(session.uploads)
     names = [safe_name(file.name) for file in given.files]
     if len(set(names)) < len(names):

@@ -6,7 +6,7 @@ import asyncio
 from dataclasses import replace
 from pathlib import Path
 
-from nicegui import events, run, ui
+from nicegui import events, ui
 
 from tunnel_lab.bench import work
 from tunnel_lab.bench.chart import Chart
@@ -59,7 +59,11 @@ class _TryIt:
                 self._effects()
             with ui.element("div").classes("shown"):
                 self._chart = Chart(
-                    "Yaw angle", "time [s]", "yaw angle [rad]", [("nominal model", "quiet"), ("with the effect", "after")], []
+                    "Yaw angle",
+                    "time [s]",
+                    "yaw angle [rad]",
+                    [("nominal model", "quiet"), ("with the effect", "after")],
+                    [],
                 )
                 self._words = ui.label().classes("soft").props("role=status aria-live=polite")
                 self._fault = Fault()
@@ -71,11 +75,14 @@ class _TryIt:
         with ui.element("div").classes("slider"):
             label = ui.label(f"{name}: {getattr(self._trial, key):g} {unit}")
 
-            async def change(event: events.ValueChangeEventArguments[float]) -> None:
-                label.set_text(f"{name}: {event.value:g} {unit}")
-                await self._change(**{key: float(event.value)})
+            async def change(event: events.ValueChangeEventArguments[float | None]) -> None:
+                value = float(event.value or 0.0)
+                label.set_text(f"{name}: {value:g} {unit}")
+                await self._change(**{key: value})
 
-            slider = ui.slider(min=low, max=high, step=step, value=getattr(self._trial, key), on_change=change)
+            slider = ui.slider(
+                min=low, max=high, step=step, value=getattr(self._trial, key), on_change=change
+            )
             slider.props(f'aria-label="{name} [{unit}]"')
 
     def _effects(self) -> None:
@@ -99,9 +106,10 @@ class _TryIt:
         with self._severity:
             label = ui.label(f"{info.meaning}: {example:.3g}{unit}")
 
-            async def change(event: events.ValueChangeEventArguments[float]) -> None:
-                label.set_text(f"{info.meaning}: {event.value:.3g}{unit}")
-                await self._change(severity=float(event.value))
+            async def change(event: events.ValueChangeEventArguments[float | None]) -> None:
+                value = float(event.value or 0.0)
+                label.set_text(f"{info.meaning}: {value:.3g}{unit}")
+                await self._change(severity=value)
 
             ui.slider(min=low, max=high, step=(high - low) / 200.0, value=example, on_change=change).props(
                 f'aria-label="{info.meaning} [{info.unit}]"'
@@ -122,7 +130,7 @@ class _TryIt:
             while shown != self._trial:
                 shown = self._trial
                 with self._fault.around():
-                    time, nominal, seen = await run.io_bound(simulate, shown)
+                    time, nominal, seen = await asyncio.to_thread(simulate, shown)
                     self._chart.show([time.tolist(), nominal.tolist(), seen.tolist()])
                     self._words.set_text(said(shown, time, nominal, seen))
                     self._car.show(time[::4].tolist(), seen[::4].tolist())
@@ -139,7 +147,7 @@ class _TryIt:
                 plan, log = self._folder / f"{session.name}.plan.toml", session.log("simulation")
                 write_whole(plan, plan_text(self._trial, session.name).encode())
                 words = ("simulate", str(plan), "--out", str(session.campaign), *effect_words(self._trial))
-                await run.io_bound(work.start, words, log)
+                await asyncio.to_thread(work.start, words, log)
                 while (one := work.work_of(log)).running:
                     await asyncio.sleep(0.2)
                 if one.error:
@@ -148,4 +156,6 @@ class _TryIt:
 
         with ui.element("p").classes("buttons"):
             button("Simulate a campaign of this rig", write)
-        ui.label("Two springs, wind off and on, with the sensor's noise, as tunnel simulate does.").classes("soft")
+        ui.label("Two springs, wind off and on, with the sensor's noise, as tunnel simulate does.").classes(
+            "soft"
+        )

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from tunnel_sim.vocabulary.errors import TunnelError
 
-_FIRST = re.compile(r"\$ (?P<command>.*) \(process (?P<process>\d+)\)")
+_FIRST = re.compile(r"\$ (?P<command>.*) \(process (?P<process>\d+), started (?P<started>\S+)\)")
 _LAST = re.compile(r"exit status (?P<status>-?\d+)")
 _PAUSED, _GOES_ON = "paused", "goes on"
 _PATIENCE_S = 3.0  # for a command to end by itself
@@ -32,6 +32,7 @@ class Work:
     Args:
         command: as one would type it; empty where there is no log.
         process: number of the process (count).
+        started: date and time, ISO 8601.
         lines: printed so far.
         running: whether the process is alive.
         paused: whether it has been suspended.
@@ -40,6 +41,7 @@ class Work:
 
     command: str = ""
     process: int = 0
+    started: str = ""
     lines: tuple[str, ...] = ()
     running: bool = False
     paused: bool = False
@@ -49,7 +51,9 @@ class Work:
     def error(self) -> str:
         """The line that says why it ended without a result; empty where it did not."""
         if not self.command or self.running or self.status in (0, None):
-            return "" if self.running or not self.command or self.status == 0 else "It was ended from outside."
+            return (
+                "" if self.running or not self.command or self.status == 0 else "It was ended from outside."
+            )
         said = [line.removeprefix("tunnel: ") for line in self.lines if line.startswith("tunnel: ")]
         return said[-1] if said else f"It ended with exit status {self.status}."
 
@@ -73,7 +77,7 @@ def work_of(log: Path) -> Work:
     shown = tuple(line for line in body if line not in (_PAUSED, _GOES_ON) and not _LAST.fullmatch(line))
     status = int(last["status"]) if last and not running else None
     paused = running and bool(marks) and marks[-1] == _PAUSED
-    return Work(first["command"], int(first["process"]), shown, running, paused, status)
+    return Work(first["command"], int(first["process"]), first["started"], shown, running, paused, status)
 
 
 def start(words: Sequence[str], log: Path) -> None:
@@ -152,12 +156,14 @@ def _run(log: Path, words: Sequence[str]) -> int:
     """Run a command with everything it prints in the log, and the lock on it."""
     import fcntl
     import shlex
+    from datetime import datetime
 
     stream = log.open("a")
     fcntl.flock(stream, fcntl.LOCK_EX)
     for descriptor in (1, 2):
         os.dup2(stream.fileno(), descriptor)
-    print(f"$ {shlex.join(['tunnel', *words])} (process {os.getpid()})", flush=True)
+    now = datetime.now().astimezone().isoformat(timespec="seconds")
+    print(f"$ {shlex.join(['tunnel', *words])} (process {os.getpid()}, started {now})", flush=True)
     from tunnel_lab.cli import main
 
     status = main(words)

@@ -7,9 +7,9 @@ import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
 
-from tunnel_sim.files.campaign_schema import CAMPAIGN_FILE
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 
+CAMPAIGN_FILE = "campaign.toml"  # as in campaign_schema, which is slow to load
 _LONGEST = 80  # characters of a file name
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # devices of Windows
 
@@ -111,7 +111,9 @@ def open_session(folder: Path, name: str) -> Session:
     found = {session.name: session for session in sessions(folder)}
     if name not in found:
         raise TunnelError(
-            f"there is no campaign '{one_line(name, 60)}'", where=str(folder), remedy="choose one on the first page"
+            f"there is no campaign '{one_line(name, 60)}'",
+            where=str(folder),
+            remedy="choose one on the first page",
         )
     return found[name]
 
@@ -136,8 +138,8 @@ def safe_name(text: str) -> str:
         text: a file name, or anything else.
 
     Returns:
-        Letters, digits, ``_``, ``-``, ``+`` and single dots, at most 80 characters; never empty, never hidden, never
-        a device. A safe name stays as it is.
+        Letters, digits, ``_``, ``-``, ``+`` and single dots, at most 80 characters; never empty, hidden or a device.
+        A safe name stays as it is.
     """
     last = re.split(r"[/\\]", unicodedata.normalize("NFKC", text))[-1]
     plain = re.sub(r"[^\w.+-]+", "_", last)
