@@ -17,7 +17,7 @@ class Chart(ui.element, component="static/chart.js"):
         y: label of the ordinate, with its unit.
         series: labels of the curves and the names of their colours (``before``, ``after``, ``soft``, …).
         data: abscissas and the ordinates of every curve; None is a gap.
-        moved: called with the id of a mark and where it was moved, in the unit of the abscissa.
+        moved: called with the id of a mark and where it was moved, in the unit of the abscissa; may be awaitable.
     """
 
     def __init__(

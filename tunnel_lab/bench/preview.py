@@ -107,16 +107,19 @@ def move(session: Session, mark: Mark, *, start: float | None = None, end: float
     Raises:
         TunnelError: when the end is not behind the start.
     """
-    first, last = max(mark.start if start is None else start, 0.0), mark.end if end is None else end
+    choices = choices_of(session)
+    kept = {(one.file, one.run): one for one in choices.stretches}
+    now = kept.pop((mark.file, mark.run), None)
+    first, last = (mark.start, mark.end) if now is None else (now.start, now.end)
+    first, last = first if start is None else max(start, 0.0), last if end is None else end
     if last <= first:
         raise TunnelError(
             f"the end ({last:.4g} s) is not behind the release ({first:.4g} s)",
             where=f"run '{mark.run}'",
             remedy="move one of them",
         )
-    others = [s for s in choices_of(session).stretches if (s.file, s.run) != (mark.file, mark.run)]
     stated = {"file": mark.file, "run": mark.run, "start": first, "end": last}
-    state(session, {"stretches": [*(s.model_dump() for s in others), stated]})
+    state(session, {"stretches": [*(one.model_dump() for one in kept.values()), stated]})
 
 
 def read(session: Session) -> Imported:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tunnel_sim.files.importing.records import Imported
 
 _TIME = "time [s], from the record's first sample"
+_KINDS = {"start": "release", "end": "rest"}
 _HELP = (
     "Drag a mark, or move it with the arrow keys, to where a run is released (circle) or has come to rest "
     "(square). Drag in a chart to zoom; double-click to see all of it."
@@ -47,8 +48,11 @@ class _Records:
                 frame.way_on()
         self._written = Fault()
         self._form_place = ui.expansion("What the files do not say, or was found wrongly").classes("choices")
-        self._found = ui.element("div").props("aria-live=polite")
-        with self._found:
+        self._reading = 0
+        self._charts: list[Chart] = []
+        self._drawn = ui.element("div")
+        self._table = ui.element("div").props("role=status aria-live=polite")
+        with self._table:
             ui.label("Reading the files …").classes("soft")
         ui.timer(0.0, self._first, once=True)
 
@@ -56,6 +60,7 @@ class _Records:
         columns = await asyncio.to_thread(preview.column_names, self._session)
         with self._form_place:
             _Choices(self._session, columns, self._changed)
+        self._show_files()
         await self._read()
         if self._imported is None:
             self._form_place.open()
@@ -65,20 +70,33 @@ class _Records:
             preview.state(self._session, {key: value})
             await self._read()
 
-    async def _read(self) -> None:
-        self._show_files()
-        self._imported = None
+    async def _moved(self, mark: preview.Mark, kind: str, at: float) -> None:
+        with self._fault.around():
+            preview.move(self._session, mark, **{kind: at})
+            await self._read(redraw=False)
+
+    async def _read(self, *, redraw: bool = True) -> None:
+        """Read the files with the choices as they are; the charts stay where only a mark was moved."""
+        self._reading += 1
+        mine = self._reading
+        imported, error = None, None
         try:
             imported = await asyncio.to_thread(preview.read, self._session)
-        except TunnelError as error:
-            self._fault.show(error)
-            self._found.clear()
+        except TunnelError as refused:
+            error = refused
+        if mine != self._reading:  # a later choice is being read
             return
         self._imported = imported
-        self._fault.clear()
-        self._found.clear()
-        with self._found:
-            self._show(imported)
+        self._fault.show(error or "")
+        self._table.clear()
+        if redraw or imported is None:
+            self._drawn.clear()
+        if imported is None:
+            return
+        with self._drawn:
+            self._draw(imported)
+        with self._table:
+            _show(imported)
 
     def _show_files(self) -> None:
         self._files.clear()
@@ -91,50 +109,35 @@ class _Records:
                 async def dropped(given: events.MultiUploadEventArguments) -> None:
                     with fault.around():
                         await keep(self._session, given)
+                        self._show_files()
                         await self._read()
 
                 drop_zone(dropped, fault)
 
-    def _show(self, imported: Imported) -> None:
-        from tunnel_lab.terminal.import_output import parts_table
+    def _draw(self, imported: Imported) -> None:
+        """Draw the records, or only their marks where they are drawn already."""
+        records = preview.drawn(imported)
+        if not self._drawn.default_slot.children:
+            self._charts = []
+            ui.label(_HELP).classes("soft")
+            with ui.element("div").classes("charts"):
+                self._charts = [self._chart(one) for one in records]
+            left = len({id(part.raw) for part in imported.parts}) - len(records)
+            if left > 0:
+                ui.label(f"{left} more records are not drawn.").classes("soft")
+        for chart, one in zip(self._charts, records, strict=True):
+            chart.show_marks(*_marks(one))
 
-        ui.label(_HELP).classes("soft")
-        with ui.element("div").classes("charts"):
-            for one in preview.drawn(imported):
-                self._chart(one)
-        left = len({id(part.raw) for part in imported.parts}) - preview.MOST_RECORDS
-        if left > 0:
-            ui.label(f"{left} more records are not drawn.").classes("soft")
-        show_parts([parts_table(imported)])
-        with ui.element("ul").classes("notes"):
-            for line in imported.remarks():
-                with ui.element("li"):
-                    ui.label(line)
-
-    def _chart(self, one: preview.Drawn) -> None:
-        marks = {f"{mark.run} {kind}": (mark, kind) for mark in one.marks for kind in ("start", "end")}
-
-        async def moved(name: str, at: float) -> None:
-            mark, kind = marks[name]
-            with self._fault.around():
-                preview.move(self._session, mark, **{kind: at})
-                await self._read()
-
-        chart = Chart(
+    def _chart(self, one: preview.Drawn) -> Chart:
+        marks = {f"{mark.run} {kind}": (mark, kind) for mark in one.marks for kind in _KINDS}
+        label = f"reading [{one.unit}]"
+        return Chart(
             one.title,
             _TIME,
-            f"reading [{one.unit}]",
+            label,
             [("reading", "after")],
             [one.time, one.reading],
-            moved,
-        )
-        words = {"start": "release", "end": "rest"}
-        chart.show_marks(
-            [
-                {"id": name, "at": getattr(mark, kind), "kind": kind, "label": f"{words[kind]} of {mark.run}"}
-                for name, (mark, kind) in marks.items()
-            ],
-            [{"from": mark.start, "to": mark.end, "at": mark.rest} for mark in one.marks],
+            lambda name, at: self._moved(*marks[name], at),
         )
 
     async def _write(self) -> None:
@@ -143,6 +146,32 @@ class _Records:
                 raise TunnelError("the files cannot be read yet", remedy="state what is asked for above")
             await asyncio.to_thread(write, self._session, self._imported)
             ui.navigate.to(address(self._session, "conditions"))
+
+
+def _marks(one: preview.Drawn) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """The runs of a record as marks and resting levels of its chart."""
+    marks = [
+        {
+            "id": f"{mark.run} {kind}",
+            "at": getattr(mark, kind),
+            "kind": kind,
+            "label": f"{words} of {mark.run}",
+        }
+        for mark in one.marks
+        for kind, words in _KINDS.items()
+    ]
+    return marks, [{"from": mark.start, "to": mark.end, "at": mark.rest} for mark in one.marks]
+
+
+def _show(imported: Imported) -> None:
+    """What was read, as ``tunnel import`` prints it."""
+    from tunnel_lab.terminal.import_output import parts_table
+
+    show_parts([parts_table(imported)])
+    with ui.element("ul").classes("notes"):
+        for line in imported.remarks():
+            with ui.element("li"):
+                ui.label(line)
 
 
 def write(session: Session, imported: Imported) -> None:

@@ -125,7 +125,7 @@ def new_session(folder: Path, file_name: str) -> Session:
         folder: the workspace.
         file_name: of the first file.
     """
-    stem = Path(safe_name(file_name)).stem
+    stem = safe_name(Path(safe_name(file_name)).stem)
     taken = {path.name.split(".")[0].lower() for path in folder.iterdir()}
     names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
     return Session(folder, next(name for name in names if name.lower() not in taken))
@@ -138,7 +138,7 @@ def safe_name(text: str) -> str:
         text: a file name, or anything else.
 
     Returns:
-        Letters, digits, ``_``, ``-``, ``+`` and single dots, at most 80 characters; never empty, hidden or a device.
+        Letters, digits, ``_``, ``-``, ``+`` and single dots, at most 85 of them; never empty, hidden or a device.
         A safe name stays as it is.
     """
     last = re.split(r"[/\\]", unicodedata.normalize("NFKC", text))[-1]
