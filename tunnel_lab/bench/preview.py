@@ -102,7 +102,7 @@ def move(session: Session, mark: Mark, *, start: float | None = None, end: float
         session: whose file it is in.
         mark: the run as it is.
         start: s from the record's first sample; None: as it is.
-        end: the same for its end.
+        end: s from the record's first sample; None: as it is.
 
     Raises:
         TunnelError: when the end is not behind the start.

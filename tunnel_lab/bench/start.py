@@ -6,11 +6,12 @@ from pathlib import Path
 
 from nicegui import events, ui
 
-from tunnel_lab.bench.guard import UPLOAD_BYTES, too_large
+from tunnel_lab.bench.guard import too_large
 from tunnel_lab.bench.parts import Fault, address
 from tunnel_lab.bench.stages import STAGES, closed
 from tunnel_lab.bench.workspace import Session, new_session, safe_name, sessions
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
 
 def build(folder: Path) -> None:

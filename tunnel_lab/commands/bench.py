@@ -35,7 +35,7 @@ def run(
       tunnel bench campaigns/my-rig
 
     [bold]Exit status[/bold]
-      0 ended by Ctrl-C, 2 bad input.
+      0 ended, by Ctrl-C; 2 bad input.
     """
     from importlib.util import find_spec
 

@@ -7,11 +7,14 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+_MOST_PICTURES = 60  # of a film
 
 
 @dataclass(frozen=True)
@@ -34,8 +37,8 @@ class Bench:
 
 
 @contextmanager
-def bench(folder: Path) -> Iterator[Bench]:
-    """Serve a workspace; Ctrl-C must end it with status 0."""
+def bench(folder: Path, *, crash: bool = False) -> Iterator[Bench]:
+    """Serve a workspace; Ctrl-C must end it with status 0. With ``crash`` it is killed in the end."""
     words = [sys.executable, "-m", "tunnel_lab.cli", "bench", str(folder), "--no-browser"]
     # NiceGUI takes a server under pytest for one of its own tests.
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}
@@ -48,9 +51,9 @@ def bench(folder: Path) -> Iterator[Bench]:
         try:
             yield Bench(found[0], folder, process)
         finally:
-            process.send_signal(signal.SIGINT)
+            process.send_signal(signal.SIGKILL if crash else signal.SIGINT)
             _, errors = process.communicate(timeout=60)
-    assert (process.returncode, errors) == (0, "")
+    assert (process.returncode, errors) == (-signal.SIGKILL if crash else 0, "")
 
 
 class Tab:
@@ -63,6 +66,7 @@ class Tab:
         self.complaints: list[str] = []
         self.requests: list[str] = []
         self.clicks = 0
+        self.film: list[bytes] = []
         self.page.set_default_timeout(60_000)
         self.page.on("console", lambda message: self.complaints.append(message.text))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
@@ -76,9 +80,26 @@ class Tab:
         self.page.wait_for_selector("h1")
 
     def click(self, words: str) -> None:
-        """Click on a button or a link, and count it."""
+        """Click on a button or a link, count it, and keep a picture of it."""
         self.clicks += 1
-        self.page.click(f":is(button, a.button):has-text('{words}')")
+        place = self.page.locator(f":is(button, a.button):has-text('{words}')").first
+        place.scroll_into_view_if_needed()
+        place.evaluate("(one) => { one.style.outline = '4px solid #d55e00'; }")
+        self.shoot()
+        place.click()
+
+    def shoot(self) -> None:
+        """Keep a picture for the film."""
+        self.film.append(self.page.screenshot(type="jpeg", quality=90))
+
+    def wait(self, selector: str, seconds: float = 900.0) -> None:
+        """Wait for an element, and keep a picture now and then."""
+        end = time.monotonic() + seconds
+        while not self.page.locator(selector).first.is_visible():
+            assert time.monotonic() < end, selector
+            if len(self.film) < _MOST_PICTURES:
+                self.shoot()
+            self.page.wait_for_timeout(3000)
 
     def close(self) -> None:
         self.context.close()
