@@ -83,7 +83,7 @@ class ByHandPart:
 
     async def _closure(self, effects: list[str], converged: bool) -> Closure | None:
         try:
-            found = await hand.closure(self._session.campaign, effects, converged=converged)
+            found = await hand.closure(self._session, effects, converged=converged)
         except TunnelError as error:
             self._fault.show(error)
             return None

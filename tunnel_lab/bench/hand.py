@@ -3,77 +3,76 @@
 from __future__ import annotations
 
 import asyncio
-import multiprocessing
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+from tunnel_lab.bench.workspace import Session
+from tunnel_sim.processes import Worker
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from diagnosis.by_hand import ByHand, Closure
 
-Parameters = ParamSpec("Parameters")
+Given = ParamSpec("Given")
 ResultT = TypeVar("ResultT")
+State = tuple[tuple[str, int, int], ...]
 
 
-async def closure(campaign: Path, effects: Sequence[str], *, converged: bool) -> Closure:
+async def closure(session: Session, effects: Sequence[str], *, converged: bool) -> Closure:
     """How far the gap closes with effects chosen by hand.
 
     Args:
-        campaign: its folder.
+        session: whose campaign it is.
         effects: their names.
         converged: whether the fit frees their forms and goes on until it has converged.
 
     Raises:
         TunnelError: when the campaign cannot be read, or an effect cannot be fitted to it.
     """
-    return await _elsewhere(_closure, str(campaign), _state(campaign), tuple(sorted(effects)), converged)
+    return await _elsewhere(_closure, session.campaign, session.state(), tuple(sorted(effects)), converged)
 
 
-async def next_run(campaign: Path, first: Sequence[str], second: Sequence[str]) -> dict[str, Any] | None:
+async def next_run(session: Session, first: Sequence[str], second: Sequence[str]) -> dict[str, Any] | None:
     """The run that would distinguish two sets of effects; None in normalised form.
 
     Args:
-        campaign: its folder.
+        session: whose campaign it is.
         first: names of effects.
         second: names of their rivals.
 
     Raises:
         TunnelError: as `closure`.
     """
-    return await _elsewhere(
-        _next_run, str(campaign), _state(campaign), tuple(sorted(first)), tuple(sorted(second))
-    )
+    answers = (tuple(sorted(first)), tuple(sorted(second)))
+    return await _elsewhere(_next_run, session.campaign, session.state(), *answers)
 
 
-async def _elsewhere(
-    work: Callable[Parameters, ResultT], *given: Parameters.args, **_: Parameters.kwargs
-) -> ResultT:
-    return await asyncio.get_running_loop().run_in_executor(_pool(), work, *given)
+async def _elsewhere(work: Callable[Given, ResultT], *given: Given.args, **named: Given.kwargs) -> ResultT:
+    try:
+        return await asyncio.wrap_future(_worker().submit(work, *given, **named))
+    except BrokenProcessPool:
+        _worker.cache_clear()
+        raise TunnelError("the process of the fits was ended from outside", remedy="try again") from None
 
 
 @cache
-def _pool() -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
+def _worker() -> Worker:
+    return Worker()
 
 
 def end() -> None:
-    """End the process."""
-    if _pool.cache_info().currsize:
-        _pool().shutdown(wait=False, cancel_futures=True)
-
-
-def _state(campaign: Path) -> tuple[int, ...]:
-    """What changes with the campaign's files."""
-    files = [campaign / "campaign.toml", *sorted((campaign / "runs").glob("*"))]
-    return tuple(path.stat().st_mtime_ns for path in files if path.is_file())
+    """End the process, also in the middle of a fit."""
+    if _worker.cache_info().currsize:
+        _worker().end()
 
 
 @lru_cache(maxsize=2)
-def _by_hand(campaign: str, state: tuple[int, ...]) -> ByHand:
+def _by_hand(campaign: Path, state: State) -> ByHand:
     from diagnosis.by_hand import ByHand
     from tunnel_sim.files.campaign_io import read_campaign
 
@@ -81,11 +80,11 @@ def _by_hand(campaign: str, state: tuple[int, ...]) -> ByHand:
     return ByHand(read_campaign(campaign))
 
 
-def _closure(campaign: str, state: tuple[int, ...], effects: tuple[str, ...], converged: bool) -> Closure:
+def _closure(campaign: Path, state: State, effects: tuple[str, ...], converged: bool) -> Closure:
     return _by_hand(campaign, state).closure(effects, converged=converged)
 
 
 def _next_run(
-    campaign: str, state: tuple[int, ...], first: tuple[str, ...], second: tuple[str, ...]
+    campaign: Path, state: State, first: tuple[str, ...], second: tuple[str, ...]
 ) -> dict[str, Any] | None:
     return _by_hand(campaign, state).next_run(first, second)

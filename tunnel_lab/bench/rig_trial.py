@@ -83,8 +83,10 @@ def simulate(trial: Trial) -> tuple[Array, Array, Array]:
         duration=trial.duration,
     )
     effect = chosen_effect(trial)
-    nominal = _read(stated, ())
-    return nominal[0], nominal[1], nominal[1] if effect is None else _read(stated, (effect,))[1]
+    time, nominal = _read(stated, ())
+    seen = nominal if effect is None else _read(stated, (effect,))[1]
+    size = min(nominal.size, seen.size)  # where samples are dropped there are fewer
+    return time[:size], nominal[:size], seen[:size]
 
 
 def _read(stated: RunSettings, effects: tuple[Effect, ...]) -> tuple[Array, Array]:

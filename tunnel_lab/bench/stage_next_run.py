@@ -71,7 +71,7 @@ class _Rivals:
             with self._place:
                 ui.label("Simulating runs …").classes("soft")
             try:
-                found = await hand.next_run(self._session.campaign, first, second)
+                found = await hand.next_run(self._session, first, second)
                 if found is None:
                     raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
             finally:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -86,11 +87,17 @@ def is_current(session: Session, result: Path) -> bool:
         return False
     stated = document.get("provenance", {}).get("sha256")
     if stated is not None:  # a copied folder has new times but the same content
-        from tunnel_lab.terminal.given_campaign import file_hashes
+        return bool(stated == _hashes(session, session.state()))
+    return max(changed for _, changed, _ in session.state()) <= result.stat().st_mtime_ns
 
-        return bool(stated == file_hashes(session.campaign))
-    files = [session.campaign / "campaign.toml", *(session.campaign / "runs").glob("*")]
-    return max(path.stat().st_mtime_ns for path in files) <= result.stat().st_mtime_ns
+
+@lru_cache(maxsize=16)
+def _hashes(session: Session, state: object) -> dict[str, str]:
+    """SHA-256 of the campaign's files; they are read again only when ``state`` has changed."""
+    from tunnel_lab.terminal.given_campaign import file_hashes
+
+    del state
+    return file_hashes(session.campaign)
 
 
 def read_result(path: Path) -> dict[str, Any] | None:

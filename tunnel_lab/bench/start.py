@@ -8,7 +8,7 @@ from nicegui import events, ui
 
 from tunnel_lab.bench.guard import too_large
 from tunnel_lab.bench.parts import Fault, address
-from tunnel_lab.bench.stages import STAGES, closed
+from tunnel_lab.bench.stages import STAGES, Stage, closed
 from tunnel_lab.bench.workspace import Session, new_session, safe_name, sessions
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
@@ -42,7 +42,9 @@ def build(folder: Path) -> None:
         with ui.element("ul").classes("sessions"):
             for session in found:
                 with ui.element("li"):
-                    ui.link(session.name, address(session, _furthest(session)))
+                    stage = _furthest(session)
+                    ui.link(session.name, address(session, stage.key))
+                    ui.label(f"open up to {stage.title}").classes("soft")
 
 
 def drop_zone(dropped: events.Handler[events.MultiUploadEventArguments], fault: Fault) -> None:
@@ -86,9 +88,9 @@ async def keep(session: Session, given: events.MultiUploadEventArguments) -> Non
         write_whole(target / name, await file.read())
 
 
-def _furthest(session: Session) -> str:
+def _furthest(session: Session) -> Stage:
     """The last stage that is open."""
     try:
-        return [stage.key for stage in STAGES if not closed(session, stage.key)][-1]
+        return [stage for stage in STAGES if not closed(session, stage.key)][-1]
     except TunnelError:
-        return STAGES[0].key
+        return STAGES[0]

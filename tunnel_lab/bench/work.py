@@ -90,7 +90,8 @@ def start(words: Sequence[str], log: Path) -> None:
     Raises:
         TunnelError: when the command is running already.
     """
-    if work_of(log).running:
+    child = _started.get(log)
+    if work_of(log).running or (child is not None and child.poll() is None):
         raise TunnelError("is running already", where=words[0], remedy="wait for it, or stop it")
     log.write_bytes(b"")
     arguments = [sys.executable, "-m", __name__, str(log), *words]
@@ -98,6 +99,10 @@ def start(words: Sequence[str], log: Path) -> None:
     deadline = time.monotonic() + 30.0
     while not work_of(log).command and _started[log].poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
+    if not work_of(log).command:
+        raise TunnelError(
+            "could not be started", where=words[0], remedy="start it in a terminal, which says why"
+        )
 
 
 def pause(log: Path) -> None:

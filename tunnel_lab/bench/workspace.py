@@ -36,6 +36,11 @@ class Session:
         """Whether the campaign has been written."""
         return (self.campaign / CAMPAIGN_FILE).is_file()
 
+    def state(self) -> tuple[tuple[str, int, int], ...]:
+        """What changes when a file of the campaign does: names, times and sizes (bytes)."""
+        files = sorted(path for path in self.campaign.rglob("*") if path.is_file())
+        return tuple((str(path), path.stat().st_mtime_ns, path.stat().st_size) for path in files)
+
     @property
     def uploads(self) -> Path:
         """Folder of the files as they were dropped."""

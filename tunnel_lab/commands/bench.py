@@ -46,6 +46,8 @@ def run(
     if find_spec("nicegui") is None:
         remedy = "pip install 'virtual-wind-tunnel[bench]'"
         raise TunnelError("NiceGUI is not installed", where="tunnel bench", remedy=remedy)
+    if find_spec("fcntl") is None:  # the bench follows its processes by locks
+        raise TunnelError("needs Linux or macOS", where="tunnel bench", remedy="use the commands")
     from tunnel_lab.bench.server import serve
 
     opened = (folder / CAMPAIGN_FILE).is_file()
