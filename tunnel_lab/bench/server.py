@@ -24,7 +24,7 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
     """Serve the bench until interrupted.
 
     Args:
-        folder: the workspace.
+        folder: the workspace, as it is shown and typed.
         port: TCP port (count); 0 takes a free one.
         browser: whether to open the page.
         first: path of the page to open.
@@ -41,7 +41,9 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
         app.add_static_files(f"/static/{name}", str(static.joinpath(place)))
     add_pages(folder)
     app.on_startup(
-        lambda: say(f"The bench: http://{HOST}:{port}{address}\nCampaigns: {folder}\nCtrl-C ends it.")
+        lambda: say(
+            f"The bench: http://{HOST}:{port}{address}\nCampaigns: {folder.resolve()}\nCtrl-C ends it."
+        )
     )
     app.on_shutdown(_end)
     with suppress(KeyboardInterrupt):  # the usual end

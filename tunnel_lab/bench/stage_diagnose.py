@@ -33,10 +33,10 @@ class _Diagnose:
         self._session, self._frame = session, frame
         self._log = session.log(WORK)
         self._shown: object = None
-        self._clock = ui.label()
         show_command(" ".join(("tunnel", *_words(session))))
         self._fault = Fault()
         self._buttons = ui.element("p").classes("buttons")
+        self._clock = ui.label().classes("soft")
         self._progress = ui.element("ol").classes("progress").props("role=status aria-live=polite")
         self._result = ui.element("div")
         self._on = ui.element("p").classes("buttons")
@@ -47,14 +47,12 @@ class _Diagnose:
         one = work.work_of(self._log)
         result = self._session.diagnosis
         written = result.stat().st_mtime_ns if result.is_file() and not one.running else 0
-        if one.running and not one.paused:
-            self._clock.set_text(
-                f"{_elapsed(one):.0f} s so far. It runs in a process of its own: this page may be closed."
-            )
         if (one, written) == self._shown:
+            self._show_clock(one)
             return
         self._shown = (one, written)
         self._show_buttons(one)
+        self._show_clock(one)
         self._show_progress(one)
         if one.error:
             self._fault.show(f"{one.error}{_AFTER_STOP if one.status == STOPPED else ''}")
@@ -75,7 +73,11 @@ class _Diagnose:
             else:
                 button("Pause", lambda: work.pause(self._log))
             button("Stop", self._stop)
-            self._clock = ui.label("Paused; it goes on where it was." if one.paused else "").classes("soft")
+
+    def _show_clock(self, one: work.Work) -> None:
+        words = f"{_elapsed(one):.0f} s so far. It runs in a process of its own: this page may be closed."
+        paused = "Paused; it goes on where it was."
+        self._clock.set_text("" if not one.running else paused if one.paused else words)
 
     async def _start(self) -> None:
         with self._fault.around():
@@ -115,6 +117,8 @@ class _Diagnose:
 
 def _elapsed(one: work.Work) -> float:
     """Time since a command was started, s."""
+    if not one.started:
+        return 0.0
     return (datetime.now().astimezone() - datetime.fromisoformat(one.started)).total_seconds()
 
 

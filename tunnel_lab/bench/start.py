@@ -32,7 +32,8 @@ def build(folder: Path) -> None:
             ui.navigate.to(address(session, "records"))
 
     drop_zone(dropped, fault)
-    ui.label(f"Dropped files are kept in {folder}, in a folder of their own beside the campaign.").classes(
+    place = folder if folder.name else folder.resolve()
+    ui.label(f"Dropped files are kept in {place}, in a folder of their own beside the campaign.").classes(
         "soft"
     )
     found = sessions(folder)

@@ -38,6 +38,7 @@ def run(
       0 ended, by Ctrl-C; 2 bad input.
     """
     from importlib.util import find_spec
+    from urllib.parse import quote
 
     from tunnel_sim.files.campaign_schema import CAMPAIGN_FILE
     from tunnel_sim.files.writing import output_folder
@@ -51,10 +52,10 @@ def run(
     from tunnel_lab.bench.server import serve
 
     opened = (folder / CAMPAIGN_FILE).is_file()
-    place = folder.resolve()
+    campaign = folder.resolve()
     serve(
-        output_folder(place.parent if opened else place),
+        output_folder(campaign.parent if opened else folder),
         port=port,
         browser=browser,
-        first=f"/{place.name}/records" if opened else "/",
+        first=f"/{quote(campaign.name)}/records" if opened else "/",
     )

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+ROOT = Path(__file__).parents[3]
 _MOST_PICTURES = 60  # of a film
 
 
@@ -39,10 +40,16 @@ class Bench:
 @contextmanager
 def bench(folder: Path, *, crash: bool = False) -> Iterator[Bench]:
     """Serve a workspace; Ctrl-C must end it with status 0. With ``crash`` it is killed in the end."""
-    words = [sys.executable, "-m", "tunnel_lab.cli", "bench", str(folder), "--no-browser"]
+    words = [sys.executable, "-m", "tunnel_lab.cli", "bench", folder.name, "--no-browser"]
     # NiceGUI takes a server under pytest for one of its own tests.
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}
-    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), environment.get("PYTHONPATH")]))
+    pipes: dict[str, Any] = {
+        "cwd": folder.parent,
+        "stdout": subprocess.PIPE,
+        "stderr": subprocess.PIPE,
+        "text": True,
+    }
     with subprocess.Popen(words, env=environment, **pipes) as process:
         assert process.stdout is not None
         line = process.stdout.readline()

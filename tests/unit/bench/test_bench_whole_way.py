@@ -49,11 +49,14 @@ def browser() -> Iterator[Any]:
 def picture(one: Tab, name: str) -> None:
     """A screenshot in light and dark, where they are wanted."""
     if PICTURES:
+        before = one.page.viewport_size
+        one.page.set_viewport_size({"width": 1200, "height": 900})
         for scheme in ("light", "dark"):
             one.page.emulate_media(color_scheme=scheme)
             one.page.wait_for_timeout(600)
             one.page.screenshot(path=f"{PICTURES}/bench-{name}-{scheme}.png")
         one.page.emulate_media(color_scheme="light")
+        one.page.set_viewport_size(before)
 
 
 def film(pictures: list[bytes], path: str) -> None:
