@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -12,6 +13,7 @@ from tunnel_lab.bench.conditions import MISSING, RIG, UNITS, WORDS
 from tunnel_lab.bench.parts import Fault, Frame
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.choices import RUN_KEYS
+from tunnel_sim.vocabulary.errors import TunnelError
 
 _MOST_ROWS = 20  # of a table without a scroll bar
 _MOST_LINES = 8  # of faults that are listed
@@ -56,7 +58,8 @@ class _Conditions:
         self._fault = Fault()
         self._lines = ui.element("ul").classes("notes").props("role=status aria-live=polite")
         self._on = ui.element("p").classes("buttons")
-        self._check()
+        with self._fault.around():
+            self._check()
 
     def _table(self) -> ui.aggrid:
         columns: list[dict[str, Any]] = [
@@ -103,14 +106,25 @@ class _Conditions:
     def _edited(self, event: events.GenericEventArguments) -> None:
         row, key = event.args["data"]["run"], event.args["colId"]
         value = event.args["newValue"]
-        self._cells[row][key] = "" if value is None else str(value)
-        self._check()
+        self._put({(row, key): "" if value is None else str(value)})
+
+    def _put(self, texts: Mapping[tuple[str, str], str]) -> None:
+        """Change cells of what is on the disk, which another tab may have changed meanwhile."""
+        with self._fault.around():
+            cells = conditions.typed(self._session)
+            if cells.keys() != self._cells.keys():
+                raise TunnelError("the campaign has other runs now", remedy="load the page again")
+            for (row, key), text in texts.items():
+                cells[row][key] = text
+            self._cells = cells
+            self._check()
 
     def _pasted(self, event: events.GenericEventArguments) -> None:
         row, key = self._runs[event.args["row"]], event.args["key"]
         if key in RUN_KEYS:
-            self._cells = conditions.pasted(self._cells, list(RUN_KEYS), row, key, event.args["text"])
-            self._check()
+            found = conditions.pasted(self._cells, list(RUN_KEYS), row, key, event.args["text"])
+            changed = {(run, one): text for run, texts in found.items() for one, text in texts.items()}
+            self._put({(run, one): t for (run, one), t in changed.items() if self._cells[run][one] != t})
 
     def _all_runs(self) -> None:
         """Fill a column at once."""
@@ -125,9 +139,7 @@ class _Conditions:
             value = ui.input("Value").props("dense")
 
             def fill() -> None:
-                for row in self._runs:
-                    self._cells[row][str(key.value)] = value.value
-                self._check()
+                self._put({(row, str(key.value)): str(value.value or "") for row in self._runs})
 
             value.on("change", fill)
 
@@ -143,23 +155,21 @@ class _Conditions:
         return found
 
     def _resize(self, key: str, field: ui.input) -> None:
-        self._cells[RIG][key] = str(field.value or "")
-        self._check()
+        self._put({(RIG, key): str(field.value or "")})
 
     def _judge(self, event: events.ValueChangeEventArguments[bool | None]) -> None:
         with self._fault.around():
             conditions.judge(self._session, not event.value)
-        self._check()
+            self._check()
 
     def _check(self) -> None:
         """Save what is right, and mark what is not."""
-        wrong: dict[tuple[str, str], str] = {}
-        with self._fault.around():
-            wrong = conditions.save(self._session, self._cells)
+        wrong = conditions.save(self._session, self._cells)
         missing = _missing(self._cells)
         self._grid.options["rowData"] = [self._row(run, wrong, missing) for run in self._runs]
         self._grid.update()
         for key, field in self._rig.items():
+            field.value = self._cells[RIG][key]
             field.error = wrong.get((RIG, key))
             field.props["hint"] = missing.get((RIG, key), "")
         self._list(wrong, missing)

@@ -60,7 +60,9 @@ def bench(folder: Path, *, crash: bool = False) -> Iterator[Bench]:
         finally:
             process.send_signal(signal.SIGKILL if crash else signal.SIGINT)
             _, errors = process.communicate(timeout=60)
-    assert (process.returncode, errors) == (-signal.SIGKILL if crash else 0, "")
+    expected = -signal.SIGKILL if crash else 0
+    assert process.returncode == expected, (process.returncode, errors)
+    assert not errors, errors
 
 
 class Tab:

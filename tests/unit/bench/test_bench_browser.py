@@ -157,6 +157,21 @@ def test_conditions_are_typed_pasted_checked_and_saved(browser: Any, served: Ben
     ]
 
 
+def test_two_tabs_of_one_campaign_do_not_undo_each_other(browser: Any, served: Bench) -> None:
+    shutil.copytree(served.folder / "two", served.folder / "both")
+    with tab(browser, served) as one, tab(browser, served) as two:
+        for opened in (one, two):
+            opened.open("/both/conditions")
+            opened.page.wait_for_selector(".ag-row")
+        for opened, name, text in ((one, "width [m]", "0.2"), (two, "frontal area A [m²]", "0.03")):
+            field = opened.page.get_by_label(name)
+            field.fill(text)
+            field.press("Tab")
+            opened.page.wait_for_timeout(1500)
+    found = read_campaign(served.folder / "both").rig
+    assert (found.width, found.frontal_area) == (0.2, 0.03)
+
+
 def test_two_tabs_do_not_mix(browser: Any, served: Bench) -> None:
     shutil.copytree(served.folder / "two", served.folder / "other")
     with tab(browser, served) as one, tab(browser, served) as two:

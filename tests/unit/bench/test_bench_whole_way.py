@@ -129,7 +129,7 @@ def test_a_simulated_campaign_is_diagnosed_as_by_the_command(browser: Any, tmp_p
         one.page.wait_for_selector(".by-hand .value", timeout=LONG_MS)
         assert one.page.locator(".by-hand .value").first.inner_text().startswith(("100", "> 99.9", "99"))
         begun = time.monotonic()
-        one.page.get_by_label("coulomb friction", exact=True).click()
+        one.page.get_by_role("checkbox", name="coulomb friction", exact=True).click()
         one.page.wait_for_selector(".by-hand .value:text-is('0 %')", timeout=LONG_MS)
         print(f"closure by hand after {time.monotonic() - begun:.1f} s")
     found = (folder / "dry.diagnosis.json").read_text()

@@ -62,8 +62,9 @@ def test_a_command_is_paused_goes_on_and_is_stopped_and_leaves_nothing(log: Path
     assert Path(f"/proc/{process}/stat").read_text().split()[13] == spent[1]
     work.go_on(log)
     assert not work.work_of(log).paused
-    work._started.clear()  # as a server that was started anew after a crash
+    child = work._started.pop(log)  # as a server that was started anew after a crash
     work.stop(log)
+    child.wait()
     found = wait(log, lambda one: not one.running)
     assert found.status in (130, None)
     assert found.error
