@@ -70,12 +70,12 @@ class _Rivals:
                 raise TunnelError("both answers are the same", remedy="choose different causes")
             with self._place:
                 ui.label("Simulating runs …").classes("soft")
-            try:
-                found = await hand.next_run(self._session, first, second)
-                if found is None:
-                    raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
-            finally:
-                self._place.clear()
+            found = await hand.next_run(self._session, first, second)
+            if self._place.is_deleted:  # the page was left
+                return
+            self._place.clear()
+            if found is None:
+                raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
             with self._place:
                 show_run(found)
 

@@ -84,7 +84,9 @@ class _Records:
             imported = await asyncio.to_thread(preview.read, self._session)
         except TunnelError as refused:
             error = refused
-        if mine != self._reading:  # a later choice is being read
+        if (
+            mine != self._reading or self._table.is_deleted
+        ):  # a later choice is being read, or the page was left
             return
         self._imported = imported
         self._fault.show(error or "")
@@ -260,6 +262,8 @@ def _as_it_is(session: Session) -> None:
 
         with fault.around():
             campaign = await asyncio.to_thread(read_campaign, session.campaign)
+            if place.is_deleted:  # the page was left
+                return
             with place.classes("charts"):
                 for one in campaign.runs[: preview.MOST_RECORDS]:
                     time, reading = thinned(one.record.time_s, one.record.yaw_rad)

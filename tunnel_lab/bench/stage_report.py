@@ -52,6 +52,8 @@ class _Report:
         with self._fault.around():
             write_json(self._session.byline, {"author": author, "notes": notes})
             await asyncio.to_thread(write, self._session, author, notes)
+            if self._place.is_deleted:  # the page was left
+                return
             self._place.clear()
             source = f"{address(self._session, 'report.html')}?{time.time_ns()}"
             with self._place:

@@ -131,6 +131,8 @@ class _TryIt:
                 shown = self._trial
                 with self._fault.around():
                     time, nominal, seen = await asyncio.to_thread(simulate, shown)
+                    if self._chart.is_deleted:  # the page was left
+                        return
                     self._chart.show([time.tolist(), nominal.tolist(), seen.tolist()])
                     self._words.set_text(said(shown, time, nominal, seen))
                     self._car.show(time[::4].tolist(), seen[::4].tolist())
