@@ -9,7 +9,7 @@ from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 
-from nicegui import app, core, ui
+from nicegui import app, background_tasks, core, ui
 
 from tunnel_lab.bench import hand, work
 from tunnel_lab.bench.guard import Guard
@@ -40,14 +40,22 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
     for name, place in (("bench", "bench/static"), ("uplot", "diagnosis_view/vendor")):
         app.add_static_files(f"/static/{name}", str(static.joinpath(place)))
     add_pages(folder)
-    app.on_startup(
-        lambda: say(
-            f"The bench: http://{HOST}:{port}{address}\nCampaigns: {folder.resolve()}\nCtrl-C ends it."
-        )
-    )
+    words = f"The bench: http://{HOST}:{port}{address}\nCampaigns: {folder.resolve()}\nCtrl-C ends it."
+    app.on_startup(lambda: background_tasks.create(_say_when_open(port, words)))
     app.on_shutdown(_end)
     with suppress(KeyboardInterrupt):  # the usual end
         _run(port, address if browser else "")
+
+
+async def _say_when_open(port: int, words: str) -> None:
+    """Print the address as soon as the port answers, which is after the start of the application."""
+    while True:
+        with suppress(OSError):
+            _, writer = await asyncio.open_connection(HOST, port)
+            writer.close()
+            break
+        await asyncio.sleep(0.02)
+    say(words)
 
 
 async def _end() -> None:

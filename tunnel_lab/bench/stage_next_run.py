@@ -70,10 +70,13 @@ class _Rivals:
                 raise TunnelError("both answers are the same", remedy="choose different causes")
             with self._place:
                 ui.label("Simulating runs …").classes("soft")
-            found = await hand.next_run(self._session, first, second)
+            try:
+                found = await hand.next_run(self._session, first, second)
+            finally:
+                if not self._place.is_deleted:
+                    self._place.clear()
             if self._place.is_deleted:  # the page was left
                 return
-            self._place.clear()
             if found is None:
                 raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
             with self._place:
