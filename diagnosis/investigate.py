@@ -55,6 +55,27 @@ def investigate(
     return replace(found, seconds=clock.seconds)
 
 
+def nominal_study(
+    campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progress | None = None
+) -> Study:
+    """Test a campaign for a gap, and fit no effect.
+
+    Args:
+        campaign: the runs.
+        kinds: the effects that may be read off the records.
+        progress: called with the name of each step.
+
+    Returns:
+        The study up to the fit of the nominal model.
+
+    Raises:
+        TunnelError: when the nominal model cannot be fitted to the runs.
+    """
+    clock = _Clock(progress)
+    found = _test(*similar_campaign(campaign), {kind.name for kind in kinds}, clock)
+    return replace(found, seconds=clock.seconds)
+
+
 def fit_nominal(data: Data) -> Fit:
     """Fit the nominal model.
 

@@ -14,6 +14,7 @@ from typing import Annotated, cast
 import typer
 
 from tunnel_lab.commands import (
+    bench,
     blind,
     compare,
     demo,
@@ -97,6 +98,7 @@ def tunnel(
       tunnel docs                        the documentation, in a browser
       tunnel doctor                      what is installed, and a self-check
       tunnel schema campaign             JSON schemas, for editors
+      tunnel bench                       all of it by hand and eye, in a browser
 
     [bold]Units[/bold]
       SI and radians throughout.
@@ -134,6 +136,11 @@ COMMANDS = (
 """Every command that is one function, in the order of the help."""
 
 WITHOUT_TABLES = (simulate, plot, export, view, render, docs, schema)
+    bench,
+)
+"""Every command that is one function, in the order of the help."""
+
+WITHOUT_TABLES = (simulate, plot, export, view, render, docs, bench)
 
 for _command in COMMANDS:
     _wider = with_quiet if _command in WITHOUT_TABLES else with_format

@@ -11,14 +11,15 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from itertools import islice
 from multiprocessing.connection import Connection
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
+Given = ParamSpec("Given")
 _ONE_THREAD = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -66,6 +67,31 @@ def in_processes(
             end.close()  # ends the processes at once
             pool.shutdown(wait=False, cancel_futures=True)
             line.close()
+
+
+class Worker:
+    """One process of one thread, which keeps what its modules hold from one piece of work to the next."""
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._line, self._end = context.Pipe(duplex=False)
+        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_start, initargs=(self._line,))
+
+    def submit(
+        self, work: Callable[Given, ResultT], *given: Given.args, **named: Given.kwargs
+    ) -> Future[ResultT]:
+        """Do work after what was submitted before.
+
+        Args:
+            work: what to do; it, its arguments and its result must be picklable.
+        """
+        with _one_thread_each():  # the process is started by the first work
+            return self._pool.submit(work, *given, **named)
+
+    def end(self) -> None:
+        """End the process at once."""
+        self._end.close()
+        self._pool.shutdown(wait=False, cancel_futures=True)
 
 
 @contextmanager

@@ -37,7 +37,7 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
         ),
         noise=_noise(answer.noise, similarity),
         confirmation=_confirmation(answer.confirmation, similarity),
-        next_run=None if answer.next_run is None else _next_run(answer.next_run, similarity),
+        next_run=None if answer.next_run is None else own_next_run(answer.next_run, similarity),
     )
 
 
@@ -105,5 +105,11 @@ def _confirmation(found: Confirmation, similarity: Similarity) -> Confirmation:
     )
 
 
-def _next_run(run: Mapping[str, Any], similarity: Similarity) -> dict[str, Any]:
+def own_next_run(run: Mapping[str, Any], similarity: Similarity) -> dict[str, Any]:
+    """A run to make (`separating_run`) in the measured campaign's units.
+
+    Args:
+        run: for the similar campaign.
+        similarity: how that was made.
+    """
     return {name: similarity.own(v, _NEXT_RUN[name]) if name in _NEXT_RUN else v for name, v in run.items()}

@@ -61,12 +61,20 @@ class Subsets:
         kinds = [kind for kind in self._study.chosen.problem.effects if kind.name in names - fewer]
         found: Fit | None = self._fits[fewer]
         for kind in kinds:
-            found = None if found is None else _one_more(found, kind)
+            found = None if found is None else one_more(found, kind)
         return found
 
 
-def _one_more(base: Fit, kind: type[Effect]) -> Fit | None:
-    """The better of the fits from the first two starting points of an effect; None where none succeeds."""
+def one_more(base: Fit, kind: type[Effect]) -> Fit | None:
+    """A fit with one more effect.
+
+    Args:
+        base: the fit without it.
+        kind: the effect to add.
+
+    Returns:
+        The better of the fits from its first two starting points; None where none succeeds.
+    """
     starts = starting_points(base, kind)[:2]
     tried = [_fitted(partial(fit, start.problem, start.point)) for start in starts]
     return min((found for found in tried if found), key=lambda found: found.total, default=None)

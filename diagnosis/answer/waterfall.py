@@ -49,6 +49,19 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
     return Waterfall(tuple(steps), without, models.words)
 
 
+def both_ends(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfall:
+    """The first and the last step only: the nominal model, and all causes together.
+
+    Args:
+        study: what was found, without a random moment.
+        base: what an excess is measured against.
+        known: runs held out of fits, where that is done already.
+    """
+    models = _Models(study, base, known)
+    last = Step(" + ".join(sorted(models.causes)), models.excess(models.causes))
+    return Waterfall((Step(None, models.excess(frozenset())), last), {}, models.words)
+
+
 class _Models:
     """The model with some of the causes: what it leaves of the gap."""
 

@@ -5,25 +5,18 @@ Truth: a document written by hand, and what the style sheet and WCAG 2 ask for.
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.unit.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
 from tests.unit.diagnosis_document import campaign, document
 from tunnel_lab.diagnosis_view import Byline, write_report
 
-sync_api = pytest.importorskip("playwright.sync_api")
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-pytestmark = [
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium"),
-    pytest.mark.filterwarnings("ignore::ResourceWarning"),  # of Playwright's own pipes
-]
-LEAST_CONTRAST = 4.5
+pytestmark = IN_A_BROWSER
 
 
 @pytest.fixture(scope="module")
@@ -38,12 +31,8 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with sync_api.sync_playwright() as playwright:
-        # Chromium's own sandbox does not start for root.
-        arguments = ["--no-sandbox"] if os.getuid() == 0 else []
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        yield chromium
-        chromium.close()
+    with chromium() as found:
+        yield found
 
 
 class Opened:
@@ -84,31 +73,6 @@ def test_nothing_is_wider_than_the_page_and_every_text_can_be_read(opened: Opene
     pairs = opened.page.evaluate(CONTRASTS)
     assert len(pairs) > 50
     assert [pair for pair in pairs if pair[1] < LEAST_CONTRAST] == []
-
-
-CONTRASTS = """() => {
-  const light = (text) => {
-    const [r, g, b] = text.match(/[\\d.]+/g).map((v) => Number(v) / 255).map(
-      (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-  };
-  const behind = (element) => {
-    for (let one = element; one; one = one.parentElement) {
-      const found = getComputedStyle(one).backgroundColor;
-      if (!found.endsWith(", 0)")) return found;
-    }
-    return getComputedStyle(document.body).backgroundColor;
-  };
-  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
-  for (let node = walker.nextNode(); node; node = walker.nextNode()) {
-    const parent = node.parentElement;
-    if (!node.textContent.trim() || !parent.checkVisibility() || parent.closest("script, option")) continue;
-    const style = getComputedStyle(parent);
-    const levels = [light(parent.closest("svg") ? style.fill : style.color), light(behind(parent))].sort();
-    found.push([node.textContent, (Math.max(...levels) + 0.05) / (Math.min(...levels) + 0.05)]);
-  }
-  return found;
-}"""
 
 
 @pytest.mark.parametrize("opened", WIDTHS[:1], indirect=True)

@@ -46,6 +46,9 @@ def run(
     author: Annotated[
         str, typer.Option("--author", metavar="NAME", help="Who made the diagnosis, for the report.")
     ] = "",
+    notes: Annotated[
+        str, typer.Option("--notes", metavar="TEXT", help="Notes for the head of the report.")
+    ] = "",
     effects: Annotated[
         list[str] | None,
         typer.Option("--effects", metavar="A,B", help="Consider these effects only."),
@@ -143,7 +146,7 @@ def run(
         from diagnosis.detection.limit_cycles import diagnosable
         from tunnel_lab.diagnosis_view import Byline, write_report
 
-        byline = Byline(datetime.now().astimezone().date().isoformat(), author)
+        byline = Byline(datetime.now().astimezone().date().isoformat(), author, notes)
         write_report(document, diagnosable(data).campaign, report, byline)
     proposed = None if propose is None else write_proposal(propose, document)
     if to_stdout:

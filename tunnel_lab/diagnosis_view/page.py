@@ -45,10 +45,12 @@ class Byline:
     Args:
         date: of the diagnosis, such as 2026-05-31; empty: none is shown.
         author: who made it; empty: nobody is named.
+        notes: for the head of the page; empty: none.
     """
 
     date: str = ""
     author: str = ""
+    notes: str = ""
 
 
 def write_report(document: Document, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:

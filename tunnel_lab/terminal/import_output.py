@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rich.text import Text
-
+from identification.printing.table import TextTable
 from tunnel_lab.terminal import tables
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from tunnel_sim.files.importing.records import Imported, Part
 
 
@@ -20,12 +17,12 @@ def show_import(imported: Imported) -> None:
     Args:
         imported: of `read_records`.
     """
-    tables.show_tables(parts_table(imported))
+    tables.show_tables(tables.rich_table(parts_table(imported)))
     for line in imported.remarks():
         tables.say(f"Note: {line}")
 
 
-def parts_table(imported: Imported) -> Table:
+def parts_table(imported: Imported) -> TextTable:
     """The runs of an import, a row for each.
 
     Args:
@@ -44,10 +41,8 @@ def parts_table(imported: Imported) -> Table:
         "V\n[m/s]",
         "Kr\n[N m/rad]",
     )
-    result = tables.table("Read", "run", "file", *headings, right=headings)
-    for part in imported.parts:
-        result.add_row(*map(Text, (part.id, part.raw.source.name, *_figures(part))))
-    return result
+    rows = tuple((part.id, part.raw.source.name, *_figures(part)) for part in imported.parts)
+    return TextTable("Read", ("run", "file", *headings), rows, right=headings)
 
 
 def _figures(part: Part) -> tuple[str, ...]:

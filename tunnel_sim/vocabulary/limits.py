@@ -16,6 +16,8 @@ CSV_BYTES = 384 * 2**20
 """Largest run file as CSV, bytes: ten million samples take 300 MB, and five times as much memory."""
 WEIGHTS_BYTES = 64 * 2**20
 """Largest file of network weights or training checkpoint, bytes: the paper's networks take 0.2 MB."""
+UPLOAD_BYTES = 128 * 2**20
+"""Most bytes dropped on the bench at once: they pass through memory; tunnel import reads larger files."""
 
 NESTING = 32
 """Deepest nesting of tables and lists: the formats need six levels, and Python's recursion limit is a thousand."""

@@ -32,6 +32,15 @@ RIG_KEYS = ("yaw_inertia", "frontal_area", "reference_length", "width")
 RUN_KEYS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
 
 
+class Stretch(StrictModel):
+    """``[[choices.stretches]]``: where a run lies in its record, seconds from the record's first sample."""
+
+    file: OneLine = Field(description="the name of the file")
+    run: OneLine = Field(description="the name of the run")
+    start: NotNegative = Field(description="the time of the release in s")
+    end: Positive = Field(description="the time in s at which the run ends, after its start")
+
+
 class ImportChoices(StrictModel):
     """How files are to be read; what is None is found from the files."""
 
@@ -55,6 +64,9 @@ class ImportChoices(StrictModel):
     )
     end: float | None = Field(default=None, description="a time of the file in s: what is later is left out")
     cut: bool = Field(default=True, description="false to keep records whole")
+    stretches: tuple[Stretch, ...] = Field(
+        default=(), strict=False, description="[[choices.stretches]] tables with file, run, start and end"
+    )
     name: OneLine | None = Field(
         default=None, description="a pattern of file names such as 'S{spring}_V{wind_speed}_*'"
     )

@@ -8,6 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from tunnel_sim.files.campaign_io import checked_record
 from tunnel_sim.files.importing.choices import RIG_KEYS, RUN_KEYS, Conditions, ImportChoices
 from tunnel_sim.files.importing.cleaning import (
@@ -167,8 +169,26 @@ def _parts(
         pieces = find_runs(time, reading) if choices.cut and angle else [Piece(0, time.size)]
         for number, piece in enumerate(pieces, 1):
             name = label if len(pieces) == 1 else f"{label}-{number}"
-            parts.append(_part(name, raw, piece, choices, table))
+            parts.append(_part(name, raw, _stated_piece(name, raw, choices) or piece, choices, table))
     return parts
+
+
+def _stated_piece(name: str, raw: Raw, choices: ImportChoices) -> Piece | None:
+    """Where a run lies by the choices; None where they do not say it."""
+    stated = next((s for s in choices.stretches if (s.file, s.run) == (raw.source.name, name)), None)
+    if stated is None:
+        return None
+    # Half a step of slack: a marker between two samples belongs to the closer one.
+    slack = 0.5 * float(np.median(np.diff(raw.cleaned.time_s)))
+    first = int(np.searchsorted(raw.cleaned.time_s, stated.start - slack))
+    last = int(np.searchsorted(raw.cleaned.time_s, stated.end + slack))
+    if last - first < 2:
+        raise TunnelError(
+            f"no samples from {stated.start:g} to {stated.end:g} s",
+            where=f"{shown(raw.source)}, run '{name}'",
+            remedy="state a start before the end, within the record",
+        )
+    return Piece(first, last)
 
 
 def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: ConditionTable | None) -> Part:

@@ -25,6 +25,7 @@ _RUN = {
     "air_density": "kg/m3: needed where wind_speed > 0",
     "release_angle": "rad, nominal; optional",
 }
+ORIGINAL = "# Original: "
 _RUNS_HEAD = "# What the files do not say about the runs: fill it in, and remove the # before it."
 
 
@@ -86,18 +87,23 @@ def write_imported(
         folder,
         run_format="csv" if samples <= _AS_TEXT else "parquet",
         overwrite=overwrite,
-        text=lambda document: campaign_text(document, imported),
+        text=lambda document: campaign_text(document, originals(imported)),
         beside=beside,
         checked=True,
     )
 
 
-def campaign_text(document: Mapping[str, Any], imported: Imported) -> str:
+def originals(imported: Imported) -> list[str]:
+    """Comments that name the files, with their SHA-256."""
+    return [f"{ORIGINAL}{one_line(s.path.name)}, SHA-256 {s.sha256}" for s in imported.sources]
+
+
+def campaign_text(document: Mapping[str, Any], originals: Sequence[str]) -> str:
     """``campaign.toml`` with the originals, and the keys that nobody has stated, as comments.
 
     Args:
         document: the tables.
-        imported: what was read.
+        originals: comments that name the files it was made of.
     """
     tables = {key: value for key, value in document.items() if key != "runs"}
     rig = tables.pop("rig", {})
@@ -107,7 +113,6 @@ def campaign_text(document: Mapping[str, Any], imported: Imported) -> str:
     for run in document["runs"]:
         unknown = [f"# {key} =   # {why}" for key, why in _RUN.items() if key not in run]
         blocks.append("\n".join(["[[runs]]", tomli_w.dumps(run).strip(), *unknown, ""]))
-    originals = [f"# Original: {one_line(s.path.name)}, SHA-256 {s.sha256}" for s in imported.sources]
     return "\n".join([*originals, *head, *blocks])
 
 

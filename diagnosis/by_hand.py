@@ -1,0 +1,154 @@
+"""Causes chosen by hand: how far the gap closes with them on what is held out, and the run that would tell."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from diagnosis.answer.candidates import candidates
+from diagnosis.answer.held_out import HeldOut, predict_held_out
+from diagnosis.answer.next_run import separating_run
+from diagnosis.answer.own_units import own_next_run
+from diagnosis.answer.reported import excess_base
+from diagnosis.answer.subsets import one_more
+from diagnosis.answer.waterfall import both_ends
+from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.hypothesis import Hypothesis, polish, restricted
+from diagnosis.detection.comparable import comparable_runs
+from diagnosis.detection.limit_cycles import diagnosable
+from diagnosis.fitting.least_squares import Fit, FitError, fit
+from diagnosis.investigate import nominal_study
+from diagnosis.names import plain
+from diagnosis.result import ParameterEstimate
+from tunnel_sim.effects import Effect, effect_class, known_effects
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+
+_ITERATIONS = 6  # of a fit with fewer effects, started from one with more
+
+
+@dataclass(frozen=True)
+class Closure:
+    """How far the gap closes with causes chosen by hand.
+
+    Args:
+        effects: names, sorted.
+        before: excess of the nominal model on what is held out, in noise variances of a sample.
+        after: excess with the effects, likewise, in noise variances of a sample.
+        held_out: what is held out, in words.
+        parameters: of the effects, by name; ``effect.parameter`` where there are several effects.
+    """
+
+    effects: tuple[str, ...]
+    before: float
+    after: float
+    held_out: str
+    parameters: Mapping[str, ParameterEstimate]
+
+    @property
+    def closed(self) -> float:
+        """Share of the gap that closes, 0 to 1."""
+        return (
+            float(np.clip(1.0 - max(self.after, 0.0) / self.before, 0.0, 1.0)) if self.before > 0.0 else 0.0
+        )
+
+
+class ByHand:
+    """A campaign with its nominal model fitted, to which effects are added by hand.
+
+    Args:
+        campaign: measured or simulated runs.
+        kinds: the effects that may be read off the records; None: all known ones.
+
+    Raises:
+        TunnelError: when the examination refuses the records, or the nominal model cannot be fitted.
+    """
+
+    def __init__(self, campaign: Campaign, kinds: Collection[type[Effect]] | None = None) -> None:
+        comparable, _ = comparable_runs(diagnosable(campaign).campaign)
+        self._study = nominal_study(comparable, tuple(known_effects() if kinds is None else kinds))
+        self._base = excess_base(self._study)
+        self._fits: dict[frozenset[str], Fit] = {frozenset(): self._study.nominal}
+        self._whole = {frozenset[str](): self._study.nominal}
+        self._held_out: dict[Fit, HeldOut] = {}
+
+    def closure(self, effects: Collection[str], *, converged: bool = False) -> Closure:
+        """Fit effects to the runs, and predict the runs held out of that fit.
+
+        Args:
+            effects: names of effects that a fit can find; none: the nominal model.
+            converged: whether the forms of the effects are freed and the fit goes on until it has converged, as for
+                the answer of a diagnosis; that takes ten times as long.
+
+        Returns:
+            The excess before and after, and the parameters. Every set is fitted once; a set close to an earlier one
+            starts from it.
+
+        Raises:
+            TunnelError: when an effect cannot be fitted to these runs.
+        """
+        names = frozenset(effects)
+        fitted = self._polished(names) if converged else self._fit(names)
+        for one in (self._study.nominal, fitted):
+            if one not in self._held_out:
+                self._held_out[one] = predict_held_out(one)
+        hypotheses = (Hypothesis(tuple(sorted(names)), fitted),) if names else ()
+        share = max(fitted.excess, 0.0) / max(self._study.nominal.excess, 1e-9)
+        weighed = (Weighed(tuple(sorted(names)), share, 1.0),) if names else ()
+        study = replace(self._study, hypotheses=hypotheses, weighed=weighed)
+        ends = both_ends(study, self._base, self._held_out)
+        parameters = candidates(study, self._base)[0].parameters if names else {}
+        before, after = (step.excess for step in ends.steps)
+        return Closure(tuple(sorted(names)), before, after, ends.held_out, parameters)
+
+    def next_run(self, first: Collection[str], second: Collection[str]) -> dict[str, Any] | None:
+        """The run that would distinguish two sets of effects.
+
+        Args:
+            first: names of effects.
+            second: names of its rivals.
+
+        Returns:
+            Spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and expected separation
+            in standard deviations of the noise; None in normalised form.
+
+        Raises:
+            TunnelError: when an effect cannot be fitted to these runs.
+        """
+        found = separating_run(self._fit(frozenset(first)), self._fit(frozenset(second)))
+        return None if found is None else own_next_run(found, self._study.similarity)
+
+    def _polished(self, names: frozenset[str]) -> Fit:
+        if names not in self._whole:
+            self._whole[names] = polish(Hypothesis(tuple(sorted(names)), self._fit(names))).fit
+        return self._whole[names]
+
+    def _fit(self, names: frozenset[str]) -> Fit:
+        if names not in self._fits:
+            larger = [known for known in self._fits if known > names]
+            found = self._from_larger(min(larger, key=len), names) if larger else None
+            self._fits[names] = found or self._from_smaller(names)
+        return self._fits[names]
+
+    def _from_larger(self, known: frozenset[str], names: frozenset[str]) -> Fit | None:
+        start = restricted(self._fits[known], names)
+        try:
+            return fit(start.problem, start.point, base=start, tolerance=1e-3, max_iterations=_ITERATIONS)
+        except (FitError, np.linalg.LinAlgError):
+            return None
+
+    def _from_smaller(self, names: frozenset[str]) -> Fit:
+        """The missing effects added one after another to the largest set that is fitted."""
+        known = max((known for known in self._fits if known < names), key=len)
+        for name in sorted(names - known):
+            found = one_more(self._fits[known], effect_class(name))
+            if found is None:
+                raise TunnelError(
+                    f"{plain([name])} cannot be fitted to these runs", remedy="choose another effect"
+                )
+            known |= {name}
+            self._fits[known] = found
+        return self._fits[names]

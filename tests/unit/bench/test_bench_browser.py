@@ -1,0 +1,232 @@
+"""The bench in a real browser: what is dropped, marked, typed and refused. Skipped where there is none.
+
+Truth: files written here, what the style sheet and WCAG 2 ask for, and the guard's rules.
+"""
+
+from __future__ import annotations
+
+import http.client
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.unit.bench.served import Bench, bench, tab
+from tests.unit.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
+from tests.unit.diagnosis_document import campaign, document
+from tests.unit.importing.import_files import decay
+from tunnel_lab.bench.workspace import Session
+from tunnel_lab.terminal.given_campaign import file_hashes
+from tunnel_sim.files import import_records
+from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.writing import write_json
+from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
+
+pytest.importorskip("nicegui")
+pytestmark = IN_A_BROWSER
+
+
+def log_text(seed: int = 1) -> str:
+    rows = [f"{t:.3f},{y:.6f}" for t, y in zip(*decay(seed), strict=True)]
+    return "time_s,yaw_rad\n" + "\n".join(rows)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    """A workspace with a campaign of two runs that has been diagnosed."""
+    folder = tmp_path_factory.mktemp("workspace")
+    for name in ("a", "b"):
+        (folder / f"{name}.csv").write_text(log_text())
+    import_records([folder / "a.csv", folder / "b.csv"], folder / "two")
+    with bench(folder) as found:
+        yield found
+
+
+def test_dropped_files_are_read_marked_and_written(browser: Any, served: Bench, tmp_path: Path) -> None:
+    hostile = tmp_path / "<img src=x onerror=alert(1)>.csv"
+    hostile.write_text(log_text())
+    with tab(browser, served) as one:
+        page = one.page
+        page.set_input_files("input[type=file]", [str(hostile)])
+        page.wait_for_url("**/img_src_x_onerror_alert_1/records")
+        page.wait_for_selector(".mark.start")
+        assert page.locator("img").count() == 0
+        session = Session(served.folder, "img_src_x_onerror_alert_1")
+        assert [path.name for path in session.uploads.iterdir()] == ["img_src_x_onerror_alert_1_.csv"]
+        mark = page.get_by_role("slider", name="release of")
+        mark.focus()
+        page.keyboard.press("PageUp")
+        page.keyboard.press("ArrowLeft")
+        page.wait_for_selector("text=begins at")
+        box = page.locator(".mark.end").bounding_box()
+        page.mouse.move(box["x"] + 7, box["y"] + 30)
+        page.mouse.down()
+        page.mouse.move(box["x"] - 60, box["y"] + 30, steps=4)
+        page.mouse.up()
+        page.wait_for_selector("text=with the motion or before the next run")
+        one.click("Write the campaign")
+        page.wait_for_url("**/conditions")
+    kept = read_campaign(session.campaign).runs[0].record
+    assert 1000 < kept.time_s.size < 1560
+    assert "stretches" in session.choices.read_text()
+
+
+def test_a_wrong_file_is_refused_in_the_words_of_the_command(
+    browser: Any, served: Bench, tmp_path: Path
+) -> None:
+    wrong = tmp_path / "notes.csv"
+    wrong.write_text("nothing but words\n" * 40)
+    with tab(browser, served) as one:
+        one.page.set_input_files("input[type=file]", [str(wrong)])
+        one.page.wait_for_url("**/notes/records")
+        line = one.page.get_by_role("alert").filter(has_text="tunnel: ").first.inner_text()
+        assert line.startswith("tunnel: ")
+        assert "notes.csv" in line
+        one.click("Write the campaign")
+        one.page.wait_for_selector("text=the files cannot be read yet")
+    assert not (served.folder / "notes").exists()
+
+
+def test_a_large_upload_is_refused_before_it_is_stored(browser: Any, served: Bench, tmp_path: Path) -> None:
+    large = tmp_path / "large.csv"
+    with large.open("wb") as stream:
+        stream.truncate(200_000_000)
+    before = sorted(served.folder.iterdir())
+    with tab(browser, served) as one:
+        one.page.set_input_files("input[type=file]", [str(large)])
+        one.page.wait_for_selector("text=200 MB are more than the 134 MB of an upload")
+        cookies = "; ".join(f"{c['name']}={c['value']}" for c in one.context.cookies())
+        uploads = [url for url in one.requests if "/upload/" in url]
+    assert uploads == []
+    # A browser that does not check: the server refuses by the length, and reads nothing.
+    connection = http.client.HTTPConnection(served.base.removeprefix("http://"), timeout=30)
+    connection.putrequest("POST", "/_nicegui/client/x/upload/1")
+    connection.putheader("Cookie", cookies)
+    connection.putheader("Content-Length", str(UPLOAD_BYTES + 1))
+    connection.endheaders()
+    answer = connection.getresponse()
+    assert (answer.status, answer.read().count(b"\n")) == (413, 1)
+    assert sorted(served.folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("headers", [{}, {"Origin": "http://evil.example"}, {"Host": "evil.example"}])
+def test_nobody_else_is_answered(served: Bench, headers: dict[str, str]) -> None:
+    for path in (
+        "/",
+        "/two/records",
+        "/two/report.html",
+        "/static/bench/bench.css",
+        "/_nicegui_ws/socket.io/",
+    ):
+        connection = http.client.HTTPConnection(served.base.removeprefix("http://"), timeout=30)
+        connection.request("GET", path, headers=headers)
+        assert connection.getresponse().status in (403, 421)
+    assert served.address.startswith("http://127.0.0.1:")
+
+
+def test_conditions_are_typed_pasted_checked_and_saved(browser: Any, served: Bench) -> None:
+    session = Session(served.folder, "two")
+    with tab(browser, served) as one:
+        page = one.page
+        one.open("/two/conditions")
+        page.dblclick("[row-id=a] [col-id=wind_speed]")
+        page.keyboard.press("Control+a")
+        page.keyboard.type("12")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("[row-id=a] [col-id=air_density].wrong")
+        page.wait_for_selector("text=tunnel: run 'a': wind-on without air_density")
+        assert page.get_by_text("3 Identify").get_attribute("aria-disabled") == "true"
+        one.open("/two/conditions")  # what is wrong is kept too
+        page.wait_for_selector("[row-id=a] [col-id=air_density].wrong")
+        page.evaluate("navigator.clipboard.writeText('16.12\\t1.2\\n44,84\\t1.3')")
+        page.click("[row-id=a] [col-id=spring_stiffness]")
+        page.keyboard.press("Control+v")
+        page.wait_for_selector("text=Continue: Identify")
+    found = read_campaign(session.campaign).runs
+    assert [(run.spring_stiffness, run.wind_speed, run.air_density) for run in found] == [
+        (16.12, 12.0, 1.2),
+        (44.84, 0.0, 1.3),
+    ]
+
+
+def test_two_tabs_of_one_campaign_do_not_undo_each_other(browser: Any, served: Bench) -> None:
+    shutil.copytree(served.folder / "two", served.folder / "both")
+    with tab(browser, served) as one, tab(browser, served) as two:
+        for opened in (one, two):
+            opened.open("/both/conditions")
+            opened.page.wait_for_selector(".ag-row")
+        for opened, name, text in ((one, "width [m]", "0.2"), (two, "frontal area A [m²]", "0.03")):
+            field = opened.page.get_by_label(name)
+            field.fill(text)
+            field.press("Tab")
+            opened.page.wait_for_timeout(1500)
+    found = read_campaign(served.folder / "both").rig
+    assert (found.width, found.frontal_area) == (0.2, 0.03)
+
+
+def test_two_tabs_do_not_mix(browser: Any, served: Bench) -> None:
+    shutil.copytree(served.folder / "two", served.folder / "other")
+    with tab(browser, served) as one, tab(browser, served) as two:
+        one.open("/two/conditions")
+        two.open("/other/conditions")
+        for opened, text in ((one, "0.5"), (two, "0.7")):
+            field = opened.page.get_by_label("reference length l [m]")
+            field.fill(text)
+            field.press("Tab")
+        for opened, text in ((one, "0.5"), (two, "0.7")):
+            opened.page.wait_for_function("document.activeElement && true")
+            opened.open(opened.page.url.removeprefix(served.base))
+            assert opened.page.get_by_label("reference length l [m]").input_value() == text
+
+
+PAGES = ("/", "/try", "/two/records", "/two/conditions", "/two/identify", "/two/diagnose", "/two/next-run")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_every_page_can_be_read_at_every_width(browser: Any, served: Bench, scheme: str) -> None:
+    session = Session(served.folder, "two")
+    _diagnosed(session)
+    with tab(browser, served, color_scheme=scheme) as one:
+        for path in PAGES:
+            one.open(path)
+            one.page.wait_for_timeout(700)
+            for width in (390, 1280, 2560):
+                one.page.set_viewport_size({"width": width, "height": 900})
+                wide, seen = one.page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
+                assert wide <= seen, (path, width)
+            pairs = one.page.evaluate(CONTRASTS)
+            assert len(pairs) > 5, path
+            assert [pair for pair in pairs if pair[1] < LEAST_CONTRAST] == [], path
+            assert one.page.evaluate(NAMELESS) == [], path
+
+
+NAMELESS = """() => [...document.querySelectorAll(
+  "button, a, input, textarea, select, [role=slider], [role=img], iframe, nav")].filter((one) => {
+  if (!one.checkVisibility() || one.closest(".ag-root-wrapper, .u-legend")) return false;
+  const label = one.id && document.querySelector(`label[for="${one.id}"]`);
+  return !(one.getAttribute("aria-label") || one.title || one.textContent.trim() || label || one.closest("label")
+    || one.closest("[aria-label]"));
+}).map((one) => one.outerHTML.slice(0, 200))"""
+
+
+def _diagnosed(session: Session) -> None:
+    """A diagnosis written by hand, as if it were of this campaign."""
+    write_json(session.estimate("output_error"), {**ESTIMATE, "campaign": session.name})
+    given = document() | {"campaign": session.name}
+    given["provenance"] = {"versions": {}, "sha256": file_hashes(session.campaign)}
+    write_json(session.diagnosis, given)
+    assert campaign().runs
+
+
+ESTIMATE = {
+    "estimator": "output_error", "cn_beta": None, "cn_r": None, "yaw_inertia": None, "mechanical_damping": None,
+    "statuses": ["ok"], "remarks": [], "runs": [],
+}  # fmt: skip

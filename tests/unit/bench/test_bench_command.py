@@ -1,0 +1,58 @@
+"""The command that starts the bench. Truth: how the command line ends with bad input."""
+
+from __future__ import annotations
+
+import importlib.util
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tunnel_lab import cli
+
+
+@pytest.mark.parametrize(("module", "said"), [("nicegui", "[bench]"), ("fcntl", "needs Linux or macOS")])
+def test_what_is_missing_is_said_in_one_line(
+    module: str,
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+) -> None:
+    real = importlib.util.find_spec
+
+    def find(name: str, *rest: Any) -> Any:
+        return None if name == module else (real(name, *rest) or True)
+
+    monkeypatch.setattr(importlib.util, "find_spec", find)
+    assert cli.main(["bench", str(tmp_path / "new")]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith("tunnel: tunnel bench: ")
+    assert said in err
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_port_that_is_taken_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("nicegui")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        words = [
+            sys.executable,
+            "-m",
+            "tunnel_lab.cli",
+            "bench",
+            str(tmp_path),
+            "--port",
+            port,
+            "--no-browser",
+        ]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"tunnel: --port {port}: cannot be had")
+    assert done.stderr.count("\n") == 1

@@ -1,0 +1,56 @@
+"""Which stages are open. Truth: the files of a session, made one after another."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+from tests.unit.importing.import_files import decay
+from tunnel_lab.bench.stages import STAGES, closed
+from tunnel_lab.bench.workspace import Session
+from tunnel_lab.terminal.given_campaign import file_hashes
+from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
+
+
+def open_stages(session: Session) -> list[str]:
+    return [stage.key for stage in STAGES if not closed(session, stage.key)]
+
+
+def test_each_stage_opens_the_next(tmp_path: Path) -> None:
+    session = Session(tmp_path, "rig")
+    assert open_stages(session) == ["records"]
+    run = Run("a", Record(*decay()), 0.0)
+    write_campaign(Campaign("rig", RigProperties(), SensorProperties(), (run,)), session.campaign)
+    assert open_stages(session) == ["records", "conditions", "identify"]
+    session.draft.write_text("{}")
+    assert closed(session, "identify").startswith("Correct the conditions")
+    session.draft.unlink()
+    session.estimate("output_error").write_text("{}")
+    assert open_stages(session)[-1] == "diagnose"
+    document = {"provenance": {"sha256": file_hashes(session.campaign)}}
+    session.diagnosis.write_text(json.dumps(document))
+    assert open_stages(session) == [stage.key for stage in STAGES]
+    # The campaign changes: what was found is of another one.
+    text = (session.campaign / "campaign.toml").read_text()
+    (session.campaign / "campaign.toml").write_text(
+        text.replace("wind_speed = 0.0", "wind_speed = 0.0, spring_stiffness = 16.0")
+    )
+    later = session.estimate("output_error").stat().st_mtime_ns + 1_000_000
+    os.utime(session.campaign / "campaign.toml", ns=(later, later))
+    assert open_stages(session)[-1] == "identify"
+    os.utime(session.estimate("output_error"), ns=(later + 1, later + 1))
+    assert open_stages(session)[-1] == "diagnose"
+    assert closed(session, "report") == "Diagnose the campaign first."
+
+
+def test_an_estimate_that_failed_does_not_open_the_diagnosis(tmp_path: Path) -> None:
+    session = Session(tmp_path, "rig")
+    run = Run("a", Record(*decay()), 0.0)
+    write_campaign(Campaign("rig", RigProperties(), SensorProperties(), (run,)), session.campaign)
+    session.estimate("output_error").write_text("{}")
+    words = "$ tunnel identify rig (process 1, started 2026-01-01T00:00:00+00:00)"
+    session.log("output_error").write_text(f"{words}\nexit status 1\n")
+    assert "could not be identified" in closed(session, "diagnose")

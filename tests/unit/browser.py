@@ -1,0 +1,61 @@
+"""A real browser: the system's Chromium by Playwright, where there are both."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from typing import Any
+
+import pytest
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+IN_A_BROWSER = [
+    pytest.mark.skipif(find_spec("playwright") is None, reason="there is no Playwright"),
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium"),
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),  # of Playwright's own pipes
+]
+LEAST_CONTRAST = 4.5
+"""Of a text with what is behind it: WCAG 2, level AA."""
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """The browser; it ends with the context."""
+    from playwright import sync_api
+
+    with sync_api.sync_playwright() as playwright:
+        # Chromium's own sandbox does not start for root.
+        arguments = ["--no-sandbox"] if os.getuid() == 0 else []
+        found = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
+        yield found
+        found.close()
+
+
+CONTRASTS = """() => {
+  const light = (text) => {
+    const most = text.startsWith("color(") ? 1 : 255;
+    const [r, g, b] = text.match(/[\\d.]+/g).map((v) => Number(v) / most).map(
+      (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const behind = (element) => {
+    for (let one = element; one; one = one.parentElement) {
+      const found = getComputedStyle(one).backgroundColor;
+      if (!found.endsWith(", 0)")) return found;
+    }
+    return getComputedStyle(document.body).backgroundColor;
+  };
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
+  for (let node = walker.nextNode(); node; node = walker.nextNode()) {
+    const parent = node.parentElement;
+    if (!node.textContent.trim() || !parent.checkVisibility() || parent.closest("script, option")) continue;
+    const style = getComputedStyle(parent);
+    const levels = [light(parent.closest("svg") ? style.fill : style.color), light(behind(parent))].sort();
+    found.push([node.textContent, (Math.max(...levels) + 0.05) / (Math.min(...levels) + 0.05)]);
+  }
+  return found;
+}"""
+"""Every text that is shown, with its contrast."""

@@ -1,0 +1,125 @@
+"""Who may use the bench: this machine's user, from the address that the command printed.
+
+Every request and every websocket must name this server as its host, must come from a page of it where the browser
+says where it comes from, and must carry the token: in the address at first, then in a cookie.
+"""
+
+from __future__ import annotations
+
+import hmac
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from urllib.parse import parse_qsl, urlencode
+
+from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from starlette.types import ASGIApp, Receive, Scope, Send
+
+_HEADERS = [(b"content-type", b"text/plain; charset=utf-8"), (b"cache-control", b"no-store")]
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a request is not answered.
+
+    Args:
+        status: of HTTP (count).
+        words: one line.
+    """
+
+    status: int
+    words: str
+
+
+class Guard:
+    """Lets only the bench's own pages through.
+
+    Args:
+        app: what is guarded.
+        port: of the server (count).
+        token: secret of this start of the server.
+    """
+
+    def __init__(self, app: ASGIApp, port: int, token: str) -> None:
+        self._app = app
+        self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
+        self._token = token
+        self._cookie = f"tunnel-bench-{port}"  # cookies do not distinguish ports
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+        query = dict(parse_qsl(scope.get("query_string", b"").decode("latin-1")))
+        refusal = self._refusal(headers, query)
+        if refusal is not None:
+            await _refuse(scope, send, refusal)
+        elif "token" in query and scope["type"] == "http" and scope["method"] == "GET":
+            await self._welcome(scope, query, send)
+        else:
+            await self._app(scope, receive, send)
+
+    def _refusal(self, headers: Mapping[str, str], query: Mapping[str, str]) -> Refusal | None:
+        host, origin = headers.get("host", ""), headers.get("origin")
+        if host not in self._hosts:
+            return Refusal(
+                421, "This is the bench of another address; use the one that tunnel bench printed."
+            )
+        if origin is not None and origin != f"http://{host}":
+            return Refusal(403, "The request comes from another page; use the bench itself.")
+        given = query.get("token") or _cookies(headers.get("cookie", "")).get(self._cookie, "")
+        if not hmac.compare_digest(given.encode(), self._token.encode()):
+            return Refusal(
+                403, "The token is missing or old; use the whole address that tunnel bench printed."
+            )
+        length = headers.get("content-length", "0")
+        if "transfer-encoding" in headers or not length.isdigit():
+            return Refusal(411, "The length of the request is not stated.")
+        if int(length) > UPLOAD_BYTES:
+            return Refusal(413, too_large(int(length)))
+        return None
+
+    async def _welcome(self, scope: Scope, query: dict[str, str], send: Send) -> None:
+        """Move the token from the address into a cookie, so that it is in no history or bookmark."""
+        rest = urlencode({name: value for name, value in query.items() if name != "token"})
+        place = f"{scope['path']}?{rest}" if rest else scope["path"]
+        cookie = f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+        found = [*_HEADERS, (b"location", _same_site(place)), (b"set-cookie", cookie.encode())]
+        await send({"type": "http.response.start", "status": 303, "headers": found})
+        await send({"type": "http.response.body", "body": b""})
+
+
+def too_large(size: int) -> str:
+    """Why an upload is refused.
+
+    Args:
+        size: of it, bytes.
+    """
+    return (
+        f"{size / 1e6:.0f} MB are more than the {UPLOAD_BYTES / 1e6:.0f} MB of an upload; "
+        "use tunnel import, or drop fewer files at a time"
+    )
+
+
+def _same_site(place: str) -> bytes:
+    """A path for a Location header: it cannot name another host."""
+    return ("/" + place.lstrip("/\\")).encode("ascii", "ignore")
+
+
+def _cookies(header: str) -> dict[str, str]:
+    pairs = (part.strip().partition("=") for part in header.split(";"))
+    return {name: value for name, _, value in pairs}
+
+
+async def _refuse(scope: Scope, send: Send, refusal: Refusal) -> None:
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": 1008, "reason": refusal.words[:120]})
+        return
+    headers = [*_HEADERS, (b"connection", b"close")]  # what is left of the request is not read
+    await send({"type": "http.response.start", "status": refusal.status, "headers": headers})
+    await send({"type": "http.response.body", "body": f"{refusal.words}\n".encode()})

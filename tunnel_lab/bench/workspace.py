@@ -1,0 +1,156 @@
+"""The files of the bench: campaigns in a folder, and beside each what belongs to it."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from pathlib import Path
+
+from tunnel_sim.vocabulary.errors import TunnelError, one_line
+
+CAMPAIGN_FILE = "campaign.toml"  # as in campaign_schema, which is slow to load
+_LONGEST = 80  # characters of a file name
+_RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # devices of Windows
+
+
+@dataclass(frozen=True)
+class Session:
+    """A campaign and the files beside it; the bench keeps no other state.
+
+    Args:
+        folder: the workspace.
+        name: of the campaign.
+    """
+
+    folder: Path
+    name: str
+
+    @property
+    def campaign(self) -> Path:
+        """Folder of the campaign, as every command takes it."""
+        return self.folder / self.name
+
+    @property
+    def imported(self) -> bool:
+        """Whether the campaign has been written."""
+        return (self.campaign / CAMPAIGN_FILE).is_file()
+
+    def state(self) -> tuple[tuple[str, int, int], ...]:
+        """What changes when a file of the campaign does: names, times and sizes (bytes)."""
+        files = sorted(path for path in self.campaign.rglob("*") if path.is_file())
+        return tuple((str(path), path.stat().st_mtime_ns, path.stat().st_size) for path in files)
+
+    @property
+    def uploads(self) -> Path:
+        """Folder of the files as they were dropped."""
+        return self._beside("uploads")
+
+    @property
+    def choices(self) -> Path:
+        """What was stated about the dropped files: a recipe, as ``tunnel import --recipe`` takes it."""
+        return self._beside("recipe.toml")
+
+    @property
+    def draft(self) -> Path:
+        """Conditions as typed that cannot be saved in the campaign yet."""
+        return self._beside("draft.json")
+
+    @property
+    def uncertainties(self) -> Path:
+        """Uncertainties of the inputs, as ``tunnel identify --uncertainties`` takes them."""
+        return self._beside("uncertainties.toml")
+
+    def estimate(self, estimator: str) -> Path:
+        """The estimate by an estimator, as ``tunnel identify --json`` writes it."""
+        return self._beside(f"{estimator}.json")
+
+    @property
+    def diagnosis(self) -> Path:
+        """The diagnosis, as ``tunnel diagnose --json`` writes it."""
+        return self._beside("diagnosis.json")
+
+    @property
+    def byline(self) -> Path:
+        """Author and notes of the report."""
+        return self._beside("byline.json")
+
+    @property
+    def report(self) -> Path:
+        """The report, one HTML page."""
+        return self._beside("report.html")
+
+    def log(self, work: str) -> Path:
+        """What a command in a process of its own has printed."""
+        return self._beside(f"{work}.log")
+
+    def _beside(self, ending: str) -> Path:
+        return self.folder / f"{self.name}.{ending}"
+
+
+def sessions(folder: Path) -> list[Session]:
+    """The sessions of a workspace, by name: campaigns, and dropped files that are not one yet.
+
+    Args:
+        folder: the workspace.
+    """
+    found = set()
+    for path in folder.iterdir():
+        if (path / CAMPAIGN_FILE).is_file():
+            found.add(path.name)
+        elif path.name.endswith(".uploads") and path.is_dir():
+            found.add(path.name.removesuffix(".uploads"))
+    return [Session(folder, name) for name in sorted(found) if name == safe_name(name)]
+
+
+def open_session(folder: Path, name: str) -> Session:
+    """A session by the name in an address.
+
+    Args:
+        folder: the workspace.
+        name: as the address has it.
+
+    Raises:
+        TunnelError: when there is no such session.
+    """
+    found = {session.name: session for session in sessions(folder)}
+    if name not in found:
+        raise TunnelError(
+            f"there is no campaign '{one_line(name, 60)}'",
+            where=str(folder),
+            remedy="choose one on the first page",
+        )
+    return found[name]
+
+
+def new_session(folder: Path, file_name: str) -> Session:
+    """A session for dropped files, with a name that nothing in the workspace has.
+
+    Args:
+        folder: the workspace.
+        file_name: of the first file.
+    """
+    stem = safe_name(Path(safe_name(file_name)).stem)
+    taken = {path.name.split(".")[0].lower() for path in folder.iterdir()}
+    names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
+    return Session(folder, next(name for name in names if name.lower() not in taken))
+
+
+def safe_name(text: str) -> str:
+    """A name that is a plain file of its folder on every system, whatever a browser sends.
+
+    Args:
+        text: a file name, or anything else.
+
+    Returns:
+        Letters, digits, ``_``, ``-``, ``+`` and single dots, at most 85 of them; never empty, hidden or a device.
+        A safe name stays as it is.
+    """
+    last = re.split(r"[/\\]", unicodedata.normalize("NFKC", text))[-1]
+    plain = re.sub(r"[^\w.+-]+", "_", last)
+    plain = re.sub(r"\.{2,}", ".", plain).strip("._-") or "file"
+    stem, dot, ending = plain.rpartition(".")
+    if dot and len(ending) < 10:
+        plain = f"{stem[: _LONGEST - 1 - len(ending)]}.{ending}"
+    plain = plain[:_LONGEST].strip("._-") or "file"
+    return f"file-{plain}" if _RESERVED.match(plain) else plain
