@@ -1,7 +1,7 @@
 """Draws campaigns for training: the reference simulator's plans and common forms of effects, in wider ranges.
 
-Rare forms and effects outside the vocabulary are never drawn; they are for tests. Sizes are not searched for in every
-campaign, as in a blind set: each form is scaled once, and its sizes scatter.
+Rare forms and effects outside the vocabulary are never drawn; they are for tests. Sizes are not searched for in
+every campaign, as in a blind set: each form is scaled once, and its sizes scatter.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from tunnel_lab.training.motions import motions_of
 from tunnel_reference.catalogue import Form, Group
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FORMS
 from tunnel_reference.severity import read_and_fit
 from tunnel_reference.terms import Motion
-from tunnel_lab.training.motions import motions_of
 
 SAMPLE_RATE = 250.0
 """Hz; the noise is reduced in proportion to the root of the rate, so that as much is known as at 1000 Hz."""
@@ -27,7 +27,9 @@ ROD = "rod_flexibility"
 _MIXTURE = Mixture(textbook=0.4, rare=0.0)
 _UNIT = 3.0  # excess at which the forms are scaled
 _ROUNDS = 3
-_LOST = {f"dropped_samples/{n}_instant{s}": k / SAMPLE_RATE for n, s, k in (("one", "", 1), ("three", "s", 3))}
+_LOST = {
+    f"dropped_samples/{n}_instant{s}": k / SAMPLE_RATE for n, s, k in (("one", "", 1), ("three", "s", 3))
+}
 
 
 def draw_for_training(rng: np.random.Generator, sizes: Mapping[str, float]) -> CampaignDraw:

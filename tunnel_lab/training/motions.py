@@ -28,9 +28,7 @@ def motions_of(draws: Sequence[CampaignDraw], substeps: int) -> list[Motion]:
         found = dict(
             zip(rigid, integrate([bound[p][0] for p in rigid], terms, substeps=substeps), strict=True)
         )
-    return [
-        found[place] if place in found else flexible_motion(c) for place, (c, _) in enumerate(bound)
-    ]
+    return [found[place] if place in found else flexible_motion(c) for place, (c, _) in enumerate(bound)]
 
 
 def flexible_motion(c: Conditions) -> Motion:

@@ -1,7 +1,7 @@
 """Training samples: features of simulated campaigns and of their runs with the truth, in shards on disk.
 
-A shard is simulated together and depends on the seed, its part and its number only, so its bits do not depend on the
-number of processes. What is on disk already is not made again.
+A shard is simulated together and depends on the seed, its part and its number only, so its bits do not depend on
+the number of processes. What is on disk already is not made again.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import load_file, save
 
-from identification.campaign.derivatives import build_design
-from identification.neural.posterior.demodulated import demodulate
+from identification.campaign.derivatives import Design, build_design
+from identification.neural.posterior.demodulated import Demodulated, demodulate
 from identification.neural.posterior.features import Features, campaign_features, record_features
 from tunnel_lab.training.draw import draw_for_training
 from tunnel_lab.training.motions import motions_of
@@ -82,9 +82,9 @@ def write_shard(spec: ShardSpec, folder: Path) -> Path:
     return path
 
 
-def read_shards(folder: Path, part: str) -> dict[str, Array]:
-    """The samples of a part, shards in order, joined."""
-    shards = [load_file(path) for path in sorted(folder.glob(f"{part}-*.safetensors"))]
+def read_shards(folder: Path, part: str, count: int) -> dict[str, Array]:
+    """The samples of the first shards of a part, joined."""
+    shards = [load_file(folder / f"{part}-{number:04d}.safetensors") for number in range(count)]
     return {name: np.concatenate([shard[name] for shard in shards]) for name in shards[0]}
 
 
@@ -155,9 +155,9 @@ def reduced(
         families: effects that act.
         first_run: its number is that of the record, modulo the number of runs.
     """
-    labels = np.array([name in families for name in FAMILIES], dtype=np.float32)
+    labels = np.array([float(name in families) for name in FAMILIES])
     seen = [(run, demodulate(run.record)) for run in campaign.runs]
-    shown = [(run, one) for run, one in seen if one is not None]
+    shown = [(run, one) for run, one in seen if isinstance(one, Demodulated)]
     if not shown:
         return
     found = record_features([one for _, one in shown])
@@ -180,10 +180,10 @@ def reduced(
         yield _sample("c", whole, coefficients, labels)
 
 
-def _decay(coefficients: Array, spring: float, design: object) -> Array:
+def _decay(coefficients: Array, spring: float, design: Design) -> Array:
     """ζ and ωn of a run at small amplitude."""
     cn_beta, cn_r, inertia, damping = coefficients
-    load, drag = design.stiffness_loads[0], design.damping_loads[0]  # type: ignore[attr-defined]
+    load, drag = design.stiffness_loads[0], design.damping_loads[0]
     omega = np.sqrt((spring - load * cn_beta) / inertia)
     return np.array([(damping - drag * cn_r) / (2.0 * inertia * omega), omega])
 

@@ -1,4 +1,4 @@
-"""A record as windows of whole periods: logarithm of the envelope, phase, zero and two harmonics, with their weights.
+"""A record as windows of whole periods: envelope, phase, zero and two harmonics, with their weights.
 
 The record is thinned to block means. In every window a least-squares fit gives the complex amplitudes of the
 oscillation and of its second and third harmonic, and the mean. The deviations from one damped oscillation are
@@ -15,6 +15,8 @@ import numpy as np
 from identification.decay.decay_fit import Reading
 from identification.decay.first_guess import starting_frequency
 from identification.decay.thinning import block_means
+from identification.policy import LEAST_ENERGY
+from identification.status import Status
 from tunnel_sim.vocabulary.record import Array, Record
 
 WINDOWS = 32
@@ -44,6 +46,7 @@ class Demodulated:
         third: of the third harmonic, shape (w,).
         noise: standard deviation of a block mean within the windows, rad.
         samples: block means in each window, shape (w,).
+        block: samples in a block mean.
         fast_noise: noise between neighbouring samples of the record over that of white noise of the same level.
         duration: of the record, s.
     """
@@ -60,6 +63,7 @@ class Demodulated:
     third: Array
     noise: float
     samples: Array
+    block: int
     fast_noise: float
     duration: float
 
@@ -67,21 +71,23 @@ class Demodulated:
 @dataclass(frozen=True, eq=False)
 class _Windows:
     time: Array
-    amplitudes: Array  # complex, one column per harmonic, at the windows' middles, phases from the first sample
+    amplitudes: (
+        Array  # complex, one column per harmonic, at the windows' middles, phases from the first sample
+    )
     zero: Array
     samples: Array
     noise: float
 
 
-def demodulate(record: Record) -> Demodulated | None:
+def demodulate(record: Record) -> Demodulated | Status:
     """Reduce a record to windows.
 
     Returns:
-        The windows; None where nothing oscillates, or where fewer than four windows show an oscillation.
+        The windows; a status where nothing oscillates, or where fewer than four periods stand out of the noise.
     """
     frequency = starting_frequency(record)
     if frequency is None:
-        return None
+        return Status.NO_OSCILLATION
     reading, factor = block_means(Reading.from_record(record), frequency, _PER_CYCLE)
     peak = float(np.ptp(reading.yaw))
     omega, rate, span = 2.0 * np.pi * frequency, 0.0, float(reading.time[-1])
@@ -90,7 +96,7 @@ def demodulate(record: Record) -> Demodulated | None:
         last = number == _PASSES - 1
         windows = _fit_windows(reading, omega, rate, span, 3 if last else 1)
         if windows is None:
-            return None
+            return Status.TOO_FEW_CYCLES
         sizes = np.abs(windows.amplitudes[:, 0])
         if last:
             break
@@ -98,7 +104,7 @@ def demodulate(record: Record) -> Demodulated | None:
         falling, turning = _lines(windows, noise)
         omega, rate = omega + turning, falling
         if not (omega > 0.0 and np.isfinite(rate) and abs(rate) < omega):
-            return None
+            return Status.NO_OSCILLATION
         least = _SEEN * noise * np.sqrt(2.0 / windows.samples.mean())
         if rate > 0.0 and sizes[0] > least:
             span = min(float(reading.time[-1]), max(np.log(sizes[0] / least) / rate, 8.0 * np.pi / omega))
@@ -122,7 +128,7 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
     time, yaw = time[: edges[-1]][chosen], reading.yaw[: edges[-1]][chosen]
     sizes = sizes[kept]
     starts = np.concatenate(([0], np.cumsum(sizes)[:-1]))
-    middle = np.add.reduceat(time, starts) / sizes
+    middle: Array = np.add.reduceat(time, starts) / sizes
     decaying = np.exp(-rate * (time - middle[place]) + 1j * omega * time)
     columns, power = [np.ones_like(time)], np.ones_like(decaying)
     for _ in range(harmonics):
@@ -144,7 +150,7 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
     freedom = time.size - size * sizes.size
     noise = float(np.sqrt(residual @ residual / max(freedom, 1)))
     amplitudes = found[:, 1::2] - 1j * found[:, 2::2]
-    return _Windows(middle, amplitudes, found[:, 0], sizes.astype(np.float64), noise)
+    return _Windows(middle, np.asarray(amplitudes), np.asarray(found[:, 0], np.float64), sizes.astype(np.float64), noise)
 
 
 def _lines(windows: _Windows, noise: float) -> tuple[float, float]:
@@ -163,8 +169,8 @@ def _lines(windows: _Windows, noise: float) -> tuple[float, float]:
 
 def _relative(
     windows: _Windows, omega: float, rate: float, noise: float, record: Record, factor: int
-) -> Demodulated:
-    """Deviations from the oscillation of the last correction."""
+) -> Demodulated | Status:
+    """Deviations from the oscillation of the last correction; a status where the windows have no common phase."""
     first = windows.amplitudes[:, 0]
     weight = windows.samples * np.abs(first) ** 2
     logs = np.log(np.maximum(np.abs(first), 1e-300)) + rate * windows.time
@@ -173,6 +179,8 @@ def _relative(
     turned = first / line
     turned = turned * np.exp(-1j * float(np.angle(weight @ turned)))
     information = 0.5 * windows.samples * line**2 / noise**2
+    if np.abs(information @ turned) ** 2 < LEAST_ENERGY * information.sum():
+        return Status.NO_OSCILLATION  # noise has amplitudes in all windows, but no common phase
     clear = information > _LINEAR
     logarithm = np.where(clear, np.log(np.maximum(np.abs(turned), 1e-300)), np.clip(turned.real - 1.0, -3, 3))
     phase = np.where(clear, np.unwrap(np.angle(turned)), np.clip(turned.imag, -3.0, 3.0))
@@ -192,6 +200,7 @@ def _relative(
         third=windows.amplitudes[:, 2] / unit**3 / line,
         noise=noise,
         samples=windows.samples,
+        block=factor,
         fast_noise=fast / (noise * np.sqrt(factor)),
         duration=record.duration,
     )

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.campaign.derivatives import Design, derivatives
-from identification.neural.posterior.demodulated import Demodulated
-from identification.neural.posterior.rivals import SETS, Rivals, fit_rivals
-from identification.neural.posterior.shapes import Conditions, Windows, campaign_columns, record_columns
 from identification.estimate import PARAMETERS
+from identification.neural.posterior.demodulated import Demodulated
+from identification.neural.posterior.rivals import SETS, Mask, Rivals, fit_rivals
+from identification.neural.posterior.shapes import Conditions, Windows, campaign_columns, record_columns
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
 
@@ -46,10 +46,10 @@ class Features:
     runs: Array
     shifts: Array
     covariances: Array
-    valid: Array
+    valid: Mask
     values: Array
     stds: Array
-    known: Array
+    known: Mask
 
 
 def record_features(runs: Sequence[Demodulated]) -> list[tuple[Features, Rivals] | None]:
@@ -172,7 +172,7 @@ def _fit(windows: Sequence[Demodulated], values: Array, design: Array, columns: 
     )
 
 
-def _features(found: Rivals, moved: Array, jacobian: Array, known: Array, runs: Array) -> Features:
+def _features(found: Rivals, moved: Array, jacobian: Array, known: Mask, runs: Array) -> Features:
     covariances = jacobian @ found.covariances @ jacobian.T
     variances = np.where(known, np.diag(covariances[0]), 1.0)
     stds = np.sqrt(np.maximum(variances, 1e-300))
@@ -205,16 +205,17 @@ def _run_features(run: Demodulated, alone: Rivals, speed: float, away: Array, li
     root = np.sqrt(run.information)
     size = run.amplitude / run.amplitude[0]
     harmonics: list[float] = []
-    for harmonic, power in ((run.second, 1.0), (run.third, 2.0)):
+    # A sensor mounted the other way round changes the sign of the zero and of the second harmonic: it is left out.
+    for harmonic, power, fold in ((run.second, 1.0, abs), (run.third, 2.0, float)):
         pattern = root * size**power
         level = pattern @ (root * harmonic) / np.sqrt(pattern @ pattern)
         spread = float(np.mean(np.abs(root * harmonic) ** 2))
-        harmonics += [np.arcsinh(level.real), np.arcsinh(level.imag), np.log(0.5 * spread + 0.05)]
+        harmonics += [fold(np.arcsinh(level.real)), fold(np.arcsinh(level.imag)), np.log(0.5 * spread + 0.05)]
     centred = (run.zero - float(np.average(run.zero, weights=weight**2))) * weight
     remaining = np.log(alone.remaining / alone.freedom + 0.05)
     own = [
-        np.arcsinh(zero_time),
-        np.arcsinh(zero_size),
+        abs(float(np.arcsinh(zero_time))),
+        abs(float(np.arcsinh(zero_size))),
         float(np.log(np.mean(centred**2) + 0.05)),
         *harmonics,
         float(remaining[0]),

@@ -10,10 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.statistics.information import determined, inverse, scaled_solve
 from tunnel_sim.vocabulary.record import Array
 
+Mask = NDArray[np.bool_]
 SETS = (2, 3, 4)
 """Numbers of columns in the larger rivals, found by forward selection; one more rival has all columns."""
 _PRIOR = 1e-6  # least squares of a column's own fit over the prior variance of its effect: 1000 deviations
@@ -42,7 +44,7 @@ class Rivals:
     own: Array
     remaining: Array
     freedom: int
-    valid: Array
+    valid: Mask
 
 
 def fit_rivals(values: Array, design: Array, columns: Array, weights: Array, taken: int) -> Rivals | None:
@@ -79,18 +81,19 @@ def fit_rivals(values: Array, design: Array, columns: Array, weights: Array, tak
     shifts, covariances = [np.zeros(parameters.size)], [covariance]
     shifts += list((-moves * sizes).T)
     covariances += [
-        covariance + np.outer(move, move) / (share + _PRIOR) for move, share in zip(moves.T, alone, strict=True)
+        covariance + np.outer(move, move) / (share + _PRIOR)
+        for move, share in zip(moves.T, alone, strict=True)
     ]
     found_scores, remaining = [0.0, *scores], [total, *(total - scores**2)]
     places = forward(gram, aim, max(SETS))
-    everything = (np.flatnonzero(valid), _PRIOR_ALL)
-    for chosen, prior in [*((places[:number], _PRIOR) for number in SETS), everything]:
-        inner = gram[np.ix_(chosen, chosen)] + prior * np.eye(len(chosen))
+    sets = [(np.array(places[:number], dtype=np.intp), _PRIOR) for number in SETS]
+    for chosen, prior in [*sets, (np.flatnonzero(valid), _PRIOR_ALL)]:
+        inner = gram[np.ix_(chosen, chosen)] + prior * np.eye(chosen.size)
         solved = np.linalg.solve(inner, np.column_stack((aim[chosen], moves[:, chosen].T)))
         shifts.append(-moves[:, chosen] @ solved[:, 0])
         covariances.append(covariance + moves[:, chosen] @ solved[:, 1:])
         fall = float(aim[chosen] @ solved[:, 0])
-        found_scores.append(np.sqrt(max(fall, 0.0)))
+        found_scores.append(float(np.sqrt(max(fall, 0.0))))
         remaining.append(total - fall)
     return Rivals(
         parameters,

@@ -2,8 +2,8 @@
 
 By averaging over a cycle, a moment changes the decay rate or the frequency by an amount that depends on the
 amplitude as a power. A rival is such a power with a factor that says how it depends on spring, wind and frequency,
-a change of the reading that depends on the amplitude, or an exact change of a stated number. All windows of all runs
-are treated in one array.
+a change of the reading that depends on the amplitude, or an exact change of a stated number. All windows of all
+runs are treated in one array.
 """
 
 from __future__ import annotations
@@ -12,9 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.neural.posterior.demodulated import Demodulated
 from tunnel_sim.vocabulary.record import Array
+
+Places = NDArray[np.intp]
 
 _FLOOR = 0.02  # least amplitude over the first: smaller ones would make inverse powers of noise
 _POWERS = (-1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0)
@@ -43,7 +46,7 @@ class Conditions:
     stiffness_load: Array
     damping_load: Array
     speed: Array
-    spring: Array
+    spring: Places
     air: tuple[float, float]
 
 
@@ -52,8 +55,8 @@ class Windows:
     """The windows of all runs, one after the other; arrays of shape (w,), those by run of shape (runs,)."""
 
     runs: Sequence[Demodulated]
-    sizes: Array
-    run: Array
+    sizes: Places
+    run: Places
     omega: Array
     rate: Array
     time: Array
@@ -75,9 +78,7 @@ class Windows:
         begins = np.concatenate(([0], np.cumsum(sizes)[:-1]))
         steps = np.diff(time, prepend=0.0)
         steps[begins] = 0.0
-        table = np.stack(
-            [*(amplitude**power for power in _POWERS), share, 1.0 - np.exp(-_SETTLING * share)]
-        )
+        table = np.stack([*(amplitude**power for power in _POWERS), share, 1.0 - np.exp(-_SETTLING * share)])
         before = np.concatenate((table[:, :1], table[:, :-1]), axis=1)
         total = np.cumsum(0.5 * steps * (table + before), axis=1)
         total = total - total[:, begins][:, place]
@@ -96,9 +97,7 @@ class Windows:
 
     def stacked(self, logarithms: Sequence[Array], phases: Sequence[Array]) -> Array:
         """Columns of the logarithm alone and of the phase alone, run by run: shape (2 w, columns)."""
-        return self.joined(
-            [*((one, None) for one in logarithms), *((None, other) for other in phases)]
-        )
+        return self.joined([*((one, None) for one in logarithms), *((None, other) for other in phases)])
 
     def joined(self, columns: Sequence[tuple[Array | None, Array | None]]) -> Array:
         """Columns of logarithm and phase; within a run the logarithms of its windows come first."""
@@ -114,7 +113,7 @@ class Windows:
                 for a, b in zip(ends - self.sizes, ends, strict=True)
             ]
         )
-        return table.reshape(2 * self.time.size, -1)[order]
+        return np.asarray(table.reshape(2 * self.time.size, -1)[order])
 
 
 def _readings(w: Windows) -> list[tuple[Array | None, Array | None]]:
