@@ -22,12 +22,19 @@ from rich.table import Table
 from benchmarks.estimators import AMPLITUDE, records
 from identification import identify
 from identification.estimators.neural_posterior import NeuralPosterior
+from identification.neural.posterior.features import CAMPAIGN_NAMES, RECORD_NAMES
+from identification.neural.posterior.mixture import distribution
+from identification.neural.posterior.network import forward, variances
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+from tunnel_lab.training.fit import INPUTS, FitSpec, fit, losses, start_state, usable
+from tunnel_lab.training.samples import read_shards
 from tunnel_sim.files.campaign_io import read_campaign
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
 
 NAMES = ("cn_beta", "cn_r")
 MODERATE = (1.0, 10.0)  # excess over the noise power
+METHODS = ("output_error", "neural_posterior")
+BAND = 1.358  # of Kolmogorov's statistic times the root of the number
 FAR = 3.0  # stated standard deviations beyond which an estimate should have been refused
 Row = dict[str, Any]
 
@@ -73,6 +80,9 @@ def blind_rows(folder: Path, kinds: Sequence[str], weights: Path | None) -> Iter
         if truth["kind"] not in kinds:
             continue
         campaign = read_campaign(folder / name)
+        # The key knows the density to more digits than the campaign states, and the coefficients multiply it.
+        exact = truth["air_density"] / next(run.air_density for run in campaign.runs if run.wind_on)
+        truth |= {quantity: truth[quantity] * exact for quantity in NAMES}
         row: Row = {
             "campaign": f"{folder.name}/{name}",
             **{key: truth[key] for key in ("kind", "effects", "form", "severity")},
@@ -100,28 +110,54 @@ def blind_rows(folder: Path, kinds: Sequence[str], weights: Path | None) -> Iter
         yield row
 
 
+def calibration_rows(folder: Path, weights: Path | None) -> Iterator[Row]:
+    """The place of the truth in the posterior of every tuning sample, from 0 to 1: uniform if calibrated."""
+    networks = NeuralPosterior(weights).networks
+    for kind, names in (("record", RECORD_NAMES), ("campaign", CAMPAIGN_NAMES)):
+        samples = usable(read_shards(folder, "tuning", len(list(folder.glob("tuning-*")))), kind[0])
+        output = forward(np, networks[kind].weights, *(samples[name] for name in INPUTS))
+        stds = np.sqrt(variances(output, samples["widths"]))
+        target = samples["target"][:, None].astype(np.float64)
+        places = distribution(np.exp(output.logarithms), output.means, stds, target)[:, 0]
+        for place, known, labels in zip(places, samples["known"], samples["labels"], strict=True):
+            found = {name: float(one) for name, one, there in zip(names, place, known, strict=True) if there}
+            yield {"place": found, "effects": int(labels.sum())}
+
+
+def curve_rows(folder: Path, steps: int, weights: Path | None) -> Iterator[Row]:
+    """The loss on tuning samples of networks of a campaign, fitted to more and more shards."""
+    shards = len(list(folder.glob("training-*")))
+    apart = usable(read_shards(folder, "tuning", len(list(folder.glob("tuning-*")))), "c")
+    spec = FitSpec(steps=steps)
+    counts = sorted({max(1, shards // 4), max(1, shards // 2)})
+    for count in counts:
+        samples = usable(read_shards(folder, "training", count), "c")
+        start = start_state(samples, spec)
+        if count == counts[0]:
+            yield {"curve": 0, "loss": float(losses(np, start.weights, apart)[0])}
+        found = fit(samples, spec, start)
+        yield {"curve": len(samples["target"]), "loss": float(losses(np, found.weights, apart)[0])}
+    whole = len(usable(read_shards(folder, "training", shards), "c")["target"])
+    final = NeuralPosterior(weights).networks["campaign"].weights
+    yield {"curve": whole, "loss": float(losses(np, final, apart)[0])}
+
+
 def batch_milliseconds(weights: Path | None, count: int = 100) -> float:
-    """Processor time per record of a campaign of a hundred records of 10 s at 1 kHz."""
-    rng = np.random.default_rng(1)
+    """Processor time per record in a campaign of a hundred records of 20 s at 1 kHz."""
     runs = [campaign.runs[0] for _, _, campaign in records(6, 1)][:count]
-    thinned = tuple(replace(run, id=f"r{number}") for number, run in enumerate(runs))
-    campaign = Campaign("batch", *_rig(), thinned)
-    del rng
+    numbered = tuple(replace(run, id=f"r{number}") for number, run in enumerate(runs))
+    campaign = Campaign("batch", RigProperties(), SensorProperties(1000.0), numbered)
     estimator = NeuralPosterior(weights)
     estimator.estimate(campaign)
     begun = time.process_time()
     estimator.estimate(campaign)
-    return 1e3 * (time.process_time() - begun) / len(thinned)
-
-
-def _rig() -> tuple[Any, Any]:
-    from tunnel_sim.vocabulary.campaign import RigProperties, SensorProperties
-
-    return RigProperties(), SensorProperties(1000.0)
+    return 1e3 * (time.process_time() - begun) / len(numbered)
 
 
 def show_clean(console: Console, rows: Sequence[Row]) -> None:
     """RMSE over the bound by cell, and coverage over all."""
+    if not rows:
+        return
     cells: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
         cells[row["cell"]].append(row)
@@ -149,6 +185,8 @@ def share_std(values: Sequence[bool]) -> float:
 
 def show_blind(console: Console, rows: Sequence[Row]) -> None:
     """Median errors, coverage and refusals of both methods by kind of campaign."""
+    if not rows:
+        return
     groups = {
         "no effect": [r for r in rows if r["kind"] == "none"],
         "one effect, 1 to 10": [r for r in rows if r["kind"] == "single" and _moderate(r)],
@@ -198,7 +236,21 @@ def show_blind(console: Console, rows: Sequence[Row]) -> None:
         )
 
 
-METHODS = ("output_error", "neural_posterior")
+def show_calibration(console: Console, rows: Sequence[Row]) -> None:
+    """Coverage of central intervals, and the largest distance from a uniform distribution against its 95 % band."""
+    for name in (*RECORD_NAMES, *CAMPAIGN_NAMES) if rows else ():
+        places = np.sort([row["place"][name] for row in rows if name in row["place"]])
+        if not places.size:
+            continue
+        away = float(np.abs(np.arange(1, places.size + 1) / places.size - places).max())
+        held = {level: float(np.mean(np.abs(places - 0.5) < 0.5 * level)) for level in (0.5, 0.8, 0.95)}
+        console.print(
+            f"{name}: {places.size} samples; "
+            + ", ".join(
+                f"{100 * level:.0f} % intervals hold {100 * share:.1f} %" for level, share in held.items()
+            )
+            + f"; largest distance from uniform {away:.3f} (95 % band {BAND / np.sqrt(places.size):.3f})"
+        )
 
 
 def _moderate(row: Row) -> bool:
@@ -224,8 +276,11 @@ def kept(rows: Iterable[Row], path: Path) -> list[Row]:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("clean", "blind", "show"))
-    parser.add_argument("folders", nargs="*", type=Path, help="blind sets, or tables to show")
+    parser.add_argument("what", choices=("clean", "blind", "calibration", "curve", "show"))
+    parser.add_argument(
+        "folders", nargs="*", type=Path, help="blind sets, shards of a training, or tables to show"
+    )
+    parser.add_argument("--steps", type=int, default=1000, help="of each fit of the curve")
     parser.add_argument("--records", type=int, default=20, help="records in each of the 18 clean cells")
     parser.add_argument("--seed", type=int, default=1, help="of the clean records' noise")
     parser.add_argument("--kinds", default="none,single,outside", help="kinds of campaign of the blind sets")
@@ -240,6 +295,10 @@ def main() -> None:
     elif options.what == "clean":
         rows = kept(clean_rows(options.records, options.seed, options.weights), options.out)
         console.print(f"{batch_milliseconds(options.weights):.1f} ms per record in a batch of 100")
+    elif options.what == "calibration":
+        rows = kept(calibration_rows(options.folders[0], options.weights), options.out)
+    elif options.what == "curve":
+        rows = kept(curve_rows(options.folders[0], options.steps, options.weights), options.out)
     else:
         found = (
             row
@@ -247,11 +306,11 @@ def main() -> None:
             for row in blind_rows(folder, options.kinds.split(","), options.weights)
         )
         rows = kept(found, options.out)
-    clean = [row for row in rows if "cell" in row]
-    if clean:
-        show_clean(console, clean)
-    if len(clean) < len(rows):
-        show_blind(console, [row for row in rows if "cell" not in row])
+    show_clean(console, [row for row in rows if "cell" in row])
+    show_blind(console, [row for row in rows if "campaign" in row])
+    show_calibration(console, [row for row in rows if "place" in row])
+    for row in (row for row in rows if "curve" in row):
+        console.print(f"{row['curve']} campaigns in the training: loss {row['loss']:.3f}")
 
 
 if __name__ == "__main__":

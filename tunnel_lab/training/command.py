@@ -17,7 +17,7 @@ def train_posterior(out: Path, seed: int, shards: int, steps: int, *, jobs: int,
 
     Args:
         out: the safetensors file; the record is written beside it.
-        shards: of training samples, a hundred campaigns each.
+        shards: of training samples, two hundred campaigns each.
         steps: number of batches of each network.
         jobs: processes that simulate.
         restart: forget unfinished work.

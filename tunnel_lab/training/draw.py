@@ -45,6 +45,7 @@ def draw_for_training(rng: np.random.Generator, sizes: Mapping[str, float]) -> C
     effects = tuple(
         replace(
             effect,
+            extra={k: DURATION if k == "duration" else v for k, v in effect.extra.items()},
             value=_clipped(
                 effect.form,
                 sizes[label(effect.form)]
@@ -75,6 +76,7 @@ def at_low_rate(c: Conditions) -> Conditions:
         coloured_share=coloured / (white + coloured),
         noise_corner=min(c.noise_corner, 0.3 * SAMPLE_RATE),
         resolution=c.resolution * float(np.sqrt(share)),
+        air_density=round(c.air_density, 4),  # as the campaign will state it
         stamp_step=0.0,
         time_scale=1.0,
         moment_scale=1.0,
@@ -88,7 +90,7 @@ def _widened(rng: np.random.Generator, c: Conditions) -> Conditions:
         return c
     return replace(
         c,
-        mechanical_damping=float(np.exp(rng.uniform(np.log(0.003), np.log(0.05)))),
+        mechanical_damping=float(np.exp(rng.uniform(np.log(0.003), np.log(0.15)))),
         cn_beta=float(rng.uniform(-0.2, 0.8)),
         cn_r=float(-rng.uniform(0.0, 0.4)),
     )

@@ -31,8 +31,8 @@ class FitSpec:
 
     seed: int = 1
     steps: int = 4000
-    batch: int = 128
-    rate: float = 2e-3
+    batch: int = 64
+    rate: float = 1.5e-3
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
 
 PARTS = ("training", "tuning", "calibration")
-CAMPAIGNS = 100
+CAMPAIGNS = 200
 """Campaigns of a shard that are integrated together."""
 VARIANTS = 3
 """Readings of each campaign: of other noise levels, lengths and numbers of runs."""

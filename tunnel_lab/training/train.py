@@ -43,17 +43,17 @@ class TrainingSpec:
 
     Args:
         seed: of all random numbers.
-        shards: of training samples, a hundred campaigns each.
+        shards: of training samples, two hundred campaigns each.
         steps: number of batches of each network.
     """
 
     seed: int = 1
-    shards: int = 40
-    steps: int = 4000
+    shards: int = 20
+    steps: int = 2000
 
     def of_part(self, part: str) -> int:
         """Number of shards of a part."""
-        return self.shards if part == PARTS[0] else max(1, self.shards // 20)
+        return self.shards if part == PARTS[0] else max(1, self.shards // 10)
 
     @property
     def fit(self) -> FitSpec:
@@ -97,7 +97,7 @@ def train(
     parts = {part: read_shards(folder, part, spec.of_part(part)) for part in PARTS}
     networks = {kind: _fitted(kind, spec, parts[PARTS[0]], folder, tell) for kind in KINDS}
     found = {
-        kind: _judged(
+        kind: judged(
             networks[kind], usable(parts[PARTS[0]], _LETTERS[kind]), usable(parts[PARTS[2]], _LETTERS[kind])
         )
         for kind in KINDS
@@ -160,7 +160,7 @@ def contexts(weights: Mapping[str, Array], samples: Mapping[str, Array]) -> Arra
     return np.asarray(found.context, dtype=np.float64)
 
 
-def _judged(weights: dict[str, Array], samples: Mapping[str, Array], apart: Mapping[str, Array]) -> Trained:
+def judged(weights: dict[str, Array], samples: Mapping[str, Array], apart: Mapping[str, Array]) -> Trained:
     """The network with its threshold, from samples it was not fitted to."""
     seen = contexts(weights, samples)
     covariance = np.cov(seen.T)

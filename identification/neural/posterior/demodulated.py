@@ -150,7 +150,9 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
     freedom = time.size - size * sizes.size
     noise = float(np.sqrt(residual @ residual / max(freedom, 1)))
     amplitudes = found[:, 1::2] - 1j * found[:, 2::2]
-    return _Windows(middle, np.asarray(amplitudes), np.asarray(found[:, 0], np.float64), sizes.astype(np.float64), noise)
+    return _Windows(
+        middle, np.asarray(amplitudes), np.asarray(found[:, 0], np.float64), sizes.astype(np.float64), noise
+    )
 
 
 def _lines(windows: _Windows, noise: float) -> tuple[float, float]:

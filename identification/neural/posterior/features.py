@@ -14,15 +14,15 @@ import numpy as np
 from identification.campaign.derivatives import Design, derivatives
 from identification.estimate import PARAMETERS
 from identification.neural.posterior.demodulated import Demodulated
-from identification.neural.posterior.rivals import SETS, Mask, Rivals, fit_rivals
+from identification.neural.posterior.rivals import Mask, Rivals, fit_rivals
 from identification.neural.posterior.shapes import Conditions, Windows, campaign_columns, record_columns
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
 
 RECORD_NAMES = ("zeta", "omega_n")
 CAMPAIGN_NAMES = PARAMETERS
-MORE = len(SETS) + 2
-"""Rivals besides those of one column: the nominal model, the sets, and all columns together."""
+LEVEL = 2
+"""Column of a rival's features: the logarithm of its χ² over the freedom, and a little."""
 OWN = 20
 """Features of a run besides the significance of its rivals."""
 

@@ -8,11 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.estimate import Quantity
-from identification.neural.posterior.features import Features
+from identification.neural.posterior.features import LEVEL, Features
 from identification.neural.posterior.files import Trained
 from identification.neural.posterior.mixture import NORMAL_WIDTH, correlation, quantiles
 from identification.neural.posterior.network import forward, variances
 from tunnel_sim.vocabulary.record import Array
+
+
+_NOISY = float(
+    np.log(0.5)
+)  # of χ² over its freedom: less is a record with hardly any noise, which nothing contradicts
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +79,7 @@ def posteriors(samples: Sequence[Features], network: Trained) -> list[Posterior]
                 np.column_stack((low, high)),
                 related * np.outer(stds, stds),
                 dict(zip(network.effects, chances[place].tolist(), strict=True)),
-                bool(distances[place] > network.threshold),
+                bool(distances[place] > network.threshold and one.rivals[0, LEVEL] > _NOISY),
             )
         )
     return result

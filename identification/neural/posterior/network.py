@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.neural.posterior.rivals import MORE, SETS
 from tunnel_sim.vocabulary.record import Array
 
 Tensor = Any
@@ -22,7 +23,8 @@ Tensor = Any
 
 TOKEN, RUN, CONTEXT, HEAD = 32, 32, 128, 32
 _GAIN = 0.5  # greatest change of a rival's shift, as a share
-_CLIP = 12.0  # of standardised inputs
+_CLIP = 4.0  # of standardised inputs: those of records with hardly any noise lie far outside
+_ALLOWANCE = -6.0  # of a rival of one column: there are fifty of them, and their sizes are not known
 _SIZES = (-4.0, 9.0)  # of the logarithms of widths
 
 
@@ -68,7 +70,12 @@ def shapes(
         "head2": (HEAD, 4 + 2 * quantities),
         "effects": (CONTEXT, effects),
     }
-    found: dict[str, tuple[int, ...]] = {"names": (rivals, TOKEN), "own": (rivals, HEAD)}
+    found: dict[str, tuple[int, ...]] = {
+        "names": (rivals, TOKEN),
+        "own": (rivals, HEAD),
+        "evidence": (2,),
+        "allowance": (rivals,),
+    }
     for name, shape in layers.items():
         found |= {f"{name}.w": shape, f"{name}.b": shape[1:]}
     return found
@@ -119,7 +126,10 @@ def forward(
     along = xp.exp(xp.clip(found[..., 3:4] - 2.0, *_SIZES))
     extras = xp.exp(xp.clip(found[..., 4 : 4 + quantities] - 2.0, *_SIZES))
     means = shifts * (1.0 + _GAIN * xp.tanh(found[..., 1:2])) + extras * xp.tanh(found[..., 4 + quantities :])
-    logits = found[..., 0] - 1e9 * (1.0 - valid)
+    # Where the network adds nothing, a rival's weight follows from its significance, its χ² and its size.
+    evidence = xp.log(1.0 + 0.5 * xp.sinh(xp.clip(rivals[..., 0], -9.0, 9.0)) ** 2)
+    evidence = weights["evidence"][0] * evidence - weights["evidence"][1] * rivals[..., 3]
+    logits = found[..., 0] + evidence + weights["allowance"] - 1e9 * (1.0 - valid)
     top = xp.amax(logits, 1)[:, None]
     logarithms = logits - top - xp.log(xp.exp(logits - top).sum(1))[:, None]
     return Output(
@@ -137,11 +147,14 @@ def variances(output: Output, widths: Tensor) -> Tensor:
 
 
 def initial(sizes: Mapping[str, tuple[int, ...]], rng: np.random.Generator) -> dict[str, Array]:
-    """Weights before training: the nominal model has most of the weight, and rivals keep their widths."""
+    """Weights before training: rivals keep their shifts and widths, and their weights follow from their fits."""
     found = {}
     for name, shape in sizes.items():
         scale = np.sqrt(2.0 / shape[0]) if name.endswith(".w") else 0.5 if name in ("names", "own") else 0.0
         found[name] = scale * rng.standard_normal(shape)
     found["head2.w"] *= 0.1
     found["effects.w"] *= 0.1
+    found["evidence"][:] = 3.0, 8.0
+    found["allowance"][1:] = _ALLOWANCE
+    found["allowance"][-MORE + 1 :] = [_ALLOWANCE * number for number in (*SETS, 2 * SETS[-1])]
     return found

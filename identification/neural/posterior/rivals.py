@@ -18,6 +18,8 @@ from tunnel_sim.vocabulary.record import Array
 Mask = NDArray[np.bool_]
 SETS = (2, 3, 4)
 """Numbers of columns in the larger rivals, found by forward selection; one more rival has all columns."""
+MORE = len(SETS) + 2
+"""Rivals besides those of one column: the nominal model first; the sets and all columns together last."""
 _PRIOR = 1e-6  # least squares of a column's own fit over the prior variance of its effect: 1000 deviations
 _PRIOR_ALL = 1e-3  # the same where all columns act together
 

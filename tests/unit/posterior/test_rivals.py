@@ -86,7 +86,9 @@ def test_a_softening_spring_is_found_by_its_own_column():
     assert abs(nominal + found.shifts[square, 1]) < 4.0 * width < 0.5 * abs(nominal)
 
 
-@pytest.mark.parametrize(("seconds", "noise", "status"), [(1.0, 1e-3, Status.TOO_FEW_CYCLES), (10.0, 30.0, None)])
+@pytest.mark.parametrize(
+    ("seconds", "noise", "status"), [(1.0, 1e-3, Status.TOO_FEW_CYCLES), (10.0, 30.0, None)]
+)
 def test_what_shows_no_oscillation_has_a_status(seconds, noise, status):
     found = demodulate(record(np.random.default_rng(5), noise=noise, time=TIME[TIME < seconds]))
     assert isinstance(found, Status)
@@ -120,7 +122,9 @@ def test_the_best_step_is_where_it_is():
     assert isinstance(seen, Demodulated)
     jump = (np.arange(seen.time.size) > 6).astype(float)
     assert best_step(seen, 0.1 * seen.time + jump) == pytest.approx(jump)
-    assert Windows.of([seen, seen]).integrals[0.0][seen.time.size :] == pytest.approx(seen.time - seen.time[0])
+    assert Windows.of([seen, seen]).integrals[0.0][seen.time.size :] == pytest.approx(
+        seen.time - seen.time[0]
+    )
 
 
 def test_quantiles_are_those_of_the_distribution():
