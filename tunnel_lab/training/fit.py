@@ -53,6 +53,8 @@ class State:
 def usable(samples: Mapping[str, Array], kind: str) -> dict[str, Array]:
     """The samples of a kind whose target is not absurdly far from the nominal fit, without the kind's prefix."""
     own = {name[2:]: values for name, values in samples.items() if name.startswith(f"{kind}.")}
+    if not all(np.all(np.isfinite(values)) for values in own.values()):
+        raise ValueError("internal error: a training sample is not finite")
     near = np.abs(own["target"]).max(axis=1) < _FAR
     return {name: values[near] for name, values in own.items()}
 
@@ -118,8 +120,6 @@ def fit(
         rate = _rate(step, spec)
         with torch.no_grad():
             for name, gradient in zip(trained, gradients, strict=True):
-                if not math.isfinite(norm):
-                    continue
                 first[name].lerp_(shrink * gradient, 0.1)
                 second[name].lerp_((shrink * gradient) ** 2, 0.001)
                 move = first[name] / (1.0 - 0.9 ** (step + 1))

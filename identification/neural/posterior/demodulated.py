@@ -186,7 +186,8 @@ def _relative(
     clear = information > _LINEAR
     logarithm = np.where(clear, np.log(np.maximum(np.abs(turned), 1e-300)), np.clip(turned.real - 1.0, -3, 3))
     phase = np.where(clear, np.unwrap(np.angle(turned)), np.clip(turned.imag, -3.0, 3.0))
-    unit = first / np.maximum(np.abs(first), 1e-300)
+    # A window of equal readings, rounded coarsely, has no phase.
+    unit = np.where(first == 0.0, 1.0, first / np.maximum(np.abs(first), 1e-300))
     differences = np.diff(record.yaw_rad, n=2)
     fast = float(np.sqrt(np.mean(differences**2) / 6.0)) if differences.size else 0.0
     return Demodulated(

@@ -14,7 +14,6 @@ from identification.neural.posterior.mixture import NORMAL_WIDTH, correlation, q
 from identification.neural.posterior.network import forward, variances
 from tunnel_sim.vocabulary.record import Array
 
-
 _NOISY = float(
     np.log(0.5)
 )  # of χ² over its freedom: less is a record with hardly any noise, which nothing contradicts

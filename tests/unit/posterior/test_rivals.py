@@ -17,8 +17,8 @@ ZETA, OMEGA, NOISE = 0.01, 12.0, 1e-3
 TIME = np.arange(10_000) / 1000.0
 
 
-def record(rng=None, *, noise=NOISE, change=lambda time, yaw: yaw, time=TIME):
-    yaw = change(time, free_decay(time, Decay.from_modal(OMEGA, ZETA), 0.3, 0.2))
+def record(rng=None, *, noise=NOISE, change=None, time=TIME):
+    yaw = free_decay(time, Decay.from_modal(OMEGA, ZETA), 0.3, 0.2) if change is None else change(time)
     return Record(time, yaw + 0.02 + (0.0 if rng is None else noise * rng.standard_normal(time.size)))
 
 
@@ -73,8 +73,7 @@ def test_a_gap_costs_no_accuracy():
 def test_a_softening_spring_is_found_by_its_own_column():
     amplitude = 0.3 * np.exp(-ZETA * OMEGA * TIME)
 
-    def softening(time, yaw):  # the phase falls behind by the integral of the amplitude's square
-        del yaw
+    def softening(time):  # the phase falls behind by the integral of the amplitude's square
         lost = 0.05 * np.concatenate(([0.0], np.cumsum(amplitude[:-1] ** 2 * np.diff(time))))
         return amplitude * np.cos(OMEGA * np.sqrt(1.0 - ZETA**2) * time - lost)
 
@@ -90,7 +89,7 @@ def test_a_softening_spring_is_found_by_its_own_column():
     ("seconds", "noise", "status"), [(1.0, 1e-3, Status.TOO_FEW_CYCLES), (10.0, 30.0, None)]
 )
 def test_what_shows_no_oscillation_has_a_status(seconds, noise, status):
-    found = demodulate(record(np.random.default_rng(5), noise=noise, time=TIME[TIME < seconds]))
+    found = demodulate(record(np.random.default_rng(5), noise=noise, time=TIME[seconds > TIME]))
     assert isinstance(found, Status)
     assert status is None or found is status
 
