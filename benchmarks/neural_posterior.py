@@ -39,17 +39,17 @@ FAR = 3.0  # stated standard deviations beyond which an estimate should have bee
 Row = dict[str, Any]
 
 
-def unrefusing(weights: Path | None) -> NeuralPosterior:
+def unrefusing() -> NeuralPosterior:
     """The estimator with its refusals switched off, to see what it would have said."""
-    bold = NeuralPosterior(weights)
+    bold = NeuralPosterior()
     networks = {kind: replace(one, threshold=np.inf) for kind, one in bold.networks.items()}
     vars(bold)["networks"] = networks
     return bold
 
 
-def clean_rows(count: int, seed: int, weights: Path | None) -> Iterator[Row]:
+def clean_rows(count: int, seed: int) -> Iterator[Row]:
     """Damped sinusoids in white noise: errors over the bound, and whether the interval holds the truth."""
-    estimator = NeuralPosterior(weights)
+    estimator = NeuralPosterior()
     for (zeta, frequency, share, phase), number, campaign in records(count, seed):
         bound = damped_sinusoid_bound(
             campaign.runs[0].record.time_s, amplitude=AMPLITUDE, phase=phase, frequency=frequency, zeta=zeta,
@@ -72,9 +72,9 @@ def clean_rows(count: int, seed: int, weights: Path | None) -> Iterator[Row]:
         yield row
 
 
-def blind_rows(folder: Path, kinds: Sequence[str], weights: Path | None) -> Iterator[Row]:
+def blind_rows(folder: Path, kinds: Sequence[str]) -> Iterator[Row]:
     """Cnβ and Cnr of every campaign of a blind set by both methods."""
-    neural, bold = NeuralPosterior(weights), unrefusing(weights)
+    neural, bold = NeuralPosterior(), unrefusing()
     truths = json.loads((folder / "key.json").read_text())["truths"]
     for name, truth in truths.items():
         if truth["kind"] not in kinds:
@@ -110,9 +110,9 @@ def blind_rows(folder: Path, kinds: Sequence[str], weights: Path | None) -> Iter
         yield row
 
 
-def calibration_rows(folder: Path, weights: Path | None) -> Iterator[Row]:
+def calibration_rows(folder: Path) -> Iterator[Row]:
     """The place of the truth in the posterior of every tuning sample, from 0 to 1: uniform if calibrated."""
-    networks = NeuralPosterior(weights).networks
+    networks = NeuralPosterior().networks
     for kind, names in (("record", RECORD_NAMES), ("campaign", CAMPAIGN_NAMES)):
         samples = usable(read_shards(folder, "tuning", len(list(folder.glob("tuning-*")))), kind[0])
         output = forward(np, networks[kind].weights, *(samples[name] for name in INPUTS))
@@ -124,7 +124,7 @@ def calibration_rows(folder: Path, weights: Path | None) -> Iterator[Row]:
             yield {"place": found, "effects": int(labels.sum())}
 
 
-def curve_rows(folder: Path, steps: int, weights: Path | None) -> Iterator[Row]:
+def curve_rows(folder: Path, steps: int) -> Iterator[Row]:
     """The loss on tuning samples of networks of a campaign, fitted to more and more shards."""
     shards = len(list(folder.glob("training-*")))
     apart = usable(read_shards(folder, "tuning", len(list(folder.glob("tuning-*")))), "c")
@@ -138,16 +138,16 @@ def curve_rows(folder: Path, steps: int, weights: Path | None) -> Iterator[Row]:
         found = fit(samples, spec, start)
         yield {"curve": len(samples["target"]), "loss": float(losses(np, found.weights, apart)[0])}
     whole = len(usable(read_shards(folder, "training", shards), "c")["target"])
-    final = NeuralPosterior(weights).networks["campaign"].weights
+    final = NeuralPosterior().networks["campaign"].weights
     yield {"curve": whole, "loss": float(losses(np, final, apart)[0])}
 
 
-def batch_milliseconds(weights: Path | None, count: int = 100) -> float:
+def batch_milliseconds(count: int = 100) -> float:
     """Processor time per record in a campaign of a hundred records of 20 s at 1 kHz."""
     runs = [campaign.runs[0] for _, _, campaign in records(6, 1)][:count]
     numbered = tuple(replace(run, id=f"r{number}") for number, run in enumerate(runs))
     campaign = Campaign("batch", RigProperties(), SensorProperties(1000.0), numbered)
-    estimator = NeuralPosterior(weights)
+    estimator = NeuralPosterior()
     estimator.estimate(campaign)
     begun = time.process_time()
     estimator.estimate(campaign)
@@ -198,7 +198,7 @@ def show_blind(console: Console, rows: Sequence[Row]) -> None:
         "two to four effects": [r for r in rows if r["kind"] in ("pair", "three", "four")],
         "outside the vocabulary": [r for r in rows if r["kind"] == "outside"],
     }
-    table = Table(title="Median absolute error, % of the truth; 95 % intervals that hold the truth")
+    table = Table(title="Median absolute error, 1/rad; 95 % intervals that hold the truth")
     for head in (
         "campaigns",
         "number",
@@ -284,27 +284,20 @@ def main() -> None:
     parser.add_argument("--records", type=int, default=20, help="records in each of the 18 clean cells")
     parser.add_argument("--seed", type=int, default=1, help="of the clean records' noise")
     parser.add_argument("--kinds", default="none,single,outside", help="kinds of campaign of the blind sets")
-    parser.add_argument(
-        "--weights", type=Path, help="written by tunnel train; the packaged ones where absent"
-    )
     parser.add_argument("--out", type=Path, default=Path("neural-posterior.jsonl"), help="table to write")
     options = parser.parse_args()
     console = Console(width=150)
     if options.what == "show":
         rows = [json.loads(line) for path in options.folders for line in path.read_text().splitlines()]
     elif options.what == "clean":
-        rows = kept(clean_rows(options.records, options.seed, options.weights), options.out)
-        console.print(f"{batch_milliseconds(options.weights):.1f} ms per record in a batch of 100")
+        rows = kept(clean_rows(options.records, options.seed), options.out)
+        console.print(f"{batch_milliseconds():.1f} ms per record in a batch of 100")
     elif options.what == "calibration":
-        rows = kept(calibration_rows(options.folders[0], options.weights), options.out)
+        rows = kept(calibration_rows(options.folders[0]), options.out)
     elif options.what == "curve":
-        rows = kept(curve_rows(options.folders[0], options.steps, options.weights), options.out)
+        rows = kept(curve_rows(options.folders[0], options.steps), options.out)
     else:
-        found = (
-            row
-            for folder in options.folders
-            for row in blind_rows(folder, options.kinds.split(","), options.weights)
-        )
+        found = (row for folder in options.folders for row in blind_rows(folder, options.kinds.split(",")))
         rows = kept(found, options.out)
     show_clean(console, [row for row in rows if "cell" in row])
     show_blind(console, [row for row in rows if "campaign" in row])

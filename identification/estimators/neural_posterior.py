@@ -17,7 +17,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from identification.campaign.assembly import departures, filled, limits, statuses_of_runs
 from identification.campaign.derivatives import Derivatives, build_design, combine, loads
@@ -152,7 +152,7 @@ def _noise(seen: _Seen, sensor: SensorProperties) -> NoiseLevel:
     """The noise within the windows; the nominal fit's χ² says whether the model departs."""
     total, freedom = float(seen.alone.remaining[0]), seen.alone.freedom
     std = seen.windows.noise * float(np.sqrt(seen.windows.block))
-    departs = total > float(chi2.isf(MISFIT_RATE, freedom))
+    departs = total > float(chdtri(freedom, MISFIT_RATE))
     disagrees = False
     if sensor.noise_std is not None:
         stated = float(np.hypot(sensor.noise_std, (sensor.resolution or 0.0) / np.sqrt(12.0)))

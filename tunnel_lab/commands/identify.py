@@ -202,4 +202,4 @@ def with_weights(name: str, weights: Path | None) -> str | Estimator:
         raise TunnelError(f"{name} has no weights", where="--weights", remedy=remedy)
     from identification.estimators import make_estimator
 
-    return replace(cast("Any", make_estimator(name)), weights=weights)  # a dataclass with this setting
+    return cast("Estimator", replace(cast("Any", make_estimator(name)), weights=weights))

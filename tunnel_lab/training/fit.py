@@ -26,7 +26,7 @@ class FitSpec:
 
     Args:
         steps: number of batches.
-        rate: greatest learning rate; it falls to zero as a cosine.
+        rate: greatest learning rate, dimensionless; it falls to zero as a cosine.
     """
 
     seed: int = 1

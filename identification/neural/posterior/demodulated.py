@@ -9,8 +9,10 @@ the weight of a window.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.decay.decay_fit import Reading
 from identification.decay.first_guess import starting_frequency
@@ -136,7 +138,7 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
         columns += [power.real, power.imag]
     basis = np.stack(columns)
     size = len(basis)
-    upper = np.triu_indices(size)
+    upper = _upper(size)
     gram = np.empty((sizes.size, size, size))
     gram[:, upper[0], upper[1]] = np.add.reduceat(basis[upper[0]] * basis[upper[1]], starts, axis=1).T
     gram[:, upper[1], upper[0]] = gram[:, upper[0], upper[1]]
@@ -153,6 +155,12 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
     return _Windows(
         middle, np.asarray(amplitudes), np.asarray(found[:, 0], np.float64), sizes.astype(np.float64), noise
     )
+
+
+@cache
+def _upper(size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Places of the upper triangle of a square matrix."""
+    return np.triu_indices(size)
 
 
 def _lines(windows: _Windows, noise: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from tunnel_sim.vocabulary.record import Array
 
 LEVELS = (0.025, 0.5, 0.975)
 NORMAL_WIDTH = 3.92  # of a normal distribution's 95 % interval, in standard deviations
-_HALVINGS = 44
+_HALVINGS = 36
 _FAR = 12.0  # standard deviations beyond which no component has weight
 _NEGLIGIBLE = 1e-9  # weight of a component that moves no quantile
 

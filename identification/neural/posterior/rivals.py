@@ -82,10 +82,8 @@ def fit_rivals(values: Array, design: Array, columns: Array, weights: Array, tak
     total = float(rest @ rest)
     shifts, covariances = [np.zeros(parameters.size)], [covariance]
     shifts += list((-moves * sizes).T)
-    covariances += [
-        covariance + np.outer(move, move) / (share + _PRIOR)
-        for move, share in zip(moves.T, alone, strict=True)
-    ]
+    outer = moves.T[:, :, None] * moves.T[:, None, :]
+    covariances += list(covariance + outer / (alone + _PRIOR)[:, None, None])
     found_scores, remaining = [0.0, *scores], [total, *(total - scores**2)]
     places = forward(gram, aim, max(SETS))
     sets = [(np.array(places[:number], dtype=np.intp), _PRIOR) for number in SETS]

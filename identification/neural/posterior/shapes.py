@@ -31,14 +31,14 @@ SPRINGS = 4
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """What is stated of the runs, and what the nominal model makes of them; arrays of shape (runs,).
+    """What is stated of the runs, and what the nominal model makes of them.
 
     Args:
-        stiffness: Kr, N m/rad.
-        stiffness_load: ½ρV²·A·l, N m; 0 with the wind off.
-        damping_load: ½ρV·A·l², N m s; 0 with the wind off.
-        speed: V over the largest of the campaign; 0 with the wind off.
-        spring: number of its spring among those of the campaign, from the softest.
+        stiffness: Kr, shape (runs,), N m/rad.
+        stiffness_load: ½ρV²·A·l, shape (runs,), N m; 0 with the wind off.
+        damping_load: ½ρV·A·l², shape (runs,), N m s; 0 with the wind off.
+        speed: V as a ratio to the largest of the campaign, shape (runs,); 0 with the wind off.
+        spring: number of the spring among those of the campaign, from the softest, shape (runs,).
         air: Cnβ and Cnr of the nominal fit, 1/rad; 0 where there are none.
     """
 
@@ -52,7 +52,19 @@ class Conditions:
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """The windows of all runs, one after the other; arrays of shape (w,), those by run of shape (runs,)."""
+    """The windows of all runs, one after the other.
+
+    Args:
+        sizes: number of windows of each run, shape (runs,).
+        run: number of each window's run, shape (w,).
+        omega: angular frequency of each run, shape (runs,), rad/s.
+        rate: decay rate of each run, shape (runs,), 1/s.
+        time: shape (w,), s.
+        powers: of the amplitude, by exponent, shape (w,) each.
+        integrals: of these powers over time, by exponent, shape (w,) each.
+        drift: integral of the time as a share of the record, shape (w,), s.
+        settling: integral of a step that settles, shape (w,), s.
+    """
 
     runs: Sequence[Demodulated]
     sizes: Places
@@ -191,7 +203,14 @@ def _wind(w: Windows, c: Conditions) -> list[tuple[Array, Array]]:
 
 
 def best_step(run: Demodulated, values: Array) -> Array:
-    """The step, from 0 to 1, beside a straight line, that lowers χ² most; shape (w,)."""
+    """The step, from 0 to 1, beside a straight line, that lowers χ² most.
+
+    Args:
+        values: logarithm or phase, shape (w,), dimensionless.
+
+    Returns:
+        Shape (w,).
+    """
     weight, time = run.information, run.time - run.time[-1]
     # Sums over the windows from each one on: every step, and its products with the line and the values.
     terms = np.stack((weight, weight * time, weight * time**2, weight * values, weight * time * values))
