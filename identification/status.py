@@ -19,6 +19,7 @@ class Status(Enum):
         "use output_error"
     )
     OUTSIDE_TRAINING = "damping or frequency outside the networks' training range: use output_error"
+    UNLIKE_TRAINING = "unlike anything the network was trained on: use output_error, and run the diagnosis"
     RUN_LEFT_OUT = "a run could not be identified and was left out: see the status of the runs"
     REPEATED_RUN = (
         "the same samples as another run, so counted once: remove the run, or correct its file name"
@@ -65,6 +66,7 @@ _FAILED = (
     Status.NOT_DETERMINED,
     Status.TOO_FEW_CYCLES,
     Status.OUTSIDE_TRAINING,
+    Status.UNLIKE_TRAINING,
 )
 _GRAVITY = {status: rank for rank, status in enumerate(Status)}
 

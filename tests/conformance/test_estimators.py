@@ -25,6 +25,7 @@ ACCURACY = {
     "hilbert": 2e-5,
     "filter_error": 1e-6,
     "bayesian": 1e-6,
+    "neural_posterior": 1e-5,  # first order in the departures from its windows
 }
 
 each_estimator = pytest.mark.parametrize("name", ALL_ESTIMATORS)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 NAME = "identify"
 FEW_RUNS = 3
 """For up to this many runs the windows are shown by default."""
+WITH_WEIGHTS = ("neural_network", "neural_posterior")
 
 
 def run(
@@ -33,7 +35,7 @@ def run(
     weights: Annotated[
         Path | None,
         typer.Option(
-            "--weights", metavar="FILE", help="Networks written by tunnel train; for neural_network."
+            "--weights", metavar="FILE", help="Networks written by tunnel train, for the same estimator."
         ),
     ] = None,
     windows: Annotated[
@@ -196,9 +198,9 @@ def with_weights(name: str, weights: Path | None) -> str | Estimator:
 
     if weights is None:
         return name
-    if name != "neural_network":
-        remedy = "add --estimator neural_network, or leave it out"
+    if name not in WITH_WEIGHTS:
+        remedy = f"add --estimator {' or '.join(WITH_WEIGHTS)}, or leave it out"
         raise TunnelError(f"{name} has no weights", where="--weights", remedy=remedy)
-    from identification.estimators.neural_network import NeuralNetwork
+    from identification.estimators import make_estimator
 
-    return NeuralNetwork(weights)
+    return cast("Estimator", replace(cast("Any", make_estimator(name)), weights=weights))

@@ -1,9 +1,9 @@
-"""``tunnel train``: the paper's two networks, trained from a seed."""
+"""``tunnel train``: the networks of an estimator, trained from a seed."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -39,11 +39,25 @@ def run(
     linear: Annotated[
         bool, typer.Option("--linear", help="Give the second network t3 and ωn instead of their logarithms.")
     ] = False,
+    estimator: Annotated[
+        Literal["neural_network", "neural_posterior"],
+        typer.Option("--estimator", "-e", help="Whose networks to train."),
+    ] = "neural_network",
+    shards: Annotated[
+        int,
+        typer.Option("--shards", min=1, help="For neural_posterior: training campaigns, in two hundreds."),
+    ] = 20,
+    steps: Annotated[
+        int, typer.Option("--steps", min=1, help="For neural_posterior: number of batches of each network.")
+    ] = 2000,
+    jobs: Annotated[
+        int, typer.Option("--jobs", min=0, help="For neural_posterior: processes that simulate.")
+    ] = 2,
     restart: Annotated[
         bool, typer.Option("--restart", help="Start again instead of continuing an interrupted training.")
     ] = False,
 ) -> None:
-    """Train the paper's networks: 100-5-5-1 for ζ, 2-2-5-1 for ωn.
+    """Train networks: the paper's, 100-5-5-1 for ζ and 2-2-5-1 for ωn, or the posterior's.
 
     Full-batch Levenberg-Marquardt with Bayesian regularisation on impulse
     responses over the ranges given. Each network is trained from several random
@@ -55,10 +69,17 @@ def run(
     An interrupted training leaves OUT.part.safetensors; the same command continues
     from there and gives the same bits.
 
+    With --estimator neural_posterior, campaigns are drawn and simulated by the
+    reference simulator with effects in many forms, and two networks are fitted to
+    them: one for a record, one for a campaign. --zeta, --omega, --starts and the
+    steps of the paper's networks do not apply. Unfinished work is in the folder
+    OUT.part; it does not matter how many processes simulate.
+
     [bold]Examples[/bold]
       tunnel train mine.safetensors --seed 7
       tunnel train wide.safetensors --zeta 0.001 0.5 --omega 0.4 60
       tunnel identify c -e neural_network --weights mine.safetensors
+      tunnel train posterior.safetensors -e neural_posterior --shards 20
 
     [bold]Exit status[/bold]
       0 trained, 2 bad input, 130 interrupted (finished work is kept).
@@ -68,6 +89,11 @@ def run(
 
     if out.suffix != ".safetensors":
         _refuse(f"{out}", "does not end in .safetensors", "give the file this suffix")
+    if estimator == "neural_posterior":
+        from tunnel_lab.training.command import train_posterior
+
+        train_posterior(out, seed, shards, steps, jobs=jobs, restart=restart)
+        return
     _check_range("--zeta", zeta, 0.0, 0.95)
     _check_range("--omega", omega, 0.0, 1e4)
     data = DataSpec(zeta_range=zeta, omega_range=omega, frequency_scale=LINEAR if linear else LOGARITHMIC)

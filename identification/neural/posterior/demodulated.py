@@ -1,0 +1,217 @@
+"""A record as windows of whole periods: envelope, phase, zero and two harmonics, with their weights.
+
+The record is thinned to block means. In every window a least-squares fit gives the complex amplitudes of the
+oscillation and of its second and third harmonic, and the mean. The deviations from one damped oscillation are
+independent from window to window and nearly normal, so the fits that follow are linear. Missing samples only reduce
+the weight of a window.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.decay.decay_fit import Reading
+from identification.decay.first_guess import starting_frequency
+from identification.decay.thinning import block_means
+from identification.policy import LEAST_ENERGY
+from identification.status import Status
+from tunnel_sim.vocabulary.record import Array, Record
+
+WINDOWS = 32
+LEAST_WINDOWS = 4
+_PER_CYCLE = 24.0  # block means per period, at least
+_LEAST_SAMPLES = 12  # of a window: seven unknowns are fitted to it
+_PASSES = 3  # each demodulates with the decay of the one before
+_LINEAR = 50.0  # information below which the logarithm of a noisy amplitude is replaced by its linear part
+_ROUGH = 1e-6  # least noise over the swing: a hundred times the error of three passes
+_SEEN = 0.5  # amplitude over the noise of a window's amplitude, down to which the record is used
+
+
+@dataclass(frozen=True, eq=False)
+class Demodulated:
+    """A record's windows relative to the damped oscillation exp(−rate·t) cos(omega·t).
+
+    Args:
+        omega: damped angular frequency of the demodulation, rad/s.
+        rate: its decay rate, 1/s.
+        time: middles of the windows since the first sample, shape (w,), s.
+        logarithm: of the amplitude, less that of the oscillation, shape (w,).
+        phase: less that of the oscillation, shape (w,), rad.
+        information: inverse variance of either, shape (w,).
+        amplitude: of the oscillation, shape (w,), rad.
+        zero: mean of the reading, shape (w,), rad.
+        second: complex amplitude of the second harmonic over the amplitude, in its phase, shape (w,).
+        third: of the third harmonic, shape (w,).
+        noise: standard deviation of a block mean within the windows, rad.
+        samples: block means in each window, shape (w,).
+        block: samples in a block mean.
+        fast_noise: noise between neighbouring samples of the record over that of white noise of the same level.
+        duration: of the record, s.
+    """
+
+    omega: float
+    rate: float
+    time: Array
+    logarithm: Array
+    phase: Array
+    information: Array
+    amplitude: Array
+    zero: Array
+    second: Array
+    third: Array
+    noise: float
+    samples: Array
+    block: int
+    fast_noise: float
+    duration: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    time: Array
+    amplitudes: (
+        Array  # complex, one column per harmonic, at the windows' middles, phases from the first sample
+    )
+    zero: Array
+    samples: Array
+    noise: float
+
+
+def demodulate(record: Record) -> Demodulated | Status:
+    """Reduce a record to windows.
+
+    Returns:
+        The windows; a status where nothing oscillates, or where fewer than four periods stand out of the noise.
+    """
+    frequency = starting_frequency(record)
+    if frequency is None:
+        return Status.NO_OSCILLATION
+    reading, factor = block_means(Reading.from_record(record), frequency, _PER_CYCLE)
+    peak = float(np.ptp(reading.yaw))
+    omega, rate, span = 2.0 * np.pi * frequency, 0.0, float(reading.time[-1])
+    windows = None
+    for number in range(_PASSES):
+        last = number == _PASSES - 1
+        windows = _fit_windows(reading, omega, rate, span, 3 if last else 1)
+        if windows is None:
+            return Status.TOO_FEW_CYCLES
+        sizes = np.abs(windows.amplitudes[:, 0])
+        if last:
+            break
+        noise = max(windows.noise, _ROUGH * peak)
+        falling, turning = _lines(windows, noise)
+        omega, rate = omega + turning, falling
+        if not (omega > 0.0 and np.isfinite(rate) and abs(rate) < omega):
+            return Status.NO_OSCILLATION
+        least = _SEEN * noise * np.sqrt(2.0 / windows.samples.mean())
+        if rate > 0.0 and sizes[0] > least:
+            span = min(float(reading.time[-1]), max(np.log(sizes[0] / least) / rate, 8.0 * np.pi / omega))
+    assert windows is not None
+    return _relative(windows, omega, rate, max(windows.noise, _ROUGH * peak), record, factor)
+
+
+def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmonics: int) -> _Windows | None:
+    time = reading.time - reading.time[0]
+    count = int(np.clip(omega * span / (2.0 * np.pi), 0, WINDOWS))
+    if count < LEAST_WINDOWS:
+        return None
+    edges = np.searchsorted(time, np.linspace(0.0, span * (1.0 + 1e-12), count + 1))
+    sizes = np.diff(edges)
+    kept = sizes >= max(_LEAST_SAMPLES if harmonics > 1 else 5, 0)
+    if kept.sum() < LEAST_WINDOWS:
+        return None
+    place = np.repeat(np.arange(count), sizes)
+    chosen = kept[place]
+    place = (np.cumsum(kept) - 1)[place[chosen]]
+    time, yaw = time[: edges[-1]][chosen], reading.yaw[: edges[-1]][chosen]
+    sizes = sizes[kept]
+    starts = np.concatenate(([0], np.cumsum(sizes)[:-1]))
+    middle: Array = np.add.reduceat(time, starts) / sizes
+    decaying = np.exp(-rate * (time - middle[place]) + 1j * omega * time)
+    columns, power = [np.ones_like(time)], np.ones_like(decaying)
+    for _ in range(harmonics):
+        power = power * decaying
+        columns += [power.real, power.imag]
+    basis = np.stack(columns)
+    size = len(basis)
+    upper = _upper(size)
+    gram = np.empty((sizes.size, size, size))
+    gram[:, upper[0], upper[1]] = np.add.reduceat(basis[upper[0]] * basis[upper[1]], starts, axis=1).T
+    gram[:, upper[1], upper[0]] = gram[:, upper[0], upper[1]]
+    gram += 1e-12 * np.eye(size)
+    moment = np.add.reduceat(basis * yaw, starts, axis=1).T
+    try:
+        found = np.linalg.solve(gram, moment[..., None])[..., 0]
+    except np.linalg.LinAlgError:
+        return None
+    residual = yaw - (basis * found.T[:, place]).sum(axis=0)
+    freedom = time.size - size * sizes.size
+    noise = float(np.sqrt(residual @ residual / max(freedom, 1)))
+    amplitudes = found[:, 1::2] - 1j * found[:, 2::2]
+    return _Windows(
+        middle, np.asarray(amplitudes), np.asarray(found[:, 0], np.float64), sizes.astype(np.float64), noise
+    )
+
+
+@cache
+def _upper(size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Places of the upper triangle of a square matrix."""
+    return np.triu_indices(size)
+
+
+def _lines(windows: _Windows, noise: float) -> tuple[float, float]:
+    """Decay rate, and correction of the frequency."""
+    sizes = np.abs(windows.amplitudes[:, 0])
+    weight = windows.samples * np.maximum(sizes, noise) ** 2
+    weight[sizes < noise * np.sqrt(2.0 / windows.samples)] *= 1e-3
+    mean = float(weight @ windows.time / weight.sum())
+    centred = (windows.time - mean) * weight
+    spread = float(centred @ windows.time)
+    logarithm = np.log(np.maximum(sizes, 1e-300))
+    slope = float(centred @ logarithm) / spread
+    phase = np.unwrap(np.angle(windows.amplitudes[:, 0]))
+    return -slope, float(centred @ phase) / spread
+
+
+def _relative(
+    windows: _Windows, omega: float, rate: float, noise: float, record: Record, factor: int
+) -> Demodulated | Status:
+    """Deviations from the oscillation of the last correction; a status where the windows have no common phase."""
+    first = windows.amplitudes[:, 0]
+    weight = windows.samples * np.abs(first) ** 2
+    logs = np.log(np.maximum(np.abs(first), 1e-300)) + rate * windows.time
+    level = float(weight @ logs / weight.sum())
+    line = np.exp(level - rate * windows.time)
+    turned = first / line
+    turned = turned * np.exp(-1j * float(np.angle(weight @ turned)))
+    information = 0.5 * windows.samples * line**2 / noise**2
+    if np.abs(information @ turned) ** 2 < LEAST_ENERGY * information.sum():
+        return Status.NO_OSCILLATION  # noise has amplitudes in all windows, but no common phase
+    clear = information > _LINEAR
+    logarithm = np.where(clear, np.log(np.maximum(np.abs(turned), 1e-300)), np.clip(turned.real - 1.0, -3, 3))
+    phase = np.where(clear, np.unwrap(np.angle(turned)), np.clip(turned.imag, -3.0, 3.0))
+    # A window of equal readings, rounded coarsely, has no phase.
+    unit = np.where(first == 0.0, 1.0, first / np.maximum(np.abs(first), 1e-300))
+    differences = np.diff(record.yaw_rad, n=2)
+    fast = float(np.sqrt(np.mean(differences**2) / 6.0)) if differences.size else 0.0
+    return Demodulated(
+        omega=omega,
+        rate=rate,
+        time=windows.time,
+        logarithm=logarithm,
+        phase=phase,
+        information=information,
+        amplitude=line,
+        zero=windows.zero,
+        second=windows.amplitudes[:, 1] / unit**2 / line,
+        third=windows.amplitudes[:, 2] / unit**3 / line,
+        noise=noise,
+        samples=windows.samples,
+        block=factor,
+        fast_noise=fast / (noise * np.sqrt(factor)),
+        duration=record.duration,
+    )

@@ -1,0 +1,120 @@
+"""The trained networks as safetensors, with their record beside them as JSON, without pickle."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from identification.neural.posterior.network import shapes
+from tunnel_sim.files.reading import as_described, parse_json, read_regular
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+
+SHIPPED = "posterior"
+KINDS = ("record", "campaign")
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """One network with its threshold.
+
+    Args:
+        weights: as `network.shapes`, and the scalings.
+        centre: mean context of the training samples, shape (c,).
+        precision: inverse covariance of it, shape (c, c).
+        threshold: squared distance above which a sample is unlike anything trained on.
+        effects: names of the effects in the order of their probabilities.
+    """
+
+    weights: Mapping[str, Array]
+    centre: Array
+    precision: Array
+    threshold: float
+    effects: tuple[str, ...]
+
+    def distance(self, context: Array) -> Array:
+        """Squared Mahalanobis distance of contexts from the training samples, shape (b,)."""
+        away = context - self.centre
+        return np.asarray(np.einsum("bi,ij,bj->b", away, self.precision, away))
+
+
+def to_bytes(networks: Mapping[str, Trained]) -> bytes:
+    """Both networks as safetensors, in single precision."""
+    tensors: dict[str, Array] = {}
+    for kind in KINDS:
+        one = networks[kind]
+        values = {**one.weights, "unlike.centre": one.centre, "unlike.precision": one.precision}
+        tensors |= {
+            f"{kind}/{name}": np.ascontiguousarray(value, np.float32) for name, value in values.items()
+        }
+    return save(tensors)
+
+
+def read_trained(path: Path) -> dict[str, Trained]:
+    """Read networks that ``tunnel train`` wrote.
+
+    Args:
+        path: the safetensors file; its record is the ``.json`` of the same name beside it.
+
+    Raises:
+        TunnelError: when a file is missing or malformed, or the two do not belong together.
+    """
+    remedy = "name the .safetensors file that tunnel train wrote, with its .json beside it"
+    content = read_regular(path, limits.WEIGHTS_BYTES, missing=remedy, readable=remedy)
+    record = read_regular(path.with_suffix(".json"), limits.JSON_BYTES, missing=remedy, readable=remedy)
+    return trained_of(content, record, str(path))
+
+
+@cache
+def shipped() -> dict[str, Trained]:
+    """The packaged networks."""
+    folder = resources.files("identification") / "neural" / "weights"
+    weights = (folder / f"{SHIPPED}.safetensors").read_bytes()
+    return trained_of(weights, (folder / f"{SHIPPED}.json").read_bytes(), SHIPPED)
+
+
+def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, Trained]:
+    """Networks from the contents of their two files.
+
+    Raises:
+        TunnelError: when they are malformed, or do not belong together.
+    """
+    remedy = "train them again with tunnel train --estimator neural_posterior"
+    document = parse_json(record, where, remedy)
+    with as_described("not the weights and record of neural_posterior", where, remedy):
+        if document["weights_sha256"] != hashlib.sha256(weights).hexdigest():
+            raise TunnelError("weights and record do not belong together", where=where, remedy=remedy)
+        try:
+            tensors = load(weights)
+        except SafetensorError as error:
+            raise ValueError(error) from None
+        return {kind: _one(tensors, kind, document) for kind in KINDS}
+
+
+def _one(tensors: Mapping[str, Array], kind: str, document: Mapping[str, Any]) -> Trained:
+    own = {
+        name.removeprefix(f"{kind}/"): np.asarray(value, dtype=np.float64)
+        for name, value in tensors.items()
+        if name.startswith(f"{kind}/")
+    }
+    told = document["networks"][kind]
+    expected = shapes(
+        *(told["sizes"][name] for name in ("rivals", "features", "runs", "quantities", "effects"))
+    )
+    for name, shape in expected.items():
+        if own[name].shape != shape:
+            raise ValueError(name)
+    if not all(np.all(np.isfinite(value)) for value in own.values()):
+        raise ValueError(kind)
+    centre, precision = own.pop("unlike.centre"), own.pop("unlike.precision")
+    return Trained(own, centre, precision, float(told["threshold"]), tuple(document["effects"]))

@@ -1,0 +1,135 @@
+"""Windows and rivals against closed forms: the nominal fit, a known effect, and what must not matter."""
+
+import numpy as np
+import pytest
+
+from identification.decay.damped_oscillation import Decay, free_decay
+from identification.neural.posterior.demodulated import Demodulated, demodulate
+from identification.neural.posterior.features import record_features
+from identification.neural.posterior.mixture import distribution, quantiles
+from identification.neural.posterior.rivals import fit_rivals, forward
+from identification.neural.posterior.shapes import Windows, best_step
+from identification.status import Status
+from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+from tunnel_sim.vocabulary.record import Record
+
+ZETA, OMEGA, NOISE = 0.01, 12.0, 1e-3
+TIME = np.arange(10_000) / 1000.0
+
+
+def record(rng=None, *, noise=NOISE, change=None, time=TIME):
+    yaw = free_decay(time, Decay.from_modal(OMEGA, ZETA), 0.3, 0.2) if change is None else change(time)
+    return Record(time, yaw + 0.02 + (0.0 if rng is None else noise * rng.standard_normal(time.size)))
+
+
+def features(one):
+    found = record_features([demodulate(one)])[0]
+    assert found is not None
+    return found
+
+
+def test_a_decay_without_noise_is_found_exactly():
+    found, _ = features(record())
+    assert found.values == pytest.approx([ZETA, OMEGA], rel=1e-6)
+
+
+def test_the_nominal_fit_is_at_the_bound():
+    rng = np.random.default_rng(1)
+    bound = damped_sinusoid_bound(
+        TIME,
+        amplitude=float(np.hypot(0.3, (0.2 + ZETA * OMEGA * 0.3) / OMEGA)),
+        phase=0.0,
+        frequency=OMEGA / (2.0 * np.pi),
+        zeta=ZETA,
+        noise_std=NOISE,
+    )
+    away, stds = [], []
+    for _ in range(60):
+        found, _ = features(record(rng))
+        stds.append(found.stds)
+        away.append((found.values - [ZETA, OMEGA]) / found.stds)
+    # Nineteen windows of a record of 19.1 cycles, and the noise is not stated.
+    assert np.mean(stds, axis=0) == pytest.approx([bound.zeta, bound.omega_n], rel=0.08)
+    # 60 records know the root mean square to 9 %; four of their deviations.
+    assert np.sqrt(np.mean(np.square(away), axis=0)) == pytest.approx([1.0, 1.0], abs=0.37)
+
+
+def test_scale_and_time_do_not_matter():
+    one, _ = features(record(np.random.default_rng(2)))
+    plain = record(np.random.default_rng(2))
+    slower = Record(plain.time_s * 7.0 + 3.0, plain.yaw_rad * 0.1)
+    other, _ = features(slower)
+    assert other.values == pytest.approx([one.values[0], one.values[1] / 7.0], rel=1e-9)
+    assert other.rivals == pytest.approx(one.rivals, abs=1e-5)
+    assert other.runs == pytest.approx(one.runs, abs=1e-5)
+
+
+def test_a_gap_costs_no_accuracy():
+    kept = (TIME < 3.0) | (TIME > 3.4)
+    found, _ = features(record(np.random.default_rng(3), time=TIME[kept]))
+    assert np.all(np.abs(found.values - [ZETA, OMEGA]) < 5.0 * found.stds)
+
+
+def test_a_softening_spring_is_found_by_its_own_column():
+    amplitude = 0.3 * np.exp(-ZETA * OMEGA * TIME)
+
+    def softening(time):  # the phase falls behind by the integral of the amplitude's square
+        lost = 0.05 * np.concatenate(([0.0], np.cumsum(amplitude[:-1] ** 2 * np.diff(time))))
+        return amplitude * np.cos(OMEGA * np.sqrt(1.0 - ZETA**2) * time - lost)
+
+    found, _ = features(record(np.random.default_rng(4), change=softening))
+    nominal = (found.values[1] - OMEGA) / found.stds[1]
+    square = 1 + 6 + 4  # nominal, six powers of damping, the fifth power of stiffness
+    assert abs(nominal) > 40.0
+    width = float(np.sqrt(found.covariances[square, 1, 1]))
+    assert abs(nominal + found.shifts[square, 1]) < 4.0 * width < 0.5 * abs(nominal)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "noise", "status"), [(1.0, 1e-3, Status.TOO_FEW_CYCLES), (10.0, 30.0, None)]
+)
+def test_what_shows_no_oscillation_has_a_status(seconds, noise, status):
+    found = demodulate(record(np.random.default_rng(5), noise=noise, time=TIME[seconds > TIME]))
+    assert isinstance(found, Status)
+    assert status is None or found is status
+
+
+def test_a_rival_shifts_the_parameters_as_least_squares_does():
+    rng = np.random.default_rng(6)
+    design, columns = rng.standard_normal((40, 2)), rng.standard_normal((40, 3))
+    values, weights = rng.standard_normal(40), rng.uniform(0.5, 2.0, 40)
+    found = fit_rivals(values, design, columns, weights, 0)
+    root = np.sqrt(weights)[:, None]
+    for place in range(3):
+        both = np.column_stack((design, columns[:, place])) * root
+        solution = np.linalg.lstsq(both, values * root[:, 0], rcond=None)[0]
+        assert found.parameters + found.shifts[1 + place] == pytest.approx(solution[:2], rel=1e-4, abs=1e-6)
+        rest = values * root[:, 0] - both @ solution
+        assert found.remaining[1 + place] == pytest.approx(rest @ rest, rel=1e-4)
+        assert found.covariances[1 + place] == pytest.approx(np.linalg.inv(both.T @ both)[:2, :2], rel=1e-4)
+
+
+def test_forward_selection_takes_the_columns_that_matter():
+    rng = np.random.default_rng(7)
+    columns = rng.standard_normal((200, 8))
+    values = 3.0 * columns[:, 5] - 2.0 * columns[:, 1] + 0.1 * rng.standard_normal(200)
+    assert forward(columns.T @ columns, columns.T @ values, 2) == [5, 1]
+
+
+def test_the_best_step_is_where_it_is():
+    seen = demodulate(record(np.random.default_rng(8)))
+    assert isinstance(seen, Demodulated)
+    jump = (np.arange(seen.time.size) > 6).astype(float)
+    assert best_step(seen, 0.1 * seen.time + jump) == pytest.approx(jump)
+    assert Windows.of([seen, seen]).integrals[0.0][seen.time.size :] == pytest.approx(
+        seen.time - seen.time[0]
+    )
+
+
+def test_quantiles_are_those_of_the_distribution():
+    rng = np.random.default_rng(9)
+    weights = rng.dirichlet(np.ones(4), size=3)
+    means, stds = 5.0 * rng.standard_normal((3, 4, 2)), np.exp(rng.standard_normal((3, 4, 2)))
+    found = quantiles(weights, means, stds)
+    levels = np.broadcast_to(np.array([0.025, 0.5, 0.975])[None, :, None], found.shape)
+    assert distribution(weights, means, stds, found) == pytest.approx(levels, abs=1e-9)

@@ -1,0 +1,89 @@
+"""``tunnel train --estimator neural_posterior`` on a few short campaigns: resumed work and the same bits."""
+
+import json
+
+import numpy as np
+import pytest
+
+from identification import identify
+from identification.estimators.neural_posterior import NeuralPosterior
+from tests.reference.free_decays import TWELVE, campaign
+from tunnel_lab.cli import main
+from tunnel_reference.catalogue import Group
+from tunnel_reference.forms import FORMS
+
+WORDS = ["-e", "neural_posterior", "--shards", "1", "--steps", "4", "--jobs", "0"]
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Two campaigns of three seconds in a shard, and typical sizes of the effects."""
+    from tunnel_lab.training import draw, samples, train
+
+    sizes = {draw.label(form): form.start for form in FORMS if form.group is not Group.RARE}
+    monkeypatch.setattr(train, "sizes_at_unit_excess", lambda _seed: sizes)
+    monkeypatch.setattr(samples, "CAMPAIGNS", 2)
+    monkeypatch.setattr(draw, "DURATION", 4.0)
+    monkeypatch.setattr(train, "_KEPT_EVERY", 2)
+    return train
+
+
+@pytest.mark.slow
+def test_interrupted_training_gives_the_same_bits_and_its_weights_are_used(
+    small, tmp_path, monkeypatch, capsys
+):
+    whole, out = tmp_path / "whole.safetensors", tmp_path / "w.safetensors"
+    assert main(["train", str(whole), *WORDS]) == 0
+    steps = small.fit
+
+    def interrupted(samples, spec, state, **named):
+        if state.step == 2:
+            raise KeyboardInterrupt
+        return steps(samples, spec, state, **named)
+
+    monkeypatch.setattr(small, "fit", interrupted)
+    assert main(["train", str(out), *WORDS]) == 130
+    assert not out.exists()
+    monkeypatch.setattr(small, "fit", steps)
+    assert main(["train", str(out), "--seed", "2", *WORDS]) == 2
+    assert "--restart" in capsys.readouterr().err
+    assert main(["train", str(out), *WORDS]) == 0
+    assert out.read_bytes() == whole.read_bytes()
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [
+        ".json",
+        ".json",
+        ".safetensors",
+        ".safetensors",
+    ]
+    record = json.loads(out.with_suffix(".json").read_text())
+    assert record["networks"]["campaign"]["samples"]["training"] >= 2
+    found = identify(
+        campaign(TWELVE[:4], noise=5e-4, rng=np.random.default_rng(1)), NeuralPosterior(out), throw=False
+    )
+    assert found.estimator == "neural_posterior"
+
+
+def test_rare_and_outside_forms_are_never_drawn():
+    from tunnel_lab.training.draw import draw_for_training, label
+
+    sizes = {label(form): form.start for form in FORMS if form.group is not Group.RARE}
+    drawn = [draw_for_training(np.random.default_rng(seed), sizes) for seed in range(60)]
+    forms = {effect.form for one in drawn for effect in one.effects}
+    assert len(forms) > 20
+    assert all(form.group is not Group.RARE and form.family != "unknown" for form in forms)
+
+
+def test_the_flexible_rod_moves_as_the_reference_integrator_says():
+    from dataclasses import replace
+
+    from tunnel_lab.training.motions import flexible_motion
+    from tunnel_reference.conditions import Rod
+    from tunnel_reference.draw import draw_conditions, with_defaults
+    from tunnel_reference.integrator import integrate
+
+    stated = with_defaults(replace(draw_conditions(np.random.default_rng(1)), duration=0.3))
+    for held in (True, False):
+        c = replace(stated, rod=Rod(1e-4, 0.15, 0.01, 0.0, held))
+        exact, stepped = flexible_motion(c), integrate([c], [[]], substeps=20)[0]
+        assert np.abs(exact.angle - stepped.angle).max() < 1e-7
+        assert np.abs(exact.rate - stepped.rate).max() < 1e-4
