@@ -132,15 +132,11 @@ COMMANDS = (
     docs,
     doctor,
     schema,
-)
-"""Every command that is one function, in the order of the help."""
-
-WITHOUT_TABLES = (simulate, plot, export, view, render, docs, schema)
     bench,
 )
 """Every command that is one function, in the order of the help."""
 
-WITHOUT_TABLES = (simulate, plot, export, view, render, docs, bench)
+WITHOUT_TABLES = (simulate, plot, export, view, render, docs, schema, bench)
 
 for _command in COMMANDS:
     _wider = with_quiet if _command in WITHOUT_TABLES else with_format
