@@ -63,6 +63,10 @@ def test_what_is_known_far_worse_does_not_set_the_axis() -> None:
     axes = figure(3.0, 2.0).add_subplot()
     limit_to_known(axes, np.array([1.0, 2.0, 3.0, 90.0]), np.array([0.1, 0.1, 0.5, 40.0]))
     assert axes.get_ylim() == pytest.approx((0.8 - 0.16, 4.0 + 0.16))
+    limit_to_known(axes, np.array([1.0, np.nan, 2.0]), np.array([0.1, np.nan, 0.1]))
+    assert axes.get_ylim() == pytest.approx((0.8 - 0.07, 2.2 + 0.07))
+    limit_to_known(axes, np.array([np.nan]), np.array([np.nan]))
+    assert axes.get_ylim() == pytest.approx((0.8 - 0.07, 2.2 + 0.07))
 
 
 def test_no_windows_no_curves() -> None:
@@ -105,6 +109,17 @@ def test_errors_are_drawn_in_standard_deviations() -> None:
         pytest.approx([1.0]),
         pytest.approx([4.0]),
     ]
+
+
+def test_estimates_without_errors_are_drawn_empty(tmp_path: Path) -> None:
+    given = [SimpleNamespace(estimator="a", cn_beta=Quantity(0.5, 0.0, "1/rad"), cn_r=None)]
+    fig = plots.truth_figure(given, {"cn_beta": 0.5, "cn_r": -0.1})
+    assert plots.save(fig, tmp_path / "a.png").exists()
+
+
+def test_a_reading_that_does_not_move_has_a_figure(tmp_path: Path) -> None:
+    run = Run("r", Record(np.arange(100.0), np.zeros(100)), 0.0)
+    assert plots.save(plots.spectrum_figure((run,)), tmp_path / "a.png").exists()
 
 
 @pytest.mark.parametrize("ends", [(0.21, 0.9), (3.0, 70.0), (1e-6, 1e2)])

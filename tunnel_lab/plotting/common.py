@@ -66,6 +66,9 @@ def log_axis(axes: Axes, which: Literal["x", "y"]) -> None:
     """
     from matplotlib.ticker import FuncFormatter, LogFormatterMathtext, LogLocator, NullFormatter
 
+    least = axes.dataLim.minposx if which == "x" else axes.dataLim.minposy
+    if not np.isfinite(least):  # nothing is drawn that a logarithmic axis could show
+        return
     axis: Axis
     if which == "x":
         axes.set_xscale("log")
@@ -93,10 +96,13 @@ def limit_to_known(axes: Axes, values: Array, stds: Array) -> None:
     Their intervals cross the axis.
 
     Args:
-        values: shape (n,), in the axis' unit.
+        values: shape (n,), in the axis' unit; NaN where there is none.
         stds: their standard deviations, shape (n,), in the same unit.
     """
-    known = stds <= _WIDE * np.median(stds)
+    found = np.isfinite(values) & np.isfinite(stds)
+    if not found.any():
+        return
+    known = found & (stds <= _WIDE * np.median(stds[found]))
     low, high = np.min((values - 2.0 * stds)[known]), np.max((values + 2.0 * stds)[known])
     margin = 0.05 * (high - low) or 0.1 * abs(high) or 1.0
     axes.set_ylim(low - margin, high + margin)

@@ -76,7 +76,8 @@ def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
         The deviations. Their variance is that of the value less that of the mean, which has the value in it.
     """
     stds = np.array([quantity.std for quantity in quantities])
-    weights = np.maximum(stds, 1e-6 * stds.max() or 1.0) ** -2.0  # a value may be exact
+    least = 1e-6 * float(np.min(stds[stds > 0.0], initial=np.inf))
+    weights = np.maximum(stds, least if np.isfinite(least) else 1.0) ** -2.0  # a value may be exact
     mean = float(weights @ [quantity.value for quantity in quantities] / weights.sum())
     left = 1.0 / float(weights.sum())
     return [Quantity(q.value - mean, sqrt(max(q.std**2 - left, 0.0)), q.unit) for q in quantities]
