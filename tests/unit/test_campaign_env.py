@@ -38,7 +38,11 @@ def equal(first, second):
         np.testing.assert_array_equal(value, second[key])
 
 
-@pytest.mark.parametrize("arguments", [SHORT, QUICK_DIAGNOSIS], ids=["identification", "diagnosis"])
+@pytest.mark.parametrize(
+    "arguments",
+    [SHORT, {**SHORT, "simulation": "full"}, QUICK_DIAGNOSIS],
+    ids=["identification", "full", "diagnosis"],
+)
 def test_the_public_checkers_pass(arguments, recwarn):
     env = make(**arguments)
     check_env(env.unwrapped, skip_render_check=False)

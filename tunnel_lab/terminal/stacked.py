@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
@@ -35,16 +36,30 @@ def _unbroken(cell: object) -> int:
     return longest if longest <= PROSE else max(map(cell_len, str(cell).split()))
 
 
-def stacked(table: Table) -> str:
-    """A table row by row: its first cell, and below it the others with their headings; empty ones are left out."""
-    return "\n".join((str(table.title or ""), *_lines(table)))
+def stacked(table: Table, width: int) -> str:
+    """A table row by row: its first cell, and below it the others with their headings; empty ones are left out.
 
-
-def _lines(table: Table) -> Iterator[str]:
+    Args:
+        width: of the terminal, columns (count); sentences are wrapped, words are never broken.
+    """
     heads = [" ".join(str(column.header).split()) for column in table.columns]
-    room = max(map(cell_len, heads[1:]), default=0)
+    lines = [str(table.title or "")]
     for first, *others in zip(*(column.cells for column in table.columns), strict=True):
-        yield f" {heads[0]} {first}".rstrip()
-        for head, cell in zip(heads[1:], others, strict=True):
-            if str(cell):
-                yield f"   {head}{' ' * (room - cell_len(head))}  {' '.join(str(cell).split())}"
+        named = [(head, str(cell)) for head, cell in zip(heads[1:], others, strict=True) if str(cell)]
+        if len(heads) == 2:
+            named, first = [], f"{first}: {others[0]}"
+        else:
+            first = f"{heads[0]} {first}"
+        lines += _wrapped(first, " ", width)
+        room = max((cell_len(head) for head, _ in named), default=0)
+        for head, cell in named:
+            lines += _wrapped(cell, f"   {head}{' ' * (room - cell_len(head))}  ", width)
+    return "\n".join(lines)
+
+
+def _wrapped(text: str, lead: str, width: int) -> Iterator[str]:
+    """Lines of a text after a lead, the later ones indented as far."""
+    room = max(width - cell_len(lead), PROSE)
+    lines = [part for line in text.splitlines() for part in wrap(line, room, break_long_words=False)]
+    for number, line in enumerate(lines or [""]):
+        yield f"{lead if number == 0 else ' ' * cell_len(lead)}{line}".rstrip()

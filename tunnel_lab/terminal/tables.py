@@ -72,7 +72,7 @@ def show_tables(*tables: Table) -> None:
         if not one.row_count:
             continue
         if chosen.get() is TableFormat.TEXT and is_too_wide(one, out.width):
-            out.print(stacked(one), soft_wrap=True)
+            out.print(stacked(one, out.width), soft_wrap=True)
         elif chosen.get() is TableFormat.TEXT:
             out.print(one)
         else:

@@ -28,14 +28,25 @@ def test_a_table_is_stacked_where_a_cell_would_be_broken() -> None:
     assert [is_too_wide(two_columns(), width) for width in (33, 34)] == [True, False]
 
 
-def test_a_stacked_table_has_every_cell_with_its_heading() -> None:
-    assert stacked(two_columns()).splitlines() == [
+def test_a_stacked_table_has_every_cell_with_its_heading_and_wraps_sentences() -> None:
+    assert stacked(two_columns(), 50).splitlines() == [
         "Title",
         " run first",
         "   value [N m]  12.5 ± 0.1",
         " run second",
         "   value [N m]  3",
-        "   remark       a remark of more than thirty characters is a sentence",
+        "   remark       a remark of more than thirty",
+        "                characters is a sentence",
+    ]
+
+
+def test_a_stacked_table_of_two_columns_has_a_line_for_each_row() -> None:
+    rows = table("Title", "part", "found")
+    rows.add_row("plugin", "/a/path/that/is/longer/than/the/terminal/is/wide")
+    assert stacked(rows, 20).splitlines() == [
+        "Title",
+        " plugin:",
+        " /a/path/that/is/longer/than/the/terminal/is/wide",
     ]
 
 
