@@ -1,4 +1,4 @@
-"""Causes chosen by hand: how far the gap closes with them on what is held out, and the run that would tell."""
+"""Causes chosen by hand: how far the gap closes with them, and the run that would distinguish two sets of them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.investigate import nominal_study
 from diagnosis.names import plain
 from diagnosis.result import ParameterEstimate
-from tunnel_sim.effects import Effect, effect_class, known_effects
+from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -61,15 +61,14 @@ class ByHand:
 
     Args:
         campaign: measured or simulated runs.
-        kinds: the effects that may be read off the records; None: all known ones.
 
     Raises:
         TunnelError: when the examination refuses the records, or the nominal model cannot be fitted.
     """
 
-    def __init__(self, campaign: Campaign, kinds: Collection[type[Effect]] | None = None) -> None:
+    def __init__(self, campaign: Campaign) -> None:
         comparable, _ = comparable_runs(diagnosable(campaign).campaign)
-        self._study = nominal_study(comparable, tuple(known_effects() if kinds is None else kinds))
+        self._study = nominal_study(comparable, known_effects())
         self._base = excess_base(self._study)
         self._fits: dict[frozenset[str], Fit] = {frozenset(): self._study.nominal}
         self._whole = {frozenset[str](): self._study.nominal}

@@ -55,15 +55,12 @@ def investigate(
     return replace(found, seconds=clock.seconds)
 
 
-def nominal_study(
-    campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progress | None = None
-) -> Study:
+def nominal_study(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Study:
     """Test a campaign for a gap, and fit no effect.
 
     Args:
         campaign: the runs.
         kinds: the effects that may be read off the records.
-        progress: called with the name of each step.
 
     Returns:
         The study up to the fit of the nominal model.
@@ -71,9 +68,7 @@ def nominal_study(
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    clock = _Clock(progress)
-    found = _test(*similar_campaign(campaign), {kind.name for kind in kinds}, clock)
-    return replace(found, seconds=clock.seconds)
+    return _test(*similar_campaign(campaign), {kind.name for kind in kinds}, _Clock(None))
 
 
 def fit_nominal(data: Data) -> Fit:

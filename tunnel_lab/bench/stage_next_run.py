@@ -48,7 +48,7 @@ class _Rivals:
             [name for name in one["effect"].split(" + ") if name in fitted] for one in document["candidates"]
         ]
         answers = [answer for answer in answers if answer] or [[next(iter(fitted))]]
-        ui.html("Which run would tell two answers apart?", sanitize=False, tag="h2")
+        ui.html("Which run would distinguish two answers?", sanitize=False, tag="h2")
         with ui.element("div").classes("fields"):
             self._first, self._second = (
                 ui.select(fitted, label=label, value=answer, multiple=True).props("dense use-chips")

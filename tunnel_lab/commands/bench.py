@@ -24,10 +24,10 @@ def run(
     """Go from a logger's files to a report in the browser, by hand and eye.
 
     The stages are those of the commands, and write the same files: drop records
-    (import), state the conditions, identify, diagnose, see which run would tell,
-    and write the report. One can go on in a terminal at any point. Only this
-    machine's user can open the page: the address has a secret in it. It needs
-    pip install 'virtual-wind-tunnel[bench]', and no network.
+    (import), state the conditions, identify, diagnose, find the run that would
+    distinguish the answers, and write the report. One can go on in a terminal at
+    any point. Only this machine's user can open the page: its address has a secret
+    in it. It needs pip install 'virtual-wind-tunnel[bench]', and no network.
 
     [bold]Examples[/bold]
       tunnel bench

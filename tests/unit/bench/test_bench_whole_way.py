@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -139,10 +140,10 @@ def test_a_simulated_campaign_is_diagnosed_as_by_the_command(browser: Any, tmp_p
 
 
 def without_times(text: str) -> str:
-    """The document with its layout and the order of its keys, but for the times."""
-    document = json.loads(text)
-    document["seconds"] = dict.fromkeys(document["seconds"], 0.0)
-    return json.dumps(document, indent=2)
+    """The bytes of a document without the values of ``seconds``."""
+    found, count = re.subn(r'("seconds": \{)[^}]*\}', r"\1}", text)
+    assert count == 1
+    return found
 
 
 def tunnel(*words: str) -> None:
