@@ -149,10 +149,13 @@ def _described(seen: _Seen, sensor: SensorProperties) -> RunEstimate:
 
 
 def _noise(seen: _Seen, sensor: SensorProperties) -> NoiseLevel:
-    """The noise within the windows; the nominal fit's χ² says whether the model departs."""
+    """The noise within the windows; the χ² of envelope and phase and the largest harmonic judge the model."""
     total, freedom = float(seen.alone.remaining[0]), seen.alone.freedom
     std = seen.windows.noise * float(np.sqrt(seen.windows.block))
-    departs = total > float(chdtri(freedom, MISFIT_RATE))
+    harmonics = np.concatenate((seen.windows.second, seen.windows.third))
+    distorted = float(np.max(np.tile(seen.windows.information, 2) * np.abs(harmonics) ** 2))
+    limit = 0.5 * MISFIT_RATE
+    departs = total > chdtri(freedom, limit) or distorted > chdtri(2, limit / harmonics.size)
     disagrees = False
     if sensor.noise_std is not None:
         stated = float(np.hypot(sensor.noise_std, (sensor.resolution or 0.0) / np.sqrt(12.0)))
@@ -160,8 +163,8 @@ def _noise(seen: _Seen, sensor: SensorProperties) -> NoiseLevel:
             np.hypot(NOISE_TOLERANCE, 1.0 / np.sqrt(2.0 * seen.windows.samples.sum()))
         )
         disagrees = stated > 0.0 and abs(std / stated - 1.0) > tolerance
-    slow = total / freedom if departs else 1.0
-    return NoiseLevel(std, "residual", std, slow, departs, disagrees)
+    slow = max(total / freedom, 1.0) if departs else 1.0
+    return NoiseLevel(std, "residual", std, slow, bool(departs), disagrees)
 
 
 def _campaign_features(campaign: Campaign, linked: Sequence[_Seen]) -> Features | None:
