@@ -76,10 +76,13 @@ class _Identify:
             orders = [
                 (name, ("--estimator", name, "--json", str(self._session.estimate(name)))) for name in names
             ]
-            for name, _ in orders:
-                if work.work_of(self._session.log(name)).running:
-                    raise TunnelError(f"{name} is running already", remedy="wait for it")
-            background_tasks.create(run_commands(self._session, orders), name="identify")
+            self._run(orders)
+
+    def _run(self, orders: Sequence[tuple[str, tuple[str, ...]]]) -> None:
+        for name, _ in orders:
+            if work.work_of(self._session.log(name)).running:
+                raise TunnelError(f"{name} is running already", remedy="wait for it")
+        background_tasks.create(run_commands(self._session, orders), name="identify")
 
     def _budget(self) -> None:
         ui.label("Standard uncertainties of what is stated, in per cent; an empty field is exact.").classes(
@@ -104,7 +107,7 @@ class _Identify:
                 others = [name for name in _FIRST if name != ESTIMATOR]
                 models = [word for name in others for word in ("--model", name)]
                 result = str(self._session.estimate(_BUDGET))
-                background_tasks.create(run_commands(self._session, [(_BUDGET, (*words, result, *models))]))
+                self._run([(_BUDGET, (*words, result, *models))])
 
         with ui.element("p").classes("buttons"):
             button("Make the budget", start)

@@ -190,6 +190,7 @@ def test_two_tabs_do_not_mix(browser: Any, served: Bench) -> None:
 PAGES = ("/", "/try", "/two/records", "/two/conditions", "/two/identify", "/two/diagnose", "/two/next-run")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_every_page_can_be_read_at_every_width(browser: Any, served: Bench, scheme: str) -> None:
     session = Session(served.folder, "two")
