@@ -61,7 +61,6 @@ def clean_rows(count: int, seed: int) -> Iterator[Row]:
         for name, truth in truths.items():
             found = getattr(run, name)
             if found is None:
-                row["failed"] = run.status.name
                 continue
             low, high = found.interval
             row[name] = {
@@ -97,17 +96,13 @@ def blind_rows(folder: Path, kinds: Sequence[str]) -> Iterator[Row]:
             for quantity in NAMES:
                 value = getattr(found, quantity)
                 if value is not None:
-                    low, high = value.interval or (
-                        value.value - 1.96 * value.std,
-                        value.value + 1.96 * value.std,
-                    )
+                    low, high = value.interval or value.value + 1.96 * value.std * np.array((-1.0, 1.0))
                     row[label][quantity] = {
                         "error": value.value - truth[quantity],
                         "std": value.std,
-                        "held": low <= truth[quantity] <= high,
+                        "held": bool(low <= truth[quantity] <= high),
                     }
-        row["effects_probability"] = bold.effects(campaign)
-        yield row
+        yield row | {"effects_probability": bold.effects(campaign)}
 
 
 def calibration_rows(folder: Path) -> Iterator[Row]:
@@ -187,16 +182,16 @@ def show_blind(console: Console, rows: Sequence[Row]) -> None:
     """Median errors, coverage and refusals of both methods by kind of campaign."""
     if not rows:
         return
+    single = [row for row in rows if row["kind"] == "single"]
+    moderate = [row for row in single if MODERATE[0] <= row["severity"] <= MODERATE[1]]
     groups = {
-        "no effect": [r for r in rows if r["kind"] == "none"],
-        "one effect, 1 to 10": [r for r in rows if r["kind"] == "single" and _moderate(r)],
-        "… textbook or common form": [
-            r for r in rows if r["kind"] == "single" and _moderate(r) and "rare" not in r["groups"]
-        ],
-        "… rare form": [r for r in rows if r["kind"] == "single" and _moderate(r) and "rare" in r["groups"]],
-        "one effect, above 10": [r for r in rows if r["kind"] == "single" and r["severity"] > MODERATE[1]],
-        "two to four effects": [r for r in rows if r["kind"] in ("pair", "three", "four")],
-        "outside the vocabulary": [r for r in rows if r["kind"] == "outside"],
+        "no effect": [row for row in rows if row["kind"] == "none"],
+        "one effect, 1 to 10": moderate,
+        "… textbook or common form": [row for row in moderate if "rare" not in row["groups"]],
+        "… rare form": [row for row in moderate if "rare" in row["groups"]],
+        "one effect, above 10": [row for row in single if row["severity"] > MODERATE[1]],
+        "two to four effects": [row for row in rows if row["kind"] in ("pair", "three", "four")],
+        "outside the vocabulary": [row for row in rows if row["kind"] == "outside"],
     }
     table = Table(title="Median absolute error, 1/rad; 95 % intervals that hold the truth")
     for head in (
@@ -253,10 +248,6 @@ def show_calibration(console: Console, rows: Sequence[Row]) -> None:
         )
 
 
-def _moderate(row: Row) -> bool:
-    return bool(MODERATE[0] <= row["severity"] <= MODERATE[1])
-
-
 def _off(row: Row) -> bool:
     own = [row["neural_posterior"][name] for name in NAMES if name in row["neural_posterior"]]
     return any(abs(one["error"]) > FAR * one["std"] for one in own)
@@ -303,7 +294,7 @@ def main() -> None:
     show_blind(console, [row for row in rows if "campaign" in row])
     show_calibration(console, [row for row in rows if "place" in row])
     for row in (row for row in rows if "curve" in row):
-        console.print(f"{row['curve']} campaigns in the training: loss {row['loss']:.3f}")
+        console.print(f"{row['curve']} readings of campaigns in the training: loss {row['loss']:.3f}")
 
 
 if __name__ == "__main__":

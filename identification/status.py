@@ -15,8 +15,8 @@ class Status(Enum):
     )
     NOT_DETERMINED = "the record does not determine frequency and damping: lengthen it, or sample faster"
     TOO_FEW_CYCLES = (
-        "fewer than three cycles after the first zero crossing, which the networks need: lengthen the record, or "
-        "use output_error"
+        "fewer cycles than the networks need, three from the first zero crossing or four above the noise: lengthen "
+        "the record, or use output_error"
     )
     OUTSIDE_TRAINING = "damping or frequency outside the networks' training range: use output_error"
     UNLIKE_TRAINING = "unlike anything the network was trained on: use output_error, and run the diagnosis"

@@ -46,7 +46,7 @@ def run(
     shards: Annotated[
         int,
         typer.Option("--shards", min=1, help="For neural_posterior: training campaigns, in two hundreds."),
-    ] = 20,
+    ] = 15,
     steps: Annotated[
         int, typer.Option("--steps", min=1, help="For neural_posterior: number of batches of each network.")
     ] = 2000,
@@ -79,7 +79,7 @@ def run(
       tunnel train mine.safetensors --seed 7
       tunnel train wide.safetensors --zeta 0.001 0.5 --omega 0.4 60
       tunnel identify c -e neural_network --weights mine.safetensors
-      tunnel train posterior.safetensors -e neural_posterior --shards 20
+      tunnel train posterior.safetensors -e neural_posterior
 
     [bold]Exit status[/bold]
       0 trained, 2 bad input, 130 interrupted (finished work is kept).

@@ -48,7 +48,7 @@ class TrainingSpec:
     """
 
     seed: int = 1
-    shards: int = 20
+    shards: int = 15
     steps: int = 2000
 
     def of_part(self, part: str) -> int:
