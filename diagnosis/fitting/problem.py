@@ -258,7 +258,9 @@ class _Job:
             self.row, self.keep_alive = slow.forward_run()
         self.blocks = run.reading.size + blocks_beyond(physics, run)
         substeps = fit_substeps(physics, run.interval)
-        stride = fit_stride(physics, run.interval) if substeps == 1 and physics.rod_twist is None else 1
+        # a derivative of the angle would show where steps are joined
+        rough = substeps > 1 or physics.rod_twist is not None or run.derivative > 0
+        stride = 1 if rough else fit_stride(physics, run.interval)
         law = physics.law(rig)
         law, step = compensated(law, run.wind_speed, stride * run.interval / substeps)
         self.row["step"], self.row["steps"], self.row["stride"] = step / stride, substeps, stride

@@ -32,7 +32,7 @@ from tunnel_sim.effects import effect_class
 _SEED = 1
 _SPEED = 10.0  # m/s, assumed
 _MAGNIFIED = (12.0, 15.0)  # s
-PAIR = ("cubic_stiffness", "quadratic_damping")
+PAIR = tuple(effect.name for effect in SOFTENING)
 
 
 def figure_3(folder: Path) -> Section:

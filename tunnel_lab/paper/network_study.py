@@ -19,6 +19,7 @@ from identification.neural.networks import Networks
 from identification.neural.shape import cycles_time, network_inputs
 from identification.neural.training_set import held_out_points
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+from tunnel_lab.terminal.effect_option import parse_effect
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.plan import CampaignPlan, EffectSetting, SensorModel, Truth
@@ -28,8 +29,8 @@ NETWORK, CONVENTIONAL, BEST = "neural_network", "conventional", "output_error"
 METHODS = (NETWORK, CONVENTIONAL, BEST)
 # What the tutorial on the paper's own gap finds in Table III, one of the explanations that it cannot tell apart.
 SOFTENING = (
-    EffectSetting("cubic_stiffness", {"coefficient": -0.39}),
-    EffectSetting("quadratic_damping", {"coefficient": 0.0038}),
+    parse_effect("cubic_stiffness:coefficient=-0.39"),
+    parse_effect("quadratic_damping:coefficient=0.0038"),
 )
 
 # N m s/rad: what Tables III and IV leave, and what is left beside a quadratic damping that does part of it.

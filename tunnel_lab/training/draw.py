@@ -16,6 +16,7 @@ from tunnel_reference.catalogue import Form, Group
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FORMS
+from tunnel_reference.linear_families import LOST_SAMPLES, ROD
 from tunnel_reference.severity import read_and_fit
 from tunnel_reference.terms import Motion
 
@@ -23,13 +24,9 @@ SAMPLE_RATE = 250.0
 """Hz; the noise is reduced in proportion to the root of the rate, so that as much is known as at 1000 Hz."""
 DURATION = 10.0
 KINDS: Mapping[str, float] = {"none": 0.25, "single": 0.4, "pair": 0.15, "three": 0.12, "four": 0.08}
-ROD = "rod_flexibility"
 _MIXTURE = Mixture(textbook=0.4, rare=0.0)
 _UNIT = 3.0  # excess at which the forms are scaled
 _ROUNDS = 3
-_LOST = {
-    f"dropped_samples/{n}_instant{s}": k / SAMPLE_RATE for n, s, k in (("one", "", 1), ("three", "s", 3))
-}
 
 
 def draw_for_training(rng: np.random.Generator, sizes: Mapping[str, float]) -> CampaignDraw:
@@ -142,5 +139,6 @@ def _nearer(draw: CampaignDraw, excess: float) -> CampaignDraw:
 
 def _clipped(form: Form, value: float) -> float:
     # At the low rate a sample is the least time that can be lost.
-    least = _LOST.get(label(form), form.limits[0])
+    lost = LOST_SAMPLES.get(label(form))
+    least = form.limits[0] if lost is None else lost / SAMPLE_RATE
     return float(np.clip(value, least, form.limits[1]))

@@ -21,6 +21,7 @@ from tunnel_lab.training.motions import motions_of
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw
 from tunnel_reference.forms import FAMILIES
+from tunnel_reference.linear_families import LINEAR_IN_A_RECORD
 from tunnel_reference.make import as_campaign
 from tunnel_reference.readings import ReadingTerm, read_motion
 from tunnel_reference.severity import Simulated, bind_effects
@@ -37,18 +38,6 @@ VARIANTS = 3
 MOST_RUNS = 16
 _SUBSTEPS = 2
 _NOISE = (0.3, 8.0)  # noise over the drawn one, in the variants after the first
-_LINEAR_IN_A_RECORD = frozenset(
-    {
-        "structural_damping",
-        "gravity_stiffness",
-        "rod_flexibility",
-        "unsteady_aero_lag",
-        "spring_miscalibration",
-        "wind_speed_offset",
-        "wind_speed_drift",
-    }
-)
-"""One record of these is another damped oscillation: what it shows is its own decay, not the stated one's."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +154,7 @@ def reduced(
     if not kept:
         return
     coefficients = np.array(list(truth.values()))
-    if not _LINEAR_IN_A_RECORD & set(families):
+    if not LINEAR_IN_A_RECORD & set(families):
         for place in {(5 * first_run) % len(kept), (5 * first_run + 2) % len(kept)}:
             run, _, (alone, _) = kept[place]
             one_design = build_design([run], campaign.rig)

@@ -49,7 +49,7 @@ def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", 
         # O_NONBLOCK: otherwise opening a FIFO without a writer would wait for ever.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except (FileNotFoundError, NotADirectoryError):
-        remedy = nearest(path) or missing or "check the path"
+        remedy = "; or ".join(filter(None, (nearest(path), missing))) or "check the path"
         raise TunnelError("no such file", where=where, remedy=remedy) from None
     except (OSError, ValueError) as error:
         raise _unreadable(error, where, readable) from None

@@ -11,6 +11,7 @@ EXTRAS = {
     "import": ("fastexcel", "xlsxwriter", "h5py", "nptdms"),
     "film": ("imageio", "imageio_ffmpeg"),
     "cluster": ("dask", "distributed"),
+    "bench": ("nicegui",),
     "docs": ("sphinx", "furo", "myst_nb"),
     "train": ("stable_baselines3",),
 }
