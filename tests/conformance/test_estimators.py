@@ -32,7 +32,7 @@ each_estimator = pytest.mark.parametrize("name", ALL_ESTIMATORS)
 
 
 def noisy_campaign():
-    return campaign(noise=5e-4, resolution=RESOLUTION, rng=np.random.default_rng(11))
+    return campaign(noise=5e-4, resolution=RESOLUTION, rate=500.0, rng=np.random.default_rng(11))
 
 
 @pytest.fixture(scope="module")
@@ -225,7 +225,8 @@ def test_records_without_a_decay_fail_with_a_remedy(name, kind):
 
 @each_estimator
 def test_a_dead_run_is_left_out_and_named(name, noisy):
-    dead = replace(noisy.runs[4], record=replace(noisy.runs[4].record, yaw_rad=np.zeros(10000)))
+    swing = noisy.runs[4].record
+    dead = replace(noisy.runs[4], record=replace(swing, yaw_rad=np.zeros_like(swing.yaw_rad)))
     data = replace(noisy, runs=(*noisy.runs[:4], dead, *noisy.runs[5:]))
     estimate = checked(identify(data, name), data)
     assert estimate.status is Status.RUN_LEFT_OUT

@@ -23,7 +23,7 @@ def nearest(path: Path) -> str:
     Returns:
         Such as ``did you mean the folder 'my-rig'?``; empty where nothing is similar.
     """
-    names = {entry.name: entry.is_dir() for entry in _entries(path.parent)}
+    names = {entry.name: _is_folder(entry) for entry in _entries(path.parent) if entry.name != path.name}
     found = get_close_matches(path.name, names, n=1)
     return _question(path.parent / found[0], names[found[0]]) if found else ""
 
@@ -48,12 +48,19 @@ def inside(folder: Path) -> str:
     """
     if (folder / _MARKER).is_file():
         return "it is a campaign, which tunnel identify and tunnel diagnose take"
-    files = sorted(entry.name for entry in _entries(folder) if entry.is_file())
+    files = sorted(entry.name for entry in _entries(folder) if (folder / entry.name).is_file())
     return f"name a file in it, such as '{shown(folder / files[0])}'" if files else ""
 
 
 def _question(path: Path, folder: bool) -> str:
     return f"did you mean the {'folder' if folder else 'file'} '{shown(path)}'?"
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:  # a link to itself
+        return False
 
 
 def _entries(folder: Path) -> Iterator[os.DirEntry[str]]:

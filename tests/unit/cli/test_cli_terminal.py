@@ -90,6 +90,13 @@ def test_a_note_shows_the_command_of_its_remedy(tunnel: Tunnel, tiny_campaign: P
     assert "run the diagnosis" not in out
 
 
+def test_a_link_to_itself_is_not_what_was_meant(tmp_path: Path) -> None:
+    (tmp_path / "rig").symlink_to("rig")
+    assert nearest(tmp_path / "rig") == ""
+    assert nearest(tmp_path / "rigs") == f"did you mean the file '{tmp_path / 'rig'}'?"
+    assert inside(tmp_path) == ""
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
