@@ -119,7 +119,8 @@ def polish(chosen: Hypothesis) -> Hypothesis:
         chosen: a fitted hypothesis.
 
     Returns:
-        The same effects with a χ² no larger; as given where the fit cannot go on.
+        The same effects with a χ² no larger, but for what following the rod changes; as given where the fit cannot
+        go on.
     """
     first = _rod_followed(chosen.fit)
     better = _free_forms(first, tolerance=_POLISH)
@@ -143,7 +144,7 @@ def _rod_followed(fitted: Fit) -> Fit:
         return fitted
     with suppress(FitError, np.linalg.LinAlgError):
         return fit(problem, fitted.point)
-    return fitted
+    return fitted  # the confirmation by MuJoCo then says how far it is off
 
 
 def _textbook(freed: Fit, first: Fit) -> Fit | None:

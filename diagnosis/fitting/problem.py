@@ -260,7 +260,7 @@ class _Job:
         substeps = fit_substeps(physics, run.interval)
         # a derivative of the angle would show where steps are joined
         rough = substeps > 1 or physics.rod_twist is not None or run.derivative > 0
-        stride = 1 if rough else fit_stride(physics, run.interval)
+        stride = 1 if rough else fit_stride(rig, physics, run.interval)
         law = physics.law(rig)
         law, step = compensated(law, run.wind_speed, stride * run.interval / substeps)
         self.row["step"], self.row["steps"], self.row["stride"] = step / stride, substeps, stride

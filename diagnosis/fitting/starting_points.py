@@ -155,9 +155,7 @@ def is_gross(fit: Fit) -> bool:
 
 
 def _own_start(base: Fit, kind: type[Effect], found: OwnNumbers) -> StartingPoint:
-    problem = Problem(
-        base.problem.data, (*base.problem.effects, kind), base.problem.fixed, base.problem.free_forms
-    )
+    problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
     infos = _own_parameters(problem, kind)
     values = [np.clip(value, info.lower, info.upper) for value, info in zip(found.values, infos, strict=True)]
     release = np.column_stack([base.point.release, found.numbers])
@@ -180,7 +178,8 @@ def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint 
     fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
     freed = any(info.form and info.name in trial.values for info in kind.parameters())
     with_free_form = (*base.problem.free_forms, kind.name) if freed else base.problem.free_forms
-    problem = Problem(base.problem.data, (*base.problem.effects, kind), fixed, with_free_form)
+    effects = (*base.problem.effects, kind)
+    problem = dataclasses.replace(base.problem, effects=effects, fixed=fixed, free_forms=with_free_form)
     infos = _own_parameters(problem, kind)
     scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)
     values = np.array([trial.values.get(info.name, info.default) for info in infos])
@@ -239,7 +238,8 @@ def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
     trial = next(iter(kind.trials(_circumstances(data))), None)
     if trial is None or (kind.condition == "wind_on" and not data.wind_on):
         return None
-    problem = Problem(data, (*base.problem.effects, kind), base.problem.fixed, (kind.name,))
+    effects = (*base.problem.effects, kind)
+    problem = dataclasses.replace(base.problem, effects=effects, free_forms=(kind.name,))
     infos = _own_parameters(problem, kind)
     values = np.array([trial.values.get(info.name, info.default) for info in infos])
     scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)

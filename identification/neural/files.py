@@ -10,7 +10,6 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,9 @@ from safetensors.numpy import load, save
 
 from identification.neural.network import Network, Scaling, parameter_count
 from identification.neural.networks import Errors, Networks
+from identification.neural.stored import packaged, read_stored
 from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec
-from tunnel_sim.files.reading import as_described, parse_json, read_regular
-from tunnel_sim.vocabulary import limits
+from tunnel_sim.files.reading import as_described, parse_json
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -59,24 +58,18 @@ def read_networks(weights: Path) -> Networks:
     Raises:
         TunnelError: when a file is missing or malformed, or the two do not belong together.
     """
-    remedy = "name the .safetensors file that tunnel train wrote, with its .json beside it"
-    content = read_regular(weights, limits.WEIGHTS_BYTES, missing=remedy, readable=remedy)
-    record = read_regular(weights.with_suffix(".json"), limits.JSON_BYTES, missing=remedy, readable=remedy)
-    return networks_of(content, record, str(weights))
+    return networks_of(*read_stored(weights), str(weights))
 
 
 @cache
 def shipped_networks() -> Networks:
     """The packaged networks."""
-    folder = resources.files("identification") / "neural" / "weights"
-    weights = (folder / f"{SHIPPED}.safetensors").read_bytes()
-    return networks_of(weights, (folder / f"{SHIPPED}.json").read_text(encoding="utf-8"), SHIPPED)
+    return networks_of(*packaged(SHIPPED), SHIPPED)
 
 
 def shipped_record() -> dict[str, Any]:
     """The training record of the packaged networks."""
-    folder = resources.files("identification") / "neural" / "weights"
-    found: dict[str, Any] = json.loads((folder / f"{SHIPPED}.json").read_text(encoding="utf-8"))
+    found: dict[str, Any] = json.loads(packaged(SHIPPED)[1])
     return found
 
 

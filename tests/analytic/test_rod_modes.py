@@ -94,11 +94,18 @@ def test_a_rod_that_swings_almost_like_the_body_is_not_separated():
 
 
 @pytest.mark.parametrize(
-    "terms", [{}, {"stiffness_cubic": -0.2}, {"quadratic_damping": 0.02}, {"aero_lag": 1.0}]
+    "terms",
+    [
+        {},
+        {"stiffness_cubic": -0.2},
+        {"quadratic_damping": 0.02},
+        {"aero_lag": 1.0},
+        {"shedding_amplitude": 0.01, "strouhal_number": 0.2},
+    ],
 )
 def test_a_step_over_several_blocks_moves_as_short_steps_do(terms):
     settings = replace(run(spring=15.0, **terms), rod_twist=None)
-    stride = fit_stride(settings, INTERVAL)
+    stride = fit_stride(RIG, settings, INTERVAL)
     assert stride == 2
     law, step = compensated(settings.law(RIG), settings.wind_speed, stride * INTERVAL)
     row, keep_alive = forward_run(settings)
@@ -112,8 +119,15 @@ def test_a_step_over_several_blocks_moves_as_short_steps_do(terms):
     del keep_alive
 
 
+def test_a_wind_that_stiffens_shortens_the_steps():
+    settings = replace(run(spring=15.0, speed=40.0), rod_twist=None)
+    stiff = replace(settings, derivatives=AeroDerivatives(-2.0, -0.11))
+    assert fit_stride(RIG, settings, INTERVAL) == 2
+    assert fit_stride(RIG, stiff, INTERVAL) == 1
+
+
 @pytest.mark.parametrize(
     "rough", [{"friction_moment": 0.01}, {"free_play": 0.01}, {"gravity_stiffness": 1.0}]
 )
 def test_kinks_and_curved_springs_keep_short_steps(rough):
-    assert fit_stride(replace(run(spring=15.0, **rough), rod_twist=None), INTERVAL) == 1
+    assert fit_stride(RIG, replace(run(spring=15.0, **rough), rod_twist=None), INTERVAL) == 1

@@ -93,7 +93,7 @@ class Knowledge:
         costs: rig time of each, s.
         runs: the runs made.
         fits: reading and fit of the runs that the belief uses, with their links; empty where ``linear``.
-        told: what these runs tell, where ``linear``.
+        learnt: what these runs give, where ``linear``.
         study: the last diagnosis; None before the first, or where there is no vocabulary.
         status: of the last run, ``ok`` or what went wrong.
     """
@@ -104,7 +104,7 @@ class Knowledge:
     costs: tuple[float, ...] = ()
     runs: tuple[Run, ...] = ()
     fits: tuple[tuple[Array, Reading, RunFit], ...] = ()
-    told: tuple[LinearRun, ...] = ()
+    learnt: tuple[LinearRun, ...] = ()
     study: Study | None = None
     status: str = "ok"
 
@@ -221,12 +221,12 @@ class Session:
         noise = conditions.noise_std * rng.standard_normal(time.size)
         run = stated_run(condition, Record(time, motion + zero + noise))
         known = replace(known, runs=(*known.runs, run))
-        told = linear_run(link, time, decay, choice.release_angle, zero, noise)
-        if told is None or not shows_a_decay(motion, conditions.noise_std):
+        learnt = linear_run(link, time, decay, choice.release_angle, zero, noise)
+        if learnt is None or not shows_a_decay(motion, conditions.noise_std):
             return replace(known, status="no information: no oscillation exceeds the noise")
-        runs = (*known.told, told)
+        runs = (*known.learnt, learnt)
         belief = linear_belief(known.prior, runs, conditions.noise_std)
-        return replace(known, told=runs, beliefs=(*known.beliefs, belief))
+        return replace(known, learnt=runs, beliefs=(*known.beliefs, belief))
 
 
 def _identified(known: Knowledge, choice: Choice) -> Knowledge:

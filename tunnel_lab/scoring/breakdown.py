@@ -18,7 +18,7 @@ import numpy as np
 
 from identification.estimate import Quantity
 from identification.scoring.accuracy import Outcome, Score, collect, score
-from tunnel_lab.scoring.work import Row, Told, estimate_rows, fingerprint, resumed
+from tunnel_lab.scoring.work import Progress, Row, estimate_rows, fingerprint, resumed
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
@@ -184,7 +184,7 @@ def break_down(
     *,
     jobs: int = 2,
     parts: Path | None = None,
-    progress: Told | None = None,
+    progress: Progress | None = None,
 ) -> list[Row]:
     """Every estimator on every case.
 

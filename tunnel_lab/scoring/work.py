@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 ItemT = TypeVar("ItemT")
 Row = dict[str, Any]
-Told = Callable[[int, int], None]
+Progress = Callable[[int, int], None]
 UNIT_TRIALS = 5
 """Trials done together; an interruption loses at most these in each process."""
 
@@ -144,7 +144,7 @@ def score_grid(
     *,
     jobs: int = 2,
     parts: Path | None = None,
-    progress: Told | None = None,
+    progress: Progress | None = None,
 ) -> list[Row]:
     """Every estimator on every trial of a grid.
 

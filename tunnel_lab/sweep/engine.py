@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Work = Callable[[str, Sequence[int]], Iterator["Finished"]]
 """A function that does shards: given the sweep as JSON and their numbers, it yields them in any order."""
-Told = Callable[[int, int], None]
+Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Outcome:
     crashes: int
 
 
-def run_sweep(sweep: Sweep, folder: Path, work: Work, progress: Told | None = None) -> Outcome:
+def run_sweep(sweep: Sweep, folder: Path, work: Work, progress: Progress | None = None) -> Outcome:
     """Do the rest of a sweep.
 
     Args:

@@ -34,7 +34,7 @@ FALSE_ALARMS = 0.01
 _KEPT_EVERY = 250  # steps between checkpoints
 _SHRINK = 0.05  # of the context's covariance towards its mean variance
 _LETTERS = {"record": "r", "campaign": "c"}
-Told = Callable[[str, int, int], None]
+Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Result:
 
 
 def train(
-    spec: TrainingSpec, folder: Path, *, jobs: int, tell: Told = lambda _what, _done, _all: None
+    spec: TrainingSpec, folder: Path, *, jobs: int, tell: Progress = lambda _what, _done, _all: None
 ) -> Result:
     """Simulate what is missing, and fit both networks; finished work in the folder is kept and used.
 
@@ -120,7 +120,7 @@ def _sizes(seed: int, folder: Path) -> tuple[tuple[str, float], ...]:
 
 
 def _fitted(
-    kind: str, spec: TrainingSpec, samples: Mapping[str, Array], folder: Path, tell: Told
+    kind: str, spec: TrainingSpec, samples: Mapping[str, Array], folder: Path, tell: Progress
 ) -> dict[str, Array]:
     """The weights of one network, from its checkpoint on."""
     own = usable(samples, _LETTERS[kind])

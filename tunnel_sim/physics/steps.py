@@ -88,10 +88,11 @@ def fit_substeps(run: RunSettings, interval: float) -> int:
     return ceil(interval / longest)
 
 
-def fit_stride(run: RunSettings, interval: float) -> int:
+def fit_stride(rig: Rig, run: RunSettings, interval: float) -> int:
     """How many block means one step of a fit covers; the motion between its ends is cubic.
 
     Args:
+        rig: gives frontal area and reference length.
         run: the run's physics, its rod rigid.
         interval: between block means, s.
 
@@ -100,8 +101,8 @@ def fit_stride(run: RunSettings, interval: float) -> int:
     """
     if run.series or run.program or any(run.parameters.get(name) for name in _ROUGH):
         return 1
-    body = sqrt(max(_spring(run), 1e-9) / run.yaw_inertia)
-    return max(1, min(_FIT_MOST_STRIDE, int(_FIT_BODY_TURN / (body * interval))))
+    turn = max(body_rate(rig, run) * interval, 1e-9)
+    return max(1, min(_FIT_MOST_STRIDE, int(_FIT_BODY_TURN / turn)))
 
 
 def compensated(law: Mapping[str, float], wind_speed: float, step: float) -> tuple[dict[str, float], float]:

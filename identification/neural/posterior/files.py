@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,8 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from identification.neural.posterior.network import shapes
-from tunnel_sim.files.reading import as_described, parse_json, read_regular
-from tunnel_sim.vocabulary import limits
+from identification.neural.stored import packaged, read_stored
+from tunnel_sim.files.reading import as_described, parse_json
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -69,18 +68,13 @@ def read_trained(path: Path) -> dict[str, Trained]:
     Raises:
         TunnelError: when a file is missing or malformed, or the two do not belong together.
     """
-    remedy = "name the .safetensors file that tunnel train wrote, with its .json beside it"
-    content = read_regular(path, limits.WEIGHTS_BYTES, missing=remedy, readable=remedy)
-    record = read_regular(path.with_suffix(".json"), limits.JSON_BYTES, missing=remedy, readable=remedy)
-    return trained_of(content, record, str(path))
+    return trained_of(*read_stored(path), str(path))
 
 
 @cache
 def shipped() -> dict[str, Trained]:
     """The packaged networks."""
-    folder = resources.files("identification") / "neural" / "weights"
-    weights = (folder / f"{SHIPPED}.safetensors").read_bytes()
-    return trained_of(weights, (folder / f"{SHIPPED}.json").read_bytes(), SHIPPED)
+    return trained_of(*packaged(SHIPPED), SHIPPED)
 
 
 def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, Trained]:
@@ -107,9 +101,9 @@ def _one(tensors: Mapping[str, Array], kind: str, document: Mapping[str, Any]) -
         for name, value in tensors.items()
         if name.startswith(f"{kind}/")
     }
-    told = document["networks"][kind]
+    stated = document["networks"][kind]
     expected = shapes(
-        *(told["sizes"][name] for name in ("rivals", "features", "runs", "quantities", "effects"))
+        *(stated["sizes"][name] for name in ("rivals", "features", "runs", "quantities", "effects"))
     )
     for name, shape in expected.items():
         if own[name].shape != shape:
@@ -117,4 +111,4 @@ def _one(tensors: Mapping[str, Array], kind: str, document: Mapping[str, Any]) -
     if not all(np.all(np.isfinite(value)) for value in own.values()):
         raise ValueError(kind)
     centre, precision = own.pop("unlike.centre"), own.pop("unlike.precision")
-    return Trained(own, centre, precision, float(told["threshold"]), tuple(document["effects"]))
+    return Trained(own, centre, precision, float(stated["threshold"]), tuple(document["effects"]))
