@@ -15,8 +15,8 @@ from math import log
 import numpy as np
 from scipy.optimize import least_squares
 
+from docs.studies.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
 from identification.datasets import WindowRow, paper_windows
-from tunnel_lab.paper.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -203,6 +203,13 @@ def _residuals(columns: Columns, target: Columns, std: Columns) -> Array:
     return np.concatenate((zeta, (columns.omega_n - target.omega_n) / std.omega_n))
 
 
+def _effects(kinds: Kinds, x: Array) -> tuple[Effect, ...]:
+    return tuple(
+        kind(**{kind.parameters()[0].name: float(u) * kind.parameters()[0].scale})
+        for kind, u in zip(kinds, x, strict=False)
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class _Task:
     """A table to be fitted. Unknowns: severities in units of the effects' scales, then base ωn and ζ."""
@@ -221,12 +228,8 @@ class _Task:
         return kinds, x if start is None else start
 
     def columns(self, kinds: Kinds, x: Array) -> Columns | None:
-        effects = tuple(
-            kind(**{kind.parameters()[0].name: float(u) * kind.parameters()[0].scale})
-            for kind, u in zip(kinds, x, strict=False)
-        )
         omega_n, zeta = self._base(x)
-        return simulate_windows(self.state, effects, omega_n, zeta, self.measured.zeta.size)
+        return simulate_windows(self.state, _effects(kinds, x), omega_n, zeta, self.measured.zeta.size)
 
     def _base(self, x: Array) -> tuple[float, float]:
         mean_omega, mean_zeta = float(self.measured.omega_n.mean()), float(self.measured.zeta.mean())
@@ -301,8 +304,4 @@ class _Task:
         chi2, count = (float(zeta @ zeta), float(omega @ omega)), self.measured.zeta.size
         nu = freedom(count)
         bic = sum((nu + count) * log(1.0 + c / nu) for c in chi2) + x.size * log(2 * count)
-        effects = tuple(
-            kind(**{kind.parameters()[0].name: float(u) * kind.parameters()[0].scale})
-            for kind, u in zip(kinds, x, strict=False)
-        )
-        return Explanation(effects, *self._base(x), columns, *chi2, bic)
+        return Explanation(_effects(kinds, x), *self._base(x), columns, *chi2, bic)
