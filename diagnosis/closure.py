@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from tunnel_sim.files.json_text import as_json
+
 
 @dataclass(frozen=True)
 class Step:
@@ -38,7 +40,7 @@ class Waterfall:
     def to_json_dict(self) -> dict[str, Any]:
         """The fields of a document: ``waterfall``, ``waterfall_on`` and ``without``."""
         return {
-            "waterfall": [{"effect": step.effect, "excess": step.excess} for step in self.steps],
+            "waterfall": as_json(self.steps),
             "waterfall_on": self.held_out,
             "without": dict(self.without),
         }
@@ -80,17 +82,3 @@ class Rest:
     material: bool
     moves: Mapping[str, Move]
     words: str
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """The fields."""
-        return {
-            "significant": self.significant,
-            "excess": self.excess,
-            "p_value": self.p_value,
-            "material": self.material,
-            "moves": {
-                name: {"value": move.value, "relative": move.relative, "std": move.std, "unit": move.unit}
-                for name, move in self.moves.items()
-            },
-            "words": self.words,
-        }

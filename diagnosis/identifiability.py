@@ -1,4 +1,4 @@
-"""Whether a campaign of good design could show an effect, and tell it from every other."""
+"""Whether a campaign of good design could show an effect, and distinguish it from every other."""
 
 from __future__ import annotations
 

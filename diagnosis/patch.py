@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from identification.printing.numbers import significant, unit_mark
 from identification.printing.table import TextTable
+from tunnel_sim.files.json_text import as_json
 
 if TYPE_CHECKING:
     import mujoco
@@ -90,10 +91,7 @@ class PatchedModel:
             "free": list(self.model.law.free),
             "rest_rad": self.model.law.rest,
             "zero_rad": self.zero,
-            "written": [
-                {"name": w.name, "before": list(w.before), "after": list(w.after), "unit": w.unit}
-                for w in self.written
-            ],
+            "written": as_json(self.written),
             "notes": list(self.notes),
             "closed": self.closure.native_closed,
             "closed_by_fit": self.closure.fit_closed,

@@ -29,8 +29,8 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
         document: of a diagnosis.
 
     Returns:
-        The verdict, where the gap is and what cannot be told apart, the answers weighed, parameters, the gap as
-        causes are added, the coefficients, and the caveats.
+        The verdict, where the gap is, the rivals, the answers considered, parameters, the gap as causes are added,
+        the coefficients, and the caveats.
     """
     return [
         document["verdict"],

@@ -56,7 +56,7 @@ LEAST_STIFFNESS_STD = 1e-5
 # --- What a record must show before something is said about it. ---
 
 LEAST_SAMPLES = 8
-"""Samples of a run: five unknowns describe it, and three more samples are the least that tell how well they do."""
+"""Samples of a run: five unknowns describe it, and three more samples are the least that show how well they do."""
 
 LEAST_ENERGY = 56.0
 """Energy of the decay over the noise variance. Noise alone reaches it, at the best of all frequencies of a record
@@ -87,7 +87,7 @@ GREATEST_NETWORK_DISTANCE = 0.1
 are not used: they were trained on damped oscillations."""
 
 CLEAR_SWING = 0.2
-"""Share of a run's largest swing from which its peaks tell the centre: smaller swings may end off it, held by dry
+"""Share of a run's largest swing from which its peaks show the centre: smaller swings may end off it, held by dry
 friction. Judgement."""
 
 EQUAL_SWINGS = 0.8

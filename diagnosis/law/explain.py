@@ -185,7 +185,7 @@ def _words(
     ]
     alike = [one for one in others if one.closed >= best.closed - max(AS_MUCH, best.std)]
     if alike:
-        said.append(f"These runs cannot tell it from {' or '.join(KINDS[one.kind] for one in alike)}.")
+        said.append(f"These runs cannot distinguish it from {' or '.join(KINDS[one.kind] for one in alike)}.")
     elif others:
         others_most = max(one.closed for one in others)
         said.append(f"No other kind would close more than {percent(max(others_most, 0.0))}.")

@@ -28,8 +28,8 @@ _SCALES = (0.02, 5e-4)  # of the base ωn (rad/s) and ζ
 _SLOWEST, _LEAST_ZETA, _MOST_ZETA = 0.1, 0.05, 0.2  # bounds of the base: a share of ωn, and ζ
 _ADJUSTMENTS = 3  # of the base, which an effect of great severity moves far
 _MOVES = 3.84  # fall of a column's χ² by chance once in twenty: an effect that does more moves the column
-#: Odds of 20:1 as a difference of BIC; less is "cannot be told apart".
-TOLD_APART = 2.0 * log(20.0)
+#: Odds of 20:1 as a difference of BIC; less is "cannot be distinguished".
+DISTINGUISHED = 2.0 * log(20.0)
 
 Kinds = tuple[type[Effect], ...]
 
@@ -88,9 +88,9 @@ class WindowDiagnosis:
 
     @property
     def tied(self) -> tuple[Explanation, ...]:
-        """Those the table cannot tell from the best: odds of less than 20:1."""
+        """Those that the table cannot distinguish from the best: odds of less than 20:1."""
         best = self.explanations[0].bic
-        return tuple(e for e in self.explanations if e.bic - best < TOLD_APART)
+        return tuple(e for e in self.explanations if e.bic - best < DISTINGUISHED)
 
     def probability_of(self, *names: str) -> float:
         """Summed weight of the hypotheses that hold at least one of the effects named."""

@@ -169,12 +169,7 @@ def base_dynamics(state: RigState, omega_n: float, zeta: float, rig: Rig) -> tup
     Returns:
         Izz in kg m² and Cr in N m s/rad.
     """
-    air = {
-        "air_density": state.air_density,
-        "wind_speed": state.wind_speed,
-        "frontal_area": rig.body.frontal_area,
-        "reference_length": rig.body.length,
-    }
+    air = rig.body.flow(state.air_density, state.wind_speed)
     inertia = (state.spring_stiffness - aerodynamic_stiffness(state.derivatives.cn_beta, **air)) / omega_n**2
     return inertia, 2.0 * zeta * omega_n * inertia + aerodynamic_damping(state.derivatives.cn_r, **air)
 

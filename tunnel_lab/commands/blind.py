@@ -96,10 +96,10 @@ def make(
 
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
     refuse_unwritable_files(key)
-    with bar("writing campaigns", count) as tell:
+    with bar("writing campaigns", count) as progress:
         where = make_blind(
             out, count=count, seed=seed, shares=shares, mixture=Mixture(textbook, rare, variety, small), key=key,
-            progress=tell, tell_steps=console(stderr=True).is_terminal,
+            progress=progress, show_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
     say(f"Written: {out} ({count} campaigns), key {where}")
     say(f"Key sha256 {read_document(out / SEAL, '')['key_sha256']}, in {out / SEAL}")
@@ -130,8 +130,8 @@ def diagnose(
     from tunnel_lab.terminal.tables import say
 
     names = split_names(exclude)
-    with bar("diagnosing", None) as tell:
-        sealed = answer_set(folder, excluded=names, jobs=jobs, progress=tell, effects_file=effects_file)
+    with bar("diagnosing", None) as progress:
+        sealed = answer_set(folder, excluded=names, jobs=jobs, progress=progress, effects_file=effects_file)
     say(f"Answers: {answers_folder(folder, names, effects_file)}")
     say(f"Answers sha256 {sealed}")
 
@@ -197,13 +197,13 @@ def score(
 def _show(found: Score) -> None:
     """Print the score."""
     from tunnel_lab.diagnosis_view import blind_page
-    from tunnel_lab.terminal.tables import say, show_tables
+    from tunnel_lab.terminal.tables import rich_table, say, show_tables
 
     for line in blind_page.origin_lines(found):
         say(line)
     say("")
     for section in blind_page.sections(found):
-        show_tables(blind_page.as_table(section))
+        show_tables(rich_table(section))
         if section.note:
             say(section.note + "\n")
 

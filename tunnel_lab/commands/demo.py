@@ -116,8 +116,8 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
     from tunnel_sim.files.campaign_io import write_campaign
     from tunnel_sim.files.writing import write_json
 
-    with bar("simulating runs", len(plan.conditions)) as tell:
-        campaign = simulate_campaign(plan, progress=tell)
+    with bar("simulating runs", len(plan.conditions)) as progress:
+        campaign = simulate_campaign(plan, progress=progress)
     write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
     estimates = []
     for name in SHOWN:

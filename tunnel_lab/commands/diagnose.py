@@ -190,8 +190,8 @@ def diagnose_with_progress(
     """
     from diagnosis import diagnose
 
-    with step_display() as tell:
-        return diagnose(campaign, kinds=kinds, progress=tell, model=model)
+    with step_display() as show_step:
+        return diagnose(campaign, kinds=kinds, progress=show_step, model=model)
 
 
 def write_patch(answer: Diagnosis, path: Path) -> None:
@@ -231,7 +231,7 @@ def step_display() -> Iterator[Callable[[str], None]]:
         task = progress.add_task("starting", total=None)
         step, begun = "", time.perf_counter()
 
-        def tell(text: str) -> None:
+        def show_step(text: str) -> None:
             nonlocal step
             if text in STEPS:
                 step = STEPS[text]
@@ -241,7 +241,7 @@ def step_display() -> Iterator[Callable[[str], None]]:
             else:
                 progress.update(task, description=f"{step}: {text}")
 
-        yield tell
+        yield show_step
 
 
 def show(document: dict[str, Any]) -> None:

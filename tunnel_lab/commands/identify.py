@@ -122,7 +122,7 @@ def run(
         detailed = len(data.runs) <= FEW_RUNS if windows is None else windows
         show_estimate(data, estimate, windows=detailed, source=campaign)
         if found is not None:
-            show_budget(found)
+            show_budget(document["budget"])
         if json is not None:
             say(f"Written: {json}")
     if estimate.status.failed:
@@ -169,17 +169,23 @@ def budgeted(
             partial(identify, estimator=chosen, throw=False),
             inputs,
             others=others,
-            told=lambda what: status.update(Text(f"uncertainty budget: {what}")),
+            progress=lambda what: status.update(Text(f"uncertainty budget: {what}")),
         )
     return with_budget(estimate, found), found
 
 
-def show_budget(budget: Budget) -> None:
-    """Print a budget and what dominates."""
+def show_budget(budget: dict[str, Any]) -> None:
+    """Print a budget and what dominates.
+
+    Args:
+        budget: as in the JSON document.
+    """
     from tunnel_lab.terminal import budget_table, tables
 
     tables.say("")
-    tables.show_tables(budget_table.budget_table(budget))
+    table = tables.rich_table(budget_table.budget_table(budget))
+    table.rows[-2].end_section = True
+    tables.show_tables(table)
     for line in budget_table.budget_lines(budget):
         tables.say(line)
     tables.say("The standard deviations above are the combined ones.")

@@ -83,8 +83,8 @@ def _film(request: Request, look: Look, path: Path) -> None:
     from tunnel_lab.show.film import write_film
     from tunnel_lab.terminal.progress import bar
 
-    with bar("drawing frames") as tell:
-        write_film(request, look, path, tell)
+    with bar("drawing frames") as progress:
+        write_film(request, look, path, progress)
 
 
 def _targets(out: list[Path] | None) -> list[Path]:

@@ -89,20 +89,15 @@ def infer_springs() -> tuple[SpringInference, ...]:
     omega = float(np.mean([row.omega_n_rad_per_s for row in rows]))
     zeta = float(np.mean([row.zeta for row in rows]))
     printed, rig = paper_derivatives()[0], load_rig()
-    air = {
-        "air_density": rig.air.density,
-        "frontal_area": rig.body.frontal_area,
-        "reference_length": rig.body.length,
-    }
     found = []
     for spring in paper_springs():
         stiffness, omega_0 = spring.stiffness_n_m_per_rad, 2.0 * pi * spring.frequency_hz
         if omega_0 <= omega:
             continue
         inertia = stiffness / omega_0**2
-        per_square = aerodynamic_stiffness(printed.cn_beta_per_rad, wind_speed=1.0, **air)
+        per_square = aerodynamic_stiffness(printed.cn_beta_per_rad, **rig.body.flow(rig.air.density, 1.0))
         speed = sqrt((stiffness - inertia * omega**2) / per_square)
-        lost = aerodynamic_damping(printed.cn_r_per_rad, wind_speed=speed, **air)
+        lost = aerodynamic_damping(printed.cn_r_per_rad, **rig.body.flow(rig.air.density, speed))
         found.append(SpringInference(spring.number, speed, 2.0 * zeta * omega * inertia + lost))
     return tuple(found)
 

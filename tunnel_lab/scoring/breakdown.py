@@ -100,7 +100,7 @@ def make_cases(
     effects: Sequence[str] = EFFECTS,
     severities: Sequence[float] = SEVERITIES,
     duration: float = 10.0,
-    tell_steps: bool = False,
+    show_steps: bool = False,
 ) -> list[Case]:
     """Size the effects and simulate their campaigns.
 
@@ -111,7 +111,7 @@ def make_cases(
         realisations: number of campaigns for each effect and severity.
         severities: excess to leave after the nominal refit, in noise powers.
         duration: of every run, s.
-        tell_steps: show the progress of sizing on standard error.
+        show_steps: show the progress of sizing on standard error.
 
     Returns:
         The campaign without effect, then by effect, severity and realisation.
@@ -120,7 +120,7 @@ def make_cases(
     nothing = CampaignDraw("none", conditions, (), 0)
     sized = size_effects(
         [_draw(conditions, name, severity, seed) for name in effects for severity in severities],
-        progress=tell_steps,
+        progress=show_steps,
     )
     several = [_realise(draw, i, seed) for draw in (nothing, *sized) for i in range(realisations)]
     # A motion without random forcing is integrated once.
@@ -202,7 +202,7 @@ def break_down(
         mark,
         jobs=jobs,
         parts=parts,
-        tell=lambda names: None if progress is None else progress(len(names), len(named)),
+        report=lambda names: None if progress is None else progress(len(names), len(named)),
     )
     return [row for name in named for row in done[name]]
 

@@ -165,7 +165,7 @@ def score_grid(
     mark = fingerprint(grid.to_json_dict(), estimators)
     sizes = {unit.name: unit.stop - unit.first for unit in units}
 
-    def tell(names: Sequence[str]) -> None:
+    def report(names: Sequence[str]) -> None:
         if progress is not None:
             progress(sum(sizes[name] for name in names), sum(sizes.values()))
 
@@ -175,7 +175,7 @@ def score_grid(
         mark,
         jobs=jobs,
         parts=parts,
-        tell=tell,
+        report=report,
     )
     order = sorted(units, key=lambda unit: (unit.cell, unit.first))
     return [row for unit in order for row in done[unit.name]]
@@ -188,7 +188,7 @@ def resumed(
     *,
     jobs: int,
     parts: Path | None,
-    tell: Callable[[Sequence[str]], None],
+    report: Callable[[Sequence[str]], None],
 ) -> dict[str, list[Row]]:
     """Do work in processes, store what is finished, and skip what was finished before.
 
@@ -198,7 +198,7 @@ def resumed(
         mark: work stored under another mark is repeated, see `fingerprint`.
         jobs: number of processes; 0 works in this one.
         parts: folder for finished work; None for none.
-        tell: called with the names of all finished items, at the start and after each.
+        report: called with the names of all finished items, at the start and after each.
 
     Returns:
         The rows of every item, by name.
@@ -208,7 +208,7 @@ def resumed(
         rows = None if parts is None else _kept(parts, name, mark)
         if rows is not None:
             done[name] = rows
-    tell(tuple(done))
+    report(tuple(done))
     names = {id(item): name for name, item in items.items()}
     left = [item for name, item in items.items() if name not in done]
     for item, rows in in_processes(work, left, jobs):
@@ -216,7 +216,7 @@ def resumed(
         if parts is not None:
             write_json(output_folder(parts) / f"{name}.json", {"fingerprint": mark, "rows": rows})
         done[name] = rows
-        tell(tuple(done))
+        report(tuple(done))
     return done
 
 

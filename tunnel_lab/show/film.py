@@ -134,7 +134,7 @@ def _draw_elsewhere(
     request: Request, look: Look, path: Path, at: float | None, progress: Callable[[int, int], None] | None
 ) -> None:
     """Draw in a child process into a temporary folder, then move the result to its place."""
-    order = {"request": request.to_json_dict(), "look": asdict(look), "at": at}
+    order = {"request": asdict(request), "look": asdict(look), "at": at}
     reasons = []
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / f"drawn{'.png' if at is not None else '.mp4'}"

@@ -30,12 +30,12 @@ def train_posterior(out: Path, seed: int, shards: int, steps: int, *, jobs: int,
     folder = out.with_suffix(".part")
     if restart and folder.exists():
         shutil.rmtree(folder)
-    with bar("training", 1) as tell:
+    with bar("training", 1) as progress:
         trained = train(
             TrainingSpec(seed, shards, steps),
             folder,
             jobs=jobs,
-            tell=lambda what, done, all_of_it: tell(done, all_of_it, what),
+            progress=lambda what, done, all_of_it: progress(done, all_of_it, what),
         )
     write_whole(out, trained.weights)
     write_json(out.with_suffix(".json"), trained.record)

@@ -161,12 +161,9 @@ def oracle(kind: type[Effect]) -> str:
 def _by_scipy(run: RunSettings, moment: Callable[[float, float, float], float], time_s: Array) -> Array:
     from scipy.integrate import solve_ivp  # only here: slow to load
 
-    body = load_rig().body
-    flow = {"air_density": run.air_density, "frontal_area": body.frontal_area, "wind_speed": run.wind_speed}
-    flow["reference_length"] = body.length
-    windy = run.wind_speed > 0.0
-    stiffness = aerodynamic_stiffness(run.derivatives.cn_beta, **flow) if windy else 0.0
-    damping = aerodynamic_damping(run.derivatives.cn_r, **flow) if windy else 0.0
+    flow = load_rig().body.flow(run.air_density, run.wind_speed)
+    stiffness = aerodynamic_stiffness(run.derivatives.cn_beta, **flow)
+    damping = aerodynamic_damping(run.derivatives.cn_r, **flow)
 
     def derivative(t: float, state: Array) -> tuple[float, float]:
         angle, rate = state

@@ -24,8 +24,6 @@ _FACTS = {
     "spring_stiffness": re.compile(r"(?i)^(spring[ _]?stiffness|stiffness)$"),
 }
 
-Stated = Mapping[str, float]
-
 
 def from_facts(facts: Mapping[str, float]) -> dict[str, float]:
     """Conditions that a file states beside its columns."""

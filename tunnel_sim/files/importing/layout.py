@@ -81,7 +81,7 @@ def find_layout(
     names = list(above[-1][1]) if above else []
     split = [split_unit(name) for name in names]
     named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
-    if len(set(named)) < len(named):  # ambiguous names: the position tells them apart
+    if len(set(named)) < len(named):  # ambiguous names: the position distinguishes them
         named = [name if named.count(name) == 1 else f"{name} #{i + 1}" for i, name in enumerate(named)]
     return Layout(
         first,
