@@ -44,7 +44,6 @@ def diagnose(
     """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
     Args:
-        campaign: measured or simulated runs.
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
         model: a model of one's own, from `read_model`, which is then the nominal model.

@@ -59,9 +59,6 @@ class Closure:
 class ByHand:
     """A campaign with its nominal model fitted, to which effects are added by hand.
 
-    Args:
-        campaign: measured or simulated runs.
-
     Raises:
         TunnelError: when the examination refuses the records, or the nominal model cannot be fitted.
     """

@@ -122,9 +122,6 @@ class Closable:
 def closable_words(document: Mapping[str, Any]) -> str:
     """What could be closed, in words.
 
-    Args:
-        document: of a diagnosis.
-
     Returns:
         A line; empty where nothing remains beyond chance.
     """
@@ -134,9 +131,6 @@ def closable_words(document: Mapping[str, Any]) -> str:
 
 def closable_table(document: Mapping[str, Any]) -> TextTable:
     """How much each kind could close.
-
-    Args:
-        document: of a diagnosis.
 
     Returns:
         A table of shares in per cent with one standard deviation; without rows where nothing remains beyond chance.

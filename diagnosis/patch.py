@@ -53,7 +53,6 @@ class PatchedModel:
     """The model with the causes written into it.
 
     Args:
-        model: as given.
         spec: the patched specification.
         written: attributes that changed.
         notes: where the native element is not the same law, in sentences.
@@ -102,9 +101,6 @@ class PatchedModel:
 def patch_table(document: Mapping[str, Any]) -> TextTable:
     """What the patch changes.
 
-    Args:
-        document: of a diagnosis.
-
     Returns:
         A table; without rows where no model was given.
     """
@@ -125,9 +121,6 @@ def patch_table(document: Mapping[str, Any]) -> TextTable:
 
 def patch_lines(document: Mapping[str, Any]) -> list[str]:
     """How far the patched model closes the gap, and where it is not the law found.
-
-    Args:
-        document: of a diagnosis.
 
     Returns:
         Lines; none where no model was given.

@@ -55,14 +55,10 @@ def assemble(
     """Compose the answer.
 
     Args:
-        study: what was found.
         where: where the gap is.
         maps: data of the figures.
         left_out: sentences on runs that were left out.
         patched: the model given with the causes written into it; the share closed is then its own.
-
-    Returns:
-        The diagnosis.
     """
     base = excess_base(study)
     chosen = study.chosen

@@ -25,7 +25,6 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
     """The answers, with what they leave of the gap in the fitted runs by the fits' own integrator.
 
     Args:
-        study: what was found.
         base: what an excess is measured against.
 
     Returns:

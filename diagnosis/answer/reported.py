@@ -122,12 +122,8 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     """The gap of the campaign and of every run, in noise variances of a sample.
 
     Args:
-        study: what was found.
         base: what an excess is measured against.
         shown: residuals from the MuJoCo model.
-
-    Returns:
-        The summary.
     """
     ratio = base.extra + 1.0  # of the estimated noise to the base
     random = study.random_answer(study.fitted)

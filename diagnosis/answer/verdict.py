@@ -38,9 +38,6 @@ def verdict(
         probability: of the answer, a fraction.
         closed_on: the runs that ``closed`` was measured on, in words (`GapSummary.closed_on`).
         both_winds: whether the campaign has runs with the wind off and runs with the wind on.
-
-    Returns:
-        Sentences.
     """
     if not causes:
         return (

@@ -78,7 +78,6 @@ class InStretches:
 
         Args:
             hypothesis: fitted to the stretches.
-            data: the runs.
 
         Returns:
             The same effects; None where the fit fails.
@@ -105,7 +104,6 @@ def grow_in_stretches(
     """Grow sets of causes on stretches of the runs, where the nominal model misses the motion itself.
 
     Args:
-        data: the runs.
         fit_nominal: fits the nominal model to any runs.
         kinds: effects to try; those that are autonomous are.
         progress: called with the names of each set.

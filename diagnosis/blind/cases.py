@@ -78,7 +78,6 @@ class Case:
     """One campaign.
 
     Args:
-        name: of the campaign.
         truth: its effects, sorted; ``("unknown",)`` outside the vocabulary, empty for none.
         withheld: whether one of its effects was excluded from the vocabulary, which makes the truth unknown.
         severity: excess of the nominal model as a ratio to the noise power; None where the truth does not say.
@@ -188,7 +187,6 @@ def case(
     """Put a truth and an answer together.
 
     Args:
-        name: of the campaign.
         truth: from the key.
         answer: the diagnosis' document.
         excluded: effects that were withheld from the vocabulary.

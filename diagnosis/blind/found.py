@@ -60,9 +60,6 @@ def found_by_group(cases: Sequence[Case]) -> list[Found]:
 
     Args:
         cases: truth and answer of every campaign.
-
-    Returns:
-        The groups that hold a campaign.
     """
     result = []
     for group, belongs in GROUPS.items():

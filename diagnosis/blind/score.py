@@ -227,13 +227,9 @@ def score_set(
     A folder without a seal, but with ``truth.json`` in every campaign, is scored as an open set.
 
     Args:
-        folder: of the set.
         excluded: effects that were withheld when it was answered.
         key: file of the key; the set's own when None.
         effects_file: with which it was answered; None: none.
-
-    Returns:
-        The score.
 
     Raises:
         TunnelError: when a campaign is not answered, key, campaign or answer is not what its hash says, or one of

@@ -34,9 +34,6 @@ class OwnNumbers:
 def ringing(fit: Fit) -> OwnNumbers | None:
     """The strongest decaying line that starts at the release and has one frequency in all runs.
 
-    Args:
-        fit: whose residuals.
-
     Returns:
         Amplitude (rad), angular frequency (rad/s) and damping ratio with every run's phase; None where no
         frequency is left beside the motion's own.
@@ -84,9 +81,6 @@ def _amplitudes(fit: Fit, grid: Array, rate: float) -> tuple[np.ndarray, Array]:
 
 def skip(fit: Fit) -> OwnNumbers | None:
     """The instants at which the runs jump ahead by one common time.
-
-    Args:
-        fit: whose residuals.
 
     Returns:
         The time lost (s) with every run's instants, as many as χ² asks for; None where no run is long enough.

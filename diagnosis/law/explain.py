@@ -28,7 +28,6 @@ def closable(study: Study, *, significant: bool) -> Closable | None:
     """Say how much of what the answer leaves could be closed, and by what.
 
     Args:
-        study: what was found.
         significant: whether what remains is beyond chance.
 
     Returns:

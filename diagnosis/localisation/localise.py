@@ -25,9 +25,6 @@ from tunnel_sim.vocabulary.record import Array
 def localise(study: Study) -> tuple[Where, Maps]:
     """Say where the nominal model departs from the runs.
 
-    Args:
-        study: of the campaign.
-
     Returns:
         The answer in fields and in words, and the maps it is read from.
     """

@@ -61,9 +61,6 @@ def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         scaled: the nominal fit with residuals in units of the noise that counts.
         excesses: its squared residuals, by run.
         chosen: ids of the runs the phase plane is taken over; all where empty.
-
-    Returns:
-        The survey.
     """
     campaign, nominal = study.campaign, study.nominal
     best = None if study.chosen is nominal else study.chosen
@@ -110,10 +107,6 @@ def _shares(excesses: list[RunExcess]) -> list[float]:
 
 def amplitudes(fit: Fit, index: int) -> Array:
     """Amplitude of the fitted motion of one run.
-
-    Args:
-        fit: any.
-        index: of the run.
 
     Returns:
         At every residual, shape (n,), rad.

@@ -57,7 +57,6 @@ class Checkpoint:
         """The inverse of `to_bytes`.
 
         Args:
-            content: the file's.
             spec: of the training to be resumed, as JSON.
 
         Returns:

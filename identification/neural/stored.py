@@ -15,9 +15,6 @@ def read_stored(weights: Path) -> tuple[bytes, bytes]:
     Args:
         weights: the safetensors file.
 
-    Returns:
-        Weights and record.
-
     Raises:
         TunnelError: when a file is missing, cannot be read or is too large.
     """

@@ -112,9 +112,6 @@ class _Document(StrictModel):
 def load_uncertainties(path: Path) -> InputUncertainties:
     """Read a file of uncertainties, as at the top of this module.
 
-    Args:
-        path: the TOML file.
-
     Raises:
         TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
     """

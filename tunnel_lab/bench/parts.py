@@ -162,8 +162,6 @@ def button(text: str, action: Callable[[], object], *, main: bool = False) -> ui
     """A button.
 
     Args:
-        text: what it does.
-        action: called when it is pressed.
         main: whether it is the way on.
     """
     found = ui.element("button").props("type=button").classes("button go" if main else "button")

@@ -28,7 +28,6 @@ class Mark:
     """A run in the chart of its record, times from the record's first sample.
 
     Args:
-        run: its id.
         file: the file that holds it.
         start: of the run: the release, s.
         end: where it has come to rest, or the next run begins, s.
@@ -81,7 +80,6 @@ def state(session: Session, changes: Mapping[str, Any]) -> None:
     """Keep choices, as a recipe beside the campaign.
 
     Args:
-        session: whose files they are about.
         changes: by field of `ImportChoices`; None: found from the files.
 
     Raises:
@@ -99,7 +97,6 @@ def move(session: Session, mark: Mark, *, start: float | None = None, end: float
     """State where a run begins or ends.
 
     Args:
-        session: whose file it is in.
         mark: the run as it is.
         start: s from the record's first sample; None: as it is.
         end: s from the record's first sample; None: as it is.

@@ -26,7 +26,6 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
     Args:
         folder: the workspace, as it is shown and typed.
         port: TCP port (count); 0 takes a free one.
-        browser: whether to open the page.
         first: path of the page to open.
 
     Raises:

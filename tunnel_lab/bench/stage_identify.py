@@ -164,7 +164,6 @@ async def run_commands(session: Session, orders: Sequence[tuple[str, tuple[str, 
     """Run ``tunnel identify`` several times, as many at a time as there are processors.
 
     Args:
-        session: whose campaign it is.
         orders: name of the log and options of each.
     """
     free = asyncio.Semaphore(os.cpu_count() or 1)

@@ -162,10 +162,6 @@ def run(
 def write_proposal(path: Path, document: dict[str, Any]) -> Path | None:
     """Write the formula proposed as an effects file.
 
-    Args:
-        path: the TOML file.
-        document: of a diagnosis.
-
     Returns:
         The file; None where no formula is proposed, and nothing is written.
     """
@@ -185,7 +181,6 @@ def diagnose_with_progress(
     """Diagnose, with step and effect on standard error where that is a terminal.
 
     Args:
-        kinds: effects to answer with.
         model: the nominal model; None: spring and damper.
     """
     from diagnosis import diagnose
@@ -245,11 +240,7 @@ def step_display() -> Iterator[Callable[[str], None]]:
 
 
 def show(document: dict[str, Any]) -> None:
-    """Print an answer: the verdict in words, then the figures behind it.
-
-    Args:
-        document: of a diagnosis.
-    """
+    """Print an answer: the verdict in words, then the figures behind it."""
     from diagnosis import printing as parts
     from diagnosis.closable import closable_table, closable_words
     from diagnosis.patch import patch_lines, patch_table

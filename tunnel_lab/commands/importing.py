@@ -168,10 +168,6 @@ def settings_of(words: list[str]) -> dict[str, float]:
 def confirm(out: Path, *, yes: bool) -> None:
     """Ask whether the campaign is to be written.
 
-    Args:
-        out: its folder.
-        yes: do not ask.
-
     Raises:
         TunnelError: when nobody can be asked.
         typer.Exit: with status 1 when it is declined.

@@ -80,7 +80,6 @@ def shade(axes: Axes, interval: Sequence[float] | None) -> None:
     """Shade the interval that holds most of the gap.
 
     Args:
-        axes: where.
         interval: its ends, in the unit of the horizontal axis; None: nothing is shaded.
     """
     if interval is not None:

@@ -52,11 +52,7 @@ def headline(document: Document) -> tuple[str, str]:
 
 
 def facts(document: Document) -> list[Fact]:
-    """The figures at the head of the page.
-
-    Returns:
-        Facts in the order shown.
-    """
+    """The figures at the head of the page."""
     gap, where = document["gap"], document["where"]
     found = [Fact("Gap of the nominal model", excess(gap["excess_before"]), "noise variances")]
     if document["causes"] and document["causes"] != ["unknown"]:
@@ -216,11 +212,7 @@ def _interval95(values: Document) -> str:
 
 
 def next_steps(document: Document) -> list[str]:
-    """What to do next, in the order in which to do it.
-
-    Returns:
-        Sentences.
-    """
+    """What to do next, in the order in which to do it."""
     causes, rest = document["causes"], document.get("rest") or {}
     steps = [
         f"{', '.join(remark['runs']) or 'The campaign'}: {remark['remedy']}."

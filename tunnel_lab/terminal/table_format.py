@@ -37,21 +37,13 @@ _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 
 
 def with_format(run: Callable[..., None]) -> Callable[..., None]:
-    """A command with ``--quiet``, and ``--format`` for the tables that it prints.
-
-    Args:
-        run: the command.
-    """
+    """A command with ``--quiet``, and ``--format`` for the tables that it prints."""
     kind = Annotated[TableFormat, typer.Option("--format", help=HELP)]
     return _with_option(with_quiet(run), "table_format", kind, chosen)
 
 
 def with_quiet(run: Callable[..., None]) -> Callable[..., None]:
-    """A command with the option ``--quiet``.
-
-    Args:
-        run: the command.
-    """
+    """A command with the option ``--quiet``."""
     return _with_option(run, "quiet", Annotated[bool, typer.Option("--quiet", "-q", help=QUIET_HELP)], quiet)
 
 

@@ -19,8 +19,6 @@ def train_posterior(out: Path, seed: int, shards: int, steps: int, *, jobs: int,
         out: the safetensors file; the record is written beside it.
         shards: of training samples, two hundred campaigns each.
         steps: number of batches of each network.
-        jobs: processes that simulate.
-        restart: forget unfinished work.
 
     Raises:
         TunnelError: when a file cannot be written, or unfinished work belongs to another seed.

@@ -53,7 +53,6 @@ class Start:
     """Where a run starts.
 
     Args:
-        run: its id.
         time: since the start of the record, s.
         angle: displacement from rest, rad.
         rate: rad/s.
@@ -88,7 +87,6 @@ def patched(
     """The model with a law written into it.
 
     Args:
-        model: as given.
         patch: the law.
         starts: of the runs, written as keyframes.
 

@@ -26,7 +26,6 @@ def increasing_times(time_s: Array, sample_rate: float | None, where: str) -> No
     Args:
         time_s: sample times, shape (n,), s.
         sample_rate: as stated in the campaign, Hz; None where it is not stated.
-        where: file and run, for messages.
 
     Raises:
         TunnelError: a step back, a repeated time, or times in a unit other than s.
@@ -63,7 +62,6 @@ def same_unit(angle: Array, column: str, release_angle: float | None, where: str
         angle: the reading, shape (n,), rad.
         column: ``yaw_rad`` or ``yaw_deg``, for messages.
         release_angle: nominal, rad; None where the campaign does not state it.
-        where: file and run, for messages.
 
     Raises:
         TunnelError: a factor of about 57.3 between reading and release angle.
@@ -91,10 +89,6 @@ def same_unit(angle: Array, column: str, release_angle: float | None, where: str
 
 def enough_cycles(record: Record, where: str) -> float:
     """Refuse a record with fewer than three cycles of oscillation.
-
-    Args:
-        record: the run's record.
-        where: file and run, for messages.
 
     Returns:
         Number of cycles in the record.

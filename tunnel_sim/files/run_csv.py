@@ -19,8 +19,6 @@ def read(content: bytes, where: str, most: int) -> FileTable:
     """The table as text.
 
     Args:
-        content: of the file.
-        where: file and run, for messages.
         most: how many samples it may hold (a count).
 
     Returns:

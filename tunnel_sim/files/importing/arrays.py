@@ -65,7 +65,6 @@ def check_size(count: int, where: str) -> None:
 
     Args:
         count: of all values (a count).
-        where: the file.
 
     Raises:
         TunnelError: too many.

@@ -108,7 +108,6 @@ def parse_setting(text: str, where: str) -> Conditions:
 
     Args:
         text: such as ``wind_speed=12.5, air_density=1.2``.
-        where: the option, for messages.
 
     Raises:
         TunnelError: not of that form, an unknown key, or a value out of range.

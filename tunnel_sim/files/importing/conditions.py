@@ -69,7 +69,6 @@ def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
 
     Args:
         pattern: of `name_pattern`; None: the name says nothing.
-        path: the file.
 
     Raises:
         TunnelError: when the name is not of that pattern.
@@ -124,7 +123,6 @@ class ConditionTable:
 
         Args:
             path: the file that holds it.
-            run: its id.
 
         Raises:
             TunnelError: when no row names the file or the run.

@@ -23,7 +23,6 @@ def is_number(text: str, decimal: str = ".") -> bool:
     """Whether a text is a number.
 
     Args:
-        text: a cell.
         decimal: the decimal sign.
     """
     return _NUMBER[decimal].fullmatch(text) is not None
