@@ -209,8 +209,8 @@ class _Choices:
             self._number("rate", "Sample rate, where there are no times [Hz]")
             self._number("counts_per_turn", "Counts of an encoder per turn")
             self._text("calibration", "Angle of a voltage, such as 0.1 + 20*V")
-            self._number("start", "Leave out what is earlier [s]")
-            self._number("end", "Leave out what is later [s]")
+            self._number("start", "Leave out samples before [s]")
+            self._number("end", "Leave out samples after [s]")
             self._text("name", "Conditions in the file names, such as S{spring}_V{wind_speed}_*")
             ui.checkbox(
                 "Cut records at releases", value=self._now.cut, on_change=lambda e: changed("cut", e.value)

@@ -66,8 +66,8 @@ def make(
             "--variety",
             min=0,
             max=1,
-            help="Share with another scale, with few runs, with coloured noise "
-            "and with uneven time stamps, each.",
+            help="Share with another scale, and the same share each with few runs, coloured noise and uneven "
+            "time stamps.",
         ),
     ] = 0.25,
     small: Annotated[
@@ -118,9 +118,8 @@ def diagnose(
     """Diagnose every campaign of a set; continue where an interrupted run ended.
 
     The answers go to FOLDER/answers (answers-without-… with --exclude,
-    answers-with-… with --effects-file), one JSON
-    file for each campaign; their SHA-256 goes to the seal.json in the same
-    folder. The key is not read.
+    answers-with-… with --effects-file), one JSON file for each campaign; their
+    SHA-256 goes to the seal.json in the same folder. The key is not read.
 
     [bold]Exit status[/bold]
       0 all answered, 2 bad input, 130 interrupted (finished answers are kept).
@@ -163,9 +162,9 @@ def score(
     The output gives exact matches by kind with Wilson intervals, causes found and
     false by number of causes and by circumstances, false alarms, calibration of
     the answer and of the probabilities of the effects, closure on held-out runs,
-    errors of Cnβ and Cnr before and after,
-    and the answers by true cause. A folder without seal.json but with a
-    truth.json in every campaign is scored as an open set and labelled as one.
+    errors of Cnβ and Cnr before and after, and the answers by true cause. A folder
+    without seal.json but with a truth.json in every campaign is scored as an open
+    set and labelled as one.
 
     [bold]Exit status[/bold]
       0 scored, 2 bad input: an answer is missing, or a file does not match its hash.

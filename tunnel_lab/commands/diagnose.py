@@ -65,14 +65,16 @@ def run(
         ),
     ] = None,
     joint: Annotated[
-        str | None, typer.Option("--joint", metavar="NAME", help="Its joint that was recorded; for --model.")
+        str | None,
+        typer.Option("--joint", metavar="NAME", help="Joint of the model that was recorded; for --model."),
     ] = None,
     free: Annotated[
         list[str] | None,
         typer.Option(
             "--free",
             metavar="A,B",
-            help="What of it is fitted: inertia, damping, stiffness, rest. Default: what matters.",
+            help="Parameters of the model to fit: inertia, damping, stiffness, rest. Default: those that the "
+            "runs can determine.",
         ),
     ] = None,
     patch: Annotated[
@@ -94,11 +96,11 @@ def run(
     the noise. Then the effects of the vocabulary, and sets of them, are fitted
     and compared. The answer is one effect or several, "none" (there is no gap) or
     "unknown" (no effect of the vocabulary explains it), each with a probability.
-    Gap and coefficients are given before and after the effects are added, and
-    whether what remains could move the coefficients; the gap is predicted for
-    runs, or stretches of time, held out of the fit. Where something remains, it
-    says how much could be closed, by what kind of moment or error of the reading,
-    and by which formula; --propose writes that for --effects-file.
+    Gap and coefficients are given before and after the effects are added. The gap
+    is predicted for runs, or stretches of time, held out of the fit. Where
+    something remains, the answer says whether it could move the coefficients, how
+    much of it could be closed, by what kind of moment or error of the reading, and
+    by which formula; --propose writes the formula for --effects-file.
 
     [bold]Examples[/bold]
       tunnel diagnose my-campaign

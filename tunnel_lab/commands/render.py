@@ -40,10 +40,10 @@ def run(
 ) -> None:
     """Film a run: the oscillating model, and the sensor's reading beside it.
 
-    Writes MP4 (H.264) and PNG files; by default
-    tunnel-output/rig.mp4 and tunnel-output/rig.png. Frames are drawn off-screen
-    with EGL or OSMesa; no display is needed. A frame takes about a fifth of a
-    second without a graphics card.
+    Writes MP4 (H.264) and PNG files; by default tunnel-output/rig.mp4 and
+    tunnel-output/rig.png. Frames are drawn off-screen with EGL or OSMesa; no
+    display is needed. A frame takes about a fifth of a second without a graphics
+    card.
 
     [bold]Examples[/bold]
       tunnel render

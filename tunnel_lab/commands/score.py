@@ -40,7 +40,9 @@ def run(
     ] = None,
     jobs: Annotated[
         int,
-        typer.Option("--jobs", min=0, help="Number of processes; 0 uses this one. Results do not change."),
+        typer.Option(
+            "--jobs", min=0, help="Number of processes, on which no result depends; 0 uses this one."
+        ),
     ] = 2,
     cells: Annotated[bool, typer.Option("--cells", help="Also show every cell.")] = False,
     check: Annotated[

@@ -27,8 +27,8 @@ class TableFormat(StrEnum):
     JSON = "json"
 
 
-HELP = "Of the tables; json: one object a line. Other lines then go to standard error."
-QUIET_HELP = "Print errors only. Files and --json - are written all the same."
+HELP = "Format of the tables; json: one object per line. Other lines then go to standard error."
+QUIET_HELP = "Print errors only; files and --json - are still written."
 chosen: ContextVar[TableFormat] = ContextVar("table format", default=TableFormat.TEXT)
 """The format of this command's tables."""
 quiet: ContextVar[bool] = ContextVar("quiet", default=False)

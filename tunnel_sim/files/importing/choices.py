@@ -60,9 +60,9 @@ class ImportChoices(StrictModel):
     )
     decimal: Literal[".", ","] | None = Field(default=None, description="'.' or ','")
     start: float | None = Field(
-        default=None, description="a time of the file in s: what is earlier is left out"
+        default=None, description="a time of the file in s: earlier samples are left out"
     )
-    end: float | None = Field(default=None, description="a time of the file in s: what is later is left out")
+    end: float | None = Field(default=None, description="a time of the file in s: later samples are left out")
     cut: bool = Field(default=True, description="false to keep records whole")
     stretches: tuple[Stretch, ...] = Field(
         default=(), strict=False, description="[[choices.stretches]] tables with file, run, start and end"
