@@ -17,6 +17,7 @@ from diagnosis.answer.subsets import one_more
 from diagnosis.answer.waterfall import both_ends
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis, polish, restricted
+from diagnosis.closure import share_closed
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.limit_cycles import diagnosable
 from diagnosis.fitting.least_squares import Fit, FitError, fit
@@ -51,9 +52,7 @@ class Closure:
     @property
     def closed(self) -> float:
         """Share of the gap that closes, 0 to 1."""
-        return (
-            float(np.clip(1.0 - max(self.after, 0.0) / self.before, 0.0, 1.0)) if self.before > 0.0 else 0.0
-        )
+        return share_closed(self.before, self.after)
 
 
 class ByHand:

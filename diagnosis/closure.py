@@ -9,6 +9,16 @@ from typing import Any
 from tunnel_sim.files.json_text import as_json
 
 
+def share_closed(before: float, after: float) -> float:
+    """Share of a gap that closes, 0 to 1.
+
+    Args:
+        before: excess of the nominal model, in noise variances of a sample.
+        after: excess with the causes, in noise variances of a sample.
+    """
+    return min(max(1.0 - max(after, 0.0) / before, 0.0), 1.0) if before > 0.0 else 0.0
+
+
 @dataclass(frozen=True)
 class Step:
     """The model with one more cause.
