@@ -55,7 +55,7 @@ def make_blind(
         TunnelError: when the folder or the key exists already, or the count is not above zero.
     """
     if count < 1:
-        raise TunnelError(f"{count} campaigns make no set", where="--count", remedy="give 1 or more")
+        raise TunnelError(f"{count} is not a number of campaigns", where="--count", remedy="give 1 or more")
     clear_leftovers(out.resolve().parent)  # what a killed command set aside is there again
     target = out / KEY if key is None else key
     for path in (out, target):

@@ -303,7 +303,7 @@ def _checked_key(
     hashes = read_hashes(folder / SEAL, "campaigns_sha256", "restore it")
     key_sha256 = read_document(folder / SEAL, "restore it").get("key_sha256")
     if set(hashes) != {path.name for path in campaigns}:
-        raise TunnelError("campaigns were added or taken away", where=str(folder), remedy="restore the set")
+        raise TunnelError("campaigns were added or removed", where=str(folder), remedy="restore the set")
     for path in campaigns:
         if folder_hash(path) != hashes[path.name]:
             raise TunnelError("is not the campaign that was sealed", where=str(path), remedy="restore it")

@@ -219,7 +219,7 @@ def _individual(
             values = _values(identify(replace(campaign, runs=runs)), budget)
             if values is None:
                 raise TunnelError(
-                    f"no answer with {name} of run {campaign.runs[group[0]].id} {100 * size:g} % larger",
+                    f"no estimate with {name} of run {campaign.runs[group[0]].id} {100 * size:g} % larger",
                     where=campaign.name,
                     remedy="use another estimator, or state a smaller uncertainty",
                 )

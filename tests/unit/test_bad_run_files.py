@@ -47,7 +47,7 @@ RUN_CASES: dict[str, tuple[str | bytes, list[str]]] = {
         pl.DataFrame({"time_s": TIME, "yaw_rad": YAW, "yaw_deg": np.rad2deg(YAW)}).write_csv(),
         ["both yaw_rad and yaw_deg", "leave one"],
     ),
-    "column twice": (GOOD.replace("time_s,yaw_rad", "yaw_rad,yaw_rad"), ["yaw_rad is there twice"]),
+    "column twice": (GOOD.replace("time_s,yaw_rad", "yaw_rad,yaw_rad"), ["yaw_rad occurs twice"]),
     "no time, no rate": (csv(None, YAW), ["time_s", "sample_rate", "[sensor]"]),
     "time in milliseconds": (GOOD.replace("time_s", "time_ms"), ["'time_ms'", "did you mean 'time_s'"]),
     "time in capitals": (GOOD.replace("time_s", "Time_s"), ["'Time_s'", "did you mean 'time_s'"]),

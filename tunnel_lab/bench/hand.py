@@ -54,7 +54,7 @@ async def _elsewhere(work: Callable[Given, ResultT], *given: Given.args, **named
         return await asyncio.wrap_future(_worker().submit(work, *given, **named))
     except BrokenProcessPool:
         _worker.cache_clear()
-        raise TunnelError("the process of the fits was ended from outside", remedy="try again") from None
+        raise TunnelError("the fitting process was ended from outside", remedy="try again") from None
 
 
 @cache

@@ -102,7 +102,7 @@ def move(session: Session, mark: Mark, *, start: float | None = None, end: float
         end: s from the record's first sample; None: as it is.
 
     Raises:
-        TunnelError: when the end is not behind the start.
+        TunnelError: when the end is not after the start.
     """
     choices = choices_of(session)
     kept = {(one.file, one.run): one for one in choices.stretches}
@@ -111,7 +111,7 @@ def move(session: Session, mark: Mark, *, start: float | None = None, end: float
     first, last = first if start is None else max(start, 0.0), last if end is None else end
     if last <= first:
         raise TunnelError(
-            f"the end ({last:.4g} s) is not behind the release ({first:.4g} s)",
+            f"the end ({last:.4g} s) is not after the release ({first:.4g} s)",
             where=f"run '{mark.run}'",
             remedy="move one of them",
         )

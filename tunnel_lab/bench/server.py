@@ -84,7 +84,7 @@ def _free_port(port: int) -> int:
     """The port, or a free one for 0.
 
     Raises:
-        TunnelError: when it cannot be had.
+        TunnelError: when it cannot be opened.
     """
     with socket.socket() as trial:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -92,7 +92,7 @@ def _free_port(port: int) -> int:
             trial.bind((HOST, port))
         except OSError as error:
             raise TunnelError(
-                f"cannot be had ({(error.strerror or str(error)).lower()})",
+                f"cannot be opened ({(error.strerror or str(error)).lower()})",
                 where=f"--port {port}",
                 remedy="name another one, or leave it out",
             ) from error

@@ -116,9 +116,7 @@ def run(
     from tunnel_sim.vocabulary.errors import TunnelError
 
     if (out is None) == (preview is None):
-        raise TunnelError(
-            "give either of them", where="--out, --preview", remedy="name a folder or a picture"
-        )
+        raise TunnelError("give one of them", where="--out, --preview", remedy="name a folder or a picture")
     if preview is not None:
         refuse_unwritable(preview)
     stated = {
@@ -171,7 +169,7 @@ def confirm(out: Path, *, yes: bool) -> None:
     """Ask whether the campaign is to be written.
 
     Raises:
-        TunnelError: when nobody can be asked.
+        TunnelError: when there is no terminal to ask.
         typer.Exit: with status 1 when it is declined.
     """
     from tunnel_sim.vocabulary.errors import TunnelError
@@ -179,6 +177,6 @@ def confirm(out: Path, *, yes: bool) -> None:
     if yes:
         return
     if not sys.stdin.isatty():
-        raise TunnelError("nobody can be asked whether to write it", where=str(out), remedy="add --yes")
+        raise TunnelError("cannot be confirmed without a terminal", where=str(out), remedy="add --yes")
     if not typer.confirm(f"Write {out}?", default=True):
         raise typer.Exit(1)

@@ -96,7 +96,11 @@ def _targets(out: list[Path] | None) -> list[Path]:
     targets = out if out else list(_DEFAULT)
     for path in targets:
         if path.suffix.lower() not in (".mp4", ".png"):
-            raise TunnelError("is neither .mp4 nor .png", where=f"--out {path}", remedy="name one of these")
+            raise TunnelError(
+                "is neither .mp4 nor .png",
+                where=f"--out {path}",
+                remedy="name a file that ends in one of these",
+            )
         if path.suffix.lower() == ".mp4":
             library("imageio_ffmpeg", "a film", "film", f"--out {path}")
         if path.is_dir():

@@ -79,7 +79,7 @@ def run(
     if summary is not None:
         if file is not None or out is not None:
             raise TunnelError(
-                "takes no FILE and no --out", where="--summary", remedy="name the folder of a sweep only"
+                "takes neither FILE nor --out", where="--summary", remedy="name the folder of a sweep only"
             )
         show_summary(summary)
         return

@@ -194,7 +194,7 @@ def _write_spring(
     real = roots.real[np.abs(roots.imag) < 1e-6]
     if real.size == 0:
         raise TunnelError(
-            "the spring of the patched model would vanish nowhere", remedy="give it a spring of its own"
+            "the patched model would have no position of rest", remedy="give it a spring of its own"
         )
     usual = -offset if np.any(own.coef) else 0.0
     zero = float(real[np.argmin(np.abs(real - usual))])

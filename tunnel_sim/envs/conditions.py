@@ -218,7 +218,7 @@ def _check_time(effect: Effect) -> None:
     """An episode reads the motion as it goes: none of it can be passed over."""
     if effect.skips and not effect.is_null:
         raise TunnelError(
-            "an episode cannot pass over samples",
+            "an episode cannot drop samples",
             where=f"effect {effect.name}",
             remedy="inject it with tunnel simulate, which makes whole records",
         )

@@ -208,7 +208,7 @@ def _check_inside(folder: Path, path: Path, where: str) -> None:
     try:
         inside = path.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):
-        raise TunnelError("the path cannot be followed", where=where, remedy="correct 'file'") from None
+        raise TunnelError("the path cannot be resolved", where=where, remedy="correct 'file'") from None
     if not inside:
         raise TunnelError(
             "a symbolic link leads outside the campaign's folder",

@@ -179,7 +179,7 @@ def frame_schema(
     with _parquet_faults(where, remedy):
         schema = dict(pl.read_parquet_schema(io.BytesIO(content)))
         count = int(pl.scan_parquet(io.BytesIO(content)).select(pl.len()).collect().item())
-    check_count(len(schema), limits.COLUMNS, "columns", where, "leave out columns that nobody reads")
+    check_count(len(schema), limits.COLUMNS, "columns", where, "leave out columns that are not needed")
     check_count(count, rows, counted, where, "split the file, or thin it out")
     return schema
 

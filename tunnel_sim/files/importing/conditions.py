@@ -54,7 +54,7 @@ def name_pattern(text: str) -> re.Pattern[str]:
             known = _ALIASES.get(key, key)
             if known not in RUN_KEYS or f"<{known}>" in expression:
                 raise TunnelError(
-                    f"'{part}' is not a condition" if known not in RUN_KEYS else f"'{part}' is there twice",
+                    f"'{part}' is not a condition" if known not in RUN_KEYS else f"'{part}' occurs twice",
                     where=f"--name {one_line(text, 60)}",
                     remedy=did_you_mean(key, (*_ALIASES, *RUN_KEYS)),
                 )
@@ -92,7 +92,7 @@ class ConditionTable:
         path: a text file with a column ``file`` or ``run``, and columns named as in ``campaign.toml``.
 
     Raises:
-        TunnelError: not such a table, a name that is there twice, or a value out of range.
+        TunnelError: not such a table, a name that occurs twice, or a value out of range.
     """
 
     def __init__(self, path: Path) -> None:
@@ -114,7 +114,7 @@ class ConditionTable:
             name = row[self._key].strip()
             if name.lower() in self._rows:
                 raise TunnelError(
-                    f"'{one_line(name)}' is there twice", where=shown(path), remedy="leave one out"
+                    f"'{one_line(name)}' occurs twice", where=shown(path), remedy="leave one out"
                 )
             self._rows[name.lower()] = _numbers({key: row[i] for key, i in used.items()}, name, path)
 
