@@ -142,7 +142,7 @@ class ByHand:
             found = one_more(self._fits[known], effect_class(name))
             if found is None:
                 raise TunnelError(
-                    f"{plain([name])} cannot be fitted to these runs", remedy="choose another effect"
+                    f"{plain(name)} cannot be fitted to these runs", remedy="choose another effect"
                 )
             known |= {name}
             self._fits[known] = found

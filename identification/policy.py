@@ -69,7 +69,7 @@ LEAST_PROMINENCE = 40.0
 """Power of a spectral peak over the median's; white noise alone reaches it less than once in 1e6 records."""
 
 FEW_CYCLES = 3.0
-"""Cycles below which a run's status warns: drift and decay are then hard to tell apart."""
+"""Cycles below which a run's status warns: drift and decay are then hard to distinguish."""
 
 LEAST_PEAK_HEIGHT = 10.0
 """Height of a peak over its standard deviation, for the logarithmic decrement: below it the noise in a logarithm is

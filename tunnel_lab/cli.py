@@ -184,7 +184,7 @@ def _flush() -> None:
 
 
 def _settle_output() -> None:
-    """Send what cannot be printed nowhere, so that Python's own flush at the end does not fail again."""
+    """Discard what cannot be printed, so that Python's own flush at the end does not fail again."""
     try:
         _flush()
     except OSError:

@@ -13,7 +13,9 @@ from tunnel_sim.vocabulary.record import Array
 _PADDING = 4  # zero padding of the spectra
 _DECAYS = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of a ringing in one run, nepers
 _MOST_SKIPS, _SWEEPS = 3, 4  # skips sought in a run, and how often each is sought again beside the others
-_EDGE = 8  # blocks at either end of a run in which a skip cannot be told from the release or seen at all
+_EDGE = (
+    8  # blocks at either end of a run in which a skip cannot be distinguished from the release or seen at all
+)
 
 
 @dataclass(frozen=True, eq=False)

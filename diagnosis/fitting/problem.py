@@ -126,7 +126,7 @@ class Problem:
         """Where the phase or the instants of each effect are among a run's own parameters.
 
         Args:
-            width: number of a run's own parameters (a count), which tells the number of instants.
+            width: number of a run's own parameters (a count), which gives the number of instants.
 
         Returns:
             By the effects' names.

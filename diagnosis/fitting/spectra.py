@@ -88,7 +88,7 @@ def mains_line(fit: Fit) -> Line | None:
     """The strongest line near 50 Hz common to all runs.
 
     Returns:
-        The line; None where the sampling is too slow to see it, or the motion too fast to tell it apart.
+        The line; None where the sampling is too slow to see it, or the motion too fast to distinguish it.
     """
     data = fit.problem.data
     mains, around = (data.similarity.similar(value, "Hz") for value in (_MAINS, _MAINS_WANDER))

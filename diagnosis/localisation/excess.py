@@ -153,7 +153,7 @@ def band_excesses(runs: list[RunExcess]) -> tuple[BandExcess, ...]:
     return tuple(result)
 
 
-def telling_bands(bands: tuple[BandExcess, ...]) -> tuple[str, ...]:
+def bands_beyond_chance(bands: tuple[BandExcess, ...]) -> tuple[str, ...]:
     """The bands whose power is beyond chance; all of them where none is.
 
     Args:

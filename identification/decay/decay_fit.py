@@ -148,11 +148,11 @@ def fit_decays(
         trial = _project(
             readings, links, best.parameters + step[: best.parameters.size], zero, prior, own_zeros
         )
-        promised = float(step @ (2.0 * gradient - normal @ step))
-        gain = (best.cost - trial.cost) / max(promised, 1e-300)
+        expected_gain = float(step @ (2.0 * gradient - normal @ step))
+        gain = (best.cost - trial.cost) / max(expected_gain, 1e-300)
         converged = size <= tolerance or (size <= _ROUNDING and trial.cost >= best.cost)
         if iteration == _MAX_ITERATIONS:
-            converged = converged or promised <= _SETTLED * best.cost / samples
+            converged = converged or expected_gain <= _SETTLED * best.cost / samples
         damping = _next_damping(damping, gain)
         if trial.runs and trial.cost <= best.cost:
             best = trial

@@ -85,9 +85,9 @@ def test_fits_of_growing_length_reach_a_truth_far_out_of_phase(data):
 
 def test_only_effects_without_a_memory_of_the_release_are_tried_on_stretches(data):
     kinds = [effect_class(name) for name in ("sensor_drift", "second_mode", "quadratic_damping")]
-    told = []
-    found = grow_in_stretches(data, fit_nominal, kinds, told.append)
-    assert set(told) == {"quadratic_damping"}
+    steps = []
+    found = grow_in_stretches(data, fit_nominal, kinds, steps.append)
+    assert set(steps) == {"quadratic_damping"}
     assert all(h.fit.problem.data is not data for h in found.hypotheses)
     whole = found.whole(found.hypotheses[0], data)
     assert whole.fit.problem.data is data

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.estimate import Quantity
-from identification.scoring.accuracy import Outcome, Score, collect, score
-from tunnel_lab.scoring.work import Progress, Row, estimate_rows, fingerprint, resumed
+from identification.scoring.accuracy import Score, collect, score
+from tunnel_lab.scoring.work import Progress, Row, estimate_rows, fingerprint, outcome, resumed
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
@@ -71,7 +70,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """Of its file."""
+        """Name of its file."""
         return f"{self.effect.replace(' ', '_')}-{self.severity:g}-{self.realisation}"
 
 
@@ -248,16 +247,11 @@ def biases(rows: Sequence[Row]) -> list[Bias]:
     return [
         Bias(
             effect, severity, float(np.mean([row["reached"] for row in some])), estimator, quantity,
-            score(collect(_outcome(row) for row in some)),
+            score(collect(outcome(row) for row in some)),
             float(np.mean([row["status"] == "model_departs" for row in some])),
         )
         for (effect, severity, estimator, quantity), some in groups.items()
     ]  # fmt: skip
-
-
-def _outcome(row: Row) -> Outcome:
-    found = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
-    return Outcome(row["truth"], found, row["bound"])
 
 
 def breakdown_frame(found: Sequence[Bias]) -> pl.DataFrame:

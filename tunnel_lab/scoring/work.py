@@ -11,6 +11,8 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from identification.estimate import UNITS, Quantity
+from identification.scoring.accuracy import Outcome
 from tunnel_lab.scoring.grid import Cell, Grid, check_trials
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import output_folder, write_json
@@ -46,7 +48,7 @@ class Unit:
 
     @property
     def name(self) -> str:
-        """Of its file."""
+        """Name of its file."""
         return f"c{self.cell:04d}-t{self.first:05d}"
 
 
@@ -127,14 +129,18 @@ def estimate_rows(
     return rows
 
 
+def outcome(row: Row) -> Outcome:
+    """A row as it is scored."""
+    found = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
+    return Outcome(row["truth"], found, row["bound"])
+
+
 def unit_of(quantity: str) -> str:
     """Unit of a scored quantity.
 
     Raises:
         KeyError: when no cell scores it.
     """
-    from identification.estimate import UNITS
-
     return {**UNITS, "zeta": "1", "omega_n": "rad/s"}[quantity]
 
 
@@ -204,10 +210,9 @@ def resumed(
         The rows of every item, by name.
     """
     done: dict[str, list[Row]] = {}
-    for name in items if parts is not None else ():
-        rows = None if parts is None else _kept(parts, name, mark)
-        if rows is not None:
-            done[name] = rows
+    if parts is not None:
+        kept = {name: _kept(parts, name, mark) for name in items}
+        done = {name: rows for name, rows in kept.items() if rows is not None}
     report(tuple(done))
     names = {id(item): name for name, item in items.items()}
     left = [item for name, item in items.items() if name not in done]

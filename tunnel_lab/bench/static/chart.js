@@ -97,7 +97,7 @@ export default {
       made.setAttribute("aria-valuemax", last);
       const mark = () => this.marks.find((one) => one.id === id);
       const to = (at) => { mark().at = Math.min(Math.max(at, this.data[0][0]), last); this.place(); };
-      const tell = () => this.$emit("moved", { id, at: mark().at });
+      const report = () => this.$emit("moved", { id, at: mark().at });
       made.addEventListener("pointerdown", (event) => {
         event.preventDefault();
         event.stopPropagation();
@@ -105,7 +105,7 @@ export default {
         made.setPointerCapture(event.pointerId);
         const box = this.chart.over.getBoundingClientRect();
         made.onpointermove = (move) => to(this.chart.posToVal(move.clientX - box.left, "x"));
-        made.onpointerup = () => { made.onpointermove = made.onpointerup = null; tell(); };
+        made.onpointerup = () => { made.onpointermove = made.onpointerup = null; report(); };
       });
       made.addEventListener("mousedown", (event) => event.stopPropagation()); // uPlot would zoom
       made.addEventListener("keydown", (event) => {
@@ -114,8 +114,8 @@ export default {
         event.preventDefault();
         const { min, max } = this.chart.scales.x;
         to(mark().at + steps * (max - min) / this.chart.over.clientWidth);
-        clearTimeout(this.telling);
-        this.telling = setTimeout(tell, 600);
+        clearTimeout(this.pending);
+        this.pending = setTimeout(report, 600);
       });
       this.handles.set(id, made);
       return made;
