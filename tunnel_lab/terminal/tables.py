@@ -92,7 +92,7 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
         title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_edge=False
     )
     for column in columns:
-        # As text, not markup: units stand in brackets. Folded, not cut, so that no digit is lost.
+        # As text, not markup: units are in brackets. Folded, not cut, so that no digit is lost.
         result.add_column(Text(column), justify="right" if column in right else "left", overflow="fold")
     return result
 

@@ -94,7 +94,7 @@ def condition(kind: type[Effect]) -> str:
 
 
 def round_trip(kind: type[Effect]) -> str:
-    """It goes through JSON by name."""
+    """Written to JSON and read back by name, it is the same."""
     for effect in (example(kind), kind()):
         document = json.loads(json.dumps(effect.to_json_dict(), allow_nan=False))
         if document.get("name") != kind.name or make_effect(kind, document.get("parameters", {})) != effect:
@@ -146,7 +146,7 @@ def integration(kind: type[Effect]) -> str:
 
 
 def oracle(kind: type[Effect]) -> str:
-    """It moves the rig as the moment does that its class states independently."""
+    """It moves the rig like the moment that its class states independently."""
     worst = 0.0
     for run in (WIND_ON, WIND_OFF):
         moment = example(kind).moment_oracle(run)
