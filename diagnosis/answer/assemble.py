@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.answer.candidates import candidates
+from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.cautions import cautions
 from diagnosis.answer.coefficients import coefficients, rival_fits
 from diagnosis.answer.held_out import HeldOut, predict_held_out
-from diagnosis.answer.inclusion import inclusion
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.own_units import own_estimate
 from diagnosis.answer.pulls import coefficient_move

@@ -159,9 +159,9 @@ def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, i
     ):
         try:
             silent = _follow(child, progress)
-        finally:  # also when interrupted
-            if child.poll() is None:
-                child.kill()
+        finally:  # also when interrupted; `Popen` itself would then wait for a quarter of a second only
+            child.kill()
+            child.wait()
         if silent:
             return f"no answer in {FIRST_FRAME_S:.0f} s"
         if child.returncode == 0:

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.answer.candidates import inclusion
 from diagnosis.answer.held_out import FOLDS, fit_seen, predict_held_out
 from diagnosis.answer.held_out_stretches import predict_stretches, turns_of
-from diagnosis.answer.inclusion import inclusion
 from diagnosis.answer.reported import Base
 from diagnosis.answer.subsets import Subsets
 from diagnosis.answer.waterfall import waterfall
