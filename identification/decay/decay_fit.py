@@ -79,7 +79,6 @@ class DecayFit:
         runs: one per reading.
         normal: information of φ, and of the zero last where it was estimated, shape (p, p) or (p + 1, p + 1).
         converged: whether the step fell below the tolerance.
-        iterations: how many linearisations it took.
     """
 
     parameters: Array
@@ -87,7 +86,6 @@ class DecayFit:
     runs: tuple[RunFit, ...]
     normal: Array
     converged: bool
-    iterations: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,14 +154,14 @@ def fit_decays(
         damping = _next_damping(damping, gain)
         if trial.runs and trial.cost <= best.cost:
             best = trial
-    nothing = DecayFit(best.parameters, best.zero, (), np.zeros((0, 0)), False, iteration)
+    nothing = DecayFit(best.parameters, best.zero, (), np.zeros((0, 0)), False)
     if not best.runs:
         return nothing
     try:
         normal, _ = _shared_system(best, links, zero is None, prior, own_zeros)
     except np.linalg.LinAlgError:
         return nothing
-    return DecayFit(best.parameters, best.zero, best.runs, normal, converged, iteration)
+    return DecayFit(best.parameters, best.zero, best.runs, normal, converged)
 
 
 def fit_run(
