@@ -249,6 +249,6 @@ def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
         raise TunnelError(
             f"{len(rows[wrong])} cells in line {wrong + 1}, but {len(rows[0])} names of columns",
             where=where,
-            remedy=f"give every line one cell for each column, with {_SAID[delimiter]}",
+            remedy=f"give every line one cell for each column, with {_SAID[delimiter]} between",
         )
     return rows[0], rows[1:]
