@@ -36,6 +36,9 @@ of the paper in view, whose p-value is 0.06: springs 4 and 7 are flagged at this
 SPRING_TOLERANCE = 0.01
 """Relative standard uncertainty of a stated stiffness: weights and arm of a static calibration."""
 
+SAME_PRESSURE = 0.1
+"""Dynamic pressures that differ by a smaller share are of one setting: speeds are read to a few per cent."""
+
 LEAST_SPRING_SPREAD = 0.01
 """Relative difference above which two stiffnesses count as different: a spring is known to a few parts in a
 thousand at best."""

@@ -60,7 +60,7 @@ def _p_value(study: Study) -> float:
     if study.chosen is study.nominal:
         return study.test.p_value
     # no cause changes the tests of the noise itself: those of the residuals count
-    errors = rounding_errors(study.chosen, study.noise.variance, study.step)
+    errors = rounding_errors(study.chosen, study.noise.white(study.step), study.step)
     return test_gap(study.chosen, study.noise, study.trend, coarse_step=True, errors=errors).p_value
 
 

@@ -106,7 +106,7 @@ def judge(
         above the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion.
         Nor is it believed where there would be more noise than is stated.
     """
-    errors = rounding_errors(nominal, noise.variance, step)
+    errors = rounding_errors(nominal, noise.white(step), step)
     allowed = None if errors is None else with_rounding(nominal.problem.data, errors)
     if allowed is not None:
         nominal = refit(Problem(allowed), nominal.point)

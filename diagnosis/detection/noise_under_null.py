@@ -15,9 +15,9 @@ from tunnel_sim.vocabulary.record import Array
 
 #: Repetitions of the campaign, fewer where it is long, never below the least.
 _REPETITIONS, _FEWEST, _SAMPLES = 32, 16, 2.5e6
-#: A step this many times the noise hides the noise's level; several levels are then tried.
+#: A step this many times the noise hides its level, since crossed edges look like noise; several are tried.
 _COARSE = 3.0
-_FACTORS = (0.5, 1.0, 1.5)
+_FACTORS = (0.0, 0.5, 1.0, 1.5)
 _NAMES = ("noise against amplitude", "noise against rate", "noise in bursts")
 _HANN = 1.57  # correlated bins of the windowed periodogram that carry the information of one independent bin
 
@@ -36,14 +36,12 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
     """
     if not trend.judged:
         return dict.fromkeys(_NAMES, 1.0)
-    variance = {run.id: noise.variance[run.id] for run in fit.problem.data.runs}
-    hidden = trend.step**2 / 12.0
-    least = max(min(variance.values()) - hidden, 0.0)
-    factors = _FACTORS if trend.step > _COARSE * np.sqrt(least) else (1.0,)
+    white = noise.white(trend.step)
+    factors = _FACTORS if trend.step > _COARSE * min(white.values()) else (1.0,)
     found = np.zeros(3)
     for factor in factors:
-        white = {run: factor * np.sqrt(max(v - hidden, 1e-3 * v)) for run, v in variance.items()}
-        found = np.maximum(found, _p_values(trend, _repetitions(fit, white, trend.step)))
+        level = {run: factor * std for run, std in white.items()}
+        found = np.maximum(found, _p_values(trend, _repetitions(fit, level, trend.step)))
     return dict(zip(_NAMES, found.tolist(), strict=True))
 
 

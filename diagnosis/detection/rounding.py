@@ -66,18 +66,18 @@ def _motion(blocks: Array, block: int) -> Array:
     return np.asarray(CubicSpline(centres, blocks)(np.arange(blocks.size * block)), np.float64)
 
 
-def rounding_errors(fit: Fit, variance: Mapping[str, float], step: float) -> list[Array] | None:
+def rounding_errors(fit: Fit, white: Mapping[str, float], step: float) -> list[Array] | None:
     """What noise and rounding alone leave in the block means.
 
     Args:
-        variance: of one sample, rounding included, rad², by run id.
+        fit: gives the motion.
+        white: standard deviation of a sample's noise before rounding, rad, by run id.
         step: of the lattice, rad.
 
     Returns:
         By run, repetitions of it, shape (repetitions, blocks), rad; None where the noise is large enough to make
         the rounding error white.
     """
-    white = {run: float(np.sqrt(max(value - step**2 / 12.0, 0.0))) for run, value in variance.items()}
     if min(white.values()) > _BLURS * step:
         return None
     count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))

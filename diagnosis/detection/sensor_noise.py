@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ _LN2 = float(np.log(2.0))  # median of a unit exponential: the periodogram of wh
 #: Error, as a share of the swing, that block means and steps leave in a fit of the closed form of the nominal
 #: model, while its bands still pass as white.
 _ACCURACY = 4e-5
+_LEAST_WHITE = 1e-3  # of the variance: some of it is white, however coarse the step
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Noise:
         estimate: the records' own variance, mean over the runs, rad²; None: the one used.
         relative: standard deviation of that estimate, a share of it.
         colour: of the noise of block means, relative to white noise of the variance used; None where it is white.
+        measured: variance of one sample as the spectrum above the motion shows it, rad², by run id.
     """
 
     variance: dict[str, float]
@@ -44,6 +46,25 @@ class Noise:
     estimate: float | None = None
     relative: float = 0.0
     colour: Colour | None = None
+    measured: Mapping[str, float] = field(default_factory=dict)
+
+    def white(self, step: float) -> dict[str, float]:
+        """The white noise before rounding.
+
+        Args:
+            step: of the lattice of the readings, rad; 0 where there is none.
+
+        Returns:
+            Standard deviation of one sample, rad, by run id. Where the motion crosses a step in many samples, the
+            spectrum above it does not show the rounding error's q²/12 but how often noise takes a reading across
+            the next edge: qσ/√π for noise of a third of a step or less.
+        """
+        found = {}
+        for run, variance in self.variance.items():
+            seen, rounded = self.measured.get(run, variance), step**2 / 12.0
+            before = max(variance - rounded, _LEAST_WHITE * variance)
+            found[run] = float(np.sqrt(np.pi) * seen / step if seen < rounded else np.sqrt(before))
+        return found
 
     @property
     def used(self) -> float:
@@ -142,10 +163,15 @@ def campaign_noise(campaign: Campaign) -> Noise:
         The stated noise where the runs agree with one another and their mean agrees with it, within `NOISE_AGREES`
         standard deviations of the estimate; else the estimate, pooled over runs where they agree with one another.
     """
-    # however slow the motion, the error of a rounded reading is that large
-    rounded = lattice_step(campaign) ** 2 / 12.0
     fastest = max((frequency(run.record) for run in campaign.runs if not run.record.uniform), default=None)
     measured = {run.id: estimate_variance(run.record, fastest) for run in campaign.runs}
+    found = _stated_or_estimated(campaign, measured)
+    return replace(found, measured={run: value for run, (value, _) in measured.items()})
+
+
+def _stated_or_estimated(campaign: Campaign, measured: Mapping[str, tuple[float, float]]) -> Noise:
+    # however slow the motion, the error of a rounded reading is that large
+    rounded = lattice_step(campaign) ** 2 / 12.0
     estimates = {run: (max(value, rounded), std) for run, (value, std) in measured.items()}
     variances = np.array([value for value, _ in estimates.values()])
     relative = np.array([std for _, std in estimates.values()])

@@ -272,7 +272,7 @@ def _coefficient(value: float, unit: str, *, severity: bool = False) -> dict[str
 
 def _inner(value: float, unit: str) -> dict[str, object]:
     ends = sorted((value / _NEAR, value * _NEAR)) if value else [-1.0, 1.0]
-    return {"unit": unit, "scale": value, "lower": ends[0], "upper": ends[1], "default": value}
+    return {"unit": unit, "scale": value or ends[1], "lower": ends[0], "upper": ends[1], "default": value}
 
 
 def effect_of(table: dict[str, Any]) -> type[Effect]:

@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
 from identification.examination.swings import Swing
-from identification.policy import LEAST_STIFFNESS_STD, MISFIT_RATE, REFUSAL_RATE, SPRING_TOLERANCE
+from identification.policy import (
+    LEAST_STIFFNESS_STD,
+    MISFIT_RATE,
+    REFUSAL_RATE,
+    SAME_PRESSURE,
+    SPRING_TOLERANCE,
+)
 from identification.remark import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
 
@@ -172,7 +178,8 @@ def _springs_exchanged(labels: Labels, away: Array) -> Iterator[tuple[tuple[int,
 
 def _winds_exchanged(labels: Labels, away: Array) -> Iterator[tuple[tuple[int, ...], Labels]]:
     for i, j in _pairs(away):
-        if labels.pressure[i] != labels.pressure[j]:
+        low, high = sorted((labels.pressure[i], labels.pressure[j]))
+        if high - low > SAME_PRESSURE * high:
             yield (i, j), replace(labels, pressure=_swapped(labels.pressure, i, j))
 
 

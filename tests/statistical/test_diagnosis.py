@@ -117,4 +117,5 @@ def test_effects_of_the_reference_simulator_are_found(tmp_path, monkeypatch):
     truths = json.loads(key.read_text(encoding="utf-8"))["truths"]
     assert sorted(effect for truth in truths.values() for effect in truth["effects"]) == sorted(wanted)
     for name, truth in truths.items():
-        assert list(diagnose(read_campaign(tmp_path / "set" / name)).causes) == truth["effects"], name
+        found = set(diagnose(read_campaign(tmp_path / "set" / name)).causes)
+        assert found - set(truth["small"]) == set(truth["effects"]), name

@@ -14,7 +14,8 @@ from diagnosis.closable import KINDS, Ceiling, closable_table, closable_words
 from diagnosis.investigate import investigate
 from diagnosis.law.ceiling import Evidence
 from diagnosis.law.explain import chosen_kind, closable
-from diagnosis.law.library import terms
+from diagnosis.law.formula import Formula, effect_of, effect_table
+from diagnosis.law.library import Term, terms
 from diagnosis.law.paths import paths
 from diagnosis.law.ridge import Rows, best_ridge, held_out, normal, total
 from tests.reference.rigs import rig
@@ -101,6 +102,15 @@ def test_the_share_of_a_single_run_is_of_what_its_stretches_show():
     assert {one.held_out for one in found.ceilings} == {"stretches of time", "short gaps"}
     assert found.kind == "angle"
     assert closed(found)["angle"] > 0.85
+
+
+def test_a_term_about_zero_is_an_effect_of_a_file():
+    """Its centre may be fitted, which needs a typical value other than 0."""
+    centred = Formula(
+        (Term("max(b-c,0)", {"c": 0.0}),), (-2.0,), of_reading=False, delta=np.zeros(5), gained=9.0
+    )
+    kind = effect_of(effect_table(centred, "beyond_the_centre"))
+    assert [(info.default, info.scale != 0.0) for info in kind.parameters()] == [(0.0, True), (0.0, True)]
 
 
 def test_what_differs_in_one_run_is_placed_in_it():

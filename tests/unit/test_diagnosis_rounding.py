@@ -43,7 +43,7 @@ def test_noise_that_blurs_the_steps_needs_no_allowance():
     data = decays(500.0, 4e-4, noise=4e-4)
     noise = campaign_noise(data)
     fit = fit_nominal(prepare(data, noise.variance))
-    assert rounding_errors(fit, noise.variance, reading_step(data)) is None
+    assert rounding_errors(fit, noise.white(reading_step(data)), reading_step(data)) is None
     assert judged(data)[0].problem.data.runs[0].noise_variance == noise.variance["r01"] / 2
 
 
@@ -56,7 +56,7 @@ def test_averaging_hardly_reduces_the_error_of_a_motion_slower_than_the_steps():
     )  # fmt: skip
     noise = campaign_noise(data)
     fit = fit_nominal(prepare(data, noise.variance))
-    errors = rounding_errors(fit, noise.variance, reading_step(data))
+    errors = rounding_errors(fit, noise.white(reading_step(data)), reading_step(data))
     allowed = with_rounding(fit.problem.data, errors)
     for run, error in zip(allowed.runs, errors, strict=True):
         assert run.block == 4

@@ -17,7 +17,7 @@ _PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
 
 
 def is_too_wide(table: Table, width: int) -> bool:
-    """Whether cells other than sentences would be broken.
+    """Whether cells other than sentences, or words of a heading, would be broken.
 
     Args:
         width: of the terminal, columns (count).
@@ -27,7 +27,8 @@ def is_too_wide(table: Table, width: int) -> bool:
 
 
 def _least_width(column: Column) -> int:
-    return max(map(_unbroken, (column.header, *column.cells)), default=0)
+    words = map(cell_len, str(column.header).split())
+    return max((*words, *map(_unbroken, column.cells)), default=0)
 
 
 def _unbroken(cell: object) -> int:

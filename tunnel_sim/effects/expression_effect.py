@@ -194,11 +194,15 @@ def _check_names(parameters: Mapping[str, Quantity]) -> None:
                 f"{quantity.lower:g} to {quantity.upper:g}",
                 remedy="correct lower, upper, scale or default",
             )
+        if quantity.scale == 0.0:
+            raise TunnelError(
+                f"parameter {name}: the scale is 0", remedy="state a typical value as the scale"
+            )
     severity = next(iter(parameters.values()), None)
-    if severity is None or severity.default != 0.0 or severity.scale == 0.0:
+    if severity is None or severity.default != 0.0:
         raise TunnelError(
             "the first parameter is not a severity",
-            remedy="give it the default 0, which removes the effect, and a scale that is not 0",
+            remedy="give it the default 0, which removes the effect",
         )
 
 

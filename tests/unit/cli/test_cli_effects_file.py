@@ -37,6 +37,7 @@ def effects_file(tmp_path: Path) -> Path:
         (("scale = 0.05, lower = -1", "scale = 0.05, lower = 0.5"), "s: the default 0 or the scale 0.05 is not"),
         (("parameters.s", "parameters.random"), "cannot be named 'random'"),
         (('"gain"', '"Gain!"'), "'name' = 'Gain!'"),
+        (("unit = \"1/rad2\", scale = 0.05", "unit = \"1/rad2\", scale = 0.0"), "parameter s: the scale is 0"),
         (("default = 0.06", "default = 0.6"), "effect 'detent': parameter w: the default 0.6 or the scale"),
         (("upper = 50.0", "upper = 50.0, default = 0.1"), "the first parameter is not a severity"),
         (("lower = -1, upper = 1", "lower = -1, upper = 0"), "the default 0 or the scale 0.05 is not from -1 to 0"),

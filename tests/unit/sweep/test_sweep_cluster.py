@@ -97,7 +97,7 @@ def test_a_scheduler_that_goes_away_is_one_line(
         status = main(["sweep", str(small), "--out", str(tmp_path / "out"), "--scheduler", address])
     said = capsys.readouterr().err.splitlines()
     assert status == 2
-    assert said[-1].startswith("tunnel: the scheduler is gone; what is finished stays")
+    assert said[-1].startswith("tunnel: the scheduler is gone; finished shards are kept")
 
 
 def test_a_local_cluster_gives_the_same(small: Path, sweep: Sweep, here, tmp_path: Path) -> None:
