@@ -114,7 +114,10 @@ def grow_in_stretches(
     """
     short = in_stretches(data)
     first = fit_nominal(short.data)
-    nominal, long = fit_longer(first, short, data, long_stretch(short))
+    try:
+        nominal, long = fit_longer(first, short, data, long_stretch(short))
+    except (FitError, np.linalg.LinAlgError):  # a model without the causes may run away in long stretches
+        nominal, long = first, short
     level, found = [_Grown(Hypothesis((), first), Hypothesis((), nominal))], []
     able = [kind for kind in kinds if kind.autonomous]
     while _may_gain(level[0].long, nominal):

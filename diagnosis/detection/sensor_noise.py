@@ -292,6 +292,7 @@ class NoiseTrend:
 
 _WINDOW = 0.02  # s: a small part of a swing, so that large angles and large rates fall in different windows
 _FEWEST = 10  # samples in a window
+_SHORTEST = 5.0 * _WINDOW  # s: of a record with several windows
 
 
 def noise_trend(campaign: Campaign) -> NoiseTrend:
@@ -299,9 +300,10 @@ def noise_trend(campaign: Campaign) -> NoiseTrend:
 
     Returns:
         Trends of the variance of fourth differences of the reading in windows of 20 ms, pooled over the runs with
-        evenly spaced samples. Their null distribution is simulated (`diagnosis.detection.noise_under_null`).
+        evenly spaced samples that are not shorter than five windows. Their null distribution is simulated
+        (`diagnosis.detection.noise_under_null`).
     """
-    even = [run.record for run in campaign.runs if run.record.uniform]
+    even = [r.record for r in campaign.runs if r.record.uniform and r.record.duration > _SHORTEST]
     values = trend_statistics([(record.yaw_rad[None], record.sample_rate) for record in even])
     if values is None:
         return NoiseTrend(0.0, 0.0, 0.0, judged=False)

@@ -53,6 +53,10 @@ RUN_CASES: dict[str, tuple[str | bytes, list[str]]] = {
     "time in capitals": (GOOD.replace("time_s", "Time_s"), ["'Time_s'", "did you mean 'time_s'"]),
     "step back": (change(300, "0.2,0.1"), ["steps back", "sort"]),
     "time stands still": (change(300, LINES[298]), ["stands still", "repeated"]),
+    "times a billionth apart": (
+        change(300, LINES[298].replace(",", "0000000001,")),
+        ["stands still", "repeated"],
+    ),
     "time backwards": (csv(TIME[::-1], YAW), ["steps back"]),
     "coarse times": (csv(np.round(TIME, 2), YAW), ["time_s"]),
     "one sample": ("\n".join(LINES[:2]), ["only one sample", "three cycles"]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tunnel_sim.files.plausible import KEEP
+from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.cycles import count_cycles
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
@@ -33,7 +34,7 @@ def increasing_times(time_s: Array, sample_rate: float | None, where: str) -> No
     if time_s.size < 2:
         raise TunnelError("only one sample", where=where, remedy="record three cycles or more")
     steps = np.diff(time_s)
-    back = np.flatnonzero(steps <= 0.0)
+    back = np.flatnonzero(steps < 1.0 / limits.FASTEST_RATE)
     if back.size:
         at = int(back[0])
         raise TunnelError(
