@@ -16,6 +16,9 @@ MODERATE = (1.0, 10.0)
 """Excess of a moderate gap: 1 to 10 times the noise power."""
 
 
+_Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
 class _Read(BaseModel):
     """The part of a document that is scored; the rest is ignored."""
 
@@ -40,12 +43,12 @@ class _Truth(_Read):
 
 class _Candidate(_Read):
     effect: str
-    probability: float
+    probability: _Probability
 
 
 class _Coefficient(_Read):
     value: float
-    std: float
+    std: Annotated[float, Field(ge=0.0)]
 
 
 class _Coefficients(_Read):
@@ -61,7 +64,7 @@ class _Answer(_Read):
     causes: list[str] | None
     ambiguous_with: list[str] = []
     candidates: list[_Candidate] = []
-    inclusion: dict[str, Annotated[float, Field(ge=0.0, le=1.0)]] = {}
+    inclusion: dict[str, _Probability] = {}
     coefficients: _Coefficients = _Coefficients()
     gap: _Gap | None = None
     wall_s: float = 0.0

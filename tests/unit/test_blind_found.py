@@ -72,6 +72,12 @@ def test_an_inclusion_that_is_not_a_probability_is_refused(bad):
         made(["free_play"], ["free_play"], inclusion=bad)
 
 
+@pytest.mark.parametrize("bad", [-0.1, 1.5, 1e300])
+def test_a_candidate_without_a_probability_is_refused(bad):
+    with pytest.raises(ValueError, match="validation error"):
+        stated(["free_play"], ["free_play"], bad)
+
+
 def drawn(shift, seed=1, campaigns=600):
     """Campaigns of 24 statements, true as often as stated plus a shift."""
     rng = np.random.default_rng(seed)
