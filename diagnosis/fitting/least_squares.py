@@ -31,7 +31,6 @@ class Fit:
         covariance: of the common parameters for the assumed noise, releases eliminated, shape (common, common).
         jacobian: of the scaled residuals' prediction with respect to the common parameters, by run, shape
             (n, common), and to the run's release, shape (n, 2).
-        iterations: Gauss–Newton steps made.
         converged: whether the last step no longer paid.
     """
 
@@ -41,7 +40,6 @@ class Fit:
     chi2: Array
     covariance: Array
     jacobian: list[tuple[Array, Array]] = field(repr=False)
-    iterations: int
     converged: bool
 
     @property
@@ -127,7 +125,7 @@ def fit(
             converged = True
         if base is not None and iterations >= _HOPELESS and state.cost > base.total:
             break  # more parameters, and still worse than without them
-    return state.result(iterations, converged)
+    return state.result(converged)
 
 
 class _State:
@@ -163,7 +161,7 @@ class _State:
             self.damping = max(self.damping * 10.0, 1e-4)
         return 0.0
 
-    def result(self, iterations: int, converged: bool) -> Fit:
+    def result(self, converged: bool) -> Fit:
         """The fit as it stands."""
         return Fit(
             self.problem,
@@ -172,7 +170,6 @@ class _State:
             np.array([float(r @ r) for r in self.residuals]),
             _covariance(self.jacobian),
             self.jacobian,
-            iterations,
             converged,
         )
 
