@@ -43,7 +43,7 @@ def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
         many = f"{len(cells)} cells" if len(cells) > 1 else "1 cell"
         one = table(
             f"{group[0].upper()}{group[1:]} ({many})",
-            *("", "RMSE/bound", "worst", "bias/bound", "95 % covers [%]", "failed [%]"),
+            *("", "RMSE/\nbound", "worst", "bias/\nbound", "95 % covers\n[%]", "failed\n[%]"),
             right=("worst",),
         )
         for name in results.estimators:
@@ -93,7 +93,7 @@ def cell_tables(results: Results) -> list[Table]:
     trials = results.trials()
     found = []
     for index, cell in enumerate(results.grid.cells):
-        one = table(cell.label, "", "RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed [%]")
+        one = table(cell.label, "", "RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
         for name in results.estimators:
             _section(one, results, name, [index])
             for quantity in cell.quantities:
