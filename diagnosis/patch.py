@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
     from tunnel_sim.engine.joint_patch import Written
 
+UNPATCHED = "The causes could not be written into the model"
+"""How a caution begins where an answer has no patched model."""
+
 
 @dataclass(frozen=True)
 class NativeClosure:

@@ -134,6 +134,10 @@ def run(
     own = (
         None if model is None or joint is None else read_model(model, joint, data, split_names(free) or None)
     )
+    if own is not None and patch is not None:
+        from diagnosis.answer.patched_model import refuse_unpatchable
+
+        refuse_unpatchable(own, data, patch)
     answer = diagnose_with_progress(data, kinds, own)
     document = answer.to_json_dict()
     document["provenance"]["sha256"] = hashes
@@ -201,16 +205,14 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
         path: of the MJCF file.
 
     Raises:
-        TunnelError: when the answer has none.
+        TunnelError: when the answer has none, with the reason.
     """
+    from diagnosis.patch import UNPATCHED
     from tunnel_sim.vocabulary.errors import TunnelError
 
     if answer.model is None:
-        raise TunnelError(
-            "there is no patched model to write",
-            where="--patch",
-            remedy="the answer without --patch says why",
-        )
+        said = next((one.rstrip(".") for one in answer.cautions if one.startswith(UNPATCHED)), UNPATCHED)
+        raise TunnelError(said, where="--patch", remedy="leave out --patch for the answer alone")
     answer.model.write(path)
 
 
