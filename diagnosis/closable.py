@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from identification.printing.table import TextTable
+from tunnel_sim.effects import known_effects
 
 KINDS: Mapping[str, str] = {
     "angle": "a moment of the angle alone",
@@ -137,10 +138,18 @@ def closable_words(document: Mapping[str, Any]) -> str:
         document: of a diagnosis.
 
     Returns:
-        A line; empty where nothing remains beyond chance.
+        A line; empty where there is no gap, or it was not found.
     """
-    found = document.get("closable")
-    return f"What could be closed: {found['words']}" if found else ""
+    if found := document.get("closable"):
+        return f"What could be closed: {found['words']}"
+    rest = document.get("rest")
+    if not rest or not document["causes"]:
+        return ""
+    if not rest["significant"]:
+        return f"What could be closed: nothing beyond chance (p = {rest['p_value']:.2g})."
+    if any(kind.random for kind in known_effects() if kind.name in document["causes"]):
+        return "What could be closed is not stated: beside a random moment any law would close something."
+    return ""
 
 
 def closable_table(document: Mapping[str, Any]) -> TextTable:

@@ -135,8 +135,30 @@ def test_nothing_is_proposed_without_a_gap(tmp_path):
     assert closable(study, significant=False) is None
     assert write_proposal(tmp_path / "law.toml", {"closable": None}) is None
     assert not (tmp_path / "law.toml").exists()
-    assert closable_words({"closable": None}) == ""
     assert closable_table({"closable": None}).rows == ()
+
+
+REST = {"significant": False, "p_value": 0.4321}
+
+
+@pytest.mark.parametrize(
+    ("causes", "rest", "said"),
+    [
+        (["coulomb_friction"], REST, "What could be closed: nothing beyond chance (p = 0.43)."),
+        (["coulomb_friction"], REST | {"significant": True}, ""),
+        (
+            ["buffeting"],
+            REST | {"significant": True},
+            "What could be closed is not stated: beside a random moment",
+        ),
+        ([], REST, ""),
+        (["unknown"], None, ""),
+    ],
+)
+def test_beside_every_named_answer_it_says_what_could_be_closed(causes, rest, said):
+    words = closable_words({"closable": None, "causes": causes, "rest": rest})
+    assert words.startswith(said)
+    assert bool(words) == bool(said)
 
 
 def test_equations_that_cannot_be_solved_are_said(monkeypatch):

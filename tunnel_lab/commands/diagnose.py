@@ -150,7 +150,8 @@ def run(
         from diagnosis.detection.limit_cycles import diagnosable
         from tunnel_lab.diagnosis_view import Byline, write_report
 
-        byline = Byline(datetime.now().astimezone().date().isoformat(), author, notes)
+        today = datetime.now().astimezone().date().isoformat()
+        byline = Byline(today, author, notes, "" if patch is None else patch.name)
         write_report(document, diagnosable(data).campaign, report, byline)
     proposed = None if propose is None else write_proposal(propose, document)
     if to_stdout:
