@@ -16,6 +16,7 @@ KINDS: Mapping[str, str] = {
     "wind": "a moment of angle and rate with the wind",
     "time": "a moment in time, alike in all runs",
     "reading": "an error of the reading, alike in all runs",
+    "line": "a steady line in the reading, of a phase of its own in every run",
     "between": "a stiffness, damping or moment of each run's own",
     "event": "a moment in time of each run's own",
     "wander": "a wandering or jumping zero of each run's own",
