@@ -214,8 +214,8 @@ def _line_words(line: SteadyLine, similarity: Similarity) -> str:
     frequency = own((line.frequency, line.frequency_std), "Hz")
     amplitude = own((line.amplitude, line.amplitude_std), unit, 1e3)
     return (
-        f"The line is at {frequency} Hz, with an amplitude of {amplitude} m{unit_mark(unit)}, root mean "
-        f"square over the runs; chance shows one in less than {100.0 * PLACE_FALSE_ALARM_RATE:.2g} % of campaigns."
+        f"The line is at {frequency} Hz, with an amplitude of {amplitude} m{unit_mark(unit)}, root mean square "
+        f"over the runs; chance alone shows one in less than {100.0 * PLACE_FALSE_ALARM_RATE:.2g} % of campaigns."
     )
 
 
