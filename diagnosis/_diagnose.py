@@ -22,6 +22,7 @@ from diagnosis.detection.refusal import refuse_hopeless
 from diagnosis.investigate import Progress, investigate
 from diagnosis.law.explain import closable
 from diagnosis.localisation.localise import localise
+from diagnosis.patch import UNPATCHED
 from diagnosis.result import Diagnosis
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
@@ -137,7 +138,7 @@ def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tupl
     try:
         return patched_model(study, model), ()
     except TunnelError as error:
-        return None, (f"The causes could not be written into the model: {error.what}.",)
+        return None, (f"{UNPATCHED}: {error.what}.",)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

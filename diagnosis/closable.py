@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from identification.printing.table import TextTable
+from tunnel_sim.effects import known_effects
 from tunnel_sim.files.json_text import as_json
 
 KINDS: Mapping[str, str] = {
@@ -16,6 +17,7 @@ KINDS: Mapping[str, str] = {
     "wind": "a moment of angle and rate with the wind",
     "time": "a moment in time, alike in all runs",
     "reading": "an error of the reading, alike in all runs",
+    "line": "a steady line in the reading, of a phase of its own in every run",
     "between": "a stiffness, damping or moment of each run's own",
     "event": "a moment in time of each run's own",
     "wander": "a wandering or jumping zero of each run's own",
@@ -123,10 +125,18 @@ def closable_words(document: Mapping[str, Any]) -> str:
     """What could be closed, in words.
 
     Returns:
-        A line; empty where nothing remains beyond chance.
+        A line; empty where there is no gap, or it was not found.
     """
-    found = document.get("closable")
-    return f"What could be closed: {found['words']}" if found else ""
+    if found := document.get("closable"):
+        return f"What could be closed: {found['words']}"
+    rest = document.get("rest")
+    if not rest or not document["causes"]:
+        return ""
+    if not rest["significant"]:
+        return f"What could be closed: nothing beyond chance (p = {rest['p_value']:.2g})."
+    if any(kind.random for kind in known_effects() if kind.name in document["causes"]):
+        return "What could be closed is not stated: beside a random moment any law would close something."
+    return ""
 
 
 def closable_table(document: Mapping[str, Any]) -> TextTable:

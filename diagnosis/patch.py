@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
     from tunnel_sim.engine.joint_patch import Written
 
+UNPATCHED = "The causes could not be written into the model"
+"""How a caution begins where an answer has no patched model."""
+
 
 @dataclass(frozen=True)
 class NativeClosure:
@@ -123,17 +126,21 @@ def patch_lines(document: Mapping[str, Any]) -> list[str]:
     """How far the patched model closes the gap, and where it is not the law found.
 
     Returns:
-        Lines; none where no model was given.
+        A line, and one for each difference of the laws; none where no model was given.
     """
     model = document.get("model")
     if model is None:
         return []
-    closed, by_fit = (f"{100.0 * model[name]:.1f} %" for name in ("closed", "closed_by_fit"))
-    return [
-        f"The patched model, simulated by MuJoCo as it stands, closes {closed} of the gap {model['closed_on']}; "
-        f"the fit itself {by_fit}. The reading is the position of {model['joint']} {model['zero_rad']:+.4g} rad.",
-        *(f"- {note}" for note in model["notes"]),
-    ]
+    if document["causes"] in ([], ["unknown"]):
+        said = f"No cause is written into the patched model, only what was free: {', '.join(model['free'])}."
+    else:
+        closed, by_fit = (f"{100.0 * model[name]:.1f} %" for name in ("closed", "closed_by_fit"))
+        said = (
+            f"The patched model, simulated by MuJoCo as it stands, closes {closed} of the gap "
+            f"{model['closed_on']}; the fit itself {by_fit}."
+        )
+    reading = f"The reading is the position of {model['joint']} {model['zero_rad']:+.4g} rad."
+    return [f"{said} {reading}", *(f"- {note}" for note in model["notes"])]
 
 
 def _numbers(values: list[float]) -> str:

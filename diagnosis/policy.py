@@ -223,5 +223,7 @@ LAW_REACHES = 0.97
 AS_MUCH = 0.02
 #: Share of what laws of single runs close that a law common to all runs must reach. Judgement.
 COMMON_SHARE = 0.8
+#: Share of a line in one half of a run that the other half must predict, for the line to be steady. Judgement.
+LINE_STEADY = 0.8
 #: Share of what is left below which no kind is named. Judgement.
 LEAST_CLOSABLE = 0.1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -10,12 +11,39 @@ import numpy as np
 from diagnosis.answer.held_out import predict_held_out
 from diagnosis.answer.joint_law import FoundLaw, found_law, start_of
 from diagnosis.answer.native_closure import native_closure
+from diagnosis.detection.own_model import reach
 from diagnosis.patch import PatchedModel
 from diagnosis.study import Study
 from tunnel_sim.engine.joint_model import JointModel
-from tunnel_sim.engine.joint_patch import Start, patched, simulate_joint
+from tunnel_sim.engine.joint_patch import JointPatch, Start, patched, patched_xml, simulate_joint
 from tunnel_sim.physics.motion import Motion
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
+
+
+def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> None:
+    """Refuse a model that no answer could be written into, before the work.
+
+    Args:
+        model: as given.
+        campaign: to be diagnosed with it.
+        path: where the patched model is to be written.
+
+    Raises:
+        TunnelError: when every run has the wind on, or the engine cannot write or simulate the model as given.
+    """
+    still = [run for run in campaign.runs if not run.wind_on]
+    if not still:
+        raise TunnelError(
+            "a patched model is simulated against runs with the wind off, and there are none",
+            where="--patch",
+            remedy="add runs with the wind off, or leave out --patch",
+        )
+    spec, _ = patched(model, JointPatch(model.law.inertia, friction=model.law.friction))
+    patched_xml(spec, model, path.parent)
+    duration = max(float(np.ptp(run.record.time_s)) for run in still)
+    simulate_joint(spec.compile(), model.law.rest, Start(still[0].id, 0.0, reach(campaign), 0.0), duration)
 
 
 def patched_model(study: Study, model: JointModel) -> PatchedModel:

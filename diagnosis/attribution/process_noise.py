@@ -57,7 +57,7 @@ class ProcessNoise:
         spectrum: as fitted.
         drop: of −2 ln L against white measurement noise alone, wind-on runs, dimensionless.
         cost: −2 ln L without constants, wind-on runs, dimensionless.
-        excess: mean squared scaled innovation minus one.
+        excess: mean squared scaled innovation minus one, dimensionless.
         innovations: scaled, by wind-on run.
         interval: between innovations, s.
     """

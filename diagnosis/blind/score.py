@@ -278,9 +278,10 @@ def _checked_answers(
 ) -> tuple[dict[str, dict[str, Any]], str]:
     """Answers by campaign, and the hash over all."""
     target = answers_folder(folder, excluded, effects_file)
-    again = f"answer the set first: tunnel blind diagnose {folder}" + "".join(
+    again = f"answer the set first: tunnel blind diagnose {shown(folder)}" + "".join(
         f" --exclude {e}" for e in excluded
     )
+    again += "" if effects_file is None else f" --effects-file {shown(effects_file)}"
     hashes = read_hashes(target / SEAL, "answers_sha256", again)
     left = [path.name for path in campaigns if path.name not in hashes]
     if left:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
-from diagnosis.fitting.run_data import Data
+from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
 from tunnel_sim.vocabulary.record import Array
 
@@ -104,7 +104,7 @@ def mains_line(fit: Fit) -> Line | None:
     )
     floor = float(np.max(np.sum([s.power(beside) for s in spectra], axis=0)))
     drop = float(total.max())
-    gain = [_block_gain(best, run.interval, run.block) * run.response(best) for run in data.runs]
+    gain = [block_gain(best, run) * run.response(best) for run in data.runs]
     scale = [np.sqrt(run.noise_variance) / g for run, g in zip(data.runs, gain, strict=True)]
     amplitude = float(
         np.sqrt(np.mean([np.abs(s.at(best) * k) ** 2 for s, k in zip(spectra, scale, strict=True)]))
@@ -133,10 +133,18 @@ def _smooth(spectrum: Spectrum) -> Spectrum:
     return Spectrum(spectrum.frequency, hann * np.sqrt(8.0 / 3.0), spectrum.duration, spectrum.count)
 
 
-def _block_gain(frequency: float, interval: float, block: int) -> float:
-    """Gain of the block mean at a frequency."""
-    x = np.pi * frequency * interval / block
-    return float(np.sin(block * x) / (block * np.sin(x))) if block > 1 else 1.0
+def block_gain(frequency: float, run: RunData) -> float:
+    """Gain of a run's block mean at a frequency.
+
+    Args:
+        frequency: Hz.
+        run: whose blocks.
+
+    Returns:
+        Dimensionless; 1 where a block is one sample.
+    """
+    x = np.pi * frequency * run.interval / run.block
+    return float(np.sin(run.block * x) / (run.block * np.sin(x))) if run.block > 1 else 1.0
 
 
 def shedding_line(fit: Fit) -> Line | None:

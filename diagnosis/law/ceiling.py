@@ -182,12 +182,25 @@ class Rest:
         precision = common_precision(parts)
         drops = []
         for matrix, residual in zip(columns, residuals, strict=True):
-            turn = np.arange(residual.size) // _GAP % _TURNS
+            turn = gaps(residual.size)
             after = sum(_gap_cost(matrix, residual, turn == t, precision) for t in range(_TURNS))
             drops.append(float(residual @ residual) - after)
         left = [float(r @ r) - r.size for r in self.fit.residuals]
         closed, std = ratio(np.array(drops), np.array(left))
         return Evidence(Ceiling(kind, closed, std, GAPS), sum(drops), precision)
+
+
+def gaps(size: int, group: int = 1) -> NDArray[np.int_]:
+    """Which of the sets of short gaps left out in turn a sample belongs to.
+
+    Args:
+        size: number of samples.
+        group: samples for each row of a `Path`.
+
+    Returns:
+        Numbers of the sets, shape (size,).
+    """
+    return np.arange(size) // (_GAP * group) % _TURNS
 
 
 def _excess_in(residual: Array, unit: Unit) -> float:

@@ -14,8 +14,10 @@ from diagnosis.law.ridge import Normal, Ridge, Rows, normal
 from tunnel_sim.vocabulary.record import Array
 
 _POINTS, _MAP = 41, 13
+LISTED = 0.1
+"""Share of the largest run's part from which a run is among the events."""
+
 _INSIDE = 0.8  # of an event's energy lies within the times given
-_LISTED = 0.1  # share of the largest run's
 
 _OVER: Mapping[str, tuple[str, ...]] = {
     "angle": ("angle",), "rate": ("rate",), "state": ("angle", "rate"), "wind": ("angle", "rate"),
@@ -107,7 +109,7 @@ def events(rest: Rest, kind: str, precision: float) -> list[dict[str, Any]]:
     return [
         {"run": path.run.id, "share": drop / whole, **_interval(energy, path.time + path.run.start)}
         for path, drop, energy in sorted(found, key=lambda one: -one[1])
-        if drop > _LISTED * largest
+        if drop > LISTED * largest
     ]
 
 

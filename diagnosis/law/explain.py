@@ -17,9 +17,11 @@ from diagnosis.law import bases
 from diagnosis.law.ceiling import Evidence, Rest
 from diagnosis.law.curve import curve, events
 from diagnosis.law.formula import Proposal, choose, propose
+from diagnosis.law.line import SteadyLine, steady_line
 from diagnosis.law.ridge import ratio
-from diagnosis.policy import AS_MUCH, COMMON_SHARE, LEAST_CLOSABLE
+from diagnosis.policy import AS_MUCH, COMMON_SHARE, LEAST_CLOSABLE, PLACE_FALSE_ALARM_RATE
 from diagnosis.study import Study
+from identification.printing.numbers import unit_mark, with_std
 
 _BESIDE = 2.0  # standard deviations
 
@@ -55,7 +57,9 @@ def explain(left: Fit, similarity: Similarity, *, named: bool) -> Closable:
     """
     rest = Rest(left)
     common = {kind: rest.common(kind) for kind in bases.COMMON}
-    single = {kind: rest.single(kind) for kind in bases.SINGLE}
+    line = steady_line(rest)
+    single = {} if line is None else {"line": line.evidence}
+    single |= {kind: rest.single(kind) for kind in bases.SINGLE}
     kind = chosen_kind(common, single)
     ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
     law, shape = None, None
@@ -64,10 +68,15 @@ def explain(left: Fit, similarity: Similarity, *, named: bool) -> Closable:
         shape = _own_curve(curve(rest, common[kind]), similarity)
         law = _law(rest, kind, common[kind].drop, similarity)
         kind = _of_formula(kind, law)
+    elif line is not None and kind == "line":
+        where = tuple(_own_event(one, similarity) for one in line.events)
     elif kind in single:
         where = tuple(_own_event(one, similarity) for one in events(rest, kind, single[kind].precision))
     excess = left.excess / left.problem.data.runs[0].block
-    words = _words(kind, {one.kind: one for one in ceilings}, law, where, named=named)
+    shown = {one.kind: one for one in ceilings}
+    words = _words(kind, shown, law, () if kind == "line" else where, named=named)
+    if line is not None and kind == "line":
+        words = f"{words} {_line_words(line, similarity)}"
     return Closable(excess, ceilings, kind, words, shape, law, where)
 
 
@@ -194,6 +203,19 @@ def _words(
         formula = law.effect.get("moment") or law.effect["reading"]
         said.append(f"The formula {formula} closes {percent(law.closed, law.std)}.")
     return " ".join(said)
+
+
+def _line_words(line: SteadyLine, similarity: Similarity) -> str:
+    def own(values: tuple[float, float], unit: str, factor: float = 1.0) -> str:
+        return with_std(*(factor * similarity.own(value, unit) for value in values))
+
+    unit = similarity.reading
+    frequency = own((line.frequency, line.frequency_std), "Hz")
+    amplitude = own((line.amplitude, line.amplitude_std), unit, 1e3)
+    return (
+        f"The line is at {frequency} Hz, with an amplitude of {amplitude} m{unit_mark(unit)}, root mean square "
+        f"over the runs; chance alone shows one in less than {100.0 * PLACE_FALSE_ALARM_RATE:.2g} % of campaigns."
+    )
 
 
 def _includes(one: str, kind: str) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.detection.gap import chance
 from diagnosis.fitting.run_data import RunData
@@ -54,10 +55,7 @@ def residual_lines(runs: list[RunExcess], data: Sequence[RunData]) -> tuple[Resi
 
 def _lines(run: RunExcess, own: RunData, runs: int) -> list[ResidualLine]:
     local = np.convolve(run.power, np.ones(_WIDTH), mode="same")
-    order = run.frequency / run.resonance
-    harmonic = (np.abs(order - np.round(order)) < _HARMONIC) & (order < 3.5)
-    harmonic |= np.abs(order - 1.0) < _OWN
-    open_to = (order > _LOWEST) & ~harmonic
+    open_to = away_from_motion(run.frequency / run.resonance)
     found: list[ResidualLine] = []
     for index in np.argsort(np.where(open_to, local, 0.0))[::-1][: 20 * _PER_RUN].tolist():
         excess = float(local[index]) - _WIDTH
@@ -72,6 +70,17 @@ def _lines(run: RunExcess, own: RunData, runs: int) -> list[ResidualLine]:
         amplitude = float(own.noise_at(frequency)) * float(np.sqrt(2.0 * excess / run.power.size))
         found.append(ResidualLine(run.id, frequency, excess / whole, amplitude))
     return found
+
+
+def away_from_motion(order: Array) -> NDArray[np.bool_]:
+    """Where a line does not belong to the motion, its drift or its harmonics.
+
+    Args:
+        order: frequency over that of the run's motion, any shape.
+    """
+    harmonic = (np.abs(order - np.round(order)) < _HARMONIC) & (order < 3.5)
+    harmonic |= np.abs(order - 1.0) < _OWN
+    return (order > _LOWEST) & ~harmonic
 
 
 def _near(index: int, run: RunExcess) -> slice:

@@ -8,14 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
+from scipy.signal import lfilter
 
 from diagnosis import _diagnose, diagnose
 from diagnosis.closable import KINDS, Ceiling, closable_table, closable_words
 from diagnosis.investigate import investigate
-from diagnosis.law.ceiling import Evidence
+from diagnosis.law.ceiling import Evidence, Rest
 from diagnosis.law.explain import chosen_kind, closable
 from diagnosis.law.formula import Formula, effect_of, effect_table
 from diagnosis.law.library import Term, terms
+from diagnosis.law.line import steady_line
 from diagnosis.law.paths import paths
 from diagnosis.law.ridge import Rows, best_ridge, held_out, normal, total
 from tests.reference.rigs import rig
@@ -125,6 +127,48 @@ def test_what_differs_in_one_run_is_placed_in_it():
     assert "r03" in found.words
 
 
+def test_a_vibration_is_a_steady_line():
+    study = study_of("platform_vibration", 0.05, frequency=7.2, seed=3.0)
+    found = closable(study, significant=True)
+    assert found.kind == "line"
+    assert found.law is None
+    assert closed(found)["line"] > 0.95
+    assert len(found.events) == RUNS.spring_stiffness.size
+    change, line = study.similarity, steady_line(Rest(study.nominal))
+    frequency, std = change.own(line.frequency, "Hz"), change.own(line.frequency_std, "Hz")
+    assert std < 0.005
+    assert frequency == pytest.approx(7.2, abs=4.0 * std)
+    # above its resonance the rig answers with M/|K - I w^2|: damping and air change that by less than a per cent
+    still = 0.05 / np.abs(RUNS.spring_stiffness - RUNS.yaw_inertia * (2.0 * np.pi * 7.2) ** 2)
+    assert line.amplitude == pytest.approx(np.sqrt(np.mean(still**2)), rel=0.03)
+    assert f"The line is at {frequency:.4f} ± {std:.4f} Hz, with an amplitude of 0.2" in found.words
+
+
+def test_what_does_not_keep_its_phase_is_not_a_line(detent):
+    """Residuals made here: white noise, a resonance driven by noise, and a sinusoid, in a closed form."""
+    fit, rng = detent[0].nominal, np.random.default_rng(1)
+    turn = 2.0 * np.pi * 7.0 * fit.problem.data.runs[0].interval
+    radius = np.exp(-turn / 60.0)
+
+    def ringing(size):
+        found = lfilter(
+            [1.0], [1.0, -2.0 * radius * np.cos(turn), radius**2], rng.standard_normal(size + 2000)
+        )
+        return 2.0 * found[2000:] / found.std()
+
+    def sinusoid(size):
+        return 0.4 * np.sin(turn * np.arange(size) + rng.uniform(0.0, 2.0 * np.pi))
+
+    lines = []
+    for shape in (np.zeros, ringing, sinusoid):
+        residuals = tuple(shape(r.size) + rng.standard_normal(r.size) for r in fit.residuals)
+        lines.append(steady_line(Rest(replace(fit, residuals=residuals))))
+    assert lines[:2] == [None, None]
+    assert lines[2].frequency == pytest.approx(7.0, abs=4.0 * lines[2].frequency_std)
+    noise = np.sqrt(np.mean([run.noise_variance for run in fit.problem.data.runs]))
+    assert lines[2].amplitude == pytest.approx(0.4 * noise, abs=4.0 * lines[2].amplitude_std)
+
+
 def test_more_noise_cannot_be_closed():
     found = closable(study_of("motion_noise", 0.03), significant=True)
     assert found is None or (found.kind == "noise" and found.law is None and "noise" in found.words)
@@ -135,8 +179,30 @@ def test_nothing_is_proposed_without_a_gap(tmp_path):
     assert closable(study, significant=False) is None
     assert write_proposal(tmp_path / "law.toml", {"closable": None}) is None
     assert not (tmp_path / "law.toml").exists()
-    assert closable_words({"closable": None}) == ""
     assert closable_table({"closable": None}).rows == ()
+
+
+REST = {"significant": False, "p_value": 0.4321}
+
+
+@pytest.mark.parametrize(
+    ("causes", "rest", "said"),
+    [
+        (["coulomb_friction"], REST, "What could be closed: nothing beyond chance (p = 0.43)."),
+        (["coulomb_friction"], REST | {"significant": True}, ""),
+        (
+            ["buffeting"],
+            REST | {"significant": True},
+            "What could be closed is not stated: beside a random moment",
+        ),
+        ([], REST, ""),
+        (["unknown"], None, ""),
+    ],
+)
+def test_beside_every_named_answer_it_says_what_could_be_closed(causes, rest, said):
+    words = closable_words({"closable": None, "causes": causes, "rest": rest})
+    assert words.startswith(said)
+    assert bool(words) == bool(said)
 
 
 def _singular(*_, **__):
@@ -158,7 +224,9 @@ def test_equations_that_cannot_be_solved_are_said(monkeypatch, unsolvable):
 def test_the_table_names_every_kind(detent):
     _, found = detent
     document = {"closable": found.to_json_dict()}
-    assert {row[0] for row in closable_table(document).rows} == set(KINDS.values()) - {KINDS["noise"]}
+    assert {row[0] for row in closable_table(document).rows} == {
+        text for kind, text in KINDS.items() if kind not in ("noise", "line")
+    }
     assert closable_words(document).endswith("%.")
 
 

@@ -181,7 +181,35 @@ def test_what_could_be_closed_is_on_the_page_only_where_something_remains(page, 
     assert "What could be closed: A moment." in text
     assert "a moment of the angle alone 41.7 ± 2.3 %" in text
     assert "0.0 ± 100.0 %" in text  # worse than nothing, and beyond any meaning
-    assert "What could be closed" not in render_report(document | {"closable": None, "maps": None}, data)
+    explained = document | {"closable": None, "maps": None}
+    assert "What could be closed" not in render_report(explained, data)
+    page = render_report(
+        explained | {"rest": {"significant": False, "p_value": 0.4321, "material": False}}, data
+    )
+    assert "What could be closed: nothing beyond chance (p = 0.43)." in Page(page).text
+    assert 'id="closable"' not in page
+
+
+MODEL = {
+    "file": "rig.xml", "joint": "yaw", "free": ["inertia", "damping"], "rest_rad": 0.0, "zero_rad": 0.0123,
+    "written": [{"name": "joint frictionloss", "before": [0.0], "after": [0.00456], "unit": "N m"}],
+    "notes": ["frictionloss is a soft constraint."],
+    "closed": 0.947, "closed_by_fit": 0.968, "closed_on": "on runs held out of the fit",
+}  # fmt: skip
+
+
+def test_the_patched_model_and_its_closure_are_on_the_page(document, data):
+    given = document | {"model": MODEL, "maps": None}
+    text = Page(render_report(given, data, Byline(patch="out.xml"))).text
+    assert "closes 94.7 % of the gap on runs held out of the fit; the fit itself 96.8 %." in text
+    assert "yaw +0.0123 rad. Written to out.xml ." in text
+    assert "Changes to rig.xml" in text
+    assert "joint frictionloss 0 0.004560 N m" in text
+    assert "frictionloss is a soft constraint." in text
+    assert "Written to" not in render_report(given, data)
+    unnamed = render_report(given | {"causes": ["unknown"]}, data)
+    assert "No cause is written into the patched model, only what was free: inertia, damping." in unnamed
+    assert "94.7 %" not in unnamed
 
 
 def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, document, data):

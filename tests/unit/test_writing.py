@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import stat
@@ -15,6 +16,7 @@ from typing import BinaryIO
 import polars as pl
 import pytest
 
+from tunnel_sim.files import writing
 from tunnel_sim.files.writing import (
     output_folder,
     refuse_unwritable,
@@ -122,6 +124,19 @@ def test_a_folder_is_refused(tmp_path: Path, linked: bool) -> None:
     for refused in (refuse_unwritable, lambda path: write_whole(path, b"")):
         with pytest.raises(TunnelError, match="is a folder, not a file; name a file"):
             refused(path)
+
+
+def test_a_folder_that_takes_no_files_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(dir: Path) -> None:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(dir))
+
+    monkeypatch.setattr(writing.tempfile, "TemporaryFile", full)
+    for path in (tmp_path / "new.xml", Path(__file__)):
+        with pytest.raises(TunnelError, match="cannot be written \\(permission denied"):
+            refuse_unwritable(path)
+    refuse_unwritable(Path(os.devnull))
 
 
 def test_a_name_too_long_for_the_disk_is_one_line(tmp_path: Path) -> None:

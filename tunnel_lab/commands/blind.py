@@ -82,6 +82,11 @@ def make(
     at random. It has up to four effects that matter, or one outside the vocabulary,
     in the textbook form or another, each sized to 1–100 times the noise power. No
     two of them imitate each other. Small effects beside them need not be found.
+    Effects of an --effects-file are not drawn: they have one form only, that of the
+    fits, so that finding them would not be an independent test. A folder of
+    campaigns from tunnel simulate, each with its truth.json, can be diagnosed with
+    them and is scored as an open set.
+
     The same seed gives the same campaigns. Sizing the effects takes several minutes,
     hardly more for many campaigns than for few.
 

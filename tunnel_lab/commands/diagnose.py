@@ -136,6 +136,10 @@ def run(
     own = (
         None if model is None or joint is None else read_model(model, joint, data, split_names(free) or None)
     )
+    if own is not None and patch is not None:
+        from diagnosis.answer.patched_model import refuse_unpatchable
+
+        refuse_unpatchable(own, data, patch)
     answer = diagnose_with_progress(data, kinds, own)
     document = answer.to_json_dict()
     document["provenance"]["sha256"] = hashes
@@ -148,7 +152,8 @@ def run(
         from diagnosis.detection.limit_cycles import diagnosable
         from tunnel_lab.diagnosis_view import Byline, write_report
 
-        byline = Byline(datetime.now().astimezone().date().isoformat(), author, notes)
+        today = datetime.now().astimezone().date().isoformat()
+        byline = Byline(today, author, notes, "" if patch is None else patch.name)
         write_report(document, diagnosable(data).campaign, report, byline)
     proposed = None if propose is None else write_proposal(propose, document)
     if to_stdout:
@@ -198,16 +203,14 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
         path: of the MJCF file.
 
     Raises:
-        TunnelError: when the answer has none.
+        TunnelError: when the answer has none, with the reason.
     """
+    from diagnosis.patch import UNPATCHED
     from tunnel_sim.vocabulary.errors import TunnelError
 
     if answer.model is None:
-        raise TunnelError(
-            "there is no patched model to write",
-            where="--patch",
-            remedy="the answer without --patch says why",
-        )
+        said = next((one.rstrip(".") for one in answer.cautions if one.startswith(UNPATCHED)), UNPATCHED)
+        raise TunnelError(said, where="--patch", remedy="leave out --patch for the answer alone")
     answer.model.write(path)
 
 

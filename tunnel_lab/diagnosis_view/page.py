@@ -10,6 +10,7 @@ from typing import Any
 
 from diagnosis.closable import closable_table, closable_words
 from diagnosis.names import plain
+from diagnosis.patch import patch_lines, patch_table
 from diagnosis.printing import inclusion_line
 from tunnel_lab.diagnosis_view import provenance, view, view_detail
 from tunnel_lab.diagnosis_view.charts import charts
@@ -46,11 +47,13 @@ class Byline:
         date: of the diagnosis, such as 2026-05-31; empty: none is shown.
         author: who made it; empty: nobody is named.
         notes: for the head of the page; empty: none.
+        patch: file of the patched model; empty: it was not written.
     """
 
     date: str = ""
     author: str = ""
     notes: str = ""
+    patch: str = ""
 
 
 def write_report(document: Document, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
@@ -139,6 +142,8 @@ def _detail(document: Document, campaign: Campaign) -> dict[str, Any]:
         "steps": view_detail.step_rows(document),
         "closable": closable_table(document).rows,
         "closable_words": closable_words(document),
+        "patch": patch_table(document),
+        "patch_lines": [line.removeprefix("- ") for line in patch_lines(document)],
         "rivals": [plain(name) for name in document["ambiguous_with"]],
         "next_run": view.next_run_rows(document),
         "runs": view_detail.run_rows(document, campaign),

@@ -119,11 +119,15 @@ def patched(
     try:
         after = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
-        said = one_line(" ".join(str(error).split()), 300)
-        raise TunnelError(
-            f"MuJoCo refuses the patched model ({said})", where=shown(model.path), remedy="simplify the model"
-        ) from error
+        raise _refused(error, model) from error
     return spec, _differences(before, after)
+
+
+def _refused(error: Exception, model: JointModel) -> TunnelError:
+    said = one_line(" ".join(str(error).split()), 300)
+    return TunnelError(
+        f"MuJoCo refuses the patched model ({said})", where=shown(model.path), remedy="simplify the model"
+    )
 
 
 def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
@@ -136,11 +140,17 @@ def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
 
     Returns:
         MJCF.
+
+    Raises:
+        TunnelError: when MuJoCo cannot write it.
     """
     for name in ("meshdir", "texturedir") if spec.meshes or spec.textures or spec.hfields else ():
         assets = model.path.parent.resolve() / getattr(spec.compiler, name)
         setattr(spec.compiler, name, os.path.relpath(assets, folder.resolve()))
-    return str(spec.to_xml())
+    try:
+        return str(spec.to_xml())
+    except (ValueError, mujoco.FatalError) as error:
+        raise _refused(error, model) from error
 
 
 def _write_inertia(

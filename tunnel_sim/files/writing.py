@@ -44,12 +44,15 @@ def refuse_unwritable(path: Path) -> None:
         path: the file; symbolic links are followed.
 
     Raises:
-        TunnelError: when it is a folder or a block device, or its folder does not exist.
+        TunnelError: when it is a folder or a block device, or its folder does not exist or takes no files.
     """
     target = _target(path)
     if not target.parent.is_dir():
         folder = shown(target.parent)
         raise TunnelError("its folder does not exist", where=shown(path), remedy=f"make {folder} first")
+    if target.is_file() or not target.exists():  # devices and pipes are written to directly
+        with refusals(path), tempfile.TemporaryFile(dir=target.parent):
+            pass
 
 
 def write_whole(path: Path, content: bytes) -> Path:

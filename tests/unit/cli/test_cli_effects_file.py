@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from diagnosis.blind import answer
 from tests.unit.own_effects import EFFECTS_FILE
+from tunnel_sim.effects import Effect, effect_class
+from tunnel_sim.vocabulary.campaign import Campaign
 
 Tunnel = Callable[..., tuple[int, str, str]]
 PLAN = Path(__file__).parents[2] / "data" / "tiny-plan.toml"
@@ -66,6 +70,35 @@ def test_what_is_known_ends_with_the_command(tunnel: Tunnel, effects_file: Path,
     assert truth["parameters"] == {"detent": {"k": 0.5, "w": 0.06}}
     assert "moment -k*b*exp(-(b/w)^2)" in tunnel("effects", "detent", "--effects-file", effects_file)[1]
     assert tunnel("effects", "detent")[0] == 2
+
+
+def test_a_blind_set_is_answered_and_scored_with_them(
+    tunnel: Tunnel, effects_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An open set of one campaign: the fits are replaced, the truth is what was planted."""
+    known: list[set[str]] = []
+
+    def diagnose(_: Campaign, kinds: Sequence[type[Effect]]) -> SimpleNamespace:
+        known.append({kind.name for kind in kinds})
+        document = {"causes": [effect_class("detent").name], "gap": {"closed": 0.99}}
+        document["candidates"] = [{"effect": "detent", "probability": 0.9}]
+        return SimpleNamespace(to_json_dict=lambda: document)
+
+    monkeypatch.setattr(answer, "diagnose", diagnose)
+    given = ("--effects-file", effects_file)
+    planted = tunnel("simulate", PLAN, "--out", tmp_path / "set" / "c1", *given, "--effect", "detent:k=0.5")
+    assert planted[0] == 0
+    status, _, err = tunnel("blind", "score", tmp_path / "set", *given)
+    assert status == 2
+    assert err.rstrip().endswith(f"tunnel blind diagnose {tmp_path / 'set'} --effects-file {effects_file}")
+    for excluded in ((), ("--exclude", "gain")):
+        assert tunnel("blind", "diagnose", tmp_path / "set", *given, *excluded)[0] == 0
+    assert [names & {"detent", "gain"} for names in known] == [{"detent", "gain"}, {"detent"}]
+    out = tmp_path / "score.json"
+    assert tunnel("blind", "score", tmp_path / "set", *given, "--json", out)[0] == 0
+    (case,) = json.loads(out.read_text(encoding="utf-8"))["cases"]
+    assert case["truth"] == case["causes"] == ["detent"]
+    assert tunnel("blind", "diagnose", tmp_path / "set", "--exclude", "detent")[0] == 2
 
 
 def test_a_check_states_every_law_and_fails_where_one_is_violated(

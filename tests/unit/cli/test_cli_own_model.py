@@ -8,18 +8,26 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from diagnosis.patch import UNPATCHED
 from tests.reference.free_decays import Setting, campaign
+from tunnel_lab.commands import diagnose as commands
 from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.vocabulary.errors import TunnelError
 
 Tunnel = Callable[..., tuple[int, str, str]]
 SPRING = 16.12
 MODEL = f"""<mujoco><option gravity="0 0 0" timestep="0.001" integrator="RK4"/><worldbody><body>
 <joint name="yaw" axis="0 0 1" stiffness="{SPRING}"/><geom type="box" size="0.3 0.1 0.1" mass="4"/>
 </body></worldbody></mujoco>"""
+
+
+def not_yet(*_: object) -> None:
+    raise AssertionError("the diagnosis has begun")
 
 
 @pytest.fixture
@@ -40,17 +48,42 @@ def spring(tmp_path: Path) -> Path:
         (["--model", "rig.xml", "--joint", "jaw"], "there is no such joint; did you mean 'yaw'?"),
         (["--model", "rig.xml", "--joint", "yaw", "--free", "mass"], "unknown parameter 'mass'"),
         (["--model", "rig.xml", "--joint", "yaw", "--patch", "no/out.xml"], "its folder does not exist"),
+        (["--model", "rig.xml", "--joint", "yaw", "--patch", "rig"], "is a folder, not a file"),
+        (["--model", "stiff.xml", "--joint", "yaw", "--patch", "out.xml"], "motion grows without bound"),
     ],
 )
 def test_bad_options_are_one_line_and_nothing_is_written(
     tunnel: Tunnel, spring: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], said: str
 ) -> None:
     monkeypatch.chdir(spring.parent)
+    monkeypatch.setattr(commands, "diagnose_with_progress", not_yet)
+    Path("stiff.xml").write_text(MODEL.replace("0.001", "0.5"))
     status, _, err = tunnel("diagnose", spring, *options)
     assert status == 2
     assert said in err
     assert len(err.strip().splitlines()) == 1
     assert not (spring.parent / "out.xml").exists()
+
+
+def test_a_patch_needs_a_run_with_the_wind_off(
+    tunnel: Tunnel, spring: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    windy = campaign([Setting(SPRING, 12.0)] * 2, duration=5.0, noise=5e-4, rng=np.random.default_rng(8))
+    folder = write_campaign(windy, tmp_path / "windy")
+    monkeypatch.setattr(commands, "diagnose_with_progress", not_yet)
+    given = ("--model", spring.parent / "rig.xml", "--joint", "yaw", "--patch", tmp_path / "out.xml")
+    status, _, err = tunnel("diagnose", folder, *given)
+    assert (status, err.count("\n")) == (2, 1)
+    assert "there are none; add runs with the wind off, or leave out --patch" in err
+
+
+def test_a_patch_that_fails_after_all_says_why(tmp_path: Path) -> None:
+    caution = f"{UNPATCHED}: MuJoCo refuses the patched model (too heavy)."
+    answer = SimpleNamespace(model=None, cautions=("Few runs.", caution))
+    with pytest.raises(
+        TunnelError, match=r"MuJoCo refuses the patched model \(too heavy\); leave out --patch"
+    ):
+        commands.write_patch(answer, tmp_path / "out.xml")  # type: ignore[arg-type]
 
 
 def test_the_free_parameters_are_written_where_there_is_no_gap(
