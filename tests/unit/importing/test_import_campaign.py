@@ -77,6 +77,31 @@ def test_a_recipe_makes_the_next_file_go_the_same_way(tmp_path: Path) -> None:
     np.testing.assert_allclose(first.campaign.runs[0].record.yaw_rad, zero, atol=1e-6)
 
 
+def test_a_stated_rest_is_subtracted_and_kept_in_the_recipe(tmp_path: Path) -> None:
+    path = csv(tmp_path)
+    imported = import_records([path], tmp_path / "rig", ImportChoices(rest=0.1))
+    assert imported.campaign.sensor.zero is None
+    assert any("0.1 rad, is subtracted" in line for line in imported.remarks())
+    again = import_records([path], tmp_path / "again", read_recipe(tmp_path / "rig"))
+    for run in (*again.campaign.runs, *read_campaign(tmp_path / "rig").runs):
+        np.testing.assert_allclose(run.record.yaw_rad, decay()[1] - 0.1, atol=6e-9)
+
+
+def test_a_rest_of_one_run_leaves_the_others_and_gives_every_run_its_own_zero(tmp_path: Path) -> None:
+    paths = [csv(tmp_path, f"{name}.csv") for name in "ab"]
+    (tmp_path / "recipe.toml").write_text(
+        'schema_version = 1\n[[choices.stretches]]\nfile = "b.csv"\nrun = "b"\nrest = -0.02\n'
+    )
+    imported = import_records(paths, tmp_path / "rig", read_recipe(tmp_path / "recipe.toml"))
+    assert [part.rest for part in imported.parts] == [None, -0.02]
+    assert any("zero of its own" in line for line in imported.remarks())
+    campaign = read_campaign(tmp_path / "rig")
+    assert campaign.sensor.zero == "per_run"
+    for run, rest in zip(campaign.runs, (0.0, -0.02), strict=True):
+        np.testing.assert_allclose(run.record.yaw_rad, decay()[1] - rest, atol=6e-9)
+        assert run.record.time_s.size == decay()[0].size  # start and end are as found
+
+
 def test_conditions_from_a_table(tmp_path: Path) -> None:
     files = [csv(tmp_path, name, seed) for seed, name in enumerate(("a.csv", "b.csv"))]
     table = written(
