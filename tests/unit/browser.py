@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,15 +26,29 @@ LEAST_CONTRAST = 4.5
 
 @contextmanager
 def chromium() -> Iterator[Any]:
-    """The browser; it ends with the context."""
+    """The browser; it ends with the context. One at a time: two on a loaded machine fail at random."""
     from playwright import sync_api
 
-    with sync_api.sync_playwright() as playwright:
-        # Chromium's own sandbox does not start for root.
-        arguments = ["--no-sandbox"] if os.getuid() == 0 else []
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        yield found
-        found.close()
+    with (Path(tempfile.gettempdir()) / f"tunnel-browser-{os.getuid()}.lock").open("w") as turn:
+        fcntl.flock(turn, fcntl.LOCK_EX)
+        with sync_api.sync_playwright() as playwright:
+            # Chromium's own sandbox does not start for root.
+            arguments = ["--no-sandbox"] if os.getuid() == 0 else []
+            found = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
+            yield found
+            found.close()
+
+
+def screenshot(page: Any, **given: Any) -> bytes:
+    """A picture of a page; a loaded machine may refuse the first attempt."""
+    from playwright import sync_api
+
+    try:
+        return bytes(page.screenshot(**given))
+    except sync_api.Error as error:
+        if "Protocol error (Page.captureScreenshot)" not in str(error):
+            raise
+        return bytes(page.screenshot(**given))
 
 
 CONTRASTS = """() => {
