@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 import tempfile
@@ -26,7 +25,9 @@ LEAST_CONTRAST = 4.5
 
 @contextmanager
 def chromium() -> Iterator[Any]:
-    """The browser; it ends with the context. One at a time: two on a loaded machine fail at random."""
+    """The browser; it ends with the context. One runs at a time: on a loaded machine two disturb each other."""
+    import fcntl
+
     from playwright import sync_api
 
     with (Path(tempfile.gettempdir()) / f"tunnel-browser-{os.getuid()}.lock").open("w") as turn:

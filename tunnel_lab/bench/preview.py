@@ -189,6 +189,5 @@ def _rest(part: Part, unit: str) -> tuple[float, str]:
     centre = None if part.run is None else centre_of(part.run, 0.0)
     if centre is not None:
         return centre.zero, f"{with_std(centre.zero, centre.std)} {unit}, found"
-    run = part.raw.cleaned.reading[part.piece.first : part.piece.last]
-    end = float(np.median(run[-max(run.size // 10, 2) :]))
+    end = float(np.median(part.reading[-max(part.reading.size // 10, 2) :]))
     return end, f"about {significant(end, 2)} {unit}, found"

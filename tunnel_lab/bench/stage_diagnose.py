@@ -18,7 +18,7 @@ from tunnel_lab.commands.diagnose import STEPS
 WORK = "diagnosis"
 STOPPED = 130
 _AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one goes on where it was"
-_BUTTONS = "Pause it to go on later; Stop ends it, and a stopped diagnosis starts again from the beginning."
+_STOP = "Stop ends it: a stopped diagnosis starts again from the beginning."
 _POLL_S = 0.5
 
 
@@ -78,7 +78,7 @@ class _Diagnose:
     def _show_clock(self, one: work.Work) -> None:
         since = f"{_elapsed(one):.0f} s so far. It runs in a process of its own: this page may be closed."
         words = "Paused; it goes on where it was." if one.paused else since
-        self._clock.set_text(f"{words} {_BUTTONS}" if one.running else "")
+        self._clock.set_text(f"{words} {_STOP}" if one.running else "")
 
     async def _start(self) -> None:
         with self._fault.around():

@@ -15,7 +15,7 @@ import pytest
 from tests.unit.importing.import_files import RATE, csv, decay, written
 from tunnel_sim import TunnelError, read_campaign
 from tunnel_sim.files.exporting import WRITERS, export_campaign
-from tunnel_sim.files.importing.choices import Conditions, ImportChoices, parse_setting, read_recipe
+from tunnel_sim.files.importing.choices import Conditions, ImportChoices, Stretch, parse_setting, read_recipe
 from tunnel_sim.files.importing.conversion import read_calibration
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.writing import import_records
@@ -100,6 +100,14 @@ def test_a_rest_of_one_run_leaves_the_others_and_gives_every_run_its_own_zero(tm
     for run, rest in zip(campaign.runs, (0.0, -0.02), strict=True):
         np.testing.assert_allclose(run.record.yaw_rad, decay()[1] - rest, atol=6e-9)
         assert run.record.time_s.size == decay()[0].size  # start and end are as found
+
+
+def test_a_rest_between_two_levels_leaves_the_resolution(tmp_path: Path) -> None:
+    rows = "".join(f"{t:.3f},{round(y, 2):.2f}\n" for t, y in zip(*decay(), strict=True))
+    paths = [written(tmp_path, f"{name}.csv", f"time_s,yaw_rad\n{rows}") for name in "ab"]
+    stretch = Stretch(file="b.csv", run="b", rest=0.005)
+    campaign = read_records(paths, ImportChoices(stretches=(stretch,))).campaign
+    assert campaign.sensor.resolution == pytest.approx(0.01)
 
 
 def test_conditions_from_a_table(tmp_path: Path) -> None:

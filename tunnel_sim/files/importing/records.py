@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tunnel_sim.files.campaign_io import checked_record
 from tunnel_sim.files.importing.choices import RIG_KEYS, RUN_KEYS, Conditions, ImportChoices
-from tunnel_sim.files.importing.cleaning import from_zero, resolution
+from tunnel_sim.files.importing.cleaning import from_rest, from_zero, resolution
 from tunnel_sim.files.importing.columns import stem
 from tunnel_sim.files.importing.conditions import ConditionTable, from_name, name_pattern
 from tunnel_sim.files.importing.conversion import read_calibration
@@ -48,6 +48,11 @@ class Part:
     run: Run | None
     said: tuple[str, ...]
     rest: float | None
+
+    @property
+    def reading(self) -> Array:
+        """Of the run, before its rest is subtracted: shape (n,), rad (rad/s or rad/s²)."""
+        return self.raw.cleaned.reading[self.piece.first : self.piece.last]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,14 +177,12 @@ def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: Cond
     where = f"{shown(raw.source)}, run '{name}'"
     stretch = choices.stretch_of(raw.source.name, name)
     piece = stated_piece(raw.cleaned.time_s, piece, stretch, where)
-    time, reading = (
-        raw.cleaned.time_s[piece.first : piece.last],
-        raw.cleaned.reading[piece.first : piece.last],
-    )
+    kept = slice(piece.first, piece.last)
+    time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
     said = _on_cut(raw.cleaned.time_s, piece)
     rest = choices.rest if stretch.rest is None else stretch.rest
     if rest is not None:
-        reading = _from_rest(reading, rest, SensorProperties(quantity=raw.quantity).unit, said, where)
+        reading = from_rest(reading, rest, SensorProperties(quantity=raw.quantity).unit, said, where)
     given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
     stated = raw.stated | (table.of(raw.source, name) if table is not None else {}) | given
     validate(Conditions, stated, raw.source)
@@ -204,19 +207,6 @@ def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: Cond
         return Part(name, raw, piece, None, (*said, f"left out: {error.what}"), rest)
     run = Run(name, record, **({"wind_speed": 0.0} | stated))
     return Part(name, raw, piece, run, tuple(said), rest)
-
-
-def _from_rest(reading: Array, rest: float, unit: str, said: list[str], where: str) -> Array:
-    """A reading without its value at rest, which a body that swings must pass."""
-    least, most = float(reading.min()), float(reading.max())
-    if not least <= rest <= most:
-        raise TunnelError(
-            f"never passes the stated rest of {rest:.4g} {unit}: it lies from {least:.4g} to {most:.4g} {unit}",
-            where=where,
-            remedy=f"state the reading at rest in {unit}, for each run where they differ",
-        )
-    said.append(f"the stated reading at rest, {rest:.6g} {unit}, is subtracted")
-    return reading - rest
 
 
 def _judged(
@@ -258,7 +248,8 @@ def _campaign(parts: Sequence[Part], choices: ImportChoices, name: str, quantity
         name,
         RigProperties(**rig),
         SensorProperties(
-            resolution=resolution([run.record.yaw_rad for run in runs]),
+            # Of the readings as they are in the files: what is subtracted need not be a whole number of steps.
+            resolution=resolution([part.reading for part in parts if part.run is not None]),
             quantity=None if quantity == "angle" else quantity,
             # What was subtracted is as uncertain as a line drawn by hand, in each run by itself.
             zero="per_run" if len({part.rest for part in parts if part.run is not None}) > 1 else None,
