@@ -24,7 +24,7 @@ LEAST_CONTRAST = 4.5
 
 
 @contextmanager
-def chromium() -> Iterator[Any]:
+def chromium(*switches: str) -> Iterator[Any]:
     """The browser; it ends with the context. One runs at a time: on a loaded machine two disturb each other."""
     import fcntl
 
@@ -34,7 +34,7 @@ def chromium() -> Iterator[Any]:
         fcntl.flock(turn, fcntl.LOCK_EX)
         with sync_api.sync_playwright() as playwright:
             # Chromium's own sandbox does not start for root.
-            arguments = ["--no-sandbox"] if os.getuid() == 0 else []
+            arguments = [*switches, *(["--no-sandbox"] if os.getuid() == 0 else [])]
             found = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
             yield found
             found.close()
