@@ -102,6 +102,11 @@ def test_a_rest_of_one_run_leaves_the_others_and_gives_every_run_its_own_zero(tm
         assert run.record.time_s.size == decay()[0].size  # start and end are as found
 
 
+def test_a_file_whose_name_no_recipe_can_hold_is_read(tmp_path: Path) -> None:
+    (part,) = read_records([csv(tmp_path, "two\nlines.csv")]).parts
+    assert part.rest is None
+
+
 def test_a_rest_between_two_levels_leaves_the_resolution(tmp_path: Path) -> None:
     rows = "".join(f"{t:.3f},{round(y, 2):.2f}\n" for t, y in zip(*decay(), strict=True))
     paths = [written(tmp_path, f"{name}.csv", f"time_s,yaw_rad\n{rows}") for name in "ab"]

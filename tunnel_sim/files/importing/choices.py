@@ -90,7 +90,8 @@ class ImportChoices(StrictModel):
             run: the name of the run.
         """
         found = (one for one in self.stretches if (one.file, one.run) == (file, run))
-        return next(found, Stretch(file=file, run=run))
+        # A file may have a name that no recipe can hold: nothing is stated about it.
+        return next(found, Stretch.model_construct(file=file, run=run))
 
 
 class OriginalTable(StrictModel):
