@@ -17,9 +17,9 @@ from rich.console import Console
 from rich.table import Table
 
 from diagnosis.blind.files import KEY
-from diagnosis.blind.statistics import Share, share_of
 from diagnosis.investigate import investigate
 from diagnosis.law.explain import closable
+from identification.statistics.proportion import Proportion
 from tunnel_sim.files.campaign_io import read_campaign
 
 STATE = ("angle", "rate", "state")
@@ -68,13 +68,17 @@ def tables(truths: Mapping[str, Any], answers: Mapping[str, Any]) -> list[Table]
     }
     state = {n: v for n, v in gaps.items() if RIGHT[v[0]] in (STATE, ("wind",))}
     empty = [a for t, a in seen.values() if not t["form"]]
-    rows: dict[str, Share] = {
-        "kind right, of the gaps detected": share_of([f["kind"] in RIGHT[form] for form, f in gaps.values()]),
-        "kind right, of moments of state": share_of([f["kind"] in RIGHT[form] for form, f in state.values()]),
-        "law closes 0.8 of the closable, of moments of state": share_of(
+    rows: dict[str, Proportion] = {
+        "kind right, of the gaps detected": Proportion.of(
+            [f["kind"] in RIGHT[form] for form, f in gaps.values()]
+        ),
+        "kind right, of moments of state": Proportion.of(
+            [f["kind"] in RIGHT[form] for form, f in state.values()]
+        ),
+        "law closes 0.8 of the closable, of moments of state": Proportion.of(
             [_closes(f) >= 0.8 for _, f in state.values()]
         ),
-        "a law where there is no gap": share_of(
+        "a law where there is no gap": Proportion.of(
             [bool(a["closable"] and a["closable"]["law"]) for a in empty]
         ),
     }

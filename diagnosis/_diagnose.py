@@ -44,7 +44,6 @@ def diagnose(
     """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
     Args:
-        campaign: measured or simulated runs.
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
         model: a model of one's own, from `read_model`, which is then the nominal model.
@@ -124,8 +123,9 @@ def _with_closable(answer: Diagnosis, study: Study) -> Diagnosis:
     """The answer with what could be closed of what remains, or a caution that it was not found."""
     significant = answer.rest is not None and answer.rest.significant
     try:
-        return replace(answer, closable=closable(study, significant=significant))
-    except np.linalg.LinAlgError:  # the answer stands without it
+        with np.errstate(over="raise"):  # a fitted model that runs away
+            return replace(answer, closable=closable(study, significant=significant))
+    except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
         said = "How much of what remains could be closed was not found: its equations cannot be solved."
         return replace(answer, cautions=(*answer.cautions, said))
 

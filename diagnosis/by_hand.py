@@ -17,6 +17,7 @@ from diagnosis.answer.subsets import one_more
 from diagnosis.answer.waterfall import both_ends
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis, polish, restricted
+from diagnosis.closure import share_closed
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.limit_cycles import diagnosable
 from diagnosis.fitting.least_squares import Fit, FitError, fit
@@ -51,16 +52,11 @@ class Closure:
     @property
     def closed(self) -> float:
         """Share of the gap that closes, 0 to 1."""
-        return (
-            float(np.clip(1.0 - max(self.after, 0.0) / self.before, 0.0, 1.0)) if self.before > 0.0 else 0.0
-        )
+        return share_closed(self.before, self.after)
 
 
 class ByHand:
     """A campaign with its nominal model fitted, to which effects are added by hand.
-
-    Args:
-        campaign: measured or simulated runs.
 
     Raises:
         TunnelError: when the examination refuses the records, or the nominal model cannot be fitted.
@@ -146,7 +142,7 @@ class ByHand:
             found = one_more(self._fits[known], effect_class(name))
             if found is None:
                 raise TunnelError(
-                    f"{plain([name])} cannot be fitted to these runs", remedy="choose another effect"
+                    f"{plain(name)} cannot be fitted to these runs", remedy="choose another effect"
                 )
             known |= {name}
             self._fits[known] = found

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from identification.printing.table import TextTable
+from tunnel_sim.files.json_text import as_json
 
 KINDS: Mapping[str, str] = {
     "angle": "a moment of the angle alone",
@@ -76,6 +77,12 @@ class Law:
     closed: float
     std: float
 
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name; of the parameters ``value`` and ``std``."""
+        parameters = {name: {"value": value, "std": std} for name, (value, std) in self.parameters.items()}
+        effect = as_json(self.effect)
+        return {"effect": effect, "parameters": parameters, "closed": self.closed, "std": self.std}
+
 
 @dataclass(frozen=True)
 class Closable:
@@ -101,40 +108,19 @@ class Closable:
 
     def to_json_dict(self) -> dict[str, Any]:
         """The fields, in JSON's types."""
-        curve, law = self.curve, self.law
         return {
             "excess": self.excess,
-            "ceilings": [vars(one) for one in self.ceilings],
+            "ceilings": as_json(self.ceilings),
             "kind": self.kind,
             "words": self.words,
-            "events": [dict(one) for one in self.events],
-            "curve": None
-            if curve is None
-            else {
-                "over": list(curve.over),
-                "places": [list(axis) for axis in curve.places],
-                "values": list(curve.values),
-                "std": list(curve.std),
-                "unit": curve.unit,
-            },
-            "law": None
-            if law is None
-            else {
-                "effect": dict(law.effect),
-                "parameters": {
-                    name: {"value": value, "std": std} for name, (value, std) in law.parameters.items()
-                },
-                "closed": law.closed,
-                "std": law.std,
-            },
+            "events": as_json(self.events),
+            "curve": as_json(self.curve),
+            "law": as_json(self.law),
         }
 
 
 def closable_words(document: Mapping[str, Any]) -> str:
     """What could be closed, in words.
-
-    Args:
-        document: of a diagnosis.
 
     Returns:
         A line; empty where nothing remains beyond chance.
@@ -145,9 +131,6 @@ def closable_words(document: Mapping[str, Any]) -> str:
 
 def closable_table(document: Mapping[str, Any]) -> TextTable:
     """How much each kind could close.
-
-    Args:
-        document: of a diagnosis.
 
     Returns:
         A table of shares in per cent with one standard deviation; without rows where nothing remains beyond chance.

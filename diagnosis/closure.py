@@ -6,6 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from tunnel_sim.files.json_text import as_json
+
+
+def share_closed(before: float, after: float) -> float:
+    """Share of a gap that closes, 0 to 1.
+
+    Args:
+        before: excess of the nominal model, in noise variances of a sample.
+        after: excess with the causes, in noise variances of a sample.
+    """
+    return min(max(1.0 - max(after, 0.0) / before, 0.0), 1.0) if before > 0.0 else 0.0
+
 
 @dataclass(frozen=True)
 class Step:
@@ -38,7 +50,7 @@ class Waterfall:
     def to_json_dict(self) -> dict[str, Any]:
         """The fields of a document: ``waterfall``, ``waterfall_on`` and ``without``."""
         return {
-            "waterfall": [{"effect": step.effect, "excess": step.excess} for step in self.steps],
+            "waterfall": as_json(self.steps),
             "waterfall_on": self.held_out,
             "without": dict(self.without),
         }
@@ -80,17 +92,3 @@ class Rest:
     material: bool
     moves: Mapping[str, Move]
     words: str
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """The fields."""
-        return {
-            "significant": self.significant,
-            "excess": self.excess,
-            "p_value": self.p_value,
-            "material": self.material,
-            "moves": {
-                name: {"value": move.value, "relative": move.relative, "std": move.std, "unit": move.unit}
-                for name, move in self.moves.items()
-            },
-            "words": self.words,
-        }

@@ -1,4 +1,4 @@
-"""Whether a campaign of good design could show an effect, and tell it from every other."""
+"""Whether a campaign of good design could show an effect, and distinguish it from every other."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ABSORBED = 0.01
 """Share of an effect's change below which the nominal model hides it."""
 
 ALIKE = 0.99
-"""Cosine from which two effects need a signal of 22 detection sigmas to be told apart (3/√(1 − cos²))."""
+"""Cosine from which two effects need a signal of 22 detection sigmas to be distinguished (3/√(1 − cos²))."""
 
 
 @dataclass(frozen=True)

@@ -38,8 +38,6 @@ def investigate(
     """Test a campaign for a gap, and weigh the effects that may cause it.
 
     Args:
-        campaign: the runs.
-        kinds: the effects to answer with.
         progress: called with the name of each step.
 
     Returns:
@@ -59,7 +57,6 @@ def nominal_study(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Study:
     """Test a campaign for a gap, and fit no effect.
 
     Args:
-        campaign: the runs.
         kinds: the effects that may be read off the records.
 
     Returns:
@@ -73,12 +70,6 @@ def nominal_study(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Study:
 
 def fit_nominal(data: Data) -> Fit:
     """Fit the nominal model.
-
-    Args:
-        data: prepared runs.
-
-    Returns:
-        The fit.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted.

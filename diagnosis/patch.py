@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from identification.printing.numbers import significant, unit_mark
 from identification.printing.table import TextTable
+from tunnel_sim.files.json_text import as_json
 
 if TYPE_CHECKING:
     import mujoco
@@ -52,7 +53,6 @@ class PatchedModel:
     """The model with the causes written into it.
 
     Args:
-        model: as given.
         spec: the patched specification.
         written: attributes that changed.
         notes: where the native element is not the same law, in sentences.
@@ -90,10 +90,7 @@ class PatchedModel:
             "free": list(self.model.law.free),
             "rest_rad": self.model.law.rest,
             "zero_rad": self.zero,
-            "written": [
-                {"name": w.name, "before": list(w.before), "after": list(w.after), "unit": w.unit}
-                for w in self.written
-            ],
+            "written": as_json(self.written),
             "notes": list(self.notes),
             "closed": self.closure.native_closed,
             "closed_by_fit": self.closure.fit_closed,
@@ -103,9 +100,6 @@ class PatchedModel:
 
 def patch_table(document: Mapping[str, Any]) -> TextTable:
     """What the patch changes.
-
-    Args:
-        document: of a diagnosis.
 
     Returns:
         A table; without rows where no model was given.
@@ -127,9 +121,6 @@ def patch_table(document: Mapping[str, Any]) -> TextTable:
 
 def patch_lines(document: Mapping[str, Any]) -> list[str]:
     """How far the patched model closes the gap, and where it is not the law found.
-
-    Args:
-        document: of a diagnosis.
 
     Returns:
         Lines; none where no model was given.

@@ -25,12 +25,9 @@ Document = Mapping[str, Any]
 def diagnosis_parts(document: Document) -> list[str | TextTable]:
     """What is printed of a diagnosis.
 
-    Args:
-        document: of a diagnosis.
-
     Returns:
-        The verdict, where the gap is and what cannot be told apart, the answers weighed, parameters, the gap as
-        causes are added, the coefficients, and the caveats.
+        The verdict, where the gap is, the rivals, the answers considered, parameters, the gap as causes are added,
+        the coefficients, and the caveats.
     """
     return [
         document["verdict"],
@@ -51,9 +48,6 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
 
 def candidates_table(document: Document) -> TextTable:
     """The answers considered, most probable first.
-
-    Args:
-        document: of a diagnosis.
 
     Returns:
         A table with probability and share of the gap closed; a last row counts the others.
@@ -82,9 +76,6 @@ def candidates_table(document: Document) -> TextTable:
 def parameters_table(document: Document) -> TextTable:
     """The parameters of the answer.
 
-    Args:
-        document: of a diagnosis.
-
     Returns:
         A table with one standard deviation; without rows where the answer has none.
     """
@@ -101,9 +92,6 @@ def parameters_table(document: Document) -> TextTable:
 
 def gap_table(document: Document) -> TextTable:
     """The gap before and after, all runs first.
-
-    Args:
-        document: of a diagnosis.
 
     Returns:
         A table of excesses in multiples of the noise power; without rows where no gap was found.
@@ -123,9 +111,6 @@ def gap_table(document: Document) -> TextTable:
 def inclusion_line(document: Document) -> str:
     """The effects that may be among the causes, most probable first.
 
-    Args:
-        document: of a diagnosis.
-
     Returns:
         A line with their probabilities; empty where none reaches 0.01.
     """
@@ -136,9 +121,6 @@ def inclusion_line(document: Document) -> str:
 
 def waterfall_table(document: Document) -> TextTable:
     """How far the gap closes with each cause, and without each.
-
-    Args:
-        document: of a diagnosis.
 
     Returns:
         A table of excesses in multiples of the noise power; without rows where no cause is named.
@@ -185,9 +167,6 @@ def _excess(value: float) -> str:
 def coefficients_table(document: Document) -> TextTable:
     """The coefficients of the nominal model before and after the causes are added.
 
-    Args:
-        document: of a diagnosis.
-
     Returns:
         A table with one standard deviation and the change; without rows where there are none.
     """
@@ -213,9 +192,6 @@ def coefficients_table(document: Document) -> TextTable:
 def where_line(document: Document) -> str:
     """Where the gap is, in words.
 
-    Args:
-        document: of a diagnosis.
-
     Returns:
         A line; empty where the document has no words on it.
     """
@@ -225,9 +201,6 @@ def where_line(document: Document) -> str:
 
 def rival_lines(document: Document) -> list[str]:
     """Effects that the runs cannot distinguish from the causes, and the run that could.
-
-    Args:
-        document: of a diagnosis.
 
     Returns:
         Lines; none where the answer has no rival.
@@ -251,9 +224,6 @@ def run_words(run: Mapping[str, float]) -> str:
     Args:
         run: spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and separation in
             standard deviations of the noise.
-
-    Returns:
-        A clause.
     """
     wind = "wind off" if run["wind_speed"] == 0.0 else f"wind at {run['wind_speed']:g} m/s"
     return (
@@ -263,14 +233,7 @@ def run_words(run: Mapping[str, float]) -> str:
 
 
 def closing_lines(document: Document) -> list[str]:
-    """Notes below the tables: noise, check by the MuJoCo model, meaning of the coefficients, caveats, blind spots.
-
-    Args:
-        document: of a diagnosis.
-
-    Returns:
-        Lines.
-    """
+    """Notes below the tables: noise, check by MuJoCo, meaning of the coefficients, caveats and blind spots."""
     noise, note = document["noise"], document["coefficients"]["note"]
     lines = [f"Noise: {noise['std']:.3g} rad, {noise['source']} ({noise['reason']})"]
     checked = document["confirmation"]

@@ -15,10 +15,15 @@ from diagnosis.printing import diagnosis_parts
 from identification.printing.frames import wide_frame
 from identification.printing.table import as_html, as_text
 from identification.remark import Remark
+from tunnel_sim.files.json_text import as_json
 
 SCHEMA_VERSION = 1
 HELD_OUT = "on runs held out of the fit"
 FITTED = "in the fitted runs (none could be held out)"
+_LAST = (
+    "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
+    "blind_spots", "cautions", "remarks", "seconds", "maps", "provenance",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -94,6 +99,15 @@ class GapSummary:
     false_alarm_rate: float
     p_value: float
     tests: Mapping[str, float] = field(default_factory=dict)
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name, and ``after_on`` before ``closed_on``."""
+        found: dict[str, Any] = {}
+        for name in self.__dataclass_fields__:
+            if name == "closed_on":
+                found["after_on"] = self.after_on
+            found[name] = as_json(getattr(self, name))
+        return found
 
     @property
     def after_on(self) -> str:
@@ -271,65 +285,12 @@ class Diagnosis:
             "campaign": self.campaign,
             "causes": list(self.causes),
             "verdict": self.verdict,
-            "gap": {
-                "detected": self.gap.detected,
-                "excess_before": self.gap.excess_before,
-                "excess_after": self.gap.excess_after,
-                "closed": self.gap.closed,
-                "after_on": self.gap.after_on,
-                "closed_on": self.gap.closed_on,
-                "runs": [
-                    {"id": run.id, "before": run.before, "after": run.after, "held_out": run.held_out}
-                    for run in self.gap.runs
-                ],
-                "false_alarm_rate": self.gap.false_alarm_rate,
-                "p_value": self.gap.p_value,
-                "tests": dict(self.gap.tests),
-            },
-            "where": {
-                "channel": self.where.channel,
-                "condition": self.where.condition,
-                "runs": list(self.where.runs),
-                "time_s": _pair(self.where.time_s),
-                "amplitude_rad": _pair(self.where.amplitude_rad),
-                "frequency_hz": _pair(self.where.frequency_hz),
-                "words": self.where.words,
-            },
-            "candidates": [
-                {
-                    "effect": candidate.effect,
-                    "probability": candidate.probability,
-                    "excess_after": candidate.excess_after,
-                    "closed": candidate.closed,
-                    "parameters": _estimates(candidate.parameters),
-                }
-                for candidate in self.candidates
-            ],
+            "gap": as_json(self.gap),
+            "where": as_json(self.where),
+            "candidates": as_json(self.candidates),
             "inclusion": dict(self.inclusion),
             **self.waterfall.to_json_dict(),
-            "rest": None if self.rest is None else self.rest.to_json_dict(),
-            "model": None if self.model is None else self.model.to_json_dict(),
-            "closable": None if self.closable is None else self.closable.to_json_dict(),
-            "ambiguous_with": list(self.ambiguous_with),
-            "next_run": None if self.next_run is None else dict(self.next_run),
-            "coefficients": {
-                "before": _estimates(self.coefficients.before),
-                "after": _estimates(self.coefficients.after),
-                "note": self.coefficients.note,
-            },
-            "confirmation": self.confirmation.to_json_dict(),
-            "noise": {
-                "std": self.noise.std,
-                "stated_std": self.noise.stated_std,
-                "source": self.noise.source,
-                "reason": self.noise.reason,
-            },
-            "blind_spots": list(self.blind_spots),
-            "cautions": list(self.cautions),
-            "remarks": [remark.to_json_dict() for remark in self.remarks],
-            "seconds": dict(self.seconds),
-            "maps": None if self.maps is None else dict(self.maps),
-            "provenance": dict(self.provenance),
+            **{name: as_json(getattr(self, name)) for name in _LAST},
         }
 
     def __str__(self) -> str:
@@ -358,7 +319,7 @@ class Diagnosis:
 
     def coefficients_frame(self) -> pl.DataFrame:
         """A row for each coefficient: its unit, and ``before`` and ``after`` with each ``_std``."""
-        before, after = _estimates(self.coefficients.before), _estimates(self.coefficients.after)
+        before, after = as_json(self.coefficients.before), as_json(self.coefficients.after)
         rows = [
             {
                 "quantity": name,
@@ -375,11 +336,3 @@ class Diagnosis:
         kinds = {"id": pl.String, "before": pl.Float64, "after": pl.Float64, "held_out": pl.Boolean}
         rows = [{name: getattr(run, name) for name in kinds} for run in self.gap.runs]
         return pl.DataFrame(rows, schema=kinds)
-
-
-def _estimates(values: Mapping[str, ParameterEstimate]) -> dict[str, Any]:
-    return {name: value.to_json_dict() for name, value in values.items()}
-
-
-def _pair(values: tuple[float, float] | None) -> list[float] | None:
-    return None if values is None else list(values)

@@ -22,6 +22,7 @@ from identification.printing.table import as_html, as_text
 from identification.remark import Remark
 from identification.status import Status as Status
 from identification.status import by_gravity as by_gravity
+from tunnel_sim.files.json_text import as_json
 from tunnel_sim.files.reading import as_described, check_shape
 from tunnel_sim.vocabulary.record import Array
 
@@ -89,10 +90,6 @@ class NoiseLevel:
     departs: bool
     disagrees: bool
 
-    def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name."""
-        return _fields_json(self)
-
 
 @dataclass(frozen=True)
 class WindowEstimate:
@@ -115,10 +112,6 @@ class WindowEstimate:
     omega_n: Quantity
     zeta: Quantity
     cycles: int = 3
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name."""
-        return _fields_json(self)
 
 
 _RUN_QUANTITIES = (
@@ -233,7 +226,7 @@ class Estimate:
         return np.array(self.covariance, dtype=np.float64).reshape(size, size)
 
     def __str__(self) -> str:
-        """The coefficients and the first runs as short tables, and what is to be said of them."""
+        """The coefficients and the first runs as short tables, and the notes on them."""
         return as_text(estimate_parts(self.to_json_dict()))
 
     def _repr_html_(self) -> str:
@@ -252,7 +245,7 @@ class Estimate:
 
     def windows_frame(self) -> pl.DataFrame:
         """A row for each window of each run: ``run``, then the fields of `WindowEstimate` with each ``_std``."""
-        rows = [{"run": run.id} | window.to_json_dict() for run in self.runs for window in run.windows]
+        rows = [{"run": run.id} | as_json(window) for run in self.runs for window in run.windows]
         times = {"start_s": pl.Float64, "duration_s": pl.Float64, "cycles": pl.Int64}
         return wide_frame(rows, {"run": pl.String, **times}, ("amplitude", "omega_n", "zeta"))
 
@@ -262,9 +255,9 @@ class Estimate:
             "campaign": self.campaign,
             "estimator": self.estimator,
             **_statuses_json(self.statuses),
-            "remarks": _json(self.remarks),
+            "remarks": as_json(self.remarks),
             **_fields_json(self, "statuses", "remarks", "runs"),
-            "runs": _json(self.runs),
+            "runs": as_json(self.runs),
         }
 
     @classmethod
@@ -315,10 +308,4 @@ def _statuses_json(statuses: tuple[Status, ...]) -> dict[str, Any]:
 
 def _fields_json(owner: Any, *without: str) -> dict[str, Any]:
     """A dataclass's fields by name, in JSON's types."""
-    return {name: _json(getattr(owner, name)) for name in owner.__dataclass_fields__ if name not in without}
-
-
-def _json(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return [_json(one) for one in value]
-    return value.to_json_dict() if hasattr(value, "to_json_dict") else value
+    return {name: as_json(getattr(owner, name)) for name in owner.__dataclass_fields__ if name not in without}

@@ -59,7 +59,7 @@ LEAST_STIFFNESS_STD = 1e-5
 # --- What a record must show before something is said about it. ---
 
 LEAST_SAMPLES = 8
-"""Samples of a run: five unknowns describe it, and three more samples are the least that tell how well they do."""
+"""Samples of a run: five unknowns describe it, and three more samples are the least that show how well they do."""
 
 LEAST_ENERGY = 56.0
 """Energy of the decay over the noise variance. Noise alone reaches it, at the best of all frequencies of a record
@@ -72,7 +72,7 @@ LEAST_PROMINENCE = 40.0
 """Power of a spectral peak over the median's; white noise alone reaches it less than once in 1e6 records."""
 
 FEW_CYCLES = 3.0
-"""Cycles below which a run's status warns: drift and decay are then hard to tell apart."""
+"""Cycles below which a run's status warns: drift and decay are then hard to distinguish."""
 
 LEAST_PEAK_HEIGHT = 10.0
 """Height of a peak over its standard deviation, for the logarithmic decrement: below it the noise in a logarithm is
@@ -90,7 +90,7 @@ GREATEST_NETWORK_DISTANCE = 0.1
 are not used: they were trained on damped oscillations."""
 
 CLEAR_SWING = 0.2
-"""Share of a run's largest swing from which its peaks tell the centre: smaller swings may end off it, held by dry
+"""Share of a run's largest swing from which its peaks show the centre: smaller swings may end off it, held by dry
 friction. Judgement."""
 
 EQUAL_SWINGS = 0.8

@@ -81,12 +81,12 @@ def tunnel(
       tunnel demo                        the whole chain, with figures
       tunnel springs                     inertia from the paper's spring table
       tunnel simulate plan.toml --out c  simulate a campaign into folder c
-      tunnel import log.csv --out c      a campaign of a data logger's files
-      tunnel identify c --json est.json  its coefficients; also of measured runs
+      tunnel import log.csv --out c      make a campaign from a logger's files
+      tunnel identify c --json est.json  its coefficients, simulated or measured
       tunnel diagnose c                  why the model does not fit it
       tunnel compare a.json b.json       diagnoses side by side
-      tunnel plot c                      figures of it
-      tunnel export c --format mat       c as MAT, CSV, Excel or HDF5
+      tunnel plot c                      draw its figures
+      tunnel export c --format mat       write it as MAT, CSV, Excel or HDF5
       tunnel effects                     effects that a plan can add
       tunnel blind                       blind tests of the diagnosis
       tunnel score                       errors of each estimator
@@ -98,7 +98,7 @@ def tunnel(
       tunnel docs                        the documentation, in a browser
       tunnel doctor                      what is installed, and a self-check
       tunnel schema campaign             JSON schemas, for editors
-      tunnel bench                       all of it by hand and eye, in a browser
+      tunnel bench                       from a logger's files to a report, in a browser
 
     [bold]Units[/bold]
       SI and radians throughout.
@@ -184,7 +184,7 @@ def _flush() -> None:
 
 
 def _settle_output() -> None:
-    """Send what cannot be printed nowhere, so that Python's own flush at the end does not fail again."""
+    """Discard what cannot be printed, so that Python's own flush at the end does not fail again."""
     try:
         _flush()
     except OSError:

@@ -6,5 +6,5 @@ within the step). For every family of effects it has further forms besides the t
 
 ``conditions`` defines a campaign, ``integrator`` integrates it, ``moments`` and ``readings`` contain the laws,
 ``forms`` and ``outside`` list them, ``severity`` scales them relative to the noise, ``draw`` draws campaigns and
-``make`` writes them: ``python -m tunnel_reference.make OUT --count N --seed S``.
+``make`` makes sets of them for ``tunnel blind make``.
 """

@@ -60,7 +60,7 @@ class Conditions:
         rod: the flexible rod; None where it is rigid.
         noise_corner: corner frequency of the coloured part of the noise, Hz.
         coloured_share: share of the noise's variance that is coloured.
-        clock_jitter: greatest delay of a sample, as a share of the sample interval; the stamps tell it.
+        clock_jitter: greatest delay of a sample, as a share of the sample interval; the time stamps show it.
         clock_seed: of the delays.
         stamp_step: step to which the written time stamps are rounded, s; 0: not rounded.
         time_scale: time as written over time as simulated. All other times here are as simulated.

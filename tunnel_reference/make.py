@@ -1,14 +1,9 @@
-"""Writes sets of campaigns with known truth.
-
-``python -m tunnel_reference.make OUT --count N --seed S`` writes OUT/c0001, OUT/c0002, …
-"""
+"""Makes sets of campaigns with known truth; ``tunnel blind make`` writes them."""
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,13 +13,11 @@ from tunnel_reference.draw import DEFAULT_SHARES, KINDS, NUMBERS, CampaignDraw, 
 from tunnel_reference.forms import FAMILIES
 from tunnel_reference.separable import size_separably
 from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions
-from tunnel_sim.files.campaign_io import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Record
 
 SCHEMA_VERSION = 1
-_CHUNK = 400
 FEW_RUNS = 6
 """The ordinary plans have at least as many runs."""
 
@@ -150,26 +143,6 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
     }
 
 
-def make_set(
-    out: Path, *, count: int, seed: int, shares: dict[str, float], mixture: Mixture, progress: bool = False
-) -> None:
-    """Draw, simulate and write a set of campaigns OUT/c0001, c0002, ….
-
-    Raises:
-        TunnelError: when the folder is not empty.
-    """
-    if out.exists() and any(out.iterdir()):
-        raise TunnelError("the folder is not empty", where=str(out), remedy="name a new one")
-    draws = draw_set(count, seed, shares, mixture)
-    width = max(4, len(str(count)))
-    for start in range(0, count, _CHUNK):
-        for number, simulated in enumerate(
-            simulate_set(draws[start : start + _CHUNK], progress=progress), start + 1
-        ):
-            name = f"c{number:0{width}d}"
-            write_campaign(as_campaign(simulated, name), out / name, truth=truth_of(simulated))
-
-
 def parse_shares(text: str) -> dict[str, float]:
     """Parse kinds with optional weights, such as ``single:3,none``.
 
@@ -190,34 +163,3 @@ def parse_shares(text: str) -> dict[str, float]:
         if not 0.0 < shares[kind] < np.inf:
             raise TunnelError(f"bad weight {weight!r}", where="--kinds", remedy="give a number above zero")
     return shares
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m tunnel_reference.make", description=__doc__)
-    parser.add_argument("out", type=Path, help="folder to create")
-    parser.add_argument("--count", type=int, default=200, help="number of campaigns")
-    parser.add_argument("--seed", type=int, required=True, help="seed of all random numbers")
-    parser.add_argument(
-        "--kinds", default=",".join(DEFAULT_SHARES), help="kinds with optional weights, kind:weight"
-    )
-    parser.add_argument("--textbook", type=float, default=0.5, help="probability of the textbook form")
-    parser.add_argument("--rare", type=float, default=0.5, help="share of rare forms among the others")
-    given = parser.parse_args(arguments)
-    try:
-        make_set(
-            given.out,
-            count=given.count,
-            seed=given.seed,
-            shares=parse_shares(given.kinds),
-            mixture=Mixture(given.textbook, given.rare),
-            progress=True,
-        )
-    except TunnelError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

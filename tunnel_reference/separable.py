@@ -24,7 +24,7 @@ _STRIDE = 7  # samples of the signatures that are kept
 
 
 def size_separably(draws: Sequence[CampaignDraw], *, progress: bool = False) -> list[CampaignDraw]:
-    """Scale the effects of campaigns; draw those again in which an effect does not matter or cannot be told apart.
+    """Scale the effects of campaigns; draw again where an effect does not matter or cannot be distinguished.
 
     Args:
         progress: whether to report progress on standard error.

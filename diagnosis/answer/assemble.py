@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.answer.candidates import candidates
+from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.cautions import cautions
 from diagnosis.answer.coefficients import coefficients, rival_fits
 from diagnosis.answer.held_out import HeldOut, predict_held_out
-from diagnosis.answer.inclusion import inclusion
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.own_units import own_estimate
 from diagnosis.answer.pulls import coefficient_move
@@ -55,14 +54,10 @@ def assemble(
     """Compose the answer.
 
     Args:
-        study: what was found.
         where: where the gap is.
         maps: data of the figures.
         left_out: sentences on runs that were left out.
         patched: the model given with the causes written into it; the share closed is then its own.
-
-    Returns:
-        The diagnosis.
     """
     base = excess_base(study)
     chosen = study.chosen

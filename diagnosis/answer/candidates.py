@@ -17,6 +17,7 @@ from diagnosis.attribution.random_moments import RandomAnswer
 from diagnosis.policy import EVEN_SHARE, GAP_FALSE_ALARM_RATE
 from diagnosis.result import Candidate, ParameterEstimate
 from diagnosis.study import COARSE_STEP, HUM, Study
+from tunnel_sim.effects import known_effects
 
 _AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends above it was stopped by the bound
 
@@ -25,7 +26,6 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
     """The answers, with what they leave of the gap in the fitted runs by the fits' own integrator.
 
     Args:
-        study: what was found.
         base: what an excess is measured against.
 
     Returns:
@@ -65,6 +65,25 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
     none = 0.0 if study.read_off else min(study.test.p_value, GAP_FALSE_ALARM_RATE)
     found.append(Candidate("none", none, before / _block(study), 0.0))
     return _normalised(found)
+
+
+def inclusion(answers: Sequence[Candidate], read_off: Sequence[str]) -> dict[str, float]:
+    """For every effect of the vocabulary the probability that it is among the causes.
+
+    Args:
+        answers: with their probabilities.
+        read_off: causes read off the records before any fit.
+
+    Returns:
+        The sum of the probabilities of the answers that name the effect; of a cause read off the records 1 minus
+        the rate at which a campaign without a gap is said to have one.
+    """
+    names = [frozenset(candidate.effect.split(" + ")) for candidate in answers]
+    found = {}
+    for kind in known_effects():
+        named = [c.probability for c, own in zip(answers, names, strict=True) if kind.name in own]
+        found[kind.name] = min(sum(named), 1.0)
+    return found | dict.fromkeys(read_off, 1.0 - GAP_FALSE_ALARM_RATE)
 
 
 def _normalised(found: Sequence[Candidate]) -> tuple[Candidate, ...]:

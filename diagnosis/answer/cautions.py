@@ -16,7 +16,6 @@ def cautions(
     """The caveats of an answer.
 
     Args:
-        campaign: the runs.
         noise: found in them.
         runs: the gap by run, which says whether the run could be held out of the fit.
         confirmation: whether the fits' integrator agrees with the MuJoCo model.

@@ -57,7 +57,6 @@ def compare(problem: Problem, common: Array, release: Array) -> Comparison:
     """Predict runs with both models.
 
     Args:
-        problem: runs and effects.
         common: common parameters, shape (common,), or (runs, common) where each run has its own, as runs
             held out of different fits do.
         release: every run's own parameters, shape (runs, own).
@@ -115,7 +114,6 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
     approximate that.
 
     Args:
-        problem: runs and effects.
         common: common parameters of every run, shape (runs, common).
         release: every run's own parameters, shape (runs, own).
 

@@ -48,7 +48,6 @@ def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
     """Groups of runs to leave out in turn.
 
     Args:
-        data: the runs.
         count: number of groups, fewer where there are few runs.
 
     Returns:
@@ -117,7 +116,6 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
     """Fit only each run's own parameters: release and phases.
 
     Args:
-        problem: runs and effects.
         start: common parameters, which are held, and releases to start from.
         slopes: derivatives of the scaled prediction to each run's own parameters, shape (n, own), from a fit of
             about the same parameters.

@@ -36,7 +36,6 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
     """The law of a fit.
 
     Args:
-        problem: with the effects found.
         common: its common parameters, shape (common,).
         release: of a run, shape (own,).
         noise: of the sensor, rad; 0: not written.
@@ -101,7 +100,6 @@ def start_of(problem: Problem, own: Array, index: int) -> Start:
     Args:
         problem: gives the runs.
         own: the run's own parameters, shape (own,).
-        index: of the run.
     """
     run, change = problem.data.runs[index], problem.data.similarity
     return Start(run.id, change.own(run.start, "s"), float(own[0]), change.own(float(own[1]), "rad/s"))

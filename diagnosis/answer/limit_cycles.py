@@ -19,7 +19,6 @@ def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnos
 
     Args:
         nominal: the answer without effects, for the gap to a free decay and the noise.
-        remarks: of the examination.
 
     Returns:
         The answer ``unknown``, without coefficients, place or rest.
@@ -40,9 +39,6 @@ def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnos
 
 def refused_limit_cycles(remarks: Sequence[Remark]) -> TunnelError:
     """The refusal where not even the nominal model can be fitted to runs in a limit cycle.
-
-    Args:
-        remarks: of the examination.
 
     Returns:
         The error, which says what was recognised.

@@ -37,9 +37,6 @@ class Modes:
 def second_modes(campaign: Campaign) -> tuple[str, ...]:
     """Name a second mode in each run that shows one.
 
-    Args:
-        campaign: the runs.
-
     Returns:
         A sentence for each run in which two decaying oscillations halve what one leaves and are farther apart than
         the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first half or

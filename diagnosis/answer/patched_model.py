@@ -23,7 +23,6 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
 
     Args:
         study: whose nominal model is the law of the model's joint.
-        model: as given.
 
     Returns:
         The patched model: with the causes, or with the free parameters alone where none is named.

@@ -41,7 +41,6 @@ def coefficient_move(fit: Fit, name: str) -> float:
     unit; a refit of each half would answer the same, but is undetermined where one half shows only some causes.
 
     Args:
-        fit: whose residuals.
         name: of the coefficient: ``cn_beta``, ``cn_r``, ``omega_n`` or ``zeta``.
 
     Returns:

@@ -27,7 +27,6 @@ def parameter_unit(name: str, campaign: Campaign) -> str:
 
     Args:
         name: ``effect.parameter``.
-        campaign: what is stated.
 
     Returns:
         The parameter's own unit; over that of Izz where any run states no spring, and times the frontal area

@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.answer.confirm import Comparison, compare, confirm
 from diagnosis.answer.held_out import HeldOut
-from diagnosis.closure import Waterfall
+from diagnosis.closure import Waterfall, share_closed
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from diagnosis.result import FITTED, HELD_OUT, Confirmation, GapSummary, RunGap
@@ -122,12 +122,8 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     """The gap of the campaign and of every run, in noise variances of a sample.
 
     Args:
-        study: what was found.
         base: what an excess is measured against.
         shown: residuals from the MuJoCo model.
-
-    Returns:
-        The summary.
     """
     ratio = base.extra + 1.0  # of the estimated noise to the base
     random = study.random_answer(study.fitted)
@@ -148,11 +144,13 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     weight = np.array(sizes) / np.sum(sizes)
     total_before = float(weight @ [run.before for run in runs])
     total_after = float(weight @ [run.after for run in runs])
+    out = sum(before_out) > 0.0  # else no run could be held out
+    closed = share_closed(sum(before_out), sum(after_out)) if out else share_closed(total_before, total_after)
     return GapSummary(
         detected=bool(study.causes),
         excess_before=total_before,
         excess_after=total_after if study.named else total_before,
-        closed=_closed(sum(before_out), sum(after_out), total_before, total_after) if study.named else 0.0,
+        closed=closed if study.named else 0.0,
         closed_on=HELD_OUT if before_out else FITTED,
         runs=tuple(runs) if study.named else tuple(replace(run, after=run.before) for run in runs),
         false_alarm_rate=GAP_FALSE_ALARM_RATE,
@@ -174,15 +172,8 @@ def on_stretches(gap: GapSummary, held_out: Waterfall) -> GapSummary:
     before, after = held_out.steps[0].excess, held_out.steps[-1].excess
     if any(run.held_out for run in gap.runs) or len(held_out.steps) == 1 or before <= 0.0:
         return gap
-    return replace(gap, closed=_closed(before, after, before, after), closed_on=held_out.held_out)
+    return replace(gap, closed=share_closed(before, after), closed_on=held_out.held_out)
 
 
 def _excess(residual: Array) -> float:
     return float(np.mean(residual**2)) - 1.0
-
-
-def _closed(before_out: float, after_out: float, before: float, after: float) -> float:
-    """Share of the gap closed: on runs held out, or on all where none could be."""
-    if before_out > 0.0:
-        return float(np.clip(1.0 - max(after_out, 0.0) / before_out, 0.0, 1.0))
-    return float(np.clip(1.0 - max(after, 0.0) / before, 0.0, 1.0)) if before > 0.0 else 0.0

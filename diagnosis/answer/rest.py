@@ -23,7 +23,6 @@ def rest(study: Study, stated: Estimates, moved: Mapping[str, float], excess: fl
     """Judge what the answer leaves of the gap.
 
     Args:
-        study: what was found.
         stated: the coefficients of the answer's fit with their standard deviations.
         moved: by the same names, how far what remains moves them (`diagnosis.answer.pulls`), in their units.
         excess: left on readings held out of the fit, in noise variances of a sample.

@@ -38,9 +38,6 @@ def verdict(
         probability: of the answer, a fraction.
         closed_on: the runs that ``closed`` was measured on, in words (`GapSummary.closed_on`).
         both_winds: whether the campaign has runs with the wind off and runs with the wind on.
-
-    Returns:
-        Sentences.
     """
     if not causes:
         return (
@@ -54,10 +51,10 @@ def verdict(
         )
     several = len(causes) > 1
     sources = "; ".join(
-        _source(name, both_winds=both_winds) + (f" ({plain([name])})" if several else "") for name in causes
+        _source(name, both_winds=both_winds) + (f" ({plain(name)})" if several else "") for name in causes
     )
     return (
-        f"The gap ({_times(before)} the noise power) comes from {plain(causes)} "
+        f"The gap ({_times(before)} the noise power) comes from {plain(*causes)} "
         f"(probability {probability:.2f}): "
         f"{sources}. With {'them' if several else 'it'} added, {100.0 * closed:.1f} % of the gap "
         f"closes {closed_on}. {rest}"

@@ -21,7 +21,6 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
     """Add the causes one after another in their best order, and take each alone out of the whole.
 
     Args:
-        study: what was found.
         base: what an excess is measured against.
         known: runs held out of fits, where that is done already.
 

@@ -56,9 +56,6 @@ def form_floor(excess: float, effects: Sequence[str] = ()) -> float:
     Args:
         excess: of the nominal model's block means.
         effects: that were fitted.
-
-    Returns:
-        The share.
     """
     exact = {kind.name for kind in known_effects() if kind.exact}
     misfit = EXACT_MISFIT if effects and exact.issuperset(effects) else FORM_MISFIT
@@ -110,14 +107,10 @@ def evidence(effects: Sequence[str], share: float, forms: int, excess: float, ch
     """Weight of a set of effects among all answers.
 
     Args:
-        effects: names.
         share: of the gap that they leave open, a fraction.
         forms: how many of their forms were freed.
         excess: of the nominal model's block means.
         chance: standard deviation of a share by chance alone.
-
-    Returns:
-        The weight, not normalised.
     """
     floor = form_floor(excess, effects) + CHANCE_STDS * chance
     return _density(share, floor) * _prior(len(effects), forms)

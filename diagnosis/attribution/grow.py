@@ -78,7 +78,6 @@ class InStretches:
 
         Args:
             hypothesis: fitted to the stretches.
-            data: the runs.
 
         Returns:
             The same effects; None where the fit fails.
@@ -105,7 +104,6 @@ def grow_in_stretches(
     """Grow sets of causes on stretches of the runs, where the nominal model misses the motion itself.
 
     Args:
-        data: the runs.
         fit_nominal: fits the nominal model to any runs.
         kinds: effects to try; those that are autonomous are.
         progress: called with the names of each set.
@@ -116,7 +114,10 @@ def grow_in_stretches(
     """
     short = in_stretches(data)
     first = fit_nominal(short.data)
-    nominal, long = fit_longer(first, short, data, long_stretch(short))
+    try:
+        nominal, long = fit_longer(first, short, data, long_stretch(short))
+    except (FitError, np.linalg.LinAlgError):  # a model without the causes may run away in long stretches
+        nominal, long = first, short
     level, found = [_Grown(Hypothesis((), first), Hypothesis((), nominal))], []
     able = [kind for kind in kinds if kind.autonomous]
     while _may_gain(level[0].long, nominal):

@@ -46,11 +46,7 @@ class Hypothesis:
 
 
 def is_plausible(fitted: Fit) -> bool:
-    """Whether every effect of a fit is still what its name means, in every run.
-
-    Args:
-        fitted: any fit.
-    """
+    """Whether every effect of a fit is still what its name means, in every run."""
     effects = fitted.problem.effects_at(fitted.point.common)
     motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]
     return all(effect.plausible(omega) for effect in effects for omega in motions)

@@ -39,9 +39,6 @@ class Outsider:
 def weigh_outsiders(nominal: Fit) -> Outsider | None:
     """The outsider that closes most of the nominal model's gap.
 
-    Args:
-        nominal: the nominal fit.
-
     Returns:
         The best; None where there is no gap.
     """

@@ -57,20 +57,16 @@ class ProcessNoise:
         spectrum: as fitted.
         drop: of −2 ln L against white measurement noise alone, wind-on runs, dimensionless.
         cost: −2 ln L without constants, wind-on runs, dimensionless.
-        white_excess: mean squared scaled residual minus one of the same samples, without the moment.
-        excess: likewise of the scaled innovations.
+        excess: mean squared scaled innovation minus one.
         innovations: scaled, by wind-on run.
-        run_ids: their runs.
         interval: between innovations, s.
     """
 
     spectrum: Spectrum
     drop: float
     cost: float
-    white_excess: float
     excess: float
     innovations: list[Array]
-    run_ids: tuple[str, ...]
     interval: float
 
 
@@ -78,7 +74,6 @@ class ProcessNoise:
 class _Channel:
     """One wind-on run for the filter."""
 
-    id: str
     residual: Array  # rad
     variance: float  # rad2, of one residual
     interval: float
@@ -162,10 +157,8 @@ def _fit(
         best,
         white - float(found.fun),
         float(found.fun),
-        sum(float(k @ k) for k in kept) / count - 1.0,
         sum(float(i @ i) for i in innovations) / count - 1.0,
         innovations,
-        tuple(c.id for c in channels),
         channels[0].interval,
     )
 
@@ -196,7 +189,6 @@ def _channel(fit: Fit, run_index: int) -> _Channel | None:
     oscillator = np.array([[0.0, 1.0], [-stiffness / inertia, -damping / inertia]])
     reduced = run.wind_speed / data.width if data.width > 0.0 else 0.0
     return _Channel(
-        run.id,
         residual,
         run.noise_variance / group,
         group * run.interval,

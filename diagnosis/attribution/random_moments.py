@@ -58,7 +58,6 @@ def weigh_random_moments(
     """Try turbulence, and vortices with a wandering phase, alone and beside the best single effects.
 
     Args:
-        nominal: the nominal fit.
         hypotheses: fitted sets of effects, best first.
         allowed: names of the vocabulary to answer in.
 

@@ -33,7 +33,6 @@ def answers_folder(folder: Path, excluded: Sequence[str] = (), effects_file: Pat
     """Where the answers to a set go.
 
     Args:
-        folder: of the set.
         excluded: effects withheld from the vocabulary.
         effects_file: of effects added to it; None: none.
 
@@ -64,9 +63,7 @@ def answer_set(
     be diagnosed gets an answer that says why; it counts as wrong.
 
     Args:
-        folder: of the set.
         excluded: effects withheld from the vocabulary.
-        jobs: number of processes.
         progress: called with the number of campaigns answered, the number in all, and the name of the last.
         effects_file: of effects added to the vocabulary; None: none.
 
@@ -133,7 +130,6 @@ def answer_campaign(
     """Diagnose one campaign of a set.
 
     Args:
-        folder: of the campaign.
         excluded: effects withheld from the vocabulary.
         effects_file: of effects added to it; None: none.
 

@@ -16,6 +16,9 @@ MODERATE = (1.0, 10.0)
 """Excess of a moderate gap: 1 to 10 times the noise power."""
 
 
+_Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
 class _Read(BaseModel):
     """The part of a document that is scored; the rest is ignored."""
 
@@ -40,12 +43,12 @@ class _Truth(_Read):
 
 class _Candidate(_Read):
     effect: str
-    probability: float
+    probability: _Probability
 
 
 class _Coefficient(_Read):
     value: float
-    std: float
+    std: Annotated[float, Field(ge=0.0)]
 
 
 class _Coefficients(_Read):
@@ -61,7 +64,7 @@ class _Answer(_Read):
     causes: list[str] | None
     ambiguous_with: list[str] = []
     candidates: list[_Candidate] = []
-    inclusion: dict[str, Annotated[float, Field(ge=0.0, le=1.0)]] = {}
+    inclusion: dict[str, _Probability] = {}
     coefficients: _Coefficients = _Coefficients()
     gap: _Gap | None = None
     wall_s: float = 0.0
@@ -78,7 +81,6 @@ class Case:
     """One campaign.
 
     Args:
-        name: of the campaign.
         truth: its effects, sorted; ``("unknown",)`` outside the vocabulary, empty for none.
         withheld: whether one of its effects was excluded from the vocabulary, which makes the truth unknown.
         severity: excess of the nominal model as a ratio to the noise power; None where the truth does not say.
@@ -188,7 +190,6 @@ def case(
     """Put a truth and an answer together.
 
     Args:
-        name: of the campaign.
         truth: from the key.
         answer: the diagnosis' document.
         excluded: effects that were withheld from the vocabulary.

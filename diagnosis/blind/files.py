@@ -46,11 +46,7 @@ def read_document(path: Path, remedy: str) -> dict[str, Any]:
     """Read a JSON document.
 
     Args:
-        path: the file.
         remedy: what to do when it is missing or broken.
-
-    Returns:
-        Its content.
 
     Raises:
         TunnelError: when it is missing, cannot be read or is no JSON object.
@@ -65,9 +61,6 @@ def read_hashes(path: Path, key: str, remedy: str) -> dict[str, str]:
         path: of the ``seal.json``.
         key: under which they are listed.
         remedy: what to do when the file is missing or broken.
-
-    Returns:
-        The hashes by the names of campaigns.
 
     Raises:
         TunnelError: when the file is missing or malformed.
@@ -100,9 +93,6 @@ def folder_hash(folder: Path) -> str:
 
 def campaign_folders(folder: Path) -> list[Path]:
     """Campaigns of a set, by name.
-
-    Args:
-        folder: of the set.
 
     Returns:
         Its subfolders that hold a campaign.

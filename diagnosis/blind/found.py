@@ -8,7 +8,7 @@ from typing import Any
 
 from diagnosis.attribution.decide import UNKNOWN
 from diagnosis.blind.cases import Case
-from diagnosis.blind.statistics import Share, share_of
+from identification.statistics.proportion import Proportion
 
 MIDDLE = (1.0 / 3.0, 3.0)
 """Time scales of the middle rigs: about a third of those drawn evenly in the logarithm from 1/30 to 30."""
@@ -46,9 +46,9 @@ class Found:
     """
 
     group: str
-    exact: Share
-    found: Share
-    false: Share
+    exact: Proportion
+    found: Proportion
+    false: Proportion
 
     def to_json_dict(self) -> dict[str, Any]:
         """The three shares."""
@@ -60,9 +60,6 @@ def found_by_group(cases: Sequence[Case]) -> list[Found]:
 
     Args:
         cases: truth and answer of every campaign.
-
-    Returns:
-        The groups that hold a campaign.
     """
     result = []
     for group, belongs in GROUPS.items():
@@ -70,7 +67,8 @@ def found_by_group(cases: Sequence[Case]) -> list[Found]:
         if inside:
             hits = [name in c.named for c in inside for name in c.truth if c.truth != UNKNOWN]
             wrong = [name not in c.truth for c in inside for name in c.named if name not in c.small]
-            result.append(Found(group, share_of([c.right for c in inside]), share_of(hits), share_of(wrong)))
+            exact = [c.right for c in inside]
+            result.append(Found(group, *map(Proportion.of, (exact, hits, wrong))))
     return result
 
 

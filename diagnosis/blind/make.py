@@ -30,7 +30,7 @@ def make_blind(
     mixture: Mixture | None = None,
     key: Path | None = None,
     progress: Progress | None = None,
-    tell_steps: bool = False,
+    show_steps: bool = False,
 ) -> Path:
     """Draw, simulate and write campaigns whose truth is only in the key.
 
@@ -46,7 +46,7 @@ def make_blind(
         mixture: how often other forms, other circumstances and small effects are drawn.
         key: file of the key; inside the folder, beside the campaigns, when None.
         progress: called with the number of campaigns written and the number in all.
-        tell_steps: report on standard error how the sizing of the effects proceeds.
+        show_steps: report on standard error how the sizing of the effects proceeds.
 
     Returns:
         The file of the key.
@@ -55,7 +55,7 @@ def make_blind(
         TunnelError: when the folder or the key exists already, or the count is not above zero.
     """
     if count < 1:
-        raise TunnelError(f"{count} campaigns make no set", where="--count", remedy="give 1 or more")
+        raise TunnelError(f"{count} is not a number of campaigns", where="--count", remedy="give 1 or more")
     clear_leftovers(out.resolve().parent)  # what a killed command set aside is there again
     target = out / KEY if key is None else key
     for path in (out, target):
@@ -63,7 +63,7 @@ def make_blind(
             raise TunnelError("exists already", where=str(path), remedy="name another")
     mixture = mixture or Mixture()
     with whole_folder(out) as partial:
-        truths = _write_campaigns(partial, count, seed, shares, mixture, progress, tell_steps)
+        truths = _write_campaigns(partial, count, seed, shares, mixture, progress, show_steps)
         document = {
             "schema_version": SCHEMA_VERSION,
             "salt": secrets.token_hex(32),
@@ -94,14 +94,14 @@ def _write_campaigns(
     shares: Mapping[str, float],
     mixture: Mixture,
     progress: Progress | None,
-    tell_steps: bool,
+    show_steps: bool,
 ) -> dict[str, Any]:
     """Write the campaigns; their truths by name."""
     draws = draw_set(count, seed, dict(shares), mixture)
     width = max(4, len(str(count)))
     truths: dict[str, Any] = {}
     for start in range(0, count, CHUNK):
-        for simulated in simulate_set(draws[start : start + CHUNK], progress=tell_steps):
+        for simulated in simulate_set(draws[start : start + CHUNK], progress=show_steps):
             name = f"c{len(truths) + 1:0{width}d}"
             write_campaign(as_campaign(simulated, name), folder / name)
             truths[name] = truth_of(simulated)

@@ -23,8 +23,10 @@ from diagnosis.blind.files import (
 )
 from diagnosis.blind.found import Found, found_by_group, inclusions
 from diagnosis.blind.smooth import SmoothCalibration, smooth_calibration
-from diagnosis.blind.statistics import CalibrationBin, Share, calibration, share_of
+from diagnosis.blind.statistics import CalibrationBin, calibration
 from diagnosis.policy import BLIND_CLOSED, BLIND_WITHIN
+from identification.statistics.proportion import Proportion
+from tunnel_sim.files.json_text import as_json
 from tunnel_sim.files.reading import as_described
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 
@@ -44,7 +46,7 @@ class CoefficientErrors:
     group: str
     name: str
     when: str
-    within: Share
+    within: Proportion
     median: float
 
 
@@ -68,18 +70,18 @@ class Score:
     made_with: dict[str, Any]
     sealed: bool
 
-    def exact(self) -> dict[str, Share]:
+    def exact(self) -> dict[str, Proportion]:
         """Exact match of the causes, by kind of campaign and severity (times the noise power)."""
         found = {}
         for kind in ("single", "pair", "three", "four", "none", "outside", "withheld"):
             cases = [c for c in self.cases if c.kind == kind]
-            found[kind] = share_of([c.right for c in cases])
+            found[kind] = Proportion.of([c.right for c in cases])
             if kind == "single":
                 for level in ("below 1", "1 to 10", "above 10"):
-                    found[f"single, {level}"] = share_of(
+                    found[f"single, {level}"] = Proportion.of(
                         [c.right for c in cases if c.severity_class == level]
                     )
-        found["all"] = share_of([c.right for c in self.cases])
+        found["all"] = Proportion.of([c.right for c in self.cases])
         return {name: share for name, share in found.items() if share.total}
 
     def confusion(self) -> dict[str, dict[str, int]]:
@@ -90,12 +92,12 @@ class Score:
             row[label(c.causes)] = row.get(label(c.causes), 0) + 1
         return found
 
-    def right_by_truth(self) -> dict[str, Share]:
+    def right_by_truth(self) -> dict[str, Proportion]:
         """How many answers are right, by truth as in the rows of `confusion`."""
         found: dict[str, list[bool]] = {}
         for c in self.cases:
             found.setdefault(_truth(c), []).append(c.right)
-        return {name: share_of(flags) for name, flags in found.items()}
+        return {name: Proportion.of(flags) for name, flags in found.items()}
 
     def pairs(self) -> dict[str, int]:
         """The answers where two effects act."""
@@ -121,26 +123,26 @@ class Score:
         """Calibration of the probabilities that each effect is among the causes; None where they are not stated."""
         return smooth_calibration(inclusions(self.cases))
 
-    def false_alarms(self) -> Share:
+    def false_alarms(self) -> Proportion:
         """How many campaigns without a gap were given a cause, ``unknown`` included."""
-        return share_of([not c.right for c in self.cases if c.kind == "none"])
+        return Proportion.of([not c.right for c in self.cases if c.kind == "none"])
 
-    def missed(self) -> Share:
+    def missed(self) -> Proportion:
         """How many campaigns with a gap were answered with ``none``."""
-        return share_of([c.causes == () for c in self.cases if c.kind != "none"])
+        return Proportion.of([c.causes == () for c in self.cases if c.kind != "none"])
 
-    def rivals(self) -> Share:
+    def rivals(self) -> Proportion:
         """Of wrong answers where known effects act, how many name the truth as a possible confusion."""
         wrong = [c for c in self.cases if c.number and not c.right]
-        return share_of([c.rival for c in wrong])
+        return Proportion.of([c.rival for c in wrong])
 
-    def closure(self) -> tuple[Share, float, float]:
+    def closure(self) -> tuple[Proportion, float, float]:
         """Of campaigns named rightly: how many close 0.95 on held-out runs; median and 5th percentile closed."""
         closed = [float(c.answer["gap"]["closed"]) for c in self.cases if c.named_rightly]
         if not closed:
-            return Share(0, 0), 0.0, 0.0
+            return Proportion(0, 0), 0.0, 0.0
         return (
-            share_of([v >= BLIND_CLOSED for v in closed]),
+            Proportion.of([v >= BLIND_CLOSED for v in closed]),
             float(np.median(closed)),
             float(np.quantile(closed, 0.05)),
         )
@@ -161,7 +163,7 @@ class Score:
                 for when in ("before", "after"):
                     errors = [e for c in cases if (e := c.error(name, when)) is not None]
                     if errors:
-                        within = share_of([abs(stds) <= BLIND_WITHIN for stds, _ in errors])
+                        within = Proportion.of([abs(stds) <= BLIND_WITHIN for stds, _ in errors])
                         median = float(np.median([abs(share) for _, share in errors]))
                         found.append(CoefficientErrors(group, name, when, within, median))
         return found
@@ -178,7 +180,6 @@ class Score:
         error, bins = self.calibration()
         share, median, low = self.closure()
         times = self.seconds()
-        inclusion = self.inclusion()
         return {
             "schema_version": 1,
             "sealed": self.sealed,
@@ -186,20 +187,18 @@ class Score:
             "answers_sha256": self.answers_sha256,
             "made_with": self.made_with,
             "excluded": list(self.excluded),
-            "exact": {name: found.to_json_dict() for name, found in self.exact().items()},
+            "exact": as_json(self.exact()),
             "confusion": self.confusion(),
             "pairs": self.pairs(),
             "calibration": {
                 "error": error,
-                "bins": [
-                    {"low": b.low, "high": b.high, "mean": b.mean, "right": b.right.to_json_dict()} for b in bins
-                ],
+                "bins": as_json(bins),
             },
             "found": {found.group: found.to_json_dict() for found in self.found()},
-            "inclusion_calibration": None if inclusion is None else inclusion.to_json_dict(),
-            "false_alarms": self.false_alarms().to_json_dict(),
-            "missed": self.missed().to_json_dict(),
-            "rivals_named": self.rivals().to_json_dict(),
+            "inclusion_calibration": as_json(self.inclusion()),
+            "false_alarms": as_json(self.false_alarms()),
+            "missed": as_json(self.missed()),
+            "rivals_named": as_json(self.rivals()),
             "closure": {"at_least_0.95": share.to_json_dict(), "median": median, "percentile_5": low},
             "coefficients": [
                 {"group": e.group, "name": e.name, "when": e.when, "within_3_std": e.within.to_json_dict(),
@@ -228,13 +227,9 @@ def score_set(
     A folder without a seal, but with ``truth.json`` in every campaign, is scored as an open set.
 
     Args:
-        folder: of the set.
         excluded: effects that were withheld when it was answered.
         key: file of the key; the set's own when None.
         effects_file: with which it was answered; None: none.
-
-    Returns:
-        The score.
 
     Raises:
         TunnelError: when a campaign is not answered, key, campaign or answer is not what its hash says, or one of
@@ -308,7 +303,7 @@ def _checked_key(
     hashes = read_hashes(folder / SEAL, "campaigns_sha256", "restore it")
     key_sha256 = read_document(folder / SEAL, "restore it").get("key_sha256")
     if set(hashes) != {path.name for path in campaigns}:
-        raise TunnelError("campaigns were added or taken away", where=str(folder), remedy="restore the set")
+        raise TunnelError("campaigns were added or removed", where=str(folder), remedy="restore the set")
     for path in campaigns:
         if folder_hash(path) != hashes[path.name]:
             raise TunnelError("is not the campaign that was sealed", where=str(path), remedy="restore it")

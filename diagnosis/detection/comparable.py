@@ -16,9 +16,6 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     """Leave out the runs that cannot be fitted together with the others.
 
-    Args:
-        campaign: the runs.
-
     Returns:
         The campaign of the remaining runs, and sentences that say which were left out and why; none where all
         runs remain. Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those

@@ -54,7 +54,6 @@ def test_gap(
 
     Args:
         fit: usually of the nominal model.
-        noise: the campaign's.
         trend: of the noise with the motion.
         coarse_step: whether the reading's step is known to be coarser than stated; the level and trend of the
             noise are then not tested.
@@ -96,7 +95,6 @@ def judge(
 
     Args:
         nominal: fit of the nominal model to runs prepared for white noise.
-        noise: the campaign's.
         trend: of the noise with the motion.
         step: of the lattice of the readings, rad; 0 where there is none.
         coarse_step: as `test_gap` takes it.

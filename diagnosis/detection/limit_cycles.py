@@ -18,8 +18,6 @@ class Diagnosable:
     """The runs to diagnose.
 
     Args:
-        campaign: the runs.
-        remarks: of the examination.
         limit_cycles: whether they are all in limit cycles, so that no decay remains.
     """
 
@@ -30,9 +28,6 @@ class Diagnosable:
 
 def diagnosable(campaign: Campaign) -> Diagnosable:
     """Examine a campaign, and separate its free decays from runs in a limit cycle.
-
-    Args:
-        campaign: measured or simulated runs.
 
     Returns:
         The free decays; the whole records of all runs where every one is in a limit cycle.

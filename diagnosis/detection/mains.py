@@ -61,7 +61,6 @@ def refine_frequency(campaign: Campaign, frequency: float) -> float:
     """The frequency of the mains, to a small fraction of a spectral bin.
 
     Args:
-        campaign: the runs.
         frequency: Hz, to within 0.02 Hz.
 
     Returns:
@@ -81,7 +80,6 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
     """Remove a hum and its harmonics from every record.
 
     Args:
-        campaign: the runs.
         frequency: of the fundamental, Hz.
         variance: of the noise of one sample, rad².
 

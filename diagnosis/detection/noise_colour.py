@@ -79,9 +79,6 @@ class Colour:
         Args:
             count: values in the record.
             interval: between them, s.
-
-        Returns:
-            The power ratio.
         """
         frequency = np.asarray(np.fft.rfftfreq(count, interval)[1:], np.float64)
         return float(np.mean(np.exp(self._extended(frequency, self.slope))))

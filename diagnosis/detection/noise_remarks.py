@@ -12,7 +12,6 @@ def noise_remarks(noise: Noise, trend: NoiseTrend) -> tuple[Remark, ...]:
     """What the user should know of the noise.
 
     Args:
-        noise: of the campaign.
         trend: of the noise with the motion.
 
     Returns:

@@ -27,8 +27,6 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
 
     Args:
         trend: of the campaign.
-        fit: gives the motion.
-        noise: of the campaign.
 
     Returns:
         P-values by name, from Student's t of the campaign among repetitions of it simulated with white noise

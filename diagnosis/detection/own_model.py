@@ -17,9 +17,6 @@ SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughout
 def reach(campaign: Campaign) -> float:
     """The greatest displacement in the records.
 
-    Args:
-        campaign: the runs.
-
     Returns:
         rad; from the frequency where the sensor measures a rate or an acceleration.
     """
@@ -35,7 +32,6 @@ def with_law(campaign: Campaign, law: JointLaw) -> Campaign:
     """The campaign with a joint's law in place of a spring.
 
     Args:
-        campaign: the runs.
         law: of the joint.
 
     Returns:

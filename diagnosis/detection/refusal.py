@@ -16,9 +16,6 @@ _HOPELESS = (Status.NO_OSCILLATION, Status.NOT_DETERMINED)
 def refuse_hopeless(campaign: Campaign) -> None:
     """Refuse a campaign with a run that shows no decaying motion; the estimators leave out the same runs.
 
-    Args:
-        campaign: the runs.
-
     Raises:
         TunnelError: for the first such run.
     """

@@ -40,7 +40,6 @@ def repeated(
     """Read the fitted motion again, with white noise and a lattice of unknown origin.
 
     Args:
-        fit: gives the motion.
         white: standard deviation of a sample's noise before rounding, rad, by run id.
         step: of the lattice, rad; 0 where there is none.
         count: of the repetitions.

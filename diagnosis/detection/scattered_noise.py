@@ -21,7 +21,6 @@ def scattered_variance(record: Record, frequency: float, block: int) -> tuple[fl
     """Variance of the noise as it acts on means of neighbouring samples.
 
     Args:
-        record: a run's reading.
         frequency: of its motion, Hz.
         block: samples that a mean is taken of. Where stamps were given to the samples afterwards, neighbours share
             some noise, so that differences of single samples would miss it.

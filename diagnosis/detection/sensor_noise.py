@@ -86,7 +86,6 @@ class Noise:
 
         Args:
             colour: its spectrum, from block means.
-            data: the runs.
 
         Returns:
             The noise with the colour, and with an estimate of all its power that the records' lengths resolve.
@@ -122,7 +121,6 @@ def estimate_variance(record: Record, fastest: float | None = None) -> tuple[flo
     Where the samples are not evenly spaced, `scattered_variance` measures it.
 
     Args:
-        record: a run's reading.
         fastest: frequency of the campaign's fastest motion, Hz, so that coloured noise is measured in the same band
             in all runs; None: the record's own.
 
@@ -160,9 +158,6 @@ def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
 
 def campaign_noise(campaign: Campaign) -> Noise:
     """The noise of every run: as stated where the records agree with it, else as estimated from them.
-
-    Args:
-        campaign: the runs.
 
     Returns:
         The stated noise where the runs agree with one another and their mean agrees with it, within `NOISE_AGREES`
@@ -227,9 +222,6 @@ def _floor(campaign: Campaign, estimates: dict[str, float], floors: dict[str, fl
 def accuracy(record: Record) -> float:
     """How small a sample's noise may be before the errors of the fits show.
 
-    Args:
-        record: a run's reading.
-
     Returns:
         Standard deviation of a sample, rad: a share of the swing, plus three times the error of the reading from
         RK4's loss of phase, (ωh)⁴/120 of the phase for steps h of a block (Hairer, Nørsett and Wanner, Solving
@@ -247,9 +239,6 @@ def accuracy(record: Record) -> float:
 def reading_step(campaign: Campaign) -> float:
     """The step of the lattice on which the readings lie.
 
-    Args:
-        campaign: the runs.
-
     Returns:
         The smallest difference between distinct readings, rad. This is the true resolution where the record
         visits neighbouring steps, as every decay does; it is far below any step where readings are continuous.
@@ -259,9 +248,6 @@ def reading_step(campaign: Campaign) -> float:
 
 def lattice_step(campaign: Campaign) -> float:
     """The step of the lattice on which the readings lie, where they do.
-
-    Args:
-        campaign: the runs.
 
     Returns:
         As `reading_step`, rad; 0 where the differences between distinct readings are not multiples of it.
@@ -306,19 +292,18 @@ class NoiseTrend:
 
 _WINDOW = 0.02  # s: a small part of a swing, so that large angles and large rates fall in different windows
 _FEWEST = 10  # samples in a window
+_SHORTEST = 5.0 * _WINDOW  # s: of a record with several windows
 
 
 def noise_trend(campaign: Campaign) -> NoiseTrend:
     """Measure whether the noise is as strong in motion as at rest, and the same at all times.
 
-    Args:
-        campaign: the runs.
-
     Returns:
         Trends of the variance of fourth differences of the reading in windows of 20 ms, pooled over the runs with
-        evenly spaced samples. Their null distribution is simulated (`diagnosis.detection.noise_under_null`).
+        evenly spaced samples that are not shorter than five windows. Their null distribution is simulated
+        (`diagnosis.detection.noise_under_null`).
     """
-    even = [run.record for run in campaign.runs if run.record.uniform]
+    even = [r.record for r in campaign.runs if r.record.uniform and r.record.duration > _SHORTEST]
     values = trend_statistics([(record.yaw_rad[None], record.sample_rate) for record in even])
     if values is None:
         return NoiseTrend(0.0, 0.0, 0.0, judged=False)

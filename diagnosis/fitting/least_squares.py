@@ -100,7 +100,6 @@ def fit(
     """Minimise χ² from a starting point.
 
     Args:
-        problem: runs and effects.
         start: parameter values to start from.
         base: a fit of the same runs with fewer effects. While progress is good, its sensitivities are used for
             the parameters that both have, which saves most of the simulations.
@@ -196,7 +195,6 @@ def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
     """Reading minus prediction.
 
     Args:
-        problem: runs and effects.
         point: parameter values.
 
     Returns:
@@ -253,8 +251,6 @@ def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> li
     """Derivatives of the scaled prediction by finite differences.
 
     Args:
-        problem: runs and effects.
-        point: where.
         base: a fit of the same runs; its derivatives are reused for the parameters it has.
 
     Returns:

@@ -13,7 +13,9 @@ from tunnel_sim.vocabulary.record import Array
 _PADDING = 4  # zero padding of the spectra
 _DECAYS = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of a ringing in one run, nepers
 _MOST_SKIPS, _SWEEPS = 3, 4  # skips sought in a run, and how often each is sought again beside the others
-_EDGE = 8  # blocks at either end of a run in which a skip cannot be told from the release or seen at all
+_EDGE = (
+    8  # blocks at either end of a run in which a skip cannot be distinguished from the release or seen at all
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +35,6 @@ class OwnNumbers:
 
 def ringing(fit: Fit) -> OwnNumbers | None:
     """The strongest decaying line that starts at the release and has one frequency in all runs.
-
-    Args:
-        fit: whose residuals.
 
     Returns:
         Amplitude (rad), angular frequency (rad/s) and damping ratio with every run's phase; None where no
@@ -84,9 +83,6 @@ def _amplitudes(fit: Fit, grid: Array, rate: float) -> tuple[np.ndarray, Array]:
 
 def skip(fit: Fit) -> OwnNumbers | None:
     """The instants at which the runs jump ahead by one common time.
-
-    Args:
-        fit: whose residuals.
 
     Returns:
         The time lost (s) with every run's instants, as many as χ² asks for; None where no run is long enough.

@@ -51,7 +51,6 @@ class Problem:
     """What is fitted: prepared runs, and the effects added to the nominal model.
 
     Args:
-        data: the runs.
         effects: effect classes whose parameters are free.
         fixed: value of effect parameters that are held, as ``effect.parameter``.
         free_forms: names of the effects whose form parameters are free; the others keep the textbook form.
@@ -127,7 +126,7 @@ class Problem:
         """Where the phase or the instants of each effect are among a run's own parameters.
 
         Args:
-            width: number of a run's own parameters (a count), which tells the number of instants.
+            width: number of a run's own parameters (a count), which gives the number of instants.
 
         Returns:
             By the effects' names.
@@ -154,9 +153,6 @@ class Problem:
 
         Args:
             common: as in `Point`, shape (common,).
-
-        Returns:
-            One effect per class.
         """
         values = dict(zip(self.names, common.tolist(), strict=True)) | dict(self.fixed)
         return tuple(
@@ -288,7 +284,6 @@ def blocks_beyond(physics: RunSettings, run: RunData) -> int:
 
     Args:
         physics: of the run, effects included.
-        run: the record.
 
     Returns:
         0 unless an effect reads the motion after the record's end.
@@ -343,9 +338,6 @@ def campaign_rig(data: Data) -> Rig:
 
     Args:
         data: gives A, l and width.
-
-    Returns:
-        The packaged rig with these.
     """
     return _rig(data.frontal_area, data.reference_length, data.width)
 

@@ -251,9 +251,6 @@ class Data:
 
         Args:
             runs: some of the runs, or further ones.
-
-        Returns:
-            The data of these runs.
         """
         return dataclasses.replace(self, runs=runs, windy=self.wind_on)
 
@@ -262,9 +259,6 @@ class Data:
 
         Args:
             keep: ids.
-
-        Returns:
-            The smaller data.
         """
         return self.with_runs(tuple(run for run in self.runs if run.id in keep))
 
@@ -275,7 +269,6 @@ def prepare(
     """Average a campaign's records in blocks.
 
     Args:
-        campaign: the runs.
         noise_variance: of one sample, rad², by run id.
         similarity: how the campaign was made from the measured one.
 
@@ -341,9 +334,6 @@ def without_start(data: Data) -> Data:
     """The runs from their second passage through the middle on.
 
     Where a hand lets go late, the start of the record is driven, which no free decay explains.
-
-    Args:
-        data: the runs.
 
     Returns:
         The data with every run cut at the first passage through its mean after its first turning point; a run

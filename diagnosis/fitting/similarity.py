@@ -129,9 +129,6 @@ _PADDING = 8  # times the record, which places the peak of a few cycles to withi
 def frequency(record: Record) -> float:
     """The frequency of a decay.
 
-    Args:
-        record: a run's reading.
-
     Returns:
         The peak of its spectrum, Hz.
     """

@@ -46,14 +46,7 @@ class Spectrum:
 
 
 def residual_spectra(fit: Fit) -> list[Spectrum]:
-    """The spectrum of every run's scaled residuals.
-
-    Args:
-        fit: gives the residuals.
-
-    Returns:
-        One spectrum per run, in order.
-    """
+    """The spectrum of every run's scaled residuals."""
     spectra = []
     for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
         size = _PADDING * residual.size
@@ -94,11 +87,8 @@ class Line:
 def mains_line(fit: Fit) -> Line | None:
     """The strongest line near 50 Hz common to all runs.
 
-    Args:
-        fit: gives the residuals.
-
     Returns:
-        The line; None where the sampling is too slow to see it, or the motion too fast to tell it apart.
+        The line; None where the sampling is too slow to see it, or the motion too fast to distinguish it.
     """
     data = fit.problem.data
     mains, around = (data.similarity.similar(value, "Hz") for value in (_MAINS, _MAINS_WANDER))
@@ -151,9 +141,6 @@ def _block_gain(frequency: float, interval: float, block: int) -> float:
 
 def shedding_line(fit: Fit) -> Line | None:
     """The strongest line at one Strouhal number in all wind-on runs.
-
-    Args:
-        fit: gives the residuals.
 
     Returns:
         The line; None without wind or body width.
@@ -208,7 +195,6 @@ def resonance(fit: Fit, run_index: int) -> float:
 
     Args:
         fit: parameter values.
-        run_index: of the run.
 
     Returns:
         Hz.
@@ -222,7 +208,6 @@ def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
 
     Args:
         fit: parameter values.
-        run_index: of the run.
 
     Returns:
         kg m², N m s/rad and N m/rad; per unit inertia in normalised form.

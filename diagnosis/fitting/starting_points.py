@@ -28,9 +28,6 @@ _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 def nominal_start(data: Data) -> Point:
     """A starting point for the nominal model.
 
-    Args:
-        data: the runs.
-
     Returns:
         Inertia and aerodynamic stiffness by linear regression of the runs' frequencies, a small damping, and
         the releases from the first samples.
@@ -141,9 +138,6 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
 
 def is_gross(fit: Fit) -> bool:
     """Whether a fit misses the motion itself, so that its sensitivities are of little use.
-
-    Args:
-        fit: any fit.
 
     Returns:
         True where the residual holds more than a hundredth of the reading's power.

@@ -54,7 +54,6 @@ def in_stretches(data: Data, length: int | None = None) -> Stretches:
     """Cut runs into stretches.
 
     Args:
-        data: the runs.
         length: of a stretch, in blocks; two cycles where not given. Multiples of it have ends in common.
 
     Returns:
@@ -79,8 +78,6 @@ def fit_longer(
 
     Args:
         found: a fit of the stretches.
-        stretches: of the runs.
-        data: the runs.
         length: to reach, in blocks; None: whole runs.
 
     Returns:

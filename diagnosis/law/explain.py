@@ -28,7 +28,6 @@ def closable(study: Study, *, significant: bool) -> Closable | None:
     """Say how much of what the answer leaves could be closed, and by what.
 
     Args:
-        study: what was found.
         significant: whether what remains is beyond chance.
 
     Returns:
@@ -185,7 +184,7 @@ def _words(
     ]
     alike = [one for one in others if one.closed >= best.closed - max(AS_MUCH, best.std)]
     if alike:
-        said.append(f"These runs cannot tell it from {' or '.join(KINDS[one.kind] for one in alike)}.")
+        said.append(f"These runs cannot distinguish it from {' or '.join(KINDS[one.kind] for one in alike)}.")
     elif others:
         others_most = max(one.closed for one in others)
         said.append(f"No other kind would close more than {percent(max(others_most, 0.0))}.")

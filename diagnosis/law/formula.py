@@ -223,7 +223,6 @@ def effect_table(formula: Formula, name: str) -> dict[str, Any]:
 
     Args:
         formula: of the fit's units.
-        name: of the effect.
 
     Returns:
         The table, its values those of the formula.

@@ -31,7 +31,6 @@ class Path:
 
     Args:
         fit: whose residuals are to be explained.
-        index: of the run.
     """
 
     fit: Fit

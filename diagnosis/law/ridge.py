@@ -147,9 +147,6 @@ def best_ridge(whole: Normal) -> Ridge:
 
     Args:
         whole: all units.
-
-    Returns:
-        The solution.
     """
     spectrum = _spectrum(whole)
     if not spectrum.values.size:
@@ -164,9 +161,6 @@ def common_precision(parts: Sequence[Normal]) -> float:
 
     Args:
         parts: by unit.
-
-    Returns:
-        The precision.
     """
     spectra = [_spectrum(part) for part in parts]
     greatest = max(max(s.values, default=0.0) for s in spectra)

@@ -82,7 +82,6 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
 
     Args:
         campaign: the records, which give the uncertainty of the noise.
-        fit: gives the residuals.
 
     Returns:
         One per run, in order.
@@ -154,14 +153,11 @@ def band_excesses(runs: list[RunExcess]) -> tuple[BandExcess, ...]:
     return tuple(result)
 
 
-def telling_bands(bands: tuple[BandExcess, ...]) -> tuple[str, ...]:
+def bands_beyond_chance(bands: tuple[BandExcess, ...]) -> tuple[str, ...]:
     """The bands whose power is beyond chance; all of them where none is.
 
     Args:
         bands: of a campaign.
-
-    Returns:
-        Names.
     """
     level = PLACE_FALSE_ALARM_RATE / max(len(bands), 1)
     found = tuple(band.band for band in bands if band.p_value < level and band.excess > 0.0)
@@ -217,9 +213,6 @@ def profile(
         power: squared residuals in noise variances, by run, arrays of shape (m,).
         expected: mean of these under white noise, by run.
         variance: what each adds to the variance of a sum of them under white noise, by run.
-
-    Returns:
-        The profile.
     """
     where = np.concatenate(place)
     excess = np.concatenate([p - e for p, e in zip(power, expected, strict=True)])

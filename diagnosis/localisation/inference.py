@@ -43,9 +43,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     """Whether the gap needs wind.
 
     Args:
-        campaign: the records.
         nominal: fit of the nominal model to all runs.
-        found: the maps.
 
     Returns:
         ``wind_on`` where the wind-off runs, fitted alone, show no gap.
@@ -88,7 +86,6 @@ def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | No
     """The time in which most of the missing moment acts, where that is a small part of the record.
 
     Args:
-        found: the maps.
         share: of the moment's energy, a fraction.
 
     Returns:
@@ -109,7 +106,6 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
 
     Args:
         nominal: fit of the nominal model.
-        found: the maps.
         condition: as inferred.
 
     Returns:

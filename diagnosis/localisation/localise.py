@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import prepare
-from diagnosis.localisation.excess import RunExcess, run_excesses, telling_bands
+from diagnosis.localisation.excess import RunExcess, bands_beyond_chance, run_excesses
 from diagnosis.localisation.inference import Finding, blow_interval, infer_channel, infer_condition
 from diagnosis.localisation.mapping import Survey, survey
 from diagnosis.localisation.maps import Maps
@@ -25,15 +25,12 @@ from tunnel_sim.vocabulary.record import Array
 def localise(study: Study) -> tuple[Where, Maps]:
     """Say where the nominal model departs from the runs.
 
-    Args:
-        study: of the campaign.
-
     Returns:
         The answer in fields and in words, and the maps it is read from.
     """
     scaled, ratio = _as_measured(study)
     excesses = run_excesses(study.campaign, scaled)
-    runs = telling_runs(excesses) if study.causes else ()
+    runs = runs_beyond_chance(excesses) if study.causes else ()
     found = survey(study, scaled, excesses, runs)
     if not study.causes:
         return Where(None, None, words=nowhere(found)), found.maps
@@ -47,11 +44,11 @@ def localise(study: Study) -> tuple[Where, Maps]:
         amplitude_rad=found.maps.amplitude.interval(),
         frequency_hz=found.frequency_interval,
     )
-    bands = telling_bands(found.maps.bands)
+    bands = bands_beyond_chance(found.maps.bands)
     return dataclasses.replace(where, words=describe(where, found, bands, channel, condition)), found.maps
 
 
-def telling_runs(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
+def runs_beyond_chance(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
     """The runs that show the gap.
 
     Args:
@@ -103,9 +100,9 @@ def _nature(study: Study, found: Survey, main: str | None) -> tuple[Finding, Fin
         return condition, infer_channel(study.nominal, found, condition.value)
     kind = effect_class(main)
     others = [name for name in study.causes if name != main]
-    reason = f"as {plain([main])} does"
+    reason = f"as {plain(main)} does"
     if others:
-        reason += f", which causes the larger part of the gap; the rest is due to {plain(others)}"
+        reason += f", which causes the larger part of the gap; the rest is due to {plain(*others)}"
     return Finding(kind.condition, reason), Finding(kind.channel, reason)
 
 

@@ -14,9 +14,9 @@ from diagnosis.localisation.excess import (
     Profile,
     RunExcess,
     band_excesses,
+    bands_beyond_chance,
     profile,
     run_excesses,
-    telling_bands,
     within_bands,
 )
 from diagnosis.localisation.lines import residual_lines
@@ -61,15 +61,13 @@ def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         scaled: the nominal fit with residuals in units of the noise that counts.
         excesses: its squared residuals, by run.
         chosen: ids of the runs the phase plane is taken over; all where empty.
-
-    Returns:
-        The survey.
     """
     campaign, nominal = study.campaign, study.nominal
     best = None if study.chosen is nominal else study.chosen
     bands = band_excesses(excesses)
     inside = [
-        within_bands(r, run, telling_bands(bands)) for r, run in zip(scaled.residuals, excesses, strict=True)
+        within_bands(r, run, bands_beyond_chance(bands))
+        for r, run in zip(scaled.residuals, excesses, strict=True)
     ]
     starts = [run.start for run in nominal.problem.data.runs]
     times = [s + _mid_times(run) for s, run in zip(starts, nominal.problem.data.runs, strict=True)]
@@ -110,10 +108,6 @@ def _shares(excesses: list[RunExcess]) -> list[float]:
 
 def amplitudes(fit: Fit, index: int) -> Array:
     """Amplitude of the fitted motion of one run.
-
-    Args:
-        fit: any.
-        index: of the run.
 
     Returns:
         At every residual, shape (n,), rad.
@@ -246,7 +240,7 @@ def _spectrum(excesses: list[RunExcess], edges: Array) -> Profile:
 
 def _frequency_interval(excesses: list[RunExcess]) -> tuple[float, float] | None:
     """Shortest interval in Hz that holds most of the excess of the bands that show the gap."""
-    names = telling_bands(band_excesses(excesses))
+    names = bands_beyond_chance(band_excesses(excesses))
     index = [i for i, name in enumerate(("0", "f0", "2f0", "3f0", "above")) if name in names]
     kept = [np.where(np.isin(run.band, index), run.power, 1.0) for run in excesses]
     high = max(float(run.frequency[-1]) for run in excesses)

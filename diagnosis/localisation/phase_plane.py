@@ -60,10 +60,6 @@ class Apparent:
 def motion(fit: Fit, index: int) -> tuple[Array, Array]:
     """Angle and rate of the fitted motion of one run.
 
-    Args:
-        fit: any.
-        index: of the run.
-
     Returns:
         Angle from the zero, rad, and rate over the angular frequency, rad, each of shape (n,).
     """
@@ -81,7 +77,6 @@ def apparent_moment(fit: Fit, index: int) -> Apparent | None:
 
     Args:
         fit: of the nominal model.
-        index: of the run.
 
     Returns:
         The moment; None where the run is sampled too slowly or too short, or the reading is not an angle.

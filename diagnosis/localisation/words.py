@@ -27,14 +27,7 @@ _CONDITION_WORDS = {"always": "with the wind on and off", "wind_on": "only with 
 
 
 def nowhere(found: Survey) -> str:
-    """The sentence for a campaign without a gap.
-
-    Args:
-        found: the maps.
-
-    Returns:
-        One sentence.
-    """
+    """The sentence for a campaign without a gap."""
     count = len(found.maps.runs)
     least = min(1.0, count * min(run.p_value for run in found.maps.runs))
     return (
@@ -50,13 +43,9 @@ def describe(
 
     Args:
         where: the same in fields.
-        found: the maps.
         bands: names of the bands that show the gap.
         channel: what it acts on, with the reason.
         condition: when it acts, with the reason.
-
-    Returns:
-        A few sentences.
     """
     parts = [_runs(where, found), _extent(where, found), _bands(found, bands)]
     both = any(group.by == "wind" for group in found.maps.groups)

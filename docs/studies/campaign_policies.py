@@ -20,7 +20,7 @@ import numpy as np
 from scipy.stats import binom
 
 from identification.estimate import PARAMETERS
-from identification.statistics.wilson import wilson_interval
+from identification.statistics.proportion import Proportion
 from tunnel_lab.envs.campaign import CampaignEnv, reached
 from tunnel_lab.envs.policies import POLICIES, run_campaign
 from tunnel_lab.envs.session import Knowledge, answers, probabilities
@@ -187,7 +187,7 @@ def _shown(values: Array, unit: float, digits: int) -> str:
 
 def _share(rows: Sequence[Row], name: str) -> str:
     hits = int(np.sum(_values(rows, name)))
-    low, high = wilson_interval(hits, len(rows))
+    low, high = Proportion(hits, len(rows)).interval
     return f"{hits} of {len(rows)} ({100 * low:.0f} to {100 * high:.0f} %)"
 
 

@@ -165,7 +165,7 @@ def page(parts: Sequence[tuple[str, str]]) -> str:
     right = sum(row.endswith("right |") for row, _ in parts)
     head = (
         "# Real records\n\nWhat the diagnosis says of measured records, and what their sources or energy balances "
-        "say. `python -m docs.studies.real_records --data FOLDER` writes this page; the expected causes stand in "
+        "say. `python -m docs.studies.real_records --data FOLDER` writes this page; the expected causes are in "
         "[real_records.py](studies/real_records.py). An answer is right if it names all of them and no others, "
         "and, where no effect explains the record, says what was recognised. The records marked * have no stated "
         "licence and are not packaged.\n\n"

@@ -1,9 +1,13 @@
-"""Campaigns of the reference simulator for the tutorial on the paper's networks."""
+"""Campaigns of the reference simulator, and which method is closer, for the tutorial on the paper's networks."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
+from tunnel_lab.paper.network_study import CONVENTIONAL, METHODS, NETWORK, Closeness
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.plan import Truth
 
@@ -33,3 +37,32 @@ def reference_campaigns(count: int, seed: int, *, softening: bool) -> list[tuple
         truth = Truth(c.cn_beta, c.cn_r, c.yaw_inertia, c.mechanical_damping)
         found.append((as_campaign(read_and_fit(draw, motion), f"reference-{number + 1}"), truth))
     return found
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether the network is the closer of two, over many campaigns.
+
+    Args:
+        rms: root mean square of each method's quantity, % of the truth or of the release angle.
+        closer: number of campaigns in which the network's is smaller than the conventional method's.
+    """
+
+    rms: Mapping[str, float]
+    closer: int
+    total: int
+
+
+def verdict(rows: Sequence[Mapping[str, Closeness]], quantity: str) -> Verdict:
+    """Count and average over campaigns that every method answered.
+
+    Args:
+        quantity: ``cn_beta``, ``cn_r`` or ``response``.
+    """
+    whole = [row for row in rows if all(method in row for method in METHODS)]
+    values = {m: np.array([getattr(row[m], quantity) for row in whole]) for m in METHODS}
+    return Verdict(
+        {m: float(np.sqrt(np.mean(v**2))) for m, v in values.items()},
+        int(np.sum(np.abs(values[NETWORK]) < np.abs(values[CONVENTIONAL]))),
+        len(whole),
+    )

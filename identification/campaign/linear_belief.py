@@ -26,7 +26,7 @@ _NO_SCORE = np.zeros(5)
 
 @dataclass(frozen=True, eq=False)
 class LinearRun:
-    """What a run tells, to first order.
+    """What a run adds to the estimate, to first order.
 
     Args:
         link: from φ to (a, k), shape (2, 4); see `belief.run_link`.

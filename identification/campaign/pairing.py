@@ -22,8 +22,9 @@ from typing import Any
 
 import numpy as np
 
+from identification.campaign.assembly import wind_off
 from identification.campaign.derivatives import has_size
-from identification.campaign.springs import inertia_of_springs, wind_off_line
+from identification.campaign.springs import inertia_of_springs
 from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, Status, by_gravity
 from identification.policy import LEAST_FOR_SCATTER
 from identification.statistics.widening import widened_covariance
@@ -154,7 +155,7 @@ def paired_estimate(
     if not pairing.off:
         return replace(estimate, statuses=by_gravity(statuses))
     seen = [one for one, _ in sprung]
-    line = _wind_off(pairing, seen)
+    line = wind_off(estimate.runs, campaign.runs)
     if line["wind_off_inertia"] is None:
         return replace(estimate, statuses=by_gravity(statuses | {Status.INERTIA_NOT_POSITIVE}))
     centre, moves = _propagated(pairing, seen, with_line=line["wind_off_intercept"] is not None)
@@ -187,16 +188,6 @@ def _propagated(pairing: _Pairing, seen: Sequence[PairedRun], *, with_line: bool
         moves.append(outcome(frequency + unit * one.frequency_std, rate) - centre)
         moves.append(outcome(frequency, rate + unit * one.rate_std) - centre)
     return centre, np.array(moves).T
-
-
-def _wind_off(pairing: _Pairing, seen: Sequence[PairedRun]) -> dict[str, Any]:
-    omegas = [seen[i].omega_n for i in pairing.off]
-    inertia, intercept = wind_off_line(
-        pairing.stiffness[pairing.off],
-        np.array([omega.value for omega in omegas]),
-        np.array([omega.std for omega in omegas]),
-    )
-    return {"wind_off_inertia": inertia, "wind_off_intercept": intercept}
 
 
 def _damping_scatter(pairing: _Pairing, seen: Sequence[PairedRun], inertia: float) -> float:

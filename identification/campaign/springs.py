@@ -91,8 +91,8 @@ def wind_off_line(
 
     The standard deviation is the larger of what the scatter about the line gives and what the frequencies'
     own standard deviations propagate to. Springs whose stated stiffnesses lie within 1 %, or whose
-    frequencies cannot be told apart, count as one: a gradient over them would be dominated by their errors and too
-    small (the attenuation of Fuller, Measurement Error Models (1987), doi 10.1002/9780470316665, § 1.1).
+    frequencies cannot be distinguished, count as one: a gradient over them would be dominated by their errors and
+    too small (the attenuation of Fuller, Measurement Error Models (1987), doi 10.1002/9780470316665, § 1.1).
 
     Args:
         stiffness: Kr per run, N m/rad, shape (n,).

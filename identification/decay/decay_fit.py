@@ -79,7 +79,6 @@ class DecayFit:
         runs: one per reading.
         normal: information of φ, and of the zero last where it was estimated, shape (p, p) or (p + 1, p + 1).
         converged: whether the step fell below the tolerance.
-        iterations: how many linearisations it took.
     """
 
     parameters: Array
@@ -87,7 +86,6 @@ class DecayFit:
     runs: tuple[RunFit, ...]
     normal: Array
     converged: bool
-    iterations: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,22 +146,22 @@ def fit_decays(
         trial = _project(
             readings, links, best.parameters + step[: best.parameters.size], zero, prior, own_zeros
         )
-        promised = float(step @ (2.0 * gradient - normal @ step))
-        gain = (best.cost - trial.cost) / max(promised, 1e-300)
+        expected_gain = float(step @ (2.0 * gradient - normal @ step))
+        gain = (best.cost - trial.cost) / max(expected_gain, 1e-300)
         converged = size <= tolerance or (size <= _ROUNDING and trial.cost >= best.cost)
         if iteration == _MAX_ITERATIONS:
-            converged = converged or promised <= _SETTLED * best.cost / samples
+            converged = converged or expected_gain <= _SETTLED * best.cost / samples
         damping = _next_damping(damping, gain)
         if trial.runs and trial.cost <= best.cost:
             best = trial
-    nothing = DecayFit(best.parameters, best.zero, (), np.zeros((0, 0)), False, iteration)
+    nothing = DecayFit(best.parameters, best.zero, (), np.zeros((0, 0)), False)
     if not best.runs:
         return nothing
     try:
         normal, _ = _shared_system(best, links, zero is None, prior, own_zeros)
     except np.linalg.LinAlgError:
         return nothing
-    return DecayFit(best.parameters, best.zero, best.runs, normal, converged, iteration)
+    return DecayFit(best.parameters, best.zero, best.runs, normal, converged)
 
 
 def fit_run(

@@ -176,7 +176,6 @@ def describe_run(
         covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
         noise_variance: of one sample of the reading, rad².
         noise: the level behind the standard deviations; None where the method does not use it.
-        windows: of the run.
 
     Returns:
         The estimate with the statuses that follow from its noise, its length and its spring; only NOT_DETERMINED

@@ -24,7 +24,7 @@ def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[R
 
     Args:
         frequency: of its oscillation, Hz.
-        per_cycle: least number of blocks per period; the record itself gives eight at the least.
+        per_cycle: least number of blocks per period; the record itself gives at least eight.
 
     Returns:
         The thinned reading, with the times of the middles of the blocks, and the number of samples per block.

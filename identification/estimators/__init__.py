@@ -46,8 +46,8 @@ SUMMARIES: Mapping[str, str] = {
     "hilbert": "envelope and phase, run by run; its windows are damping and frequency against amplitude",
     "filter_error": "maximum likelihood with a random moment on the model: for runs with buffeting",
     "bayesian": "posterior means and 95 % intervals that are valid for records of one to three cycles",
-    "neural_posterior": "posterior by a trained network: robust to effects that nobody named, and refuses what is "
-    "unlike its training",
+    "neural_posterior": "posterior by a trained network: robust to unnamed effects; refuses what is unlike "
+    "its training",
 }
 """Method and purpose of each estimator by name, one line for the help of the command line."""
 

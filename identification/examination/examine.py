@@ -35,7 +35,7 @@ def examine(campaign: Campaign) -> Examined:
         The campaign to identify and the remarks; the given campaign itself if nothing is wrong.
 
     Raises:
-        TunnelError: when a wind-on run states no air density, or a stated value cannot be computed with.
+        TunnelError: when a wind-on run states no air density, or a stated value is out of range.
     """
     for run in campaign.runs:
         loads(run, campaign.rig)

@@ -127,7 +127,7 @@ def _best_exchanges(
     if not mended:
         return []
     least = min(found.squares for _, found in mended)
-    # Exchanges that fit as well as the best one cannot be told apart.
+    # Exchanges that fit as well as the best one cannot be distinguished.
     limit = least + float(chi2.isf(MISFIT_RATE, 1))
     return [places for places, found in mended if found.squares <= limit]
 

@@ -38,9 +38,6 @@ _REGULAR = 2  # half cycles of about the usual length before a release; more are
 def find_release(record: Record, sensor: SensorProperties) -> int:
     """The sample at which the body is released.
 
-    Args:
-        record: one run's reading.
-
     Returns:
         Index of the first sample of the free motion; 0 if the record starts in it, or if no oscillation is found.
     """

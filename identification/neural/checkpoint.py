@@ -44,10 +44,10 @@ class Checkpoint:
         Args:
             spec: of the training, as JSON; the checkpoint is valid only for the same one.
         """
-        told = [*self.ended, *([] if self.running is None else [self.running])]
-        tensors = {f"weights.{number}": one.weights for number, one in enumerate(told)}
+        kept = [*self.ended, *([] if self.running is None else [self.running])]
+        tensors = {f"weights.{number}": one.weights for number, one in enumerate(kept)}
         state = [
-            [one.held.alpha, one.held.beta, one.damping, one.iteration, one.finished] for one in told
+            [one.held.alpha, one.held.beta, one.damping, one.iteration, one.finished] for one in kept
         ]  # Python writes floats so that they are read back exactly
         document = {"spec": spec, "state": state, "ended": len(self.ended)}
         return save(tensors or {"none": np.zeros(1)}, {"training": json_line(document)})
@@ -57,7 +57,6 @@ class Checkpoint:
         """The inverse of `to_bytes`.
 
         Args:
-            content: the file's.
             spec: of the training to be resumed, as JSON.
 
         Returns:
@@ -70,13 +69,13 @@ class Checkpoint:
             if document["spec"] != json.loads(json_line(spec)):
                 return None
             tensors = load(content)
-            told = [_progress(tensors[f"weights.{at}"], one) for at, one in enumerate(document["state"])]
+            kept = [_progress(tensors[f"weights.{at}"], one) for at, one in enumerate(document["state"])]
             ended = document["ended"]
-            if not isinstance(ended, int) or not max(0, len(told) - 1) <= ended <= len(told):
+            if not isinstance(ended, int) or not max(0, len(kept) - 1) <= ended <= len(kept):
                 return None
         except (SafetensorError, TunnelError, ValueError, LookupError, TypeError, AttributeError):
             return None
-        return cls(tuple(told[:ended]), told[ended] if len(told) > ended else None)
+        return cls(tuple(kept[:ended]), kept[ended] if len(kept) > ended else None)
 
 
 def _progress(weights: Array, state: Sequence[float]) -> Progress:

@@ -5,24 +5,19 @@ The packaged ones are ``paper.safetensors`` and ``paper.json`` in ``identificati
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
+from safetensors.numpy import save
 
 from identification.neural.network import Network, Scaling, parameter_count
 from identification.neural.networks import Errors, Networks
-from identification.neural.stored import packaged, read_stored
+from identification.neural.stored import opened, packaged, read_stored
 from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec
-from tunnel_sim.files.reading import as_described, parse_json
-from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 SHIPPED = "paper"
@@ -83,28 +78,9 @@ def networks_of(weights: bytes, record: bytes | str, where: str) -> Networks:
     Raises:
         TunnelError: when they are malformed, or do not belong together.
     """
-    remedy = "train them again with tunnel train"
-    document = parse_json(record, where, remedy)
-    with (
-        as_described("not the weights and training record of two networks", where, remedy),
-        _as_value_error(),
-    ):
-        if document["weights_sha256"] != hashlib.sha256(weights).hexdigest():
-            raise TunnelError(
-                "weights and training record do not belong together", where=where, remedy=remedy
-            )
+    with opened(weights, record, where, estimator="neural_network") as (tensors, document):
         spec, errors = DataSpec.from_json_dict(document["data"]), Errors.from_json_dict(document["errors"])
-        tensors = load(weights)
         return Networks(_network(tensors, DAMPING), _network(tensors, FREQUENCY), spec, errors)
-
-
-@contextmanager
-def _as_value_error() -> Iterator[None]:
-    """The error of safetensors has no base class but Exception."""
-    try:
-        yield
-    except SafetensorError as error:
-        raise ValueError(error) from None
 
 
 def _network(tensors: Mapping[str, Array], name: str) -> Network:

@@ -32,13 +32,9 @@ class Errors:
     omega_relative: float
     omega_relative_rms: float
 
-    def to_json_dict(self) -> dict[str, float]:
-        """Fields by name."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
     @classmethod
     def from_json_dict(cls, data: dict[str, Any]) -> Errors:
-        """The inverse of `to_json_dict`; raises ValueError or TypeError for a malformed document."""
+        """From the fields by name; raises ValueError or TypeError for a malformed document."""
         if not all(isinstance(value, float | int) and isfinite(value) for value in data.values()):
             raise ValueError("an error that is not a finite number")
         return cls(**data)

@@ -55,7 +55,7 @@ class TrainingSpec:
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name."""
-        return {**asdict(self), "data": self.data.to_json_dict()}
+        return asdict(self)
 
     def steps(self, which: str) -> int:
         """Steps of a network's training, at most."""
@@ -91,14 +91,14 @@ def train(
     spec: TrainingSpec,
     *,
     resume: Checkpoint | None = None,
-    tell: Callable[[int, str], None] = lambda _done, _text: None,
+    progress: Callable[[int, str], None] = lambda _done, _text: None,
     keep: Callable[[Checkpoint], None] = lambda _checkpoint: None,
 ) -> Trained:
     """Train both networks.
 
     Args:
         resume: progress of an interrupted training of the same specification.
-        tell: called after every step with the work done and a description.
+        progress: called after every step with the work done and a description.
         keep: called with a checkpoint after every step; an exception from it ends the training.
     """
     checkpoint = resume or Checkpoint()
@@ -108,7 +108,7 @@ def train(
             for start in range(spec.starts):
                 if len(checkpoint.ended) > number * spec.starts + start:
                     continue
-                checkpoint = _one_start(spec, (number, start), problem, checkpoint, tell, keep)
+                checkpoint = _one_start(spec, (number, start), problem, checkpoint, progress, keep)
         return _collect(spec, checkpoint)
 
 
@@ -126,28 +126,24 @@ def _one_start(
     place: tuple[int, int],
     problem: Problem,
     checkpoint: Checkpoint,
-    tell: Callable[[int, str], None],
+    progress: Callable[[int, str], None],
     keep: Callable[[Checkpoint], None],
 ) -> Checkpoint:
     number, start = place
-    which = NETWORKS[number]
-    progress = checkpoint.running
-    if progress is None:
-        rng = np.random.default_rng([spec.seed, _START, number, start])
-        progress = Progress(first_weights(problem.sizes, rng))
-    before = _work_before(spec, number, start)
-    while progress.iteration < spec.steps(which) and not progress.finished:
-        progress = advance(progress, problem)
-        checkpoint = replace(checkpoint, running=progress)
-        keep(checkpoint)
-        tell(
-            before + progress.iteration * spec.work(which),
-            f"{which} network, start {start + 1} of {spec.starts}",
+    which, name = NETWORKS[number], f"{NETWORKS[number]} network, start {start + 1} of {spec.starts}"
+    state = checkpoint.running
+    if state is None:
+        state = Progress(
+            first_weights(problem.sizes, np.random.default_rng([spec.seed, _START, number, start]))
         )
-    tell(
-        before + spec.steps(which) * spec.work(which), f"{which} network, start {start + 1} of {spec.starts}"
-    )
-    return Checkpoint((*checkpoint.ended, progress), None)
+    before = _work_before(spec, number, start)
+    while state.iteration < spec.steps(which) and not state.finished:
+        state = advance(state, problem)
+        checkpoint = replace(checkpoint, running=state)
+        keep(checkpoint)
+        progress(before + state.iteration * spec.work(which), name)
+    progress(before + spec.steps(which) * spec.work(which), name)
+    return Checkpoint((*checkpoint.ended, state), None)
 
 
 def _work_before(spec: TrainingSpec, number: int, start: int) -> int:
@@ -177,7 +173,7 @@ def _collect(spec: TrainingSpec, checkpoint: Checkpoint) -> Trained:
     record = {
         **spec.to_json_dict(),
         "networks": described,
-        "errors": networks.errors.to_json_dict(),
+        "errors": asdict(networks.errors),
         "versions": {
             name: version(name) for name in ("virtual-wind-tunnel", "torch", "numpy", "safetensors")
         },

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import inf
 from typing import Any
 
@@ -37,13 +37,9 @@ class DataSpec:
     frequency_scale: str = LOGARITHMIC
     test_count: int = 4000
 
-    def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name."""
-        return asdict(self)
-
     @classmethod
     def from_json_dict(cls, data: dict[str, Any]) -> DataSpec:
-        """The inverse of `to_json_dict`; raises ValueError, TypeError or KeyError for a malformed document."""
+        """From the fields by name; raises ValueError, TypeError or KeyError for a malformed document."""
         pairs = {name: tuple(data[name]) for name in ("zeta_range", "omega_range", "grid")}
         for low, high in (pairs["zeta_range"], pairs["omega_range"], pairs["grid"]):
             if not (0.0 < float(low) < inf and 0.0 < float(high) < inf):

@@ -11,12 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import hypot, sqrt
-from typing import Any
 
 import numpy as np
 
 from identification.estimate import Quantity
-from identification.statistics.wilson import wilson_interval
+from identification.statistics.proportion import Proportion
 from tunnel_sim.vocabulary.record import Array, read_only
 
 NOMINAL_COVERAGE = 0.95
@@ -107,32 +106,6 @@ def collect(outcomes: Iterable[Outcome]) -> Trials:
 
 
 @dataclass(frozen=True)
-class Proportion:
-    """A share, such as that of trials that failed.
-
-    Args:
-        total: number of trials, above 0.
-    """
-
-    count: int
-    total: int
-
-    @property
-    def value(self) -> float:
-        """The share."""
-        return self.count / self.total
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Wilson's interval of 95 %, as shares."""
-        return wilson_interval(self.count, self.total)
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """Count, total, share and interval."""
-        return {"count": self.count, "total": self.total, "share": self.value, "wilson_95": [*self.interval]}
-
-
-@dataclass(frozen=True)
 class Score:
     """The figures of a method. A figure is None where fewer than two trials gave an estimate.
 
@@ -156,16 +129,6 @@ class Score:
     rmse: Quantity | None = None
     rmse_over_bound: Quantity | None = None
     coverage: Proportion | None = None
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name; None where there is no figure."""
-        figures = ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound", "coverage")
-        given = {name: getattr(self, name) for name in figures}
-        return {
-            "count": self.count,
-            "failures": self.failures.to_json_dict(),
-            **{name: None if value is None else value.to_json_dict() for name, value in given.items()},
-        }
 
 
 def score(trials: Trials) -> Score:

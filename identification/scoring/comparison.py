@@ -21,7 +21,6 @@ from identification.scoring.accuracy import NOMINAL_COVERAGE, Trials
 from tunnel_sim.vocabulary.record import Array
 
 Aspect = Literal["bias", "spread", "outliers", "coverage", "failures"]
-ASPECTS: tuple[Aspect, ...] = ("bias", "spread", "outliers", "coverage", "failures")
 
 
 @dataclass(frozen=True)

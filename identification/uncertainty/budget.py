@@ -35,7 +35,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
 Identify = Callable[[Campaign], Estimate]
-Told = Callable[[str], None]
+Progress = Callable[[str], None]
 _NAMES = (*PARAMETERS, "wind_off_inertia")
 # Powers with which a common scale of a stated input enters; the clock's is that of the time axis.
 _POWERS: Mapping[str, tuple[float, float, float, float, float]] = {
@@ -127,14 +127,14 @@ def make_budget(
     inputs: InputUncertainties,
     *,
     others: Mapping[str, Identify] | None = None,
-    told: Told | None = None,
+    progress: Progress = lambda _: None,
 ) -> Budget:
     """The budget of a campaign's coefficients.
 
     Args:
         identify: the estimator that made it; it is called again with changed campaigns.
         others: other estimators, by name, whose spread counts as the choice of model.
-        told: called with a description of each step.
+        progress: called with a description of each step.
 
     Raises:
         TunnelError: when the estimate has no coefficients.
@@ -146,14 +146,13 @@ def make_budget(
             where=campaign.name,
             remedy="state spring_stiffness, or leave --budget and --uncertainties out",
         )
-    tell = told or (lambda _: None)
     quantities: list[Quantity] = [getattr(estimate, name) for name in names]
     budget = Budget(names, tuple(q.unit for q in quantities), np.array([q.value for q in quantities]))
     noise = Component("noise of the readings", "A", _noise(estimate, budget))
     common = _common(budget, inputs, any(run.wind_on for run in campaign.runs))
-    individual = _individual(campaign, budget, identify, inputs, tell)
+    individual = _individual(campaign, budget, identify, inputs, progress)
     scatter = _scatter(campaign, estimate, budget, inputs)
-    tell("choice of model")
+    progress("choice of model")
     rivals: dict[str, Estimate] = {name: other(campaign) for name, other in (others or {}).items()}
     rivals["the first half of the records"] = identify(_first_half(campaign))
     model = _model(budget, np.sqrt(np.diag(noise.covariance)), rivals)
@@ -204,7 +203,7 @@ def _common(budget: Budget, inputs: InputUncertainties, windy: bool) -> list[Com
 
 
 def _individual(
-    campaign: Campaign, budget: Budget, identify: Identify, inputs: InputUncertainties, tell: Told
+    campaign: Campaign, budget: Budget, identify: Identify, inputs: InputUncertainties, progress: Progress
 ) -> list[Component]:
     found = []
     for name, size in inputs.individual.items():
@@ -213,14 +212,14 @@ def _individual(
         groups = error_groups(campaign.runs, name)
         total = np.zeros((len(budget.names),) * 2)
         for number, group in enumerate(groups, 1):
-            tell(f"{name}, {number} of {len(groups)}")
+            progress(f"{name}, {number} of {len(groups)}")
             runs = tuple(
                 scaled(run, name, 1.0 + size) if i in group else run for i, run in enumerate(campaign.runs)
             )
             values = _values(identify(replace(campaign, runs=runs)), budget)
             if values is None:
                 raise TunnelError(
-                    f"no answer with {name} of run {campaign.runs[group[0]].id} {100 * size:g} % larger",
+                    f"no estimate with {name} of run {campaign.runs[group[0]].id} {100 * size:g} % larger",
                     where=campaign.name,
                     remedy="use another estimator, or state a smaller uncertainty",
                 )

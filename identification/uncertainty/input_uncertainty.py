@@ -34,15 +34,31 @@ from tunnel_sim.files.toml_input import StrictModel, read_document, shown
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
 
-COMMON = (
-    "spring_stiffness", "wind_speed", "air_density", "frontal_area", "reference_length", "yaw_inertia", "clock"
-)  # fmt: skip
-"""Inputs whose error may be common to all runs; ``clock`` is the scale of the time axis."""
-INDIVIDUAL = ("spring_stiffness", "wind_speed", "air_density")
-"""Inputs that may have a separate error for every spring, or for every wind-on run."""
+_Relative = Annotated[
+    float,
+    Field(ge=0.0, lt=0.5, description="a relative standard uncertainty from 0 to 0.5, such as 0.01 for 1 %"),
+]
 
-_Relative = Annotated[float, Field(ge=0.0, lt=0.5)]
-_MEANING = "a relative standard uncertainty from 0 to 0.5, such as 0.01 for 1 %"
+
+class _IndividualTable(StrictModel):
+    """``[individual]``."""
+
+    spring_stiffness: _Relative = 0.0
+    wind_speed: _Relative = 0.0
+    air_density: _Relative = 0.0
+
+
+class _CommonTable(_IndividualTable):
+    """``[common]``."""
+
+    frontal_area: _Relative = 0.0
+    reference_length: _Relative = 0.0
+    yaw_inertia: _Relative = 0.0
+    clock: _Relative = 0.0
+
+
+COMMON = tuple(_CommonTable.model_fields)
+"""Inputs whose error may be common to all runs; ``clock`` is the scale of the time axis."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +67,8 @@ class InputUncertainties:
 
     Args:
         common: by name of `COMMON`: one error for all runs.
-        individual: by name of `INDIVIDUAL`: independent errors of springs or wind-on runs, besides the common one.
+        individual: of ``spring_stiffness``, ``wind_speed`` and ``air_density``: independent errors of springs or
+            wind-on runs, besides the common one.
         correlations: pairs of common inputs with their correlation coefficient.
     """
 
@@ -76,26 +93,6 @@ class InputUncertainties:
         return matrix
 
 
-class _CommonTable(StrictModel):
-    """``[common]``."""
-
-    spring_stiffness: _Relative = Field(default=0.0, description=_MEANING)
-    wind_speed: _Relative = Field(default=0.0, description=_MEANING)
-    air_density: _Relative = Field(default=0.0, description=_MEANING)
-    frontal_area: _Relative = Field(default=0.0, description=_MEANING)
-    reference_length: _Relative = Field(default=0.0, description=_MEANING)
-    yaw_inertia: _Relative = Field(default=0.0, description=_MEANING)
-    clock: _Relative = Field(default=0.0, description=_MEANING)
-
-
-class _IndividualTable(StrictModel):
-    """``[individual]``."""
-
-    spring_stiffness: _Relative = Field(default=0.0, description=_MEANING)
-    wind_speed: _Relative = Field(default=0.0, description=_MEANING)
-    air_density: _Relative = Field(default=0.0, description=_MEANING)
-
-
 class _CorrelationTable(StrictModel):
     """``[[correlations]]``."""
 
@@ -114,9 +111,6 @@ class _Document(StrictModel):
 
 def load_uncertainties(path: Path) -> InputUncertainties:
     """Read a file of uncertainties, as at the top of this module.
-
-    Args:
-        path: the TOML file.
 
     Raises:
         TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.

@@ -32,13 +32,11 @@ class SideScatter:
 
     Args:
         known: whether the runs leave a degree of freedom to determine it.
-        ratio: largest of the sums of squares over its expectation, of a or of k (1).
         names: parameters of the covariance.
         covariance: what the excess adds to that of the parameters, shape (p, p); zero within chance.
     """
 
     known: bool
-    ratio: float
     names: tuple[str, ...]
     covariance: Array
 
@@ -73,7 +71,7 @@ def side_scatter(
         if run.spring_stiffness is not None and found.omega_n is not None and found.zeta is not None
     ]
     runs = [run for run, _ in pairs]
-    nothing = SideScatter(False, 1.0, (), np.zeros((0, 0)))
+    nothing = SideScatter(False, (), np.zeros((0, 0)))
     if not pairs:
         return nothing, nothing
     design = build_design(runs, campaign.rig)
@@ -172,7 +170,7 @@ def _side(fit: _Fit, covariance: Array, mine: Array) -> SideScatter:
 
     size = fit.residual.size
     added = np.zeros((len(fit.names),) * 2)
-    largest, seen = 0.0, False
+    seen = False
     for row in (0, 1):  # decay rates, then stiffnesses
         chosen = (mine & (np.arange(size) % 2 == row)).astype(np.float64)
         root = np.sqrt(chosen * np.diag(fit.weight))
@@ -185,10 +183,9 @@ def _side(fit: _Fit, covariance: Array, mine: Array) -> SideScatter:
         expected = float(np.trace(spread))
         degrees = expected**2 / float(np.sum(spread**2))
         ratio = float(np.sum((root * fit.residual) ** 2)) / expected
-        largest = max(largest, ratio)
         if ratio > float(chdtri(degrees, DIFFERENCE_RATE)) / degrees:
             # As in the jackknife, every run gets the variance of its own residual, corrected for its leverage.
             freed = fit.residual / np.maximum(1.0 - np.diag(fit.hat), LEAST_FREE_SHARE)
             excess = np.maximum(freed**2 - np.diag(covariance), 0.0)
             added += (fit.influence * (chosen * excess)) @ fit.influence.T
-    return SideScatter(seen, largest, fit.names, added)
+    return SideScatter(seen, fit.names, added)

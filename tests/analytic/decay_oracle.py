@@ -47,11 +47,11 @@ class Oracle:
         lag = self.term("aero_lag")
         seen = angle if lag == 0.0 else lagged if lag > 0.0 else angle + (angle - lagged)
         moment = ka * seen * (
-            1.0 + self.term("moment_cubic") * self.bent(abs(angle), "moment_cubic", 2.0)
+            1.0 + self.term("moment_cubic") * self.raised(abs(angle), "moment_cubic", 2.0)
         ) + ka * self.term("flow_angle")
         moment += (
             ca
-            * (1.0 + self.term("damping_quadratic") * self.bent(abs(angle), "damping_quadratic", 2.0))
+            * (1.0 + self.term("damping_quadratic") * self.raised(abs(angle), "damping_quadratic", 2.0))
             * rate
         )
         cycles = self.term("strouhal_number") * speed * t / WIDTH
@@ -60,7 +60,7 @@ class Oracle:
         )
         return moment + pressure * self.forcing(t)
 
-    def bent(self, size: float, term: str, textbook: float, reference: float = 0.2) -> float:
+    def raised(self, size: float, term: str, textbook: float, reference: float = 0.2) -> float:
         """The textbook's power of an angle or rate, or another that equals it at the reference."""
         power = self.term(f"{term}_exponent") or textbook
         return size**power * reference ** (textbook - power)
@@ -71,15 +71,15 @@ class Oracle:
         moment = -self.stiffness * stretched - self.damping * rate
         moment -= (
             self.term("quadratic_damping")
-            * self.bent(abs(rate), "quadratic_damping", 2.0, 2.0)
+            * self.raised(abs(rate), "quadratic_damping", 2.0, 2.0)
             * copysign(1.0, rate)
         )
         moment -= self.term("loss_factor") * self.stiffness / sqrt(self.stiffness / self.inertia) * rate
         moment -= self.stiffness * (
             self.term("stiffness_cubic")
-            * self.bent(abs(angle), "stiffness_cubic", 3.0)
+            * self.raised(abs(angle), "stiffness_cubic", 3.0)
             * copysign(1.0, angle)
-            + self.term("stiffness_quadratic") * self.bent(abs(angle), "stiffness_quadratic", 2.0)
+            + self.term("stiffness_quadratic") * self.raised(abs(angle), "stiffness_quadratic", 2.0)
         )
         return moment - self.term("gravity_stiffness") * sin(angle - self.term("gravity_angle"))
 

@@ -105,7 +105,7 @@ def test_without_wind_nothing_is_learnt_of_the_air() -> None:
     assert rewards == [0.0] * 100
 
 
-def test_more_noise_tells_less_and_a_better_prior_leaves_less_to_learn() -> None:
+def test_more_noise_informs_less_and_a_better_prior_leaves_less_to_learn() -> None:
     options = {"spring": 5, "wind_speed": 20.0, "release_angle": 0.3}
     plain, noisy, known = (
         sum(run(options, duration=2.0, **arguments)[1])

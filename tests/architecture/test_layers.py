@@ -91,7 +91,7 @@ def test_a_planted_breach_is_caught(tmp_path: Path, module: str, line: str) -> N
     assert "BROKEN" in done.stdout
 
 
-def test_the_reference_simulator_rests_on_values_and_files_alone() -> None:
+def test_the_reference_simulator_rests_on_values_alone() -> None:
     graph = grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
     foreign = {
         name
@@ -100,9 +100,9 @@ def test_the_reference_simulator_rests_on_values_and_files_alone() -> None:
         for name in graph.find_upstream_modules(module)
         if name.split(".")[0] in {*PACKAGES, "mujoco", "scipy"}
     }
-    own = ("tunnel_reference", "tunnel_sim.vocabulary", "tunnel_sim.files")
+    own = ("tunnel_reference", "tunnel_sim.vocabulary")
     assert {name for name in foreign if not name.startswith(own)} == set()
-    assert "tunnel_sim.files.campaign_io" in foreign
+    assert "tunnel_sim.vocabulary.campaign" in foreign
 
 
 def test_mujoco_is_imported_only_where_the_engine_runs() -> None:

@@ -109,8 +109,8 @@ def test_recovers_the_truth_from_noise_free_records(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("nominal", [None, 0.13])
 def test_nominal_inertia_decides_nothing(name, nominal, noisy, of_noisy):
-    told = replace(noisy, rig=replace(noisy.rig, yaw_inertia=nominal))
-    assert identify(told, name) == of_noisy(name)
+    stated = replace(noisy, rig=replace(noisy.rig, yaw_inertia=nominal))
+    assert identify(stated, name) == of_noisy(name)
 
 
 @each_estimator
@@ -134,18 +134,18 @@ def test_same_input_same_answer_and_input_untouched(name, noisy, of_noisy):
 @each_estimator
 def test_order_of_runs_does_not_matter(name, noisy, of_noisy):
     turned = replace(noisy, runs=noisy.runs[::-1])
-    straight, back = of_noisy(name), identify(turned, name)
+    plain, back = of_noisy(name), identify(turned, name)
     for quantity in NAMES:
-        one, other = getattr(straight, quantity), getattr(back, quantity)
+        one, other = getattr(plain, quantity), getattr(back, quantity)
         assert other.value == pytest.approx(one.value, rel=1e-9)
 
 
 @each_estimator
 def test_sensor_zero_and_sign_do_not_matter(name, noisy, of_noisy):
     mirrored = with_records(noisy, lambda _, yaw: 0.1 - yaw)
-    straight, other = of_noisy(name), identify(mirrored, name)
+    plain, other = of_noisy(name), identify(mirrored, name)
     for quantity in NAMES:
-        assert getattr(other, quantity).value == pytest.approx(getattr(straight, quantity).value, rel=1e-6)
+        assert getattr(other, quantity).value == pytest.approx(getattr(plain, quantity).value, rel=1e-6)
 
 
 PARTIAL = {

@@ -57,12 +57,12 @@ def _run(given: argparse.Namespace, shares: dict[str, float], outcomes: list[Out
     with bar("fuzzing", given.count) as advance:
         advance(0, given.count, "")
 
-        def tell(outcome: Outcome) -> None:
+        def progress(outcome: Outcome) -> None:
             outcomes.append(outcome)
             advance(len(outcomes), given.count, "")
 
         indices = range(given.first, given.first + given.count)
-        run_trials(given.seed, indices, workers=given.workers, shares=shares, tell=tell)
+        run_trials(given.seed, indices, workers=given.workers, shares=shares, progress=progress)
 
 
 def _repeat(seed: int, index: int, shares: dict[str, float]) -> int:

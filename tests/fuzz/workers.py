@@ -47,7 +47,7 @@ def run_trials(
     *,
     workers: int = 1,
     shares: Shares = None,
-    tell: Callable[[Outcome], None] = lambda _outcome: None,
+    progress: Callable[[Outcome], None] = lambda _outcome: None,
     trial: Trial = run_trial,
 ) -> list[Outcome]:
     """Run trials in worker processes.
@@ -57,7 +57,7 @@ def run_trials(
         indices: which trials.
         workers: number of processes.
         shares: of the groups; those of `fuzz.trials` where not given.
-        tell: is given every outcome as it comes.
+        progress: called with every outcome as it comes.
         trial: what runs one.
 
     Returns:
@@ -66,7 +66,7 @@ def run_trials(
     found: list[Outcome] = []
     for outcome in _outcomes(seed, list(indices), workers, shares, trial):
         found.append(outcome)
-        tell(outcome)
+        progress(outcome)
     return sorted(found, key=lambda outcome: outcome.index)
 
 

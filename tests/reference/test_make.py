@@ -1,8 +1,6 @@
-"""Sets of campaigns on disk."""
+"""Sets of campaigns."""
 
 from __future__ import annotations
-
-import json
 
 import numpy as np
 import pytest
@@ -11,7 +9,6 @@ from tests.reference.rigs import rig
 from tunnel_reference import draw, make
 from tunnel_reference.draw import DEFAULT_SHARES, Mixture
 from tunnel_reference.forms import FAMILIES
-from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -37,23 +34,18 @@ def short_runs(monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("short_runs")
-def test_a_set_is_written_in_the_campaign_format_and_is_reproducible(tmp_path):
-    arguments = ["--count", "3", "--seed", "5", "--kinds", "none:1,single:2"]
-    for name in ("a", "b"):
-        assert make.main([str(tmp_path / name), *arguments]) == 0
-    truths = [json.loads((tmp_path / "a" / f"c000{i}" / "truth.json").read_text()) for i in (1, 2, 3)]
+def test_a_set_is_reproducible():
+    def made():
+        return make.simulate_set(make.draw_set(3, 5, {"none": 1.0, "single": 2.0}, Mixture()))
+
+    first, second = made(), made()
+    truths = [make.truth_of(one) for one in first]
     assert sorted(t["kind"] for t in truths) == ["none", "single", "single"]
-    for number, truth in enumerate(truths, 1):
-        one, two = (read_campaign(tmp_path / name / f"c000{number}") for name in ("a", "b"))
+    for truth, one, two in zip(truths, first, second, strict=True):
         assert len(truth["effects"]) == (truth["kind"] == "single")
-        for left, right in zip(one.runs, two.runs, strict=True):
-            assert np.array_equal(left.record.yaw_rad, right.record.yaw_rad)
-
-
-def test_a_folder_with_something_in_it_is_refused(tmp_path, capsys):
-    (tmp_path / "kept.txt").write_text("mine")
-    assert make.main([str(tmp_path), "--count", "1", "--seed", "1"]) == 2
-    assert "not empty" in capsys.readouterr().err
+        left, right = make.as_campaign(one, "one"), make.as_campaign(two, "two")
+        for run, same in zip(left.runs, right.runs, strict=True):
+            assert np.array_equal(run.record.yaw_rad, same.record.yaw_rad)
 
 
 @pytest.mark.parametrize(("text", "complaint"), [("singel", "did you mean"), ("pair:-1", "bad weight"),

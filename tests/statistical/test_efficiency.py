@@ -1,4 +1,4 @@
-"""Monte-Carlo: errors against the Cramér–Rao bound, intervals against their promise, cases that must fail.
+"""Monte-Carlo: errors against the Cramér–Rao bound, intervals against their stated coverage, cases that must fail.
 
 One harness judges scores; the planted cases feed it a wrong noise level and must be caught. Seeds are fixed;
 the false-alarm rate is that of an efficient estimator over the choice of seeds.

@@ -81,7 +81,7 @@ def with_bursts(data, share, size, seed=5):
 
 
 @pytest.mark.parametrize(("share", "size", "alarm"), [(0.0, 0.0, False), (0.1, 0.3, False), (0.1, 3.0, True)])
-def test_bursts_are_told_from_noise_that_is_nearly_steady(share, size, alarm):
+def test_bursts_are_distinguished_from_noise_that_is_nearly_steady(share, size, alarm):
     data = with_bursts(decays(2), share, size)
     noise = campaign_noise(data)
     p = trend_p_values(noise_trend(data), fit_nominal(prepare(data, noise.variance)), noise)

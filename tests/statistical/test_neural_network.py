@@ -1,4 +1,4 @@
-"""The networks' intervals against their promise, the paper's claim on two kinds of rig, and planted faults."""
+"""The networks' intervals and coverage, the paper's claim on two kinds of rig, and planted faults."""
 
 from functools import cache
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-from docs.studies.reference_campaigns import reference_campaigns
+from docs.studies.reference_campaigns import reference_campaigns, verdict
 from identification import identify
 from tests.reference.free_decays import damped_cosine
-from tunnel_lab.paper.network_study import CONVENTIONAL, NETWORK, closeness, verdict
+from tunnel_lab.paper.network_study import CONVENTIONAL, NETWORK, closeness
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
@@ -66,10 +66,10 @@ def test_closer_than_the_conventional_method_on_softening_rigs_and_not_on_linear
     linear = [closeness(*pair) for pair in reference_campaigns(8, 32, softening=False)]
     softening = [closeness(*pair) for pair in reference_campaigns(24, 33, softening=True)]
     for quantity in ("cn_beta", "cn_r", "response"):
-        straight, soft = verdict(linear, quantity), verdict(softening, quantity)
-        assert straight.total == 8
-        assert straight.closer <= 1
-        assert straight.rms[NETWORK] > straight.rms[CONVENTIONAL]
+        on_linear, soft = verdict(linear, quantity), verdict(softening, quantity)
+        assert on_linear.total == 8
+        assert on_linear.closer <= 1
+        assert on_linear.rms[NETWORK] > on_linear.rms[CONVENTIONAL]
         assert soft.total == 24
         assert soft.closer >= 18
         assert soft.rms[NETWORK] < soft.rms[CONVENTIONAL]

@@ -1,4 +1,4 @@
-"""Every run-by-run claim over the rig's range: RMSE against the bound, intervals against their promise.
+"""Every run-by-run claim over the rig's range: RMSE against the bound, intervals against their stated coverage.
 
 Records are closed forms with white noise over ζ 0.002–0.05, 0.8–4 Hz and S/A 0.1–1 %, 20 s at 1 kHz. Buffeted
 runs are driven by the effect's moment or by the reference simulator's spectra, and integrated by SciPy with

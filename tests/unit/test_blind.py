@@ -1,25 +1,21 @@
-"""Blind sets: sealed, answered once, resumed, verified and counted. Truth: hand-made sets and hand counts."""
+"""Blind sets: sealed, answered once, resumed and verified. Truth: hand-made sets."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import math
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from diagnosis import result
 from diagnosis.blind import answer, answer_set, answers_folder, make_blind, score_set
-from diagnosis.blind.cases import case
-from diagnosis.blind.score import Score
-from diagnosis.blind.statistics import Share, calibration
+from identification.statistics.proportion import Proportion
 from tests.reference.rigs import rig
 from tests.unit.gone_reader import unheard
+from tests.unit.test_blind_score import document
 from tunnel_lab.cli import main
-from tunnel_lab.diagnosis_view import blind_page
 from tunnel_reference import draw
 from tunnel_reference.draw import Mixture
 from tunnel_sim.files.campaign_io import read_campaign
@@ -52,22 +48,6 @@ def blind(made, tmp_path):
 
 def append(path, text):
     path.write_text(path.read_text(encoding="utf-8") + text, encoding="utf-8")
-
-
-def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12), std=(0.001, 0.001)):
-    """A diagnosis with given causes, as its JSON."""
-    name = " + ".join(causes) or "none"
-    values = {
-        k: result.ParameterEstimate(v, s, "1/rad")
-        for k, v, s in zip(("cn_beta", "cn_r"), cn, std, strict=True)
-    }
-    return result.Diagnosis(
-        "c", tuple(causes), "words",
-        result.GapSummary(bool(causes), 2.0, 0.1, closed, result.HELD_OUT, (), 0.001, 0.5),
-        result.Where(None, None), (result.Candidate(name, probability, 0.1, closed),), tuple(rivals), None,
-        result.Coefficients(values, values), result.Confirmation(True, 0.0, "r01", 0.0, 1e-5),
-        result.NoiseSummary(5e-4, None, "estimated", ""),
-    ).to_json_dict()  # fmt: skip
 
 
 @pytest.fixture
@@ -157,12 +137,12 @@ def test_answering_goes_on_where_it_was_interrupted(blind, quick, monkeypatch):
         answer_set(blind)
     assert [name for name, _ in quick] == ["c0001"]
     first = (blind / "answers" / "c0001.json").read_bytes()
-    told = []
+    steps = []
     monkeypatch.setattr(answer, "diagnose", whole)
-    answer_set(blind, progress=lambda *args: told.append(args))
+    answer_set(blind, progress=lambda *args: steps.append(args))
     assert [name for name, _ in quick] == ["c0001", "c0002", "c0003"]
     assert (blind / "answers" / "c0001.json").read_bytes() == first
-    assert told == [(1, 3, ""), (2, 3, "c0002"), (3, 3, "c0003")]
+    assert steps == [(1, 3, ""), (2, 3, "c0002"), (3, 3, "c0003")]
     assert {p.name for p in (blind / "answers").iterdir()} == {
         "c0001.json",
         "c0002.json",
@@ -184,7 +164,7 @@ def test_a_campaign_that_cannot_be_diagnosed_is_a_wrong_answer(blind, monkeypatc
     monkeypatch.setattr(answer, "diagnose", fails)
     answer_set(blind)
     score = score_set(blind)
-    assert score.exact()["all"] == Share(0, 3)
+    assert score.exact()["all"] == Proportion(0, 3)
     assert {name for row in score.confusion().values() for name in row} == {"no answer"}
     assert "do not help" in (blind / "answers" / "c0002.json").read_text()
 
@@ -244,115 +224,12 @@ def test_withheld_effects_are_withheld_and_their_truth_is_unknown(blind, quick):
         score_set(blind, excluded=("rod_flexibility",))
 
 
-TRUTH = {"cn_beta": 0.45, "cn_r": -0.12, "severity": 4.0}
-SAID = [  # truth, answer, probability
-    (["coulomb_friction"], ["coulomb_friction"], 0.95),
-    (["coulomb_friction"], ["quadratic_damping"], 0.95),
-    (["free_play"], ["free_play"], 0.85),
-    (["free_play"], ["unknown"], 0.55),
-    (["free_play", "mains_hum"], ["free_play", "mains_hum"], 0.95),
-    (["free_play", "mains_hum"], ["free_play"], 0.95),
-    ([], [], 0.999),
-    ([], ["mains_hum"], 0.65),
-    (["unknown"], ["unknown"], 0.75),
-    (["sensor_drift"], [], 0.999),
-]
-
-
-@pytest.fixture
-def score():
-    cases = tuple(
-        case(f"c{i}", {**TRUTH, "effects": truth}, document(said, probability=p))
-        for i, (truth, said, p) in enumerate(SAID)
-    )
-    return Score(cases, (), "k", "a", {}, True)
-
-
-def test_counts_are_those_made_by_hand(score):
-    exact = score.exact()
-    assert exact["single"] == exact["single, 1 to 10"] == Share(2, 5)
-    assert exact["pair"] == Share(1, 2)
-    assert exact["none"] == Share(1, 2)
-    assert exact["outside"] == Share(1, 1)
-    assert exact["all"] == Share(5, 10)
-    assert score.false_alarms() == Share(1, 2)
-    assert score.missed() == Share(1, 8)
-    assert score.pairs()["both"] == 1
-    assert score.pairs()["one of them"] == 1
-    assert score.confusion() == {
-        "coulomb_friction": {"coulomb_friction": 1, "quadratic_damping": 1},
-        "free_play": {"free_play": 1, "unknown": 1},
-        "two or more": {"two or more": 1, "free_play": 1},
-        "none": {"none": 1, "mains_hum": 1},
-        "unknown": {"unknown": 1},
-        "sensor_drift": {"none": 1},
-    }
-    assert score.closure()[0] == Share(3, 3)
-
-
-def test_calibration_error_is_that_made_by_hand(score):
-    # 0.9 to 1: six answers, three right. Alone in their bins: 0.85 and 0.75 right, 0.65 and 0.55 wrong.
-    mean = (4 * 0.95 + 2 * 0.999) / 6
-    expected = (6 * abs(0.5 - mean) + 0.15 + 0.25 + 0.65 + 0.55) / 10
-    error, bins = score.calibration()
-    assert math.isclose(error, expected, rel_tol=1e-12)
-    assert sum(b.right.total for b in bins) == 10
-
-
-def test_a_calibrated_answerer_has_no_calibration_error_but_chance():
-    rng = np.random.default_rng(1)
-    p = rng.uniform(0.5, 1.0, 20000)
-    assert calibration(p, rng.random(p.size) < p)[0] < 0.02
-    assert calibration(p, rng.random(p.size) < p - 0.1)[0] > 0.07
-    assert calibration([], []) == (0.0, ())
-
-
-def test_wilsons_interval_is_the_published_one():
-    # R. G. Newcombe, Stat. Med. 17 (1998) 857–872, table I, method 3: 81/263, 15/148, 0/20, 1/29.
-    for count, total, low, high in ((81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611),
-                                    (1, 29, 0.0061, 0.1718)):  # fmt: skip
-        assert np.allclose(Share(count, total).interval, (low, high), atol=5e-5)
-
-
-def test_errors_of_coefficients_are_in_standard_deviations():
-    said = document(["free_play"], cn=(0.4525, -0.124), std=(0.001, 0.001))
-    one = case("c", {**TRUTH, "effects": ["free_play"]}, said)
-    assert np.allclose(one.error("cn_beta", "after"), (2.5, 0.0025 / 0.45))
-    assert np.allclose(one.error("cn_r", "before"), (-4.0, -0.004 / 0.12))
-    found = {(e.group, e.name, e.when): e.within for e in Score((one,), (), "", "", {}, False).coefficients()}
-    assert found["named rightly", "cn_beta", "after"] == Share(1, 1)
-    assert found["named rightly", "cn_r", "after"] == Share(0, 1)
-
-
-def test_a_rival_is_named_where_the_truth_is_among_those_not_told_apart():
-    truth = {**TRUTH, "effects": ["free_play"]}
-    assert case("c", truth, document(["cubic_stiffness"], rivals=["free_play"])).rival
-    assert not case("c", truth, document(["cubic_stiffness"], rivals=["buffeting"])).rival
-    assert not case("c", truth, document(["free_play"])).rival
-
-
-def test_the_page_holds_every_figure_and_no_empty_cell_of_the_matrix(score):
-    page = blind_page.markdown(score, "set")
-    assert "| one effect | 2 | 5 | 40.0 % |" in page
-    assert "## Confusion matrix" in page
-    rows = [line for line in page.splitlines() if line.startswith("|")]
-    for row in rows:
-        assert row.count("|") == row.strip().count("|")
-    matrix = page[page.index("## Confusion matrix") :].splitlines()
-    cells = [
-        line.split("|")[3:-1] for line in matrix if line.startswith("| ") and not line.startswith("| truth")
-    ]
-    counted = sum(int(cell) for row in cells for cell in row if cell.strip().isdigit())
-    assert counted == len(SAID)
-    json.dumps(score.to_json_dict(), allow_nan=False)
-
-
 def test_the_commands_agree_with_one_another(blind, quick, capsys, tmp_path):
     assert main(["blind", "diagnose", str(blind)]) == 0
-    told = capsys.readouterr().out
+    printed = capsys.readouterr().out
     assert len(quick) == 3
     sealed = hashlib.sha256((blind / "answers" / "seal.json").read_bytes()).hexdigest()
-    assert sealed in told
+    assert sealed in printed
     page, figures = tmp_path / "page.md", tmp_path / "score.json"
     assert unheard("blind", "score", blind, "--markdown", page, "--json", figures) == 0
     assert page.exists()
@@ -415,20 +292,3 @@ def test_a_malformed_document_is_one_line(blind, capsys, name, content):
     capsys.readouterr()
     assert main(["blind", "score", str(blind)]) == 2
     assert capsys.readouterr().err.startswith("tunnel: ")
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [("causes", 3), ("causes", [1]), ("causes", ...), ("candidates", [{"effect": "x"}]), ("candidates", 1),
-     ("coefficients", {"before": {"cn_beta": {"value": "x", "std": 1.0}}}), ("coefficients", []), ("gap", None),
-     ("gap", {"closed": "1"}), ("wall_s", "x"), ("ambiguous_with", None)],
-)  # fmt: skip
-def test_an_answer_of_another_kind_is_refused_where_it_is_read(key, value):
-    good = document(["free_play"])
-    spoilt = {name: one for name, one in good.items() if name != key} | ({} if value is ... else {key: value})
-    case("c", {**TRUTH, "effects": ["free_play"]}, good)
-    with pytest.raises(ValueError, match="validation error"):
-        case("c", {**TRUTH, "effects": ["free_play"]}, spoilt)
-    for truth in ({}, {"effects": 1}, {"effects": ["x"], "severity": "y"}, {"effects": [], "cn_r": []}):
-        with pytest.raises(ValueError, match="validation error"):
-            case("c", truth, good)

@@ -9,8 +9,8 @@ from diagnosis.blind.cases import case
 from diagnosis.blind.found import found_by_group, inclusions
 from diagnosis.blind.score import Score
 from diagnosis.blind.smooth import smooth_calibration
-from diagnosis.blind.statistics import Share
-from tests.unit.test_blind import document
+from identification.statistics.proportion import Proportion
+from tests.unit.test_blind_score import document
 from tunnel_lab.diagnosis_view import blind_page
 from tunnel_lab.diagnosis_view.blind_figures import calibration_figure, confusion_figure
 
@@ -37,22 +37,22 @@ CASES = (
 
 def test_causes_found_and_false_are_those_counted_by_hand():
     found = {f.group: f for f in found_by_group(CASES)}
-    assert found["three causes"].exact == Share(1, 3)
-    assert found["three causes"].found == Share(6, 9)
-    assert found["three causes"].false == Share(1, 7)
-    assert (found["four causes"].found, found["four causes"].false) == (Share(0, 4), Share(0, 0))
-    assert found["one cause"].exact == found["slow rigs"].exact == Share(1, 1)
-    assert found["fast rigs"].exact == found["none acts, coloured noise"].exact == Share(0, 1)
-    assert found["none acts, rounded or jittered stamps"].exact == found["few runs"].exact == Share(1, 1)
-    assert found["none acts"].false == Share(1, 1)
-    assert found["outside the vocabulary"].false == Share(1, 1)
-    assert found["all"].exact == Share(4, 9)
+    assert found["three causes"].exact == Proportion(1, 3)
+    assert found["three causes"].found == Proportion(6, 9)
+    assert found["three causes"].false == Proportion(1, 7)
+    assert (found["four causes"].found, found["four causes"].false) == (Proportion(0, 4), Proportion(0, 0))
+    assert found["one cause"].exact == found["slow rigs"].exact == Proportion(1, 1)
+    assert found["fast rigs"].exact == found["none acts, coloured noise"].exact == Proportion(0, 1)
+    assert found["none acts, rounded or jittered stamps"].exact == found["few runs"].exact == Proportion(1, 1)
+    assert found["none acts"].false == Proportion(1, 1)
+    assert found["outside the vocabulary"].false == Proportion(1, 1)
+    assert found["all"].exact == Proportion(4, 9)
     assert "two causes" not in found
 
 
 def test_kinds_go_up_to_four():
     exact = Score(CASES, (), "", "", {}, False).exact()
-    assert (exact["three"], exact["four"]) == (Share(1, 3), Share(0, 1))
+    assert (exact["three"], exact["four"]) == (Proportion(1, 3), Proportion(0, 1))
 
 
 def test_a_truth_of_the_first_edition_has_no_small_causes_and_an_even_clock():
@@ -70,6 +70,12 @@ def test_inclusions_leave_small_causes_out():
 def test_an_inclusion_that_is_not_a_probability_is_refused(bad):
     with pytest.raises(ValueError, match="validation error"):
         made(["free_play"], ["free_play"], inclusion=bad)
+
+
+@pytest.mark.parametrize("bad", [-0.1, 1.5, 1e300])
+def test_a_candidate_without_a_probability_is_refused(bad):
+    with pytest.raises(ValueError, match="validation error"):
+        stated(["free_play"], ["free_play"], bad)
 
 
 def drawn(shift, seed=1, campaigns=600):
@@ -121,7 +127,7 @@ def test_the_calibration_of_the_answers_is_drawn_in_bins_with_wilsons_intervals(
     assert list(x) == pytest.approx([0.56, 0.98])
     assert list(y) == pytest.approx([1 / 2, 2 / 3])
     ends = [segment[:, 1].tolist() for segment in bars.get_segments()]
-    assert ends == [pytest.approx(Share(1, 2).interval), pytest.approx(Share(2, 3).interval)]
+    assert ends == [pytest.approx(Proportion(1, 2).interval), pytest.approx(Proportion(2, 3).interval)]
     assert [text.get_text() for text in axes.texts] == ["2", "3"]
 
 

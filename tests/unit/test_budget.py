@@ -117,8 +117,8 @@ def test_the_choice_of_model_shows_where_the_model_is_wrong(noisy):
     calm = budget_of(noisy, InputUncertainties(), others={"conventional": by("conventional")})
     assert not component(calm, "choice").covariance.any()
     # A spring that stiffens with the angle: the first half of a decay is quicker than the whole.
-    bent = with_records(noisy, lambda time, yaw: yaw + 0.02 * np.sin(0.4 * time) * yaw)
-    budget = budget_of(bent, InputUncertainties())
+    curved = with_records(noisy, lambda time, yaw: yaw + 0.02 * np.sin(0.4 * time) * yaw)
+    budget = budget_of(curved, InputUncertainties())
     assert component(budget, "choice").covariance[1, 1] > 0.0
     assert "first half" in component(budget, "choice").note
 

@@ -161,7 +161,7 @@ def test_it_is_truncated_when_the_runs_are_used_up():
     assert len(info["campaign"].runs) == 2
 
 
-def test_a_lost_run_costs_its_time_and_tells_nothing():
+def test_a_lost_run_costs_its_time_and_gives_no_information():
     env = make(springs=(1, 5), durations=(20.0,))
     before, _ = env.reset(seed=3, options={"truth": TRUTH})
     after, reward, terminated, truncated, info = env.step(np.array([0, 3, 2, 0]))

@@ -66,13 +66,13 @@ def test_greedy_takes_the_largest_expected_gain_for_its_time():
 
 def test_greedy_brings_what_it_promises():
     """Over a few seeds the information that the chosen run brings is the one expected, to a fifth."""
-    promised, brought = [], []
+    expected, brought = [], []
     for seed in range(6):
         env = begun((0, 1, 1, 1), seed=seed, **SMALL)
         action = greedy(env.known)
-        promised.append(expected_gain(env.known, env.known.conditions.menu.choice(action)))
+        expected.append(expected_gain(env.known, env.known.conditions.menu.choice(action)))
         brought.append(env.step(np.array(action))[-1]["step_information_nats"])
-    assert np.mean(brought) == pytest.approx(np.mean(promised), rel=0.2)
+    assert np.mean(brought) == pytest.approx(np.mean(expected), rel=0.2)
 
 
 def test_greedy_leaves_out_runs_that_might_not_come_back():
@@ -88,8 +88,8 @@ def test_separating_follows_the_script_until_there_is_something_to_separate():
     assert separating(env.known) == scripted(env.known)  # no wind yet
 
 
-def test_separating_prefers_the_run_that_tells_the_rivals_apart():
-    """A damping effect seen at one speed alone: air or rig? The wind off tells, though it costs another minute."""
+def test_separating_prefers_the_run_that_distinguishes_the_rivals():
+    """A damping effect seen at one speed alone: air or rig? A run with the wind off shows it, for a minute more."""
     env = CampaignEnv(
         preset="diagnosis",
         springs=(5,),

@@ -139,10 +139,16 @@ def test_nothing_is_proposed_without_a_gap(tmp_path):
     assert closable_table({"closable": None}).rows == ()
 
 
-def test_equations_that_cannot_be_solved_are_said(monkeypatch):
-    def unsolvable(*_, **__):
-        raise np.linalg.LinAlgError
+def _singular(*_, **__):
+    raise np.linalg.LinAlgError
 
+
+def _running_away(*_, **__):
+    return np.full(2, 1e300) @ np.full(2, 1e300)
+
+
+@pytest.mark.parametrize("unsolvable", [_singular, _running_away])
+def test_equations_that_cannot_be_solved_are_said(monkeypatch, unsolvable):
     monkeypatch.setattr(_diagnose, "closable", unsolvable)
     found = diagnose(campaign(), kinds=[effect_class("coulomb_friction")])
     assert found.closable is None

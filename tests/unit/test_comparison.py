@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from identification.scoring.accuracy import Trials
-from identification.scoring.comparison import ASPECTS, _rank_sum, changes, holm
+from identification.scoring.comparison import Aspect, _rank_sum, changes, holm
 
 CELLS, COUNT = 6, 60
 
@@ -48,7 +49,7 @@ PLANTED = {
 }
 
 
-@pytest.mark.parametrize("aspect", ASPECTS)
+@pytest.mark.parametrize("aspect", get_args(Aspect))
 def test_each_aspect_is_caught_by_its_own_test(aspect):
     found = {change.aspect: change for change in changes(several(1), several(2, **PLANTED[aspect]))}
     assert found[aspect].p_value < 1e-6

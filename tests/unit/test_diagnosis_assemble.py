@@ -252,7 +252,7 @@ def test_the_excess_is_of_samples_whatever_the_blocks():
 
 
 @pytest.mark.slow
-def test_rivals_are_named_with_the_run_that_would_tell(found):
+def test_rivals_are_named_with_the_run_that_would_distinguish_them(found):
     first = found.hypothesis(("quadratic_damping",))
     second = found.hypothesis(("coulomb_friction",))
     assert first is not None
@@ -340,10 +340,10 @@ def test_the_chosen_fit_is_that_of_the_answer(found):
     assert lost.causes == ("unknown",)
 
 
-def test_progress_is_told_and_steps_are_timed():
-    told = []
-    answer = diagnose(campaign(QUADRATIC), kinds=FEW, progress=told.append)
-    assert {"noise", "nominal fit", "effects", "quadratic_damping"} <= set(told)
+def test_progress_is_reported_and_steps_are_timed():
+    steps = []
+    answer = diagnose(campaign(QUADRATIC), kinds=FEW, progress=steps.append)
+    assert {"noise", "nominal fit", "effects", "quadratic_damping"} <= set(steps)
     assert set(answer.seconds) >= {"noise", "nominal fit", "effects"}
     assert all(seconds >= 0.0 for seconds in answer.seconds.values())
 

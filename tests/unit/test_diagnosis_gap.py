@@ -112,7 +112,7 @@ def test_noise_that_misbehaves_is_a_gap_unless_a_coarse_step_explains_it(fitted)
         quiet = verdict(fit, **options, coarse_step=True)
         assert not quiet.detected
         assert not quiet.noisy
-    # where the accuracy of the fits stands in, the record's noise tells nothing
+    # where the accuracy of the fits stands in, the record's noise shows nothing
     assert not verdict(fit, noise=floor, trend=NoiseTrend(15.0, 15.0, 1.0)).noisy
 
 

@@ -35,8 +35,8 @@ def of_three():
     effects = [
         effect_from(name, {effect_class(name).parameters()[0].name: value}) for name, value in THREE.items()
     ]
-    base, told = nominal(campaign(*effects)), []
-    return base, told, grow(base, FEW, told.append)
+    base, steps = nominal(campaign(*effects)), []
+    return base, steps, grow(base, FEW, steps.append)
 
 
 @pytest.mark.parametrize(
@@ -50,12 +50,12 @@ def of_three():
 )
 def test_the_effect_put_in_fits_best_and_the_growth_ends_with_it(name, values):
     base = nominal(campaign(effect_from(name, values)))
-    told = []
-    ranked = grow(base, [kind for kind in ALL_EFFECTS if kind.fitted], told.append)
+    steps = []
+    ranked = grow(base, [kind for kind in ALL_EFFECTS if kind.fitted], steps.append)
     assert ranked[0].effects == (name,)
     assert within_noise(ranked[0].fit)
     assert all(len(hypothesis.effects) == 1 for hypothesis in ranked)
-    assert {h.effects[0] for h in ranked} <= set(told)
+    assert {h.effects[0] for h in ranked} <= set(steps)
     totals = [h.fit.total for h in ranked]
     assert totals == sorted(totals)
     severity, value = next(iter(values.items()))
@@ -78,7 +78,7 @@ def test_a_set_of_two_is_found_and_fitted_once():
 
 
 def test_a_set_of_three_is_found(of_three):
-    base, told, ranked = of_three
+    base, steps, ranked = of_three
     three = next(h for h in ranked if len(h.effects) == 3)
     assert three.names == tuple(sorted(THREE))
     assert within_noise(three.fit)
@@ -86,7 +86,7 @@ def test_a_set_of_three_is_found(of_three):
         key = f"{name}.{effect_class(name).parameters()[0].name}"
         assert abs(three.fit.value(key) - value) < 4.0 * three.fit.std(key)
     assert max(len(h.effects) for h in ranked) == 3 < MOST_CAUSES
-    assert any(line.count(" + ") == 2 for line in told)
+    assert any(line.count(" + ") == 2 for line in steps)
     shares = [(h.effects, max(h.fit.excess, 0.0) / base.excess) for h in ranked]
     assert weigh(shares, base.chance, base.excess)[0].effects == three.names
 
@@ -94,11 +94,11 @@ def test_a_set_of_three_is_found(of_three):
 def test_growth_ends_where_a_further_effect_closes_nothing():
     """Neither the air nor a spring clips a sensor: two of them leave what one leaves."""
     base = nominal(campaign(effect_from("sensor_clipping", {"limit": 0.33})))
-    told = []
+    steps = []
     kinds = [effect_class(name) for name in ("nonlinear_yaw_moment", "quadratic_damping", "cubic_stiffness")]
-    ranked = grow(base, kinds, told.append)
+    ranked = grow(base, kinds, steps.append)
     assert all(h.fit.excess > 0.99 * base.excess for h in ranked)
-    assert max(line.count(" + ") for line in told) == 1
+    assert max(line.count(" + ") for line in steps) == 1
 
 
 def test_pruning_fits_the_smaller_sets_that_are_missing(of_three):

@@ -1,4 +1,4 @@
-"""The run that would tell two models apart."""
+"""The run that would distinguish two models."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def apart(first, second, run, angle):
     return np.sqrt(normal_equations([(change[:, None], slopes[0])], [change])[0][0, 0])
 
 
-def test_the_run_separates_as_promised_and_better_than_a_plain_one(rivals):
+def test_the_run_separates_as_predicted_and_better_than_a_plain_one(rivals):
     found = separating_run(*rivals)
     assert found is not None
     template = rivals[0].problem.data.runs[0]
@@ -54,7 +54,7 @@ def test_the_run_separates_as_promised_and_better_than_a_plain_one(rivals):
     assert found["separation"] > 10.0
 
 
-def test_a_model_is_not_told_from_itself(rivals):
+def test_a_model_is_not_distinguished_from_itself(rivals):
     found = separating_run(rivals[0], rivals[0])
     assert found is not None
     assert found["separation"] == pytest.approx(0.0, abs=1e-6)

@@ -221,3 +221,10 @@ def test_a_record_that_rests_has_finite_statistics():
 def test_too_slow_a_sampling_has_no_trend():
     trend = noise_trend(decays(rate=250.0))
     assert not trend.judged
+
+
+def test_records_of_a_few_windows_have_no_trend():
+    long = decays(rate=1000.0)
+    runs = [replace(r, record=Record(r.record.time_s[:40], r.record.yaw_rad[:40])) for r in long.runs]
+    assert noise_trend(long).judged
+    assert not noise_trend(replace(long, runs=tuple(runs))).judged

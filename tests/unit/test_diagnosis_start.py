@@ -68,7 +68,7 @@ LINEAR = {
 
 
 @pytest.mark.parametrize("name", LINEAR)
-def test_the_promise_of_a_small_effect_is_the_drop_it_brings(name):
+def test_the_predicted_drop_of_a_small_effect_is_the_drop_it_brings(name):
     values = LINEAR[name]
     base = nominal(campaign(effect_from(name, values)))
     lead = starting_points(base, effect_class(name))[0]
@@ -93,9 +93,9 @@ def test_what_these_runs_cannot_show_has_no_lead():
 
 def test_leads_come_the_most_promising_first():
     base = nominal(campaign(effect_from("rod_flexibility", {"compliance": 5e-5, "inertia_share": 0.2})))
-    promises = [lead.predicted_drop for lead in starting_points(base, effect_class("rod_flexibility"))]
-    assert promises == sorted(promises, reverse=True)
-    assert len(promises) == 3
+    drops = [start.predicted_drop for start in starting_points(base, effect_class("rod_flexibility"))]
+    assert drops == sorted(drops, reverse=True)
+    assert len(drops) == 3
 
 
 def test_a_wrong_spring_is_sought_among_the_springs_there_are():
@@ -175,6 +175,6 @@ def test_resonance_is_the_undamped_frequency_with_the_air():
         assert resonance(base, i) == pytest.approx(expected, rel=1e-3)
 
 
-def test_a_gross_misfit_is_told_from_a_small_one():
+def test_a_gross_misfit_is_distinguished_from_a_small_one():
     assert not is_gross(nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))))
     assert is_gross(nominal(campaign(effect_from("coulomb_friction", {"friction_moment": 0.3}))))

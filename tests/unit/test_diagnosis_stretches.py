@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagnosis.attribution.grow import grow_in_stretches
-from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.least_squares import FitError, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
 from diagnosis.fitting.stretches import fit_longer, in_stretches, long_stretch
@@ -85,12 +85,22 @@ def test_fits_of_growing_length_reach_a_truth_far_out_of_phase(data):
 
 def test_only_effects_without_a_memory_of_the_release_are_tried_on_stretches(data):
     kinds = [effect_class(name) for name in ("sensor_drift", "second_mode", "quadratic_damping")]
-    told = []
-    found = grow_in_stretches(data, fit_nominal, kinds, told.append)
-    assert set(told) == {"quadratic_damping"}
+    steps = []
+    found = grow_in_stretches(data, fit_nominal, kinds, steps.append)
+    assert set(steps) == {"quadratic_damping"}
     assert all(h.fit.problem.data is not data for h in found.hypotheses)
     whole = found.whole(found.hypotheses[0], data)
     assert whole.fit.problem.data is data
+
+
+def test_a_nominal_model_that_runs_away_on_long_stretches_stays_on_short_ones(data, monkeypatch):
+    def away(*_, **__):
+        raise FitError
+
+    monkeypatch.setattr("diagnosis.attribution.grow.fit_longer", away)
+    found = grow_in_stretches(data, fit_nominal, [effect_class("quadratic_damping")])
+    assert found.hypotheses == ()
+    assert max(run.reading.size for run in found.nominal.problem.data.runs) == in_stretches(data).length
 
 
 GRAVITY, DRY, QUADRATIC, VISCOUS = 30.9, 0.2, 0.02, 0.02  # per unit inertia

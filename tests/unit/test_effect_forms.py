@@ -30,7 +30,7 @@ def test_a_form_bends_the_effect_and_its_default_is_the_textbooks(kind, info) ->
         effect_from(kind.name, values),
         effect_from(kind.name, {**values, info.name: info.default}),
     )
-    bent = effect_from(kind.name, {**values, info.name: info.default + 0.3 * info.scale})
+    curved = effect_from(kind.name, {**values, info.name: info.default + 0.3 * info.scale})
     assert plain == stated
 
     def act(effect):
@@ -38,8 +38,8 @@ def test_a_form_bends_the_effect_and_its_default_is_the_textbooks(kind, info) ->
         run, reading = chain.physics(), chain.reading(chain.angle(ANGLE, TIME))
         return dataclasses.replace(run, duration=1.0), reading
 
-    (run, reading), (bent_run, bent_reading) = act(plain), act(bent)
-    assert run != bent_run or not np.array_equal(reading, bent_reading)
+    (run, reading), (curved_run, curved_reading) = act(plain), act(curved)
+    assert run != curved_run or not np.array_equal(reading, curved_reading)
 
 
 def settled(time: np.ndarray, constant: float) -> np.ndarray:
@@ -75,8 +75,8 @@ def test_an_offset_and_a_misaligned_flow_follow_a_power_of_the_speed(speed: floa
 
 
 def test_a_sensor_may_have_a_square_beside_its_cube() -> None:
-    bent = read("sensor_nonlinearity", coefficient=0.1, quadratic=-0.05)
-    assert bent == pytest.approx(ANGLE + 0.1 * ANGLE**3 - 0.05 * ANGLE**2)
+    curved = read("sensor_nonlinearity", coefficient=0.1, quadratic=-0.05)
+    assert curved == pytest.approx(ANGLE + 0.1 * ANGLE**3 - 0.05 * ANGLE**2)
 
 
 def test_a_limit_may_lie_on_one_side() -> None:
@@ -86,14 +86,14 @@ def test_a_limit_may_lie_on_one_side() -> None:
 
 def test_a_soft_limit_bends_over_without_a_kink() -> None:
     limit, knee = 0.2, 0.25
-    bent = read("sensor_clipping", limit=limit, knee=knee)
-    straight = limit * (1.0 - knee)
-    inside = np.abs(ANGLE) <= straight
-    assert np.array_equal(bent[inside], ANGLE[inside])
+    curved = read("sensor_clipping", limit=limit, knee=knee)
+    below_knee = limit * (1.0 - knee)
+    inside = np.abs(ANGLE) <= below_knee
+    assert np.array_equal(curved[inside], ANGLE[inside])
     room = limit * knee
-    expected = straight + room * (1.0 - np.exp(-(np.abs(ANGLE) - straight) / room))
-    assert np.abs(bent[~inside]) == pytest.approx(expected[~inside])
-    assert np.max(np.abs(bent)) < limit
+    expected = below_knee + room * (1.0 - np.exp(-(np.abs(ANGLE) - below_knee) / room))
+    assert np.abs(curved[~inside]) == pytest.approx(expected[~inside])
+    assert np.max(np.abs(curved)) < limit
 
 
 def test_rounded_backlash_is_the_mean_of_two_plays() -> None:

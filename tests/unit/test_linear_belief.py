@@ -1,4 +1,4 @@
-"""Campaigns by linear theory: against the full simulation of the same seed, and at the limits of what runs tell."""
+"""Campaigns by linear theory: against the full simulation of the same seed, and where runs hold no information."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def test_a_campaign_is_that_of_the_full_simulation_to_first_order(seed):
     assert infos[0]["total_information_nats"] == pytest.approx(infos[1]["total_information_nats"], rel=0.1)
 
 
-def test_without_noise_a_run_tells_its_decay_and_zero():
+def test_without_noise_a_run_gives_its_decay_and_zero():
     time, decay = np.arange(800) / 100.0, Decay(0.2, 60.0)
     run = linear_run(np.eye(2, 4), time, decay, 0.1, 0.003, np.zeros(800))
     np.testing.assert_allclose(run.found, [0.2, 60.0, 0.003])
 
 
-def test_the_belief_is_the_prior_where_nothing_is_told_and_moves_towards_what_is():
+def test_the_belief_is_the_prior_without_information_and_moves_with_it():
     prior = prior_belief(MEAN, STD)
     assert linear_belief(prior, [], 0.05) is prior
     env = CampaignEnv()
@@ -50,7 +50,7 @@ def test_the_belief_is_the_prior_where_nothing_is_told_and_moves_towards_what_is
     assert env.known.belief.values[0] == pytest.approx(0.6, abs=4.0 * env.known.belief.std("cn_beta"))
 
 
-def test_what_does_not_stand_out_or_come_back_tells_nothing():
+def test_what_does_not_stand_out_or_come_back_gives_no_information():
     assert shows_a_decay(np.full(100, 0.1), 0.1)
     assert not shows_a_decay(np.full(100, 0.05), 0.1)
     weak = CampaignEnv(noise_std=2.0)

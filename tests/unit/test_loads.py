@@ -32,6 +32,6 @@ def test_the_loads_are_the_products() -> None:
     ],
 )
 def test_a_number_whose_square_is_none_is_refused_in_one_line(changes: dict[str, float]) -> None:
-    with pytest.raises(TunnelError, match=r"run r1: .* cannot be computed with; correct its unit") as caught:
+    with pytest.raises(TunnelError, match=r"run r1: .* is out of range; correct its unit") as caught:
         loads(replace(RUN, **changes), RIG)  # type: ignore[arg-type]
     assert str(caught.value).isprintable()

@@ -14,7 +14,7 @@ from diagnosis.fitting.spectra import linear_coefficients
 from diagnosis.fitting.starting_points import nominal_start, starting_points
 from diagnosis.localisation.backbone import backbones, drift
 from diagnosis.localisation.excess import RunExcess, run_excesses, shortest_interval
-from diagnosis.localisation.localise import localise, telling_runs
+from diagnosis.localisation.localise import localise, runs_beyond_chance
 from diagnosis.localisation.phase_plane import apparent_moment
 from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, nominal, studied, with_blow
 from tunnel_sim.effects import effect_class, effect_from
@@ -127,7 +127,7 @@ def test_gap_free_runs_are_not_named():
     named = 0
     for seed in range(8):
         data = campaign(seed=100 + seed)
-        named += bool(telling_runs(run_excesses(data, nominal(data))))
+        named += bool(runs_beyond_chance(run_excesses(data, nominal(data))))
     assert named <= binom.ppf(0.9999, 8, 0.01)
 
 
@@ -173,10 +173,10 @@ def test_backbones_are_level_for_a_linear_rig_and_bend_for_friction():
     count = sum(curve.time.size - 1 for curve in level)
     assert max(np.abs(drift(level))) < 6.0 * np.sqrt(2.0 * count)
     data = campaign(effect_from("coulomb_friction", {"friction_moment": 0.004}))
-    bent = backbones(nominal(data))
-    frequency, damping = drift(bent)
+    curved = backbones(nominal(data))
+    frequency, damping = drift(curved)
     assert damping > 20.0 * max(frequency, 1.0)
-    first = bent[0]
+    first = curved[0]
     assert np.all(np.diff(first.amplitude) < 0.0)
     assert first.zeta[-1] > first.zeta[0]
 

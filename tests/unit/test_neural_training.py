@@ -139,12 +139,12 @@ def test_a_short_training_repeats_to_the_bit_and_another_seed_does_not():
 
 
 def test_the_progress_is_the_work_done_of_all_work():
-    told = []
-    train(SHORT, tell=lambda done, _text: told.append(done))
+    seen = []
+    train(SHORT, progress=lambda done, _text: seen.append(done))
     steps = [SHORT.work(which) for which in (DAMPING, FREQUENCY) for _ in range(2 * SHORT.steps(which))]
-    assert sorted(set(told)) == np.cumsum(steps).tolist()
-    assert told == sorted(told)
-    assert told[-1] == SHORT.total_work
+    assert sorted(set(seen)) == np.cumsum(steps).tolist()
+    assert seen == sorted(seen)
+    assert seen[-1] == SHORT.total_work
 
 
 def test_the_record_says_why_each_training_stopped():
@@ -188,8 +188,8 @@ def test_shipped_weights_are_what_their_record_says():
     content = (resources.files("identification") / "neural" / "weights" / "paper.safetensors").read_bytes()
     assert hashlib.sha256(content).hexdigest() == record["weights_sha256"]
     # As tunnel train trains by default, so that anyone can make them again.
-    told = json.loads(json.dumps(TrainingSpec().to_json_dict()))
-    assert {name: record[name] for name in told} == told
+    seen = json.loads(json.dumps(TrainingSpec().to_json_dict()))
+    assert {name: record[name] for name in seen} == seen
     assert networks.spec == TrainingSpec().data
     # The errors again, on the same responses and on others.
     same = held_out_errors(networks, np.random.default_rng([record["seed"], 2]))

@@ -90,10 +90,10 @@ def drifting_stiffness(data, share):
 def test_a_departing_model_is_flagged_and_the_intervals_widened(stated):
     rng = np.random.default_rng(6)
     clean = campaign(noise=0.0, stated_noise=stated)
-    bent = with_records(
+    curved = with_records(
         drifting_stiffness(clean, -2e-3), lambda clock, yaw: yaw + 5e-4 * rng.standard_normal(clock.size)
     )
-    estimate = identify(bent)
+    estimate = identify(curved)
     assert Status.MODEL_DEPARTS in estimate.statuses
     assert estimate.noise.slow_ratio > 2.0
     honest = identify(campaign(noise=5e-4, rng=np.random.default_rng(6)))

@@ -22,13 +22,13 @@ def test_covariance_is_that_of_trials(zeta):
     rng, noise, trials = np.random.default_rng(4), 1e-3, 400
     clock = 0.04 * np.arange(250)
     clean = 0.1 + free_decay(clock, Decay.from_modal(10.0, zeta), 0.3, 0.0)
-    seen, told = [], None
+    seen, expected = [], None
     for _ in range(trials):
         found = pencil_decay(clean + noise * rng.standard_normal(250), 0.04, 10.0)
         seen.append([found.decay.rate, found.decay.stiffness])
-        told = noise**2 * found.weights @ found.weights.T
+        expected = noise**2 * found.weights @ found.weights.T
     # χ² of 400 trials: a deviation is known to 3.5 %, and this is four of them.
-    np.testing.assert_allclose(np.std(seen, axis=0), np.sqrt(np.diag(told)), rtol=0.15)
+    np.testing.assert_allclose(np.std(seen, axis=0), np.sqrt(np.diag(expected)), rtol=0.15)
 
 
 def test_the_weights_are_the_slope():

@@ -84,12 +84,7 @@ def test_the_paper_plan_can_be_flown() -> None:
     assert {c.wind_speed for c in plan.conditions} == {0.0, 10.0, 15.0, 20.0}
     assert (plan.truth.cn_beta, plan.truth.cn_r, plan.truth.yaw_inertia) == (0.4719, -0.1033, 0.1014)
     for c in plan.conditions:
-        flow = {
-            "air_density": c.air_density,
-            "wind_speed": c.wind_speed,
-            "frontal_area": rig.body.frontal_area,
-            "reference_length": rig.body.length,
-        }
+        flow = rig.body.flow(c.air_density, c.wind_speed)
         stiffness = c.spring_stiffness - aerodynamic_stiffness(plan.truth.cn_beta, **flow)
         damping = plan.truth.mechanical_damping - aerodynamic_damping(plan.truth.cn_r, **flow)
         assert stiffness > 0.0

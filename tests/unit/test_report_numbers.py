@@ -318,6 +318,6 @@ def test_a_value_that_was_held_has_five_digits() -> None:
     assert "0.123457" not in text
 
 
-def test_what_is_known_is_told_of_the_vocabulary_only(given: Document) -> None:
+def test_what_is_known_is_stated_of_the_vocabulary_only(given: Document) -> None:
     named = view.cause_paragraphs(given | {"causes": [CAUSE], "ambiguous_with": ["unknown", RIVAL]})
     assert [cause["name"] for cause in named] == [CAUSE.replace("_", " "), RIVAL.replace("_", " ")]

@@ -44,16 +44,16 @@ def test_a_linear_run_has_a_flat_backbone_and_windows_can_be_left_out():
 
 @pytest.mark.parametrize("name", ["log_decrement", "hilbert"])
 def test_deviations_are_raised_where_a_line_does_not_fit(name):
-    bent = identify(decaying(lambda a: 0.05 * a + 0.8 * a**2, noise=2e-4), name).runs[0]
-    straight = identify(decaying(lambda a: 0.2 * a, noise=2e-4), name).runs[0]
-    assert bent.zeta.std > 5.0 * straight.zeta.std
-    assert straight.zeta.value == pytest.approx(0.2 / (4.0 * np.pi), abs=5.0 * straight.zeta.std)
+    curved = identify(decaying(lambda a: 0.05 * a + 0.8 * a**2, noise=2e-4), name).runs[0]
+    linear = identify(decaying(lambda a: 0.2 * a, noise=2e-4), name).runs[0]
+    assert curved.zeta.std > 5.0 * linear.zeta.std
+    assert linear.zeta.value == pytest.approx(0.2 / (4.0 * np.pi), abs=5.0 * linear.zeta.std)
 
 
 @pytest.mark.parametrize("name", ["matrix_pencil", "log_decrement", "filter_error", "bayesian"])
 def test_runs_that_contradict_each_other_widen_the_coefficients(name):
     data = campaign(TWELVE[:6], noise=5e-4, rng=np.random.default_rng(3))
-    # One run of a spring half a percent stiffer than stated: its own deviations cannot tell.
+    # One run of a spring half a percent stiffer than stated: its own deviations cannot show it.
     stiff = campaign((Setting(16.2, 0.0),), noise=5e-4, rng=np.random.default_rng(4)).runs[0]
     mixed = replace(data, runs=(replace(stiff, id="r01", spring_stiffness=16.12), *data.runs[1:]))
     assert identify(mixed, name).yaw_inertia.std > 5.0 * identify(data, name).yaw_inertia.std

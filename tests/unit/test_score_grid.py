@@ -98,13 +98,13 @@ def test_the_number_of_processes_changes_no_bit_and_an_interruption_costs_little
     small, tmp_path, monkeypatch
 ):
     here = work.score_grid(small, NAMES, jobs=0)
-    told = []
+    reported = []
     there = work.score_grid(
-        small, NAMES, jobs=2, parts=tmp_path / "parts", progress=lambda *now: told.append(now)
+        small, NAMES, jobs=2, parts=tmp_path / "parts", progress=lambda *now: reported.append(now)
     )
     assert timeless(here) == timeless(there)
-    assert told[0] == (0, 16)
-    assert told[-1] == (16, 16)
+    assert reported[0] == (0, 16)
+    assert reported[-1] == (16, 16)
     # All is kept: going on estimates nothing again, unless the seed is another or a part was spoilt.
     (tmp_path / "parts" / "c0001-t00000.json").write_text('{"fingerprint": ')
     done = []

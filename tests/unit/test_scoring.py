@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from identification.estimate import Quantity
-from identification.scoring.accuracy import Outcome, Proportion, collect, overall, score
+from identification.scoring.accuracy import Outcome, collect, overall, score
+from identification.statistics.proportion import Proportion
+from tunnel_sim.files.json_text import as_json
 
 
 def outcomes(errors, *, std=1.0, truth=10.0, bound=1.0):
@@ -52,7 +54,7 @@ def test_failures_and_single_trials_have_no_figures():
     found = score(collect(outcomes([0.5])))
     assert found.rmse is None
     assert found.coverage.value == 1.0
-    json.dumps(found.to_json_dict(), allow_nan=False)
+    json.dumps(as_json(found), allow_nan=False)
     with pytest.raises(ValueError, match="no trial"):
         score(collect([]))
 

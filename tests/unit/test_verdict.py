@@ -78,7 +78,7 @@ def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
     assert table.columns == ("run", "before", "after")
 
 
-def test_every_cause_of_several_is_told_with_what_it_acts_on():
+def test_every_cause_of_several_is_named_with_what_it_acts_on():
     text = said("coulomb_friction", "cubic_stiffness", "mains_hum", both_winds=False)
     assert "from coulomb friction, cubic stiffness and mains hum (probability 0.90)" in text
     for words in ("the damping (coulomb friction)", "the restoring moment (cubic stiffness)", "(mains hum)"):

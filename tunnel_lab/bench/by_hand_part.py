@@ -25,7 +25,6 @@ class ByHandPart:
     """Switches for the causes, and the closure with those that are on.
 
     Args:
-        session: whose campaign it is.
         document: of its diagnosis; its causes are on at first.
     """
 

@@ -37,8 +37,8 @@ class ChoicesPart:
             self._number("rate", "Sample rate, where there are no times [Hz]")
             self._number("counts_per_turn", "Counts of an encoder per turn")
             self._text("calibration", "Angle of a voltage, such as 0.1 + 20*V")
-            self._number("start", "Leave out what is earlier [s]")
-            self._number("end", "Leave out what is later [s]")
+            self._number("start", "Leave out samples before [s]")
+            self._number("end", "Leave out samples after [s]")
             self._number("rest", "Reading at rest of every run, to be subtracted [rad]")
             self._text("name", "Conditions in the file names, such as S{spring}_V{wind_speed}_*")
             ui.checkbox(

@@ -81,7 +81,6 @@ def faults(cells: Cells, *, plausible: bool = True) -> dict[tuple[str, str], str
     """What is wrong, by row and key.
 
     Args:
-        cells: as typed.
         plausible: whether values that look like a wrong unit are wrong.
 
     Returns:
@@ -113,7 +112,6 @@ def number(text: str, where: str) -> float | None:
 
     Args:
         text: with a decimal point or comma.
-        where: the cell, for the message.
 
     Raises:
         TunnelError: when it is not a number.
@@ -130,10 +128,6 @@ def number(text: str, where: str) -> float | None:
 
 def save(session: Session, cells: Cells) -> dict[tuple[str, str], str]:
     """Save conditions in the campaign, or as a draft beside it while something is wrong.
-
-    Args:
-        session: whose campaign it is.
-        cells: as typed.
 
     Returns:
         What is wrong (`faults`).
@@ -187,7 +181,6 @@ def restore(session: Session, before: Cells) -> None:
     """State again what was stated before a campaign was written anew, for the runs that it still has.
 
     Args:
-        session: whose campaign it is.
         before: of `stated`.
 
     Raises:
@@ -205,7 +198,6 @@ def pasted(cells: Cells, columns: list[str], row: str, key: str, text: str) -> C
     """Cells with a block from a spreadsheet put in, its upper left cell at a place.
 
     Args:
-        cells: as typed.
         columns: keys of the table's columns, in their order.
         row: where the block begins.
         key: likewise.

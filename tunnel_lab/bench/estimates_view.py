@@ -1,13 +1,12 @@
-"""Estimates side by side, and an uncertainty budget, as tables, from the JSON documents of ``tunnel identify``."""
+"""Estimates side by side as tables, from the JSON documents of ``tunnel identify``."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import sqrt
 from typing import Any
 
 from identification.estimate import UNITS
-from identification.printing.numbers import SYMBOLS, significant, unit, with_std
+from identification.printing.numbers import SYMBOLS, unit, with_std
 from identification.printing.table import TextTable
 
 Document = Mapping[str, Any]
@@ -58,35 +57,3 @@ def _notes(document: Document) -> list[str]:
 
     said = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
     return [*said, *status_lines(document)]
-
-
-def budget_parts(document: Document) -> list[str | TextTable]:
-    """The budget of an estimate: the standard uncertainty from every source, and which dominates.
-
-    Args:
-        document: an estimate with its ``budget``.
-    """
-    components = document["budget"]["components"]
-    combined = document["budget"]["combined_std"]
-    names = [name for name in UNITS if name in combined]
-    headings = tuple(f"{SYMBOLS[name]}\n{unit(UNITS[name])}" for name in names)
-    rows = [(one["name"], *(_share(one, name) for name in names)) for one in components]
-    rows.append(("all together", *(significant(combined[name], 2) for name in names)))
-    title = "Uncertainty budget: one standard uncertainty each"
-    table = TextTable(title, ("source", *headings), tuple(rows), right=headings)
-    notes = [f"{one['name']}: {one['note']}" for one in components if one["note"]]
-    return [table, *(_dominant(components, name) for name in names), *notes]
-
-
-def _share(component: Document, name: str) -> str:
-    variance = float(component["variance"][name])
-    if variance == 0.0:
-        return "0" if component["known"] else "–"
-    return f"{'−' if variance < 0.0 else ''}{significant(sqrt(abs(variance)), 2)}"
-
-
-def _dominant(components: Sequence[Document], name: str) -> str:
-    largest = max(components, key=lambda one: float(one["variance"][name]))
-    total = sum(float(one["variance"][name]) for one in components)
-    share = 100.0 * float(largest["variance"][name]) / total if total > 0.0 else 0.0
-    return f"{SYMBOLS[name]}: most comes from {largest['name']}, {share:.0f} % of the variance"

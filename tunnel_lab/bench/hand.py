@@ -27,8 +27,6 @@ async def closure(session: Session, effects: Sequence[str], *, converged: bool) 
     """How far the gap closes with effects chosen by hand.
 
     Args:
-        session: whose campaign it is.
-        effects: their names.
         converged: whether the fit frees their forms and goes on until it has converged.
 
     Raises:
@@ -41,7 +39,6 @@ async def next_run(session: Session, first: Sequence[str], second: Sequence[str]
     """The run that would distinguish two sets of effects; None in normalised form.
 
     Args:
-        session: whose campaign it is.
         first: names of effects.
         second: names of their rivals.
 
@@ -57,7 +54,7 @@ async def _elsewhere(work: Callable[Given, ResultT], *given: Given.args, **named
         return await asyncio.wrap_future(_worker().submit(work, *given, **named))
     except BrokenProcessPool:
         _worker.cache_clear()
-        raise TunnelError("the process of the fits was ended from outside", remedy="try again") from None
+        raise TunnelError("the fitting process was ended from outside", remedy="try again") from None
 
 
 @cache

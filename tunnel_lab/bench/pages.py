@@ -16,11 +16,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def add_pages(folder: Path) -> None:
-    """Add the pages of a workspace.
-
-    Args:
-        folder: the workspace.
-    """
+    """Add the pages of a workspace."""
 
     @ui.page("/")
     def first() -> None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import wraps
-from typing import TypeVar
+from html import escape
 from urllib.parse import quote
 
 from nicegui import ui
@@ -15,7 +14,6 @@ from tunnel_lab.bench.stages import STAGES, closed
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.vocabulary.errors import TunnelError
 
-ResultT = TypeVar("ResultT")
 _THEME = "bench-theme"
 _HEAD = """
 <link rel="stylesheet" href="/static/uplot/uPlot.min.css">
@@ -148,17 +146,6 @@ class Fault:
             self.show(error)
 
 
-def guarded(fault: Fault, action: Callable[[], Awaitable[None]]) -> Callable[[], Awaitable[None]]:
-    """An action whose error is shown."""
-
-    @wraps(action)
-    async def wrapped() -> None:
-        with fault.around():
-            await action()
-
-    return wrapped
-
-
 def show_parts(parts: Iterable[str | TextTable]) -> None:
     """Tables and paragraphs as the terminal prints them."""
     ui.html(as_html(parts), sanitize=False).classes("printed")  # its texts are escaped
@@ -168,24 +155,16 @@ def show_command(words: str) -> None:
     """The command that does the same in a terminal."""
     with ui.element("p").classes("command"):
         ui.label("In a terminal:").classes("soft")
-        ui.html(tag="code", sanitize=False, content=_escaped(words))
+        ui.html(tag="code", sanitize=False, content=escape(words))
 
 
 def button(text: str, action: Callable[[], object], *, main: bool = False) -> ui.element:
     """A button.
 
     Args:
-        text: what it does.
-        action: called when it is pressed.
         main: whether it is the way on.
     """
     found = ui.element("button").props("type=button").classes("button go" if main else "button")
     with found:
-        ui.html(_escaped(text), sanitize=False, tag="span")
+        ui.html(escape(text), sanitize=False, tag="span")
     return found.on("click", action)
-
-
-def _escaped(text: str) -> str:
-    from html import escape
-
-    return escape(text)

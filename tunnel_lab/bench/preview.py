@@ -28,7 +28,6 @@ class Mark:
     """A run in the chart of its record, times from the record's first sample.
 
     Args:
-        run: its id.
         file: the file that holds it.
         start: of the run: the release, s.
         end: where it has come to rest, or the next run begins, s.
@@ -83,7 +82,6 @@ def state(session: Session, changes: Mapping[str, Any]) -> None:
     """Keep choices, as a recipe beside the campaign.
 
     Args:
-        session: whose files they are about.
         changes: by field of `ImportChoices`; None: found from the files.
 
     Raises:
@@ -99,13 +97,12 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
     """State where a run begins, ends or rests.
 
     Args:
-        session: whose file it is in.
         mark: the run as it is.
         places: ``start`` and ``end`` in s from the record's first sample, ``rest`` in the reading's unit;
             None: as found.
 
     Raises:
-        TunnelError: when the end is not behind the start.
+        TunnelError: when the end is not after the start.
     """
     choices = choices_of(session)
     now = choices.stretch_of(mark.file, mark.run)
@@ -115,7 +112,7 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
     last = mark.end if stated["end"] is None else stated["end"]
     if last <= first:
         raise TunnelError(
-            f"the end ({last:.4g} s) is not behind the release ({first:.4g} s)",
+            f"the end ({last:.4g} s) is not after the release ({first:.4g} s)",
             where=f"run '{mark.run}'",
             remedy="move one of them",
         )

@@ -62,9 +62,6 @@ def chosen_effect(trial: Trial) -> Effect | None:
 def simulate(trial: Trial) -> tuple[Array, Array, Array]:
     """Simulate a run without and with the effect.
 
-    Args:
-        trial: what is chosen.
-
     Returns:
         Times (s), and readings (rad) of the nominal model and with the effect, shape (n,) each; neither has noise.
 
@@ -108,7 +105,6 @@ def plan_text(trial: Trial, name: str) -> str:
 
     Args:
         trial: what is chosen; its effect is an option of the command.
-        name: of the campaign.
     """
     import tomli_w
 
@@ -138,7 +134,6 @@ def said(trial: Trial, time: Array, nominal: Array, seen: Array) -> str:
     """What the trial shows, in a sentence.
 
     Args:
-        trial: what is chosen.
         time: s, shape (n,).
         nominal: reading of the nominal model, rad, shape (n,).
         seen: reading with the effect, rad, shape (n,).

@@ -26,7 +26,6 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
     Args:
         folder: the workspace, as it is shown and typed.
         port: TCP port (count); 0 takes a free one.
-        browser: whether to open the page.
         first: path of the page to open.
 
     Raises:
@@ -85,7 +84,7 @@ def _free_port(port: int) -> int:
     """The port, or a free one for 0.
 
     Raises:
-        TunnelError: when it cannot be had.
+        TunnelError: when it cannot be opened.
     """
     with socket.socket() as trial:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -93,7 +92,7 @@ def _free_port(port: int) -> int:
             trial.bind((HOST, port))
         except OSError as error:
             raise TunnelError(
-                f"cannot be had ({(error.strerror or str(error)).lower()})",
+                f"cannot be opened ({(error.strerror or str(error)).lower()})",
                 where=f"--port {port}",
                 remedy="name another one, or leave it out",
             ) from error

@@ -44,7 +44,7 @@ class _Conditions:
         self._cells = conditions.typed(session)
         self._runs = [row for row in self._cells if row != RIG]
         ui.label(
-            "Type, or paste a block from a spreadsheet into a cell. What is right is saved at once in "
+            "Type, or paste a block from a spreadsheet into a cell. Valid values are saved at once in "
             f"{session.campaign / 'campaign.toml'}; nothing else of the campaign changes."
         ).classes("soft")
         self._all_runs()

@@ -170,11 +170,7 @@ class _Answer:
 
 
 def figures(document: dict[str, Any]) -> list[str]:
-    """The report's figures of the summary, as elements of a page.
-
-    Args:
-        document: of its diagnosis.
-    """
+    """The report's figures of the summary, as elements of a page."""
     from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
     from tunnel_lab.diagnosis_view.figures_where import runs_figure
     from tunnel_lab.diagnosis_view.page import DESCRIPTIONS

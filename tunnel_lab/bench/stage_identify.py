@@ -13,10 +13,11 @@ from nicegui import background_tasks, ui
 
 from identification.estimators import ALL_ESTIMATORS, SUMMARIES
 from tunnel_lab.bench import work
-from tunnel_lab.bench.estimates_view import budget_parts, side_by_side
+from tunnel_lab.bench.estimates_view import side_by_side
 from tunnel_lab.bench.parts import Fault, Frame, button, show_command, show_parts
 from tunnel_lab.bench.stages import ESTIMATOR, is_current, read_result
 from tunnel_lab.bench.workspace import Session
+from tunnel_lab.terminal.budget_table import budget_lines, budget_table
 from tunnel_sim.files.toml_input import load_toml
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -147,7 +148,7 @@ class _Identify:
                 and "budget" in budget
                 and is_current(self._session, self._session.estimate(_BUDGET))
             ):
-                show_parts(budget_parts(budget))
+                show_parts([budget_table(budget["budget"]), *budget_lines(budget["budget"])])
 
 
 def _progress(name: str, one: work.Work) -> None:
@@ -163,7 +164,6 @@ async def run_commands(session: Session, orders: Sequence[tuple[str, tuple[str, 
     """Run ``tunnel identify`` several times, as many at a time as there are processors.
 
     Args:
-        session: whose campaign it is.
         orders: name of the log and options of each.
     """
     free = asyncio.Semaphore(os.cpu_count() or 1)

@@ -213,10 +213,6 @@ def _show(imported: Imported) -> None:
 def write(session: Session, imported: Imported) -> None:
     """Write the campaign, as ``tunnel import`` does; conditions that were stated before are kept.
 
-    Args:
-        session: whose campaign it is.
-        imported: what was read.
-
     Raises:
         TunnelError: when the folder cannot be written.
     """

@@ -67,7 +67,6 @@ def write(session: Session, author: str, notes: str) -> None:
     """Write the report of the session's diagnosis, as ``tunnel diagnose --report`` does.
 
     Args:
-        session: whose diagnosis it is.
         author: who made it; may be empty.
         notes: for the head of the page; may be empty.
 

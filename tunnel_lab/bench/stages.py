@@ -40,10 +40,6 @@ STAGES = (
 def closed(session: Session, key: str) -> str:
     """Why a stage cannot be opened.
 
-    Args:
-        session: whose files are looked at.
-        key: of the stage.
-
     Returns:
         What to do first, in one line; empty where the stage is open.
     """
@@ -76,12 +72,7 @@ def _diagnosed(session: Session) -> str:
 
 
 def is_current(session: Session, result: Path) -> bool:
-    """Whether a result is of the campaign as it is now.
-
-    Args:
-        session: whose campaign it is.
-        result: a file of it.
-    """
+    """Whether a result is of the campaign as it is now."""
     document = read_result(result)
     if document is None:
         return False
@@ -102,9 +93,6 @@ def _hashes(session: Session, state: object) -> dict[str, str]:
 
 def read_result(path: Path) -> dict[str, Any] | None:
     """The JSON document that a command has written; None where there is none.
-
-    Args:
-        path: the file.
 
     Raises:
         TunnelError: when the file is not such a document.

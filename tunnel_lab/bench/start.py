@@ -15,11 +15,7 @@ from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
 
 def build(folder: Path) -> None:
-    """Build the page.
-
-    Args:
-        folder: the workspace.
-    """
+    """Build the page."""
     ui.label("Drop the files of a data logger. Every step writes the files that the commands write.").classes(
         "lede"
     )
@@ -76,7 +72,6 @@ async def keep(session: Session, given: events.MultiUploadEventArguments) -> Non
     """Keep dropped files under safe names; a file of the same name is replaced.
 
     Args:
-        session: whose files they are.
         given: the drop.
     """
     from tunnel_sim.files.writing import output_folder, write_whole

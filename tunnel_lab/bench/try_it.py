@@ -36,11 +36,7 @@ class Car(ui.element, component="static/car.js"):
 
 
 def build(folder: Path) -> None:
-    """Build the page.
-
-    Args:
-        folder: the workspace.
-    """
+    """Build the page."""
     _TryIt(folder)
 
 

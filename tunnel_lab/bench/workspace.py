@@ -16,12 +16,7 @@ _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  #
 
 @dataclass(frozen=True)
 class Session:
-    """A campaign and the files beside it; the bench keeps no other state.
-
-    Args:
-        folder: the workspace.
-        name: of the campaign.
-    """
+    """A campaign and the files beside it; the bench keeps no other state."""
 
     folder: Path
     name: str
@@ -89,11 +84,7 @@ class Session:
 
 
 def sessions(folder: Path) -> list[Session]:
-    """The sessions of a workspace, by name: campaigns, and dropped files that are not one yet.
-
-    Args:
-        folder: the workspace.
-    """
+    """The sessions of a workspace, by name: campaigns, and dropped files that are not one yet."""
     found = set()
     for path in folder.iterdir():
         if (path / CAMPAIGN_FILE).is_file():
@@ -107,7 +98,6 @@ def open_session(folder: Path, name: str) -> Session:
     """A session by the name in an address.
 
     Args:
-        folder: the workspace.
         name: as the address has it.
 
     Raises:
@@ -127,7 +117,6 @@ def new_session(folder: Path, file_name: str) -> Session:
     """A session for dropped files, with a name that nothing in the workspace has.
 
     Args:
-        folder: the workspace.
         file_name: of the first file.
     """
     stem = safe_name(Path(safe_name(file_name)).stem)

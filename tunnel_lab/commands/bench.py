@@ -11,9 +11,7 @@ NAME = "bench"
 
 
 def run(
-    folder: Annotated[
-        Path, typer.Argument(help="Where campaigns are and go. Or a campaign, which is then opened.")
-    ] = Path(),
+    folder: Annotated[Path, typer.Argument(help="Folder of campaigns, or a campaign to open.")] = Path(),
     port: Annotated[
         int, typer.Option("--port", metavar="N", min=0, max=65535, help="TCP port; 0 takes a free one.")
     ] = 0,
@@ -21,13 +19,13 @@ def run(
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
     ] = True,
 ) -> None:
-    """Go from a logger's files to a report in the browser, by hand and eye.
+    r"""Go from a logger's files to a report in the browser.
 
     The stages are those of the commands, and write the same files: drop records
     (import), state the conditions, identify, diagnose, find the run that would
-    distinguish the answers, and write the report. One can go on in a terminal at
+    distinguish the answers, and write the report. You can go on in a terminal at
     any point. Only this machine's user can open the page: its address has a secret
-    in it. It needs pip install 'virtual-wind-tunnel[bench]', and no network.
+    in it. It needs pip install 'virtual-wind-tunnel\[bench]', and no network.
 
     [bold]Examples[/bold]
       tunnel bench

@@ -66,8 +66,8 @@ def make(
             "--variety",
             min=0,
             max=1,
-            help="Share with another scale, with few runs, with coloured noise "
-            "and with uneven time stamps, each.",
+            help="Share with another scale, and the same share each with few runs, coloured noise and uneven "
+            "time stamps.",
         ),
     ] = 0.25,
     small: Annotated[
@@ -96,10 +96,10 @@ def make(
 
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
     refuse_unwritable_files(key)
-    with bar("writing campaigns", count) as tell:
+    with bar("writing campaigns", count) as progress:
         where = make_blind(
             out, count=count, seed=seed, shares=shares, mixture=Mixture(textbook, rare, variety, small), key=key,
-            progress=tell, tell_steps=console(stderr=True).is_terminal,
+            progress=progress, show_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
     say(f"Written: {out} ({count} campaigns), key {where}")
     say(f"Key sha256 {read_document(out / SEAL, '')['key_sha256']}, in {out / SEAL}")
@@ -118,9 +118,8 @@ def diagnose(
     """Diagnose every campaign of a set; continue where an interrupted run ended.
 
     The answers go to FOLDER/answers (answers-without-… with --exclude,
-    answers-with-… with --effects-file), one JSON
-    file for each campaign; their SHA-256 goes to the seal.json in the same
-    folder. The key is not read.
+    answers-with-… with --effects-file), one JSON file for each campaign; their
+    SHA-256 goes to the seal.json in the same folder. The key is not read.
 
     [bold]Exit status[/bold]
       0 all answered, 2 bad input, 130 interrupted (finished answers are kept).
@@ -130,8 +129,8 @@ def diagnose(
     from tunnel_lab.terminal.tables import say
 
     names = split_names(exclude)
-    with bar("diagnosing", None) as tell:
-        sealed = answer_set(folder, excluded=names, jobs=jobs, progress=tell, effects_file=effects_file)
+    with bar("diagnosing", None) as progress:
+        sealed = answer_set(folder, excluded=names, jobs=jobs, progress=progress, effects_file=effects_file)
     say(f"Answers: {answers_folder(folder, names, effects_file)}")
     say(f"Answers sha256 {sealed}")
 
@@ -163,9 +162,9 @@ def score(
     The output gives exact matches by kind with Wilson intervals, causes found and
     false by number of causes and by circumstances, false alarms, calibration of
     the answer and of the probabilities of the effects, closure on held-out runs,
-    errors of Cnβ and Cnr before and after,
-    and the answers by true cause. A folder without seal.json but with a
-    truth.json in every campaign is scored as an open set and labelled as one.
+    errors of Cnβ and Cnr before and after, and the answers by true cause. A folder
+    without seal.json but with a truth.json in every campaign is scored as an open
+    set and labelled as one.
 
     [bold]Exit status[/bold]
       0 scored, 2 bad input: an answer is missing, or a file does not match its hash.
@@ -197,13 +196,13 @@ def score(
 def _show(found: Score) -> None:
     """Print the score."""
     from tunnel_lab.diagnosis_view import blind_page
-    from tunnel_lab.terminal.tables import say, show_tables
+    from tunnel_lab.terminal.tables import rich_table, say, show_tables
 
     for line in blind_page.origin_lines(found):
         say(line)
     say("")
     for section in blind_page.sections(found):
-        show_tables(blind_page.as_table(section))
+        show_tables(rich_table(section))
         if section.note:
             say(section.note + "\n")
 

@@ -20,7 +20,7 @@ def run(
 
     For each diagnosis: the gap (noise powers) before and with the causes, the causes
     with their parameters, and the coefficients with standard deviations. Then the
-    difference of each coefficient from the first diagnosis, the campaigns taken as
+    difference of each coefficient from the first diagnosis, for campaigns that are
     independent of each other.
 
     [bold]Examples[/bold]

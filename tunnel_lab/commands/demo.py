@@ -116,8 +116,8 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
     from tunnel_sim.files.campaign_io import write_campaign
     from tunnel_sim.files.writing import write_json
 
-    with bar("simulating runs", len(plan.conditions)) as tell:
-        campaign = simulate_campaign(plan, progress=tell)
+    with bar("simulating runs", len(plan.conditions)) as progress:
+        campaign = simulate_campaign(plan, progress=progress)
     write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
     estimates = []
     for name in SHOWN:
@@ -130,12 +130,13 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
 
 def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: CampaignPlan) -> None:
     """Print the comparison with the truth."""
-    from tunnel_lab.terminal.tables import say, show_tables, status_lines, truth_table
+    from identification.printing.estimate_tables import status_lines
+    from tunnel_lab.terminal.tables import say, show_tables, truth_table
 
     say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")
     show_tables(truth_table(estimates, truth_of(plan)))
     for estimate in estimates:
-        for line in status_lines(estimate):
+        for line in status_lines(estimate.to_json_dict()):
             say(f"Note, {estimate.estimator}: {line}")
 
 

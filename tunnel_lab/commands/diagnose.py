@@ -65,14 +65,16 @@ def run(
         ),
     ] = None,
     joint: Annotated[
-        str | None, typer.Option("--joint", metavar="NAME", help="Its joint that was recorded; for --model.")
+        str | None,
+        typer.Option("--joint", metavar="NAME", help="Joint of the model that was recorded; for --model."),
     ] = None,
     free: Annotated[
         list[str] | None,
         typer.Option(
             "--free",
             metavar="A,B",
-            help="What of it is fitted: inertia, damping, stiffness, rest. Default: what matters.",
+            help="Parameters of the model to fit: inertia, damping, stiffness, rest. Default: those that the "
+            "runs can determine.",
         ),
     ] = None,
     patch: Annotated[
@@ -94,11 +96,11 @@ def run(
     the noise. Then the effects of the vocabulary, and sets of them, are fitted
     and compared. The answer is one effect or several, "none" (there is no gap) or
     "unknown" (no effect of the vocabulary explains it), each with a probability.
-    Gap and coefficients are given before and after the effects are added, and
-    whether what remains could move the coefficients; the gap is predicted for
-    runs, or stretches of time, held out of the fit. Where something remains, it
-    says how much could be closed, by what kind of moment or error of the reading,
-    and by which formula; --propose writes that for --effects-file.
+    Gap and coefficients are given before and after the effects are added. The gap
+    is predicted for runs, or stretches of time, held out of the fit. Where
+    something remains, the answer says whether it could move the coefficients, how
+    much of it could be closed, by what kind of moment or error of the reading, and
+    by which formula; --propose writes the formula for --effects-file.
 
     [bold]Examples[/bold]
       tunnel diagnose my-campaign
@@ -162,10 +164,6 @@ def run(
 def write_proposal(path: Path, document: dict[str, Any]) -> Path | None:
     """Write the formula proposed as an effects file.
 
-    Args:
-        path: the TOML file.
-        document: of a diagnosis.
-
     Returns:
         The file; None where no formula is proposed, and nothing is written.
     """
@@ -185,13 +183,12 @@ def diagnose_with_progress(
     """Diagnose, with step and effect on standard error where that is a terminal.
 
     Args:
-        kinds: effects to answer with.
         model: the nominal model; None: spring and damper.
     """
     from diagnosis import diagnose
 
-    with step_display() as tell:
-        return diagnose(campaign, kinds=kinds, progress=tell, model=model)
+    with step_display() as show_step:
+        return diagnose(campaign, kinds=kinds, progress=show_step, model=model)
 
 
 def write_patch(answer: Diagnosis, path: Path) -> None:
@@ -231,7 +228,7 @@ def step_display() -> Iterator[Callable[[str], None]]:
         task = progress.add_task("starting", total=None)
         step, begun = "", time.perf_counter()
 
-        def tell(text: str) -> None:
+        def show_step(text: str) -> None:
             nonlocal step
             if text in STEPS:
                 step = STEPS[text]
@@ -241,15 +238,11 @@ def step_display() -> Iterator[Callable[[str], None]]:
             else:
                 progress.update(task, description=f"{step}: {text}")
 
-        yield tell
+        yield show_step
 
 
 def show(document: dict[str, Any]) -> None:
-    """Print an answer: the verdict in words, then the figures behind it.
-
-    Args:
-        document: of a diagnosis.
-    """
+    """Print an answer: the verdict in words, then the figures behind it."""
     from diagnosis import printing as parts
     from diagnosis.closable import closable_table, closable_words
     from diagnosis.patch import patch_lines, patch_table

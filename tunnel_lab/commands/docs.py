@@ -21,7 +21,7 @@ def run(
     """Build the documentation site and open it.
 
     The site has all pages, an API reference and three notebooks, which are
-    run. It is kept in _build/html of the folder; pages that have not changed
+    executed. It is kept in _build/html of the folder; pages that have not changed
     are not built again. It needs the extra 'docs'.
 
     [bold]Examples[/bold]

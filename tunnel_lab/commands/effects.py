@@ -47,8 +47,8 @@ def run(
       tunnel effects --json effects.json
       tunnel effects check detent --effects-file my.toml
 
-    tunnel effects check NAME holds an effect of your own to the laws that every
-    effect obeys, and says which other effects move a rig as it does.
+    tunnel effects check NAME tests an effect of your own by the laws that every
+    effect obeys, and names other effects with the same influence on the motion.
 
     [bold]Exit status[/bold]
       0 shown, 1 a law is violated, 2 bad input.

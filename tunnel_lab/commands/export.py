@@ -26,7 +26,7 @@ def run(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="FILE", help="The file. Default: the folder's name in this folder."
+            "--out", "-o", metavar="FILE", help="The file. Default: the name of the campaign's folder, here."
         ),
     ] = None,
 ) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import inspect
+import textwrap
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from tunnel_lab.terminal.estimator_help import with_estimators
+from identification.estimators import SUMMARIES
 from tunnel_lab.terminal.given_campaign import HELP as CAMPAIGN_HELP
 
 if TYPE_CHECKING:
@@ -20,6 +22,9 @@ if TYPE_CHECKING:
 NAME = "identify"
 FEW_RUNS = 3
 """For up to this many runs the windows are shown by default."""
+ESTIMATORS = "  {estimators}"
+"""Placeholder of their list in the help."""
+_HELP_WIDTH = 78
 WITH_WEIGHTS = ("neural_network", "neural_posterior")
 
 
@@ -122,11 +127,23 @@ def run(
         detailed = len(data.runs) <= FEW_RUNS if windows is None else windows
         show_estimate(data, estimate, windows=detailed, source=campaign)
         if found is not None:
-            show_budget(found)
+            show_budget(document["budget"])
         if json is not None:
             say(f"Written: {json}")
     if estimate.status.failed:
         raise typer.Exit(1)
+
+
+def with_estimators(text: str | None) -> str:
+    """A docstring with one paragraph per estimator: its name, and its summary wrapped beside it."""
+    column = max(map(len, SUMMARIES)) + 4
+    paragraphs = [
+        textwrap.fill(
+            summary, _HELP_WIDTH, initial_indent=f"  {name}".ljust(column), subsequent_indent=" " * column
+        )
+        for name, summary in SUMMARIES.items()
+    ]
+    return inspect.cleandoc(text or "").replace(ESTIMATORS, "\n".join(paragraphs))
 
 
 run.__doc__ = with_estimators(run.__doc__)
@@ -169,17 +186,23 @@ def budgeted(
             partial(identify, estimator=chosen, throw=False),
             inputs,
             others=others,
-            told=lambda what: status.update(Text(f"uncertainty budget: {what}")),
+            progress=lambda what: status.update(Text(f"uncertainty budget: {what}")),
         )
     return with_budget(estimate, found), found
 
 
-def show_budget(budget: Budget) -> None:
-    """Print a budget and what dominates."""
+def show_budget(budget: dict[str, Any]) -> None:
+    """Print a budget and what dominates.
+
+    Args:
+        budget: as in the JSON document.
+    """
     from tunnel_lab.terminal import budget_table, tables
 
     tables.say("")
-    tables.show_tables(budget_table.budget_table(budget))
+    table = tables.rich_table(budget_table.budget_table(budget))
+    table.rows[-2].end_section = True
+    tables.show_tables(table)
     for line in budget_table.budget_lines(budget):
         tables.say(line)
     tables.say("The standard deviations above are the combined ones.")

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    pass
 
 NAME = "import"
 
@@ -28,34 +25,39 @@ def run(
         ),
     ] = None,
     unit: Annotated[
-        str | None, typer.Option("--unit", help="Of the angle: rad, mrad, deg, turns, counts, V, deg/s, …")
+        str | None,
+        typer.Option("--unit", help="Unit of the angle: rad, mrad, deg, turns, counts, V, deg/s, …"),
     ] = None,
     time: Annotated[
         str | None, typer.Option("--time", metavar="NAME", help="Column of the times, by name or number.")
     ] = None,
     time_unit: Annotated[
-        str | None, typer.Option("--time-unit", help="Of the times: s, ms, us, min, …")
+        str | None, typer.Option("--time-unit", help="Unit of the times: s, ms, us, min, …")
     ] = None,
     rate: Annotated[
         float | None, typer.Option("--rate", help="Sample rate, Hz, where there are no times.")
     ] = None,
     counts_per_turn: Annotated[
-        float | None, typer.Option("--counts-per-turn", help="Of an encoder, where the angle is in counts.")
+        float | None, typer.Option("--counts-per-turn", help="Counts of an encoder per turn.")
     ] = None,
     calibration: Annotated[
         str | None,
         typer.Option(
-            "--calibration", metavar="'a + b*V'", help="Angle of a voltage; or a table of two columns."
+            "--calibration",
+            metavar="'a + b*V'",
+            help="Volts to angle: a formula, or a file of two columns.",
         ),
     ] = None,
     conditions: Annotated[
         Path | None,
-        typer.Option("--conditions", metavar="RUNS.csv", help="Table: file or run, wind_speed, …"),
+        typer.Option(
+            "--conditions", metavar="RUNS.csv", help="Table of conditions: file or run, wind_speed, …"
+        ),
     ] = None,
     name: Annotated[
         str | None,
         typer.Option(
-            "--name", metavar="PATTERN", help="Conditions in the files' names: S{spring}_V{wind_speed}_*"
+            "--name", metavar="PATTERN", help="Conditions in the file names: S{spring}_V{wind_speed}_*"
         ),
     ] = None,
     settings: Annotated[
@@ -64,8 +66,8 @@ def run(
             "--set", metavar="KEY=NUMBER", help="A condition of all runs, or a size. May be repeated."
         ),
     ] = None,
-    start: Annotated[float | None, typer.Option("--start", help="Leave out what is earlier, s.")] = None,
-    end: Annotated[float | None, typer.Option("--end", help="Leave out what is later, s.")] = None,
+    start: Annotated[float | None, typer.Option("--start", help="Leave out earlier samples, s.")] = None,
+    end: Annotated[float | None, typer.Option("--end", help="Leave out later samples, s.")] = None,
     rest: Annotated[
         float | None, typer.Option("--rest", help="Reading at rest of every run, rad: it is subtracted.")
     ] = None,
@@ -73,7 +75,7 @@ def run(
         bool | None, typer.Option("--cut/--no-cut", help="Cut records at releases.", show_default="--cut")
     ] = None,
     delimiter: Annotated[
-        str | None, typer.Option("--delimiter", help="Of a text file: tab, blank, ';', ',' or '|'.")
+        str | None, typer.Option("--delimiter", help="Delimiter of a text file: tab, blank, ';', ',' or '|'.")
     ] = None,
     decimal: Annotated[str | None, typer.Option("--decimal", help="Decimal sign of a text file.")] = None,
     recipe: Annotated[
@@ -88,19 +90,19 @@ def run(
         bool, typer.Option("--overwrite", help="Replace a campaign that is already in the folder.")
     ] = False,
 ) -> None:
-    r"""Make a campaign of files as a data logger, a spreadsheet or MATLAB writes them.
+    """Make a campaign from the files of a data logger, a spreadsheet or MATLAB.
 
     Text of any dialect, Excel, MAT, TDMS, HDF5 and Parquet are read. Columns, units,
     sample rate, runs and releases are found; what was found, and why, is printed
-    before anything is written. Options state what was found wrongly. The campaign
+    before anything is written. Options correct what was found wrongly. The campaign
     gets a picture (import.png), the choices made (import.toml, for --recipe), and
-    comments in campaign.toml on what the files do not say, such as the stiffness.
+    comments in campaign.toml on what the files do not state, such as the stiffness.
 
     [bold]Examples[/bold]
       tunnel import log.csv --out my-rig
       tunnel import log.csv --preview import.png
       tunnel import S*.csv --out my-rig --name "S{spring}_V{wind_speed}_*" --set air_density=1.2
-      tunnel import rig.mat --out my-rig --angle "data\\[1]" --unit deg
+      tunnel import rig.mat --out my-rig --angle "data[1]" --unit deg
       tunnel import next.csv --out next --recipe my-rig/import.toml --yes
 
     [bold]Exit status[/bold]
@@ -117,9 +119,7 @@ def run(
     from tunnel_sim.vocabulary.errors import TunnelError
 
     if (out is None) == (preview is None):
-        raise TunnelError(
-            "give either of them", where="--out, --preview", remedy="name a folder or a picture"
-        )
+        raise TunnelError("give one of them", where="--out, --preview", remedy="name a folder or a picture")
     if preview is not None:
         refuse_unwritable(preview)
     stated = {
@@ -172,12 +172,8 @@ def settings_of(words: list[str]) -> dict[str, float]:
 def confirm(out: Path, *, yes: bool) -> None:
     """Ask whether the campaign is to be written.
 
-    Args:
-        out: its folder.
-        yes: do not ask.
-
     Raises:
-        TunnelError: when nobody can be asked.
+        TunnelError: when there is no terminal to ask.
         typer.Exit: with status 1 when it is declined.
     """
     from tunnel_sim.vocabulary.errors import TunnelError
@@ -185,6 +181,6 @@ def confirm(out: Path, *, yes: bool) -> None:
     if yes:
         return
     if not sys.stdin.isatty():
-        raise TunnelError("nobody can be asked whether to write it", where=str(out), remedy="add --yes")
+        raise TunnelError("cannot be confirmed without a terminal", where=str(out), remedy="add --yes")
     if not typer.confirm(f"Write {out}?", default=True):
         raise typer.Exit(1)

@@ -44,8 +44,8 @@ def run(
     for name in only or ():
         if name not in known:
             raise TunnelError(f"no part '{name}'", where="--only", remedy=did_you_mean(name, tuple(known)))
-    with bar("paper") as tell:
-        page, sections = write_paper(out, list(dict.fromkeys(only or known)), progress=tell)
+    with bar("paper") as progress:
+        page, sections = write_paper(out, list(dict.fromkeys(only or known)), progress=progress)
     summary = table("The paper, ours beside theirs", "item", "paper", "here", "outcome")
     for section in sections.values():
         summary.add_row(section.title, section.theirs, section.ours, section.outcome)

@@ -40,10 +40,10 @@ def run(
 ) -> None:
     """Film a run: the oscillating model, and the sensor's reading beside it.
 
-    Writes MP4 (H.264) and PNG files; by default
-    tunnel-output/rig.mp4 and tunnel-output/rig.png. Frames are drawn off-screen
-    with EGL or OSMesa; no display is needed. A frame takes about a fifth of a
-    second without a graphics card.
+    Writes MP4 (H.264) and PNG files; by default tunnel-output/rig.mp4 and
+    tunnel-output/rig.png. Frames are drawn off-screen with EGL or OSMesa; no
+    display is needed. A frame takes about a fifth of a second without a graphics
+    card.
 
     [bold]Examples[/bold]
       tunnel render
@@ -83,8 +83,8 @@ def _film(request: Request, look: Look, path: Path) -> None:
     from tunnel_lab.show.film import write_film
     from tunnel_lab.terminal.progress import bar
 
-    with bar("drawing frames") as tell:
-        write_film(request, look, path, tell)
+    with bar("drawing frames") as progress:
+        write_film(request, look, path, progress)
 
 
 def _targets(out: list[Path] | None) -> list[Path]:
@@ -96,7 +96,11 @@ def _targets(out: list[Path] | None) -> list[Path]:
     targets = out if out else list(_DEFAULT)
     for path in targets:
         if path.suffix.lower() not in (".mp4", ".png"):
-            raise TunnelError("is neither .mp4 nor .png", where=f"--out {path}", remedy="name one of these")
+            raise TunnelError(
+                "is neither .mp4 nor .png",
+                where=f"--out {path}",
+                remedy="name a file that ends in one of these",
+            )
         if path.suffix.lower() == ".mp4":
             library("imageio_ffmpeg", "a film", "film", f"--out {path}")
         if path.is_dir():

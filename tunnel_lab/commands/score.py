@@ -40,7 +40,9 @@ def run(
     ] = None,
     jobs: Annotated[
         int,
-        typer.Option("--jobs", min=0, help="Number of processes; 0 uses this one. Results do not change."),
+        typer.Option(
+            "--jobs", min=0, help="Number of processes, on which no result depends; 0 uses this one."
+        ),
     ] = 2,
     cells: Annotated[bool, typer.Option("--cells", help="Also show every cell.")] = False,
     check: Annotated[
@@ -180,8 +182,8 @@ def _rows(grid: Grid, names: tuple[str, ...], jobs: int, out: Path | None) -> li
     from tunnel_lab.terminal.progress import bar
 
     parts = None if out is None else out / "parts"
-    with bar("scoring") as tell:
-        return score_grid(grid, names, jobs=jobs, parts=parts, progress=tell)
+    with bar("scoring") as progress:
+        return score_grid(grid, names, jobs=jobs, parts=parts, progress=progress)
 
 
 def _keep(out: Path, results: Results) -> list[Path]:
@@ -238,10 +240,10 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
     from tunnel_sim.files.writing import write_whole
 
     terminal = console(stderr=True).is_terminal
-    cases = work.make_cases(seed, realisations=trials or work.REALISATIONS, tell_steps=terminal)
+    cases = work.make_cases(seed, realisations=trials or work.REALISATIONS, show_steps=terminal)
     parts = None if out is None else out / "parts"
-    with bar("scoring") as tell:
-        rows = work.break_down(cases, names, seed, jobs=jobs, parts=parts, progress=tell)
+    with bar("scoring") as progress:
+        rows = work.break_down(cases, names, seed, jobs=jobs, parts=parts, progress=progress)
     found = work.biases(rows)
     written = []
     if out is not None:

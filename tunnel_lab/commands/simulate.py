@@ -83,8 +83,8 @@ def run(
     loaded = replace(loaded, effects=loaded.effects + added)
     plan_effects(loaded)  # refuses what cannot be injected before anything is simulated
     refuse_occupied(out, overwrite=overwrite)
-    with bar("simulating runs", len(loaded.conditions)) as tell:
-        campaign = simulate_campaign(loaded, progress=tell)
+    with bar("simulating runs", len(loaded.conditions)) as progress:
+        campaign = simulate_campaign(loaded, progress=progress)
     folder = write_campaign(
         campaign, out, run_format=format.value, truth=truth_document(loaded), overwrite=overwrite
     )

@@ -79,7 +79,7 @@ def run(
     if summary is not None:
         if file is not None or out is not None:
             raise TunnelError(
-                "takes no FILE and no --out", where="--summary", remedy="name the folder of a sweep only"
+                "takes neither FILE nor --out", where="--summary", remedy="name the folder of a sweep only"
             )
         show_summary(summary)
         return
@@ -115,8 +115,8 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
         )
     sweep = read_sweep(file)
     work = _work(workers, scheduler, sweep)
-    with bar("cases", sweep.size) as tell:
-        outcome = run_sweep(sweep, out, work, tell)
+    with bar("cases", sweep.size) as progress:
+        outcome = run_sweep(sweep, out, work, progress)
     if outcome.found:
         say(f"{outcome.found} of {sweep.shards} shards were finished before")
     estimates = sweep.size * len(sweep.document.estimators)
@@ -136,10 +136,12 @@ def _work(workers: int | None, scheduler: str | None, sweep: Sweep) -> Work:
 
     count = min(workers or available_processors(), sweep.shards)
 
-    def tell(line: str) -> None:
+    def say_line(line: str) -> None:
         say(f"tunnel: {line}", stderr=True)
 
-    return shards_in_processes(count, tell) if scheduler is None else on_cluster(scheduler, count, tell)
+    return (
+        shards_in_processes(count, say_line) if scheduler is None else on_cluster(scheduler, count, say_line)
+    )
 
 
 def show_summary(folder: Path) -> None:

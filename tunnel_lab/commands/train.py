@@ -30,26 +30,23 @@ def run(
     starts: Annotated[
         int, typer.Option("--starts", min=1, help="Number of training runs of each network.")
     ] = 3,
-    damping_steps: Annotated[
-        int, typer.Option("--damping-steps", min=1, help="Largest number of steps of the first network.")
-    ] = 400,
-    frequency_steps: Annotated[
-        int, typer.Option("--frequency-steps", min=1, help="Largest number of steps of the second network.")
-    ] = 3000,
-    linear: Annotated[
-        bool, typer.Option("--linear", help="Give the second network t3 and ωn instead of their logarithms.")
-    ] = False,
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            "--steps",
+            min=1,
+            help="Largest number of steps of each network. Default: 400 for ζ, 3000 for ωn; 2000 for "
+            "neural_posterior.",
+        ),
+    ] = None,
     estimator: Annotated[
         Literal["neural_network", "neural_posterior"],
         typer.Option("--estimator", "-e", help="Whose networks to train."),
     ] = "neural_network",
     shards: Annotated[
         int,
-        typer.Option("--shards", min=1, help="For neural_posterior: training campaigns, in two hundreds."),
+        typer.Option("--shards", min=1, help="For neural_posterior: training campaigns, in units of 200."),
     ] = 15,
-    steps: Annotated[
-        int, typer.Option("--steps", min=1, help="For neural_posterior: number of batches of each network.")
-    ] = 2000,
     jobs: Annotated[
         int, typer.Option("--jobs", min=0, help="For neural_posterior: processes that simulate.")
     ] = 2,
@@ -71,9 +68,9 @@ def run(
 
     With --estimator neural_posterior, campaigns are drawn and simulated by the
     reference simulator with effects in many forms, and two networks are fitted to
-    them: one for a record, one for a campaign. --zeta, --omega, --starts and the
-    steps of the paper's networks do not apply. Unfinished work is in the folder
-    OUT.part; it does not matter how many processes simulate.
+    them: one for a record, one for a campaign. --zeta, --omega and --starts do not
+    apply. Unfinished work is in the folder OUT.part; it does not matter how many
+    processes simulate.
 
     [bold]Examples[/bold]
       tunnel train mine.safetensors --seed 7
@@ -85,19 +82,19 @@ def run(
       0 trained, 2 bad input, 130 interrupted (finished work is kept).
     """
     from identification.neural.train import TrainingSpec
-    from identification.neural.training_set import LINEAR, LOGARITHMIC, DataSpec
+    from identification.neural.training_set import DataSpec
 
     if out.suffix != ".safetensors":
         _refuse(f"{out}", "does not end in .safetensors", "give the file this suffix")
     if estimator == "neural_posterior":
         from tunnel_lab.training.command import train_posterior
 
-        train_posterior(out, seed, shards, steps, jobs=jobs, restart=restart)
+        train_posterior(out, seed, shards, steps or 2000, jobs=jobs, restart=restart)
         return
     _check_range("--zeta", zeta, 0.0, 0.95)
     _check_range("--omega", omega, 0.0, 1e4)
-    data = DataSpec(zeta_range=zeta, omega_range=omega, frequency_scale=LINEAR if linear else LOGARITHMIC)
-    spec = TrainingSpec(seed, data, starts, damping_steps, frequency_steps)
+    data = DataSpec(zeta_range=zeta, omega_range=omega)
+    spec = TrainingSpec(seed, data, starts, steps or 400, steps or 3000)
     _train(out, spec, restart=restart)
 
 
@@ -126,9 +123,12 @@ def _train(out: Path, spec: TrainingSpec, *, restart: bool) -> None:
             written = monotonic()
 
     try:
-        with bar("training", spec.total_work) as tell:
+        with bar("training", spec.total_work) as progress:
             trained = train(
-                spec, resume=resume, keep=keep, tell=lambda done, text: tell(done, spec.total_work, text)
+                spec,
+                resume=resume,
+                keep=keep,
+                progress=lambda done, text: progress(done, spec.total_work, text),
             )
     except KeyboardInterrupt:
         write_whole(partial, latest.to_bytes(spec.to_json_dict()))

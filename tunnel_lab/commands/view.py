@@ -42,9 +42,9 @@ def run(
 
     --web serves the same to a browser (MuJoCo Studio's web viewer, WebGL 2), which
     has controls for pause, speed and reset, and shows trace, wind speed and its
-    address. It needs no display. It listens on
-    all network interfaces, asks for no password and does not check the Origin of
-    a page: use it only in a network that you trust.
+    address. It needs no display. It listens on all network interfaces, asks for no
+    password and does not check the Origin of a page: use it only in a network that
+    you trust.
 
     [bold]Examples[/bold]
       tunnel view

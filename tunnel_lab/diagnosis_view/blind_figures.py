@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from diagnosis.names import plain
 from tunnel_lab.diagnosis_view.blind_page import confusion
-from tunnel_lab.diagnosis_view.figures_common import AFTER, BEFORE, INK, PAPER, QUIET, plain
+from tunnel_lab.diagnosis_view.figures_common import AFTER, BEFORE, INK, PAPER, QUIET
 from tunnel_lab.plotting.common import WIDTH, figure, grid, styled
 
 if TYPE_CHECKING:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from identification.printing.table import TextTable
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from rich.table import Table
 
     from diagnosis.blind import Score
-    from diagnosis.blind.statistics import Share
+    from identification.statistics.proportion import Proportion
 
 INCLUSION = "Calibration of inclusion"
 CALIBRATION = "Calibration"
@@ -34,19 +35,20 @@ KINDS = {
 
 
 @dataclass(frozen=True)
-class Section:
-    """A table with a title.
+class Section(TextTable):
+    """A table with a line below it.
 
     Args:
-        headings: of the columns.
-        rows: cells as text.
-        note: a line below it.
+        note: the line; empty: none.
     """
 
-    title: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
     note: str = ""
+
+
+def _section(
+    title: str, headings: tuple[str, ...], rows: Sequence[tuple[str, ...]], note: str = ""
+) -> Section:
+    return Section(title, headings, tuple(rows), headings[1:-1], note)
 
 
 def sections(score: Score) -> list[Section]:
@@ -60,16 +62,6 @@ def sections(score: Score) -> list[Section]:
         _closure(score), _coefficients(score), _pairs(score), _answers(score), _time(score),
     ]  # fmt: skip
     return [section for section in found if section.rows]
-
-
-def as_table(section: Section) -> Table:
-    """A section for the terminal."""
-    from tunnel_lab.terminal.tables import table
-
-    result = table(section.title, *section.headings, right=section.headings[1:-1])
-    for row in section.rows:
-        result.add_row(*row)
-    return result
 
 
 def origin_lines(score: Score) -> list[str]:
@@ -117,7 +109,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
         *(f"    {line}" for line in origin_lines(score)),
     ]
     for section in sections(score):
-        lines += ["", f"## {section.title}", "", *_rows(section.headings, section.rows)]
+        lines += ["", f"## {section.title}", "", *_rows(section.columns, section.rows)]
         if section.note:
             lines += ["", section.note]
         if figures[0] and section.title == CALIBRATION:
@@ -144,7 +136,7 @@ def _rows(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 def _exact(score: Score) -> Section:
     rows = tuple((KINDS[name], *_share(found)) for name, found in score.exact().items())
-    return Section("Causes exactly right", ("campaigns where", "right", "of", "share", "95 %"), rows)
+    return _section("Causes exactly right", ("campaigns where", "right", "of", "share", "95 %"), rows)
 
 
 def _alarms(score: Score) -> Section:
@@ -154,7 +146,7 @@ def _alarms(score: Score) -> Section:
         "truth named as rival in a wrong answer": score.rivals(),
     }
     rows = tuple((name, *_share(found)) for name, found in entries.items() if found.total)
-    return Section("Alarms", ("", "number", "of", "share", "95 %"), rows)
+    return _section("Alarms", ("", "number", "of", "share", "95 %"), rows)
 
 
 def _found(score: Score) -> Section:
@@ -167,13 +159,13 @@ def _found(score: Score) -> Section:
         "beyond a third and three times the standard rig's. Intervals take the causes of a campaign as independent."
     )
     headings = ("campaigns", "sets exact", "true causes found", "named causes false", "")
-    return Section("Causes found and false", headings, rows, note)
+    return _section("Causes found and false", headings, rows, note)
 
 
 def _inclusion(score: Score) -> Section:
     found = score.inclusion()
     if found is None:
-        return Section(INCLUSION, (), ())
+        return _section(INCLUSION, (), ())
     low, high = found.interval
     row = (f"{found.error:.4f}", f"{low:.4f}–{high:.4f}", str(found.statements), str(found.campaigns))
     note = (
@@ -181,7 +173,7 @@ def _inclusion(score: Score) -> Section:
         "it gives (Błasiok and Nakkiran 2023); the interval is by resampling campaigns."
     )
     headings = ("smooth calibration error", "95 %", "statements", "campaigns")
-    return Section(INCLUSION, headings, (row,), note)
+    return _section(INCLUSION, headings, (row,), note)
 
 
 def _calibration(score: Score) -> Section:
@@ -189,14 +181,14 @@ def _calibration(score: Score) -> Section:
     rows = tuple((f"{b.low:.1f} to {b.high:.1f}", f"{b.mean:.3f}", *_share(b.right)) for b in bins)
     headings = ("probability stated", "mean", "right", "of", "share", "95 %")
     note = f"Expected calibration error of the answer given, {len(rows)} bins in use: {error:.3f}"
-    return Section(CALIBRATION, headings, rows, note)
+    return _section(CALIBRATION, headings, rows, note)
 
 
 def _closure(score: Score) -> Section:
     share, median, low = score.closure()
     rows = (("at least 0.95 of the gap closed", *_share(share)),) if share.total else ()
     note = f"Closed: median {median:.4f}, 5th percentile {low:.4f}"
-    return Section(
+    return _section(
         "Closure on held-out runs, where the causes are right",
         ("", "number", "of", "share", "95 %"),
         rows,
@@ -227,13 +219,13 @@ def _coefficients(score: Score) -> Section:
         "Errors are medians of |estimate − truth| / |truth|; ≤ 3 std counts errors within three standard "
         "deviations of the estimate."
     )
-    return Section("Coefficients before and after the causes are added", headings, tuple(rows), note)
+    return _section("Coefficients before and after the causes are added", headings, rows, note)
 
 
 def _pairs(score: Score) -> Section:
     found = score.pairs()
     rows = tuple((name, str(number), "") for name, number in found.items()) if sum(found.values()) else ()
-    return Section("Answers to two effects", ("answered", "number", ""), rows)
+    return _section("Answers to two effects", ("answered", "number", ""), rows)
 
 
 def _answers(score: Score) -> Section:
@@ -244,13 +236,13 @@ def _answers(score: Score) -> Section:
         own = {"withheld": "unknown"}.get(truth, truth)
         others = ", ".join(f"{name} {number}" for name, number in wrong if name != own)
         rows.append((truth, str(right[truth].total), str(right[truth].count), others))
-    return Section("Answers by truth", ("truth", "number", "right", "answered otherwise"), tuple(rows))
+    return _section("Answers by truth", ("truth", "number", "right", "answered otherwise"), rows)
 
 
 def _time(score: Score) -> Section:
     median, high, largest = score.seconds()
     rows = ((f"{median:.1f}", f"{high:.1f}", f"{largest:.1f}"),) if largest > 0.0 else ()
-    return Section("Seconds for each campaign", ("median", "90th percentile", "largest"), rows)
+    return _section("Seconds for each campaign", ("median", "90th percentile", "largest"), rows)
 
 
 def confusion(score: Score) -> tuple[list[str], list[str], NDArray[np.int_]]:
@@ -284,7 +276,7 @@ def _order(name: str) -> tuple[int, str]:
     return (last.index(name) + 1 if name in last else 0, name)
 
 
-def _brief(share: Share) -> str:
+def _brief(share: Proportion) -> str:
     """Count, number of all, share and interval in one cell; a dash of none."""
     if not share.total:
         return "–"
@@ -292,7 +284,7 @@ def _brief(share: Share) -> str:
     return f"{count}/{total}, {value} ({interval})"
 
 
-def _share(share: Share) -> tuple[str, str, str, str]:
+def _share(share: Proportion) -> tuple[str, str, str, str]:
     low, high = share.interval
-    value = "–" if share.value is None else f"{100.0 * share.value:.1f} %"
+    value = f"{100.0 * share.value:.1f} %" if share.total else "–"
     return str(share.count), str(share.total), value, f"{100.0 * low:.1f}–{100.0 * high:.1f} %"

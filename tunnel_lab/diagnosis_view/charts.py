@@ -27,7 +27,6 @@ def charts(document: Document, campaign: Campaign) -> dict[str, list[Chart]]:
 
     Args:
         document: the diagnosis as JSON's types; without ``maps`` there are none.
-        campaign: its records.
 
     Returns:
         Charts by the name of the figure that they replace on a screen.

@@ -1,4 +1,4 @@
-"""The figures of a diagnosis as PNG files for papers, and as figures for the report."""
+"""All figures of a diagnosis, by name."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from diagnosis.names import plain
 from diagnosis.policy import LISTED_PROBABILITY
 from identification.printing.numbers import coefficient_label
 from tunnel_lab.diagnosis_view.figures_common import (
@@ -21,7 +22,6 @@ from tunnel_lab.diagnosis_view.figures_common import (
     Document,
     array,
     noise_axis,
-    plain,
 )
 from tunnel_lab.plotting.common import WIDTH, figure, figure_text, grid, styled
 

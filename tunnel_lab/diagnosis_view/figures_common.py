@@ -71,16 +71,10 @@ def drawn_label(run: Document) -> str:
     return figure_text(run_label(run))
 
 
-def plain(name: str) -> str:
-    """An effect's name as words: underscores become spaces."""
-    return name.replace("_", " ")
-
-
 def shade(axes: Axes, interval: Sequence[float] | None) -> None:
     """Shade the interval that holds most of the gap.
 
     Args:
-        axes: where.
         interval: its ends, in the unit of the horizontal axis; None: nothing is shaded.
     """
     if interval is not None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from diagnosis.names import plain
 from diagnosis.printing import excess_std, held_out_excess
 from tunnel_lab.diagnosis_view import figures_common as common
 from tunnel_lab.plotting.common import figure, grid, styled
@@ -42,7 +43,7 @@ def waterfall_figure(document: common.Document) -> Figure | None:
     axes.set_xlim(None, 12.0 * axes.get_xlim()[1])  # room for the numbers
     _steps(axes, left, floor)
     _alone(axes, document, floor)
-    names = [textwrap.fill(f"+ {common.plain(str(step['effect']))}", _LABEL) for step in steps[1:]]
+    names = [textwrap.fill(f"+ {plain(str(step['effect']))}", _LABEL) for step in steps[1:]]
     axes.set_yticks(
         range(left.size + 1), ["nominal model", *names, textwrap.fill(_rest_name(document), _LABEL)]
     )

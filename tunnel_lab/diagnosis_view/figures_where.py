@@ -64,9 +64,6 @@ def runs_figure(document: Document) -> Figure:
 def run_cells(maps: Document) -> tuple[Array, float, float]:
     """The map of runs over time.
 
-    Args:
-        maps: of a diagnosis.
-
     Returns:
         Excess by run and bin of time, shape (runs, n), NaN within the noise; the least and the greatest value of
         the scale. In noise variances.

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis.closable import closable_table, closable_words
+from diagnosis.names import plain
 from diagnosis.printing import inclusion_line
 from tunnel_lab.diagnosis_view import provenance, view, view_detail
 from tunnel_lab.diagnosis_view.charts import charts
 from tunnel_lab.diagnosis_view.figures import diagnosis_figures
-from tunnel_lab.diagnosis_view.figures_common import plain
 from tunnel_lab.diagnosis_view.fonts import font_face
 from tunnel_lab.diagnosis_view.svg import inline_svg, shown_text
 from tunnel_sim.files.writing import write_encoded

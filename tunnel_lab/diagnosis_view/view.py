@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from diagnosis.names import plain as words
+from diagnosis.names import plain
 from diagnosis.policy import LISTED_PROBABILITY
 from diagnosis.printing import run_words
 from identification.printing.numbers import (
@@ -17,7 +17,6 @@ from identification.printing.numbers import (
     unit_mark,
     with_std,
 )
-from tunnel_lab.diagnosis_view.figures_common import plain
 from tunnel_sim.effects import effect_class, known_effects
 
 Document = Mapping[str, Any]
@@ -45,18 +44,14 @@ def headline(document: Document) -> tuple[str, str]:
         return "No gap", "none"
     if causes == ["unknown"]:
         return "Unexplained gap", "unknown"
-    names = words(causes)
+    names = plain(*causes)
     if document["ambiguous_with"]:
         return f"{names}, or {' or '.join(plain(n) for n in document['ambiguous_with'])}", "open"
     return names, "found"
 
 
 def facts(document: Document) -> list[Fact]:
-    """The figures at the head of the page.
-
-    Returns:
-        Facts in the order shown.
-    """
+    """The figures at the head of the page."""
     gap, where = document["gap"], document["where"]
     found = [Fact("Gap of the nominal model", excess(gap["excess_before"]), "noise variances")]
     if document["causes"] and document["causes"] != ["unknown"]:
@@ -216,11 +211,7 @@ def _interval95(values: Document) -> str:
 
 
 def next_steps(document: Document) -> list[str]:
-    """What to do next, in the order in which to do it.
-
-    Returns:
-        Sentences.
-    """
+    """What to do next, in the order in which to do it."""
     causes, rest = document["causes"], document.get("rest") or {}
     steps = [
         f"{', '.join(remark['runs']) or 'The campaign'}: {remark['remedy']}."
@@ -239,7 +230,7 @@ def next_steps(document: Document) -> list[str]:
         steps.append("State the effect that you suspect in a file, and diagnose again with --effects-file.")
     else:
         steps.append(
-            f"Repair the rig ({words(causes)}), measure again, and compare the two diagnoses (tunnel compare)."
+            f"Repair the rig ({plain(*causes)}), measure again, and compare the two diagnoses (tunnel compare)."
         )
         steps.append("Until then use the coefficients with the causes, not those of the nominal model.")
     if rest.get("material"):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from diagnosis.names import plain
 from diagnosis.printing import held_out_excess
 from identification.printing.numbers import significant
-from tunnel_lab.diagnosis_view.figures_common import plain
 from tunnel_lab.diagnosis_view.view import CONDITIONS, UNDETERMINED_PLACE, excess, minus, percent
 from tunnel_sim.vocabulary.campaign import Campaign
 

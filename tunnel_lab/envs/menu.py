@@ -127,7 +127,9 @@ def make_menu(
     for name, values in lists.items():
         least = 0.0 if name == "wind_speeds" else np.nextafter(0.0, 1.0)
         if len(values) == 0 or len(set(values)) != len(values):
-            raise TunnelError(f"{name} = {list(values)!r} needs values, each once", remedy="correct the list")
+            raise TunnelError(
+                f"{name} = {list(values)!r} is empty or holds a value twice", remedy="correct the list"
+            )
         for value in values:
             if isinstance(value, bool) or not (isfinite(value) and value >= least):
                 bound = "of 0 or more" if least == 0.0 else "above 0"

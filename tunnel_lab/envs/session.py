@@ -66,7 +66,7 @@ class Conditions:
 
     @property
     def noise_std(self) -> float:
-        """Of the reading, quantisation included, rad."""
+        """Standard deviation of the reading's noise, quantisation included, rad."""
         noise = stated_noise(self.sensor_properties)
         assert noise is not None
         return noise
@@ -125,7 +125,7 @@ class Knowledge:
 
     @property
     def rig_time(self) -> float:
-        """Spent so far, s."""
+        """Rig time spent so far, s."""
         return float(sum(self.costs))
 
     @property

@@ -68,12 +68,7 @@ def known_run() -> KnownRun:
     """Spring 5 at 10 m/s with the paper's coefficients: the run that Table III may be of, an inference."""
     plan, rig = paper_run_plan(1), load_rig()
     truth, on = plan.truth, plan.conditions[1]
-    air = {
-        "air_density": rig.air.density,
-        "wind_speed": on.wind_speed,
-        "frontal_area": rig.body.frontal_area,
-        "reference_length": rig.body.length,
-    }
+    air = rig.body.flow(rig.air.density, on.wind_speed)
     stiffness = float(on.spring_stiffness or 0.0)
     inertia, damping = truth.yaw_inertia, truth.mechanical_damping
     ka, ca = aerodynamic_stiffness(truth.cn_beta, **air), aerodynamic_damping(truth.cn_r, **air)

@@ -1,33 +1,30 @@
-"""The paper's networks against known truth: Fig. 3, Tables III and IV, Figs 4 to 6, and noise against the bound.
-
-Nothing is printed or drawn here; the page ``the-papers-networks`` and `tunnel_lab.paper.network_plots` show it.
-"""
+"""The paper's networks against known truth: Fig. 3, the run behind Table III, Table IV and Figs 4 to 6."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from math import pi, sqrt
 
 import numpy as np
-from scipy.stats import chi2
 
 from identification import identify
-from identification.decay.damped_oscillation import Decay, free_decay, response_rows
-from identification.estimate import Estimate, Quantity
+from identification.datasets import paper_derivatives, paper_springs, paper_windows
+from identification.decay.damped_oscillation import Decay, response_rows
+from identification.estimate import Estimate
 from identification.neural.networks import Networks
 from identification.neural.shape import cycles_time, network_inputs
 from identification.neural.training_set import held_out_points
-from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_lab.terminal.effect_option import parse_effect
 from tunnel_sim.files.plan_file import paper_plan
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.plan import CampaignPlan, EffectSetting, SensorModel, Truth
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.record import Array
 
 NETWORK, CONVENTIONAL, BEST = "neural_network", "conventional", "output_error"
 METHODS = (NETWORK, CONVENTIONAL, BEST)
-# What the tutorial on the paper's own gap finds in Table III, one of the explanations that it cannot tell apart.
+# One of the explanations of Table III that the tutorial on the paper's own gap cannot distinguish.
 SOFTENING = (
     parse_effect("cubic_stiffness:coefficient=-0.39"),
     parse_effect("quadratic_damping:coefficient=0.0038"),
@@ -63,107 +60,46 @@ def fig3_errors(networks: Networks, rng: np.random.Generator) -> HeldOutErrors:
 
 
 @dataclass(frozen=True)
-class Ratio:
-    """A root mean square error over the Cramér–Rao bound.
+class SpringInference:
+    """What one spring of Table II would imply for the run behind Table III.
 
     Args:
-        value: the ratio.
-        low: end of its 95 % interval, ratio.
-        high: the other end, ratio.
+        spring: number.
+        wind_speed: V at which the printed Cnβ brings the spring's wind-off frequency down to the table's
+            mean, m/s.
+        mechanical_damping: Cr left of the table's mean damping once the printed Cnr is taken off, N m s/rad;
+            negative is impossible.
     """
 
-    value: float
-    low: float
-    high: float
-
-    def __str__(self) -> str:
-        """Value and interval."""
-        return f"{self.value:.2g} ({self.low:.2g}-{self.high:.2g})"
+    spring: int
+    wind_speed: float
+    mechanical_damping: float
 
 
-def ratio_of(errors: Array, bound: float) -> Ratio:
-    """RMS over a bound, with the interval of a normal error's variance.
+def infer_springs() -> tuple[SpringInference, ...]:
+    """Which springs can be the one behind Table III: an inference, not a statement of the paper.
 
-    Args:
-        errors: shape (n,).
-        bound: standard deviation, in the errors' unit.
+    Each spring's own inertia is Kr/ω0², as in the paper's eqs 10 and 11; Cnβ and Cnr are Table IV's of the
+    neural network, which the paper took from the means of Table III.
+
+    Returns:
+        One row per spring whose wind-off frequency lies above the table's mean, as a positive Cnβ demands.
     """
-    value, count = float(np.sqrt(np.mean(errors**2))) / bound, errors.size
-    low, high = np.sqrt(count / chi2.ppf([0.975, 0.025], count))
-    return Ratio(value, value * float(low), value * float(high))
-
-
-@dataclass(frozen=True)
-class NoiseRow:
-    """Errors of ζ in white noise at one damping ratio.
-
-    Args:
-        zeta: true damping ratio.
-        window: of the networks on the first three cycles, over the bound of those three cycles.
-        runs: by method on the whole record, over the bound of the whole record; None where it fails on any.
-        coverage: share of the networks' 95 % intervals that hold the truth, ratio.
-    """
-
-    zeta: float
-    window: Ratio
-    runs: Mapping[str, Ratio | None]
-    coverage: float
-
-
-def noise_row(
-    zeta: float,
-    rng: np.random.Generator,
-    *,
-    omega_n: float = 12.5,
-    noise: float = 5e-4,
-    trials: int = 40,
-    duration: float = 10.0,
-) -> NoiseRow:
-    """Identify closed-form releases from 20° at 1 kHz in white noise.
-
-    Args:
-        zeta: damping ratio.
-        omega_n: natural frequency, rad/s.
-        noise: standard deviation, rad.
-        duration: of a record, s.
-    """
-    time, angle = np.arange(round(1000.0 * duration)) / 1000.0, float(np.radians(20.0))
-    clean = free_decay(time, Decay.from_modal(omega_n, zeta), angle, 0.0)
-    found: dict[str, list[Quantity]] = {method: [] for method in METHODS}
-    first: list[Quantity] = []
-    for _ in range(trials):
-        run = Run("r", Record(time, clean + noise * rng.standard_normal(time.size)), 0.0)
-        campaign = Campaign("noise", RigProperties(), SensorProperties(1000.0, None, noise), (run,))
-        for method in METHODS:
-            (estimate,) = identify(campaign, method, throw=False).runs
-            if estimate.zeta is not None:
-                found[method].append(estimate.zeta)
-            if method == NETWORK and estimate.windows:
-                first.append(estimate.windows[0].zeta)
-    whole, three = _bounds(zeta, omega_n, noise, time, angle)
-    own = found[NETWORK]
-    errors = {method: np.array([one.value - zeta for one in values]) for method, values in found.items()}
-    return NoiseRow(
-        zeta=zeta,
-        window=ratio_of(np.array([one.value - zeta for one in first]), three),
-        runs={m: ratio_of(e, whole) if e.size == trials else None for m, e in errors.items()},
-        coverage=float(np.mean([abs(one.value - zeta) < 1.96 * one.std for one in own])),
-    )
-
-
-def _bounds(zeta: float, omega_n: float, noise: float, time: Array, angle: float) -> tuple[float, float]:
-    # Of ζ: from the whole record, and from three cycles after its first zero crossing.
-    root = float(np.sqrt(1.0 - zeta**2))
-    bound = partial(
-        damped_sinusoid_bound, frequency=omega_n * root / (2.0 * np.pi), zeta=zeta, noise_std=noise
-    )
-    lag = -float(np.arctan2(zeta, root))
-    whole = bound(time, amplitude=angle / root, phase=lag)
-    crossing = (0.5 * np.pi - lag) / (omega_n * root)
-    size = angle / root * float(np.exp(-zeta * omega_n * crossing))
-    t3 = 6.0 * np.pi / (omega_n * root)
-    three = bound(time[time < t3], amplitude=size, phase=-0.5 * np.pi)
-    return whole.zeta, three.zeta
+    rows = paper_windows()
+    omega = float(np.mean([row.omega_n_rad_per_s for row in rows]))
+    zeta = float(np.mean([row.zeta for row in rows]))
+    printed, rig = paper_derivatives()[0], load_rig()
+    found = []
+    for spring in paper_springs():
+        stiffness, omega_0 = spring.stiffness_n_m_per_rad, 2.0 * pi * spring.frequency_hz
+        if omega_0 <= omega:
+            continue
+        inertia = stiffness / omega_0**2
+        per_square = aerodynamic_stiffness(printed.cn_beta_per_rad, **rig.body.flow(rig.air.density, 1.0))
+        speed = sqrt((stiffness - inertia * omega**2) / per_square)
+        lost = aerodynamic_damping(printed.cn_r_per_rad, **rig.body.flow(rig.air.density, speed))
+        found.append(SpringInference(spring.number, speed, 2.0 * zeta * omega * inertia + lost))
+    return tuple(found)
 
 
 def paper_run_plan(
@@ -237,32 +173,3 @@ def _mean_misfit(campaign: Campaign, estimate: Estimate) -> float:
             left = run.record.yaw_rad - regenerated(run, one.omega_n.value, one.zeta.value)
             values.append(float(np.sqrt(np.mean(left**2))) / abs(run.release_angle or np.nan))
     return float(np.mean(values))
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Whether the network is the closer of two, over many campaigns.
-
-    Args:
-        rms: root mean square of each method's quantity, % of the truth or of the release angle.
-        closer: number of campaigns in which the network's is smaller than the conventional method's.
-    """
-
-    rms: Mapping[str, float]
-    closer: int
-    total: int
-
-
-def verdict(rows: Sequence[Mapping[str, Closeness]], quantity: str) -> Verdict:
-    """Count and average over campaigns that every method answered.
-
-    Args:
-        quantity: ``cn_beta``, ``cn_r`` or ``response``.
-    """
-    whole = [row for row in rows if all(method in row for method in METHODS)]
-    values = {m: np.array([getattr(row[m], quantity) for row in whole]) for m in METHODS}
-    return Verdict(
-        {m: float(np.sqrt(np.mean(v**2))) for m, v in values.items()},
-        int(np.sum(np.abs(values[NETWORK]) < np.abs(values[CONVENTIONAL]))),
-        len(whole),
-    )

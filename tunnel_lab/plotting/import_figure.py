@@ -26,9 +26,6 @@ _GREY = "0.6"
 def import_picture(imported: Imported) -> bytes:
     """Draw what was read.
 
-    Args:
-        imported: of `read_records`.
-
     Returns:
         A PNG. Samples that are left out are grey; a vertical line marks where a run begins.
     """

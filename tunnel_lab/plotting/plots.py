@@ -29,7 +29,7 @@ COLOURS = (
     "#0072b2", "#d55e00", "#009e73", "#b0529b", "#9a6f00", "#2f8fb0", "#b5484f", "#6f8200", "#7a63c7", "#77808a",
 )  # fmt: skip
 """Of `figures.mplstyle`."""
-BLUE, VERMILION, GREEN, GREY = (COLOURS[index] for index in (0, 1, 2, 9))
+BLUE, VERMILION = COLOURS[:2]
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
 WIND_OFF, WIND_ON = BLUE, VERMILION
 PANELS_PER_PAGE = 12

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.estimate import Quantity
-from identification.scoring.accuracy import Outcome, Score, collect, score
-from tunnel_lab.scoring.work import Progress, Row, estimate_rows, fingerprint, resumed
+from identification.scoring.accuracy import Score, collect, score
+from tunnel_lab.scoring.work import Progress, Row, estimate_rows, fingerprint, outcome, resumed
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
@@ -71,7 +70,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """Of its file."""
+        """Name of its file."""
         return f"{self.effect.replace(' ', '_')}-{self.severity:g}-{self.realisation}"
 
 
@@ -100,7 +99,7 @@ def make_cases(
     effects: Sequence[str] = EFFECTS,
     severities: Sequence[float] = SEVERITIES,
     duration: float = 10.0,
-    tell_steps: bool = False,
+    show_steps: bool = False,
 ) -> list[Case]:
     """Size the effects and simulate their campaigns.
 
@@ -111,7 +110,7 @@ def make_cases(
         realisations: number of campaigns for each effect and severity.
         severities: excess to leave after the nominal refit, in noise powers.
         duration: of every run, s.
-        tell_steps: show the progress of sizing on standard error.
+        show_steps: show the progress of sizing on standard error.
 
     Returns:
         The campaign without effect, then by effect, severity and realisation.
@@ -120,7 +119,7 @@ def make_cases(
     nothing = CampaignDraw("none", conditions, (), 0)
     sized = size_effects(
         [_draw(conditions, name, severity, seed) for name in effects for severity in severities],
-        progress=tell_steps,
+        progress=show_steps,
     )
     several = [_realise(draw, i, seed) for draw in (nothing, *sized) for i in range(realisations)]
     # A motion without random forcing is integrated once.
@@ -202,7 +201,7 @@ def break_down(
         mark,
         jobs=jobs,
         parts=parts,
-        tell=lambda names: None if progress is None else progress(len(names), len(named)),
+        report=lambda names: None if progress is None else progress(len(names), len(named)),
     )
     return [row for name in named for row in done[name]]
 
@@ -248,16 +247,11 @@ def biases(rows: Sequence[Row]) -> list[Bias]:
     return [
         Bias(
             effect, severity, float(np.mean([row["reached"] for row in some])), estimator, quantity,
-            score(collect(_outcome(row) for row in some)),
+            score(collect(outcome(row) for row in some)),
             float(np.mean([row["status"] == "model_departs" for row in some])),
         )
         for (effect, severity, estimator, quantity), some in groups.items()
     ]  # fmt: skip
-
-
-def _outcome(row: Row) -> Outcome:
-    found = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
-    return Outcome(row["truth"], found, row["bound"])
 
 
 def breakdown_frame(found: Sequence[Bias]) -> pl.DataFrame:

@@ -104,7 +104,7 @@ def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
     """The conditions of cells of one kind in a few words.
 
     Returns:
-        What tells each cell from the others; and what is common to all.
+        What distinguishes each cell from the others; and what is common to all.
     """
     parts = [_parts(cell) for cell in cells]
     if len(parts) == 1:

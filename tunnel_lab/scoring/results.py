@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from identification.estimate import Quantity
 from identification.scoring.accuracy import Outcome, Score, Trials, collect, score
 from tunnel_lab.scoring.grid import NO_EFFECT, Cell, Grid
-from tunnel_lab.scoring.work import Row, describe, unit_of
+from tunnel_lab.scoring.work import Row, describe, outcome, unit_of
 from tunnel_sim.files.json_text import json_line
 from tunnel_sim.files.reading import as_described, frame_schema, parse_json, read_frame, read_regular
 from tunnel_sim.files.writing import write_whole
@@ -50,9 +50,8 @@ class Results:
         """The trials of every estimator, cell and quantity."""
         outcomes: dict[Key, list[Outcome]] = {}
         for row in self.rows:
-            found = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
             key = (row["estimator"], row["cell"], row["quantity"])
-            outcomes.setdefault(key, []).append(Outcome(row["truth"], found, row["bound"]))
+            outcomes.setdefault(key, []).append(outcome(row))
         return {key: collect(every) for key, every in outcomes.items()}
 
     def milliseconds(self, estimator: str, cells: Sequence[int]) -> float:

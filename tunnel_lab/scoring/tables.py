@@ -9,7 +9,8 @@ import numpy as np
 from rich.text import Text
 
 from identification.printing.numbers import SYMBOLS, concise, significant
-from identification.scoring.accuracy import Proportion, Score, mean_figure, overall, score
+from identification.scoring.accuracy import Score, mean_figure, overall, score
+from identification.statistics.proportion import Proportion
 from tunnel_lab.scoring.check import Finding, Verdict
 from tunnel_lab.scoring.results import Results, groups_of
 from tunnel_lab.terminal.tables import table

@@ -11,6 +11,8 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from identification.estimate import UNITS, Quantity
+from identification.scoring.accuracy import Outcome
 from tunnel_lab.scoring.grid import Cell, Grid, check_trials
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import output_folder, write_json
@@ -46,7 +48,7 @@ class Unit:
 
     @property
     def name(self) -> str:
-        """Of its file."""
+        """Name of its file."""
         return f"c{self.cell:04d}-t{self.first:05d}"
 
 
@@ -127,14 +129,18 @@ def estimate_rows(
     return rows
 
 
+def outcome(row: Row) -> Outcome:
+    """A row as it is scored."""
+    found = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
+    return Outcome(row["truth"], found, row["bound"])
+
+
 def unit_of(quantity: str) -> str:
     """Unit of a scored quantity.
 
     Raises:
         KeyError: when no cell scores it.
     """
-    from identification.estimate import UNITS
-
     return {**UNITS, "zeta": "1", "omega_n": "rad/s"}[quantity]
 
 
@@ -165,7 +171,7 @@ def score_grid(
     mark = fingerprint(grid.to_json_dict(), estimators)
     sizes = {unit.name: unit.stop - unit.first for unit in units}
 
-    def tell(names: Sequence[str]) -> None:
+    def report(names: Sequence[str]) -> None:
         if progress is not None:
             progress(sum(sizes[name] for name in names), sum(sizes.values()))
 
@@ -175,7 +181,7 @@ def score_grid(
         mark,
         jobs=jobs,
         parts=parts,
-        tell=tell,
+        report=report,
     )
     order = sorted(units, key=lambda unit: (unit.cell, unit.first))
     return [row for unit in order for row in done[unit.name]]
@@ -188,7 +194,7 @@ def resumed(
     *,
     jobs: int,
     parts: Path | None,
-    tell: Callable[[Sequence[str]], None],
+    report: Callable[[Sequence[str]], None],
 ) -> dict[str, list[Row]]:
     """Do work in processes, store what is finished, and skip what was finished before.
 
@@ -198,17 +204,16 @@ def resumed(
         mark: work stored under another mark is repeated, see `fingerprint`.
         jobs: number of processes; 0 works in this one.
         parts: folder for finished work; None for none.
-        tell: called with the names of all finished items, at the start and after each.
+        report: called with the names of all finished items, at the start and after each.
 
     Returns:
         The rows of every item, by name.
     """
     done: dict[str, list[Row]] = {}
-    for name in items if parts is not None else ():
-        rows = None if parts is None else _kept(parts, name, mark)
-        if rows is not None:
-            done[name] = rows
-    tell(tuple(done))
+    if parts is not None:
+        kept = {name: _kept(parts, name, mark) for name in items}
+        done = {name: rows for name, rows in kept.items() if rows is not None}
+    report(tuple(done))
     names = {id(item): name for name, item in items.items()}
     left = [item for name, item in items.items() if name not in done]
     for item, rows in in_processes(work, left, jobs):
@@ -216,7 +221,7 @@ def resumed(
         if parts is not None:
             write_json(output_folder(parts) / f"{name}.json", {"fingerprint": mark, "rows": rows})
         done[name] = rows
-        tell(tuple(done))
+        report(tuple(done))
     return done
 
 

@@ -134,7 +134,7 @@ def _draw_elsewhere(
     request: Request, look: Look, path: Path, at: float | None, progress: Callable[[int, int], None] | None
 ) -> None:
     """Draw in a child process into a temporary folder, then move the result to its place."""
-    order = {"request": request.to_json_dict(), "look": asdict(look), "at": at}
+    order = {"request": asdict(request), "look": asdict(look), "at": at}
     reasons = []
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / f"drawn{'.png' if at is not None else '.mp4'}"
@@ -159,9 +159,9 @@ def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, i
     ):
         try:
             silent = _follow(child, progress)
-        finally:  # also when interrupted
-            if child.poll() is None:
-                child.kill()
+        finally:  # also when interrupted; `Popen` itself would then wait for a quarter of a second only
+            child.kill()
+            child.wait()
         if silent:
             return f"no answer in {FIRST_FRAME_S:.0f} s"
         if child.returncode == 0:

@@ -51,13 +51,9 @@ class Request:
     effects: tuple[str, ...] = ()
     seed: int | None = None
 
-    def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name, in JSON's types."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> Request:
-        """The inverse of `to_json_dict`."""
+        """From the fields by name."""
         return cls(**{**data, "effects": tuple(data["effects"])})
 
 

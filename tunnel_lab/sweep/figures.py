@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from identification.estimate import Quantity
-    from identification.scoring.accuracy import Proportion
+    from identification.statistics.proportion import Proportion
 
 DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "cn_r": "Cnr"}
 """Quantities that have a panel; Izz, Cr and the sensor's zero are in the first table and the CSV."""

@@ -29,7 +29,6 @@ def shards_in_processes(workers: int, say: Said) -> Callable[[str, Sequence[int]
     """Work by processes of this machine.
 
     Args:
-        workers: number of processes.
         say: called with each line for the user.
 
     Returns:

@@ -176,13 +176,7 @@ def _common(conditions: tuple[Condition, ...]) -> tuple[float | None, float | No
 
 def _run_truths(case: Case, condition: Condition) -> dict[str, float | None]:
     """ωn (rad/s) and ζ of the nominal model, small angles; None where its stiffness is not positive."""
-    truth, body = case.plan.truth, case.rig.body
-    air = {
-        "air_density": condition.air_density,
-        "wind_speed": condition.wind_speed,
-        "frontal_area": body.frontal_area,
-        "reference_length": body.length,
-    }
+    truth, air = case.plan.truth, case.rig.body.flow(condition.air_density, condition.wind_speed)
     stiffness = condition.spring_stiffness - aerodynamic_stiffness(truth.cn_beta, **air)
     damping = truth.mechanical_damping - aerodynamic_damping(truth.cn_r, **air)
     if stiffness <= 0.0:

@@ -135,6 +135,8 @@ class Store:
 
     def _is_whole(self, index: int) -> bool:
         """Whether the parts of a shard exist and match their checksums."""
+        if not self._checksum(index).exists():
+            return False
         kept = (RESULTS, RECORDS) if self.sweep.document.records else (RESULTS,)
         try:
             known = read_regular(self._checksum(index), limits.DOCUMENT_BYTES)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.scoring.accuracy import Proportion, Score, Trials, score
+from identification.scoring.accuracy import Score, Trials, score
+from identification.statistics.proportion import Proportion
 from tunnel_lab.sweep.product import NO_EFFECT
 from tunnel_lab.sweep.store import TIMINGS, Store
 from tunnel_sim.effects import effect_class

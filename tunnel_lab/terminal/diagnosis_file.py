@@ -60,7 +60,9 @@ class Document(Part):
     schema_version: int = Field(description="1")
     campaign: OneLine = Field(description="the campaign's name")
     causes: list[OneLine] = Field(description="effect names; empty: no gap; unknown: no effect explains it")
-    ambiguous_with: list[OneLine] = Field(description="effects that the runs cannot tell from the causes")
+    ambiguous_with: list[OneLine] = Field(
+        description="effects that the runs cannot distinguish from the causes"
+    )
     gap: _Gap = Field(description="the gap before and after the causes are added")
     candidates: list[_Candidate] = Field(min_length=1, description="answers, most probable first")
     coefficients: _Coefficients = Field(description="estimates before and after, and a note")

@@ -12,11 +12,7 @@ if TYPE_CHECKING:
 
 
 def show_import(imported: Imported) -> None:
-    """Print what was read, and how.
-
-    Args:
-        imported: of `read_records`.
-    """
+    """Print what was read, and how."""
     tables.show_tables(tables.rich_table(parts_table(imported)))
     for line in imported.remarks():
         tables.say(f"Note: {line}")
@@ -24,9 +20,6 @@ def show_import(imported: Imported) -> None:
 
 def parts_table(imported: Imported) -> TextTable:
     """The runs of an import, a row for each.
-
-    Args:
-        imported: of `read_records`.
 
     Returns:
         Samples, rate, the stretch of the record, the swing and the conditions.

@@ -39,11 +39,11 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
         task = progress.add_task(what, total=total)
         begun = False
 
-        def tell(done: int, count: int, name: str = "") -> None:
+        def advance(done: int, count: int, name: str = "") -> None:
             nonlocal begun
             if not begun:
                 progress.reset(task, completed=done, total=count)
                 begun = True
             progress.update(task, completed=done, total=count, description=f"{what} {name}".rstrip())
 
-        yield tell
+        yield advance

@@ -87,7 +87,7 @@ def _row(row: list[str], columns: dict[str, int], where: str) -> tuple[str, floa
     name = row[columns[NAME]].strip() if NAME in columns else ""
     if len(name) > limits.NAME_CHARACTERS:
         what = f"the spring's name has {len(name)} characters"
-        raise TunnelError(what, where=where, remedy=f"give it {limits.NAME_CHARACTERS} at the most")
+        raise TunnelError(what, where=where, remedy=f"give it {limits.NAME_CHARACTERS} at most")
     return name, _positive(row[columns[STIFFNESS]], where), _positive(row[columns[FREQUENCY]], where)
 
 

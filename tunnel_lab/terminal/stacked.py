@@ -58,9 +58,9 @@ def stacked(table: Table, width: int) -> str:
     return "\n".join(lines)
 
 
-def _wrapped(text: str, lead: str, width: int) -> Iterator[str]:
-    """Lines of a text after a lead, the later ones indented as far."""
-    room = max(width - cell_len(lead), PROSE)
+def _wrapped(text: str, prefix: str, width: int) -> Iterator[str]:
+    """Lines of a text after a prefix, the later ones indented as far."""
+    room = max(width - cell_len(prefix), PROSE)
     lines = [part for line in text.splitlines() for part in wrap(line, room, break_long_words=False)]
     for number, line in enumerate(lines or [""]):
-        yield f"{lead if number == 0 else ' ' * cell_len(lead)}{line}".rstrip()
+        yield f"{prefix if number == 0 else ' ' * cell_len(prefix)}{line}".rstrip()

@@ -27,8 +27,8 @@ class TableFormat(StrEnum):
     JSON = "json"
 
 
-HELP = "Of the tables; json: one object a line. Other lines then go to standard error."
-QUIET_HELP = "Print errors only. Files and --json - are written all the same."
+HELP = "Format of the tables; json: one object per line. Other lines then go to standard error."
+QUIET_HELP = "Print errors only; files and --json - are still written."
 chosen: ContextVar[TableFormat] = ContextVar("table format", default=TableFormat.TEXT)
 """The format of this command's tables."""
 quiet: ContextVar[bool] = ContextVar("quiet", default=False)
@@ -37,21 +37,13 @@ _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 
 
 def with_format(run: Callable[..., None]) -> Callable[..., None]:
-    """A command with ``--quiet``, and ``--format`` for the tables that it prints.
-
-    Args:
-        run: the command.
-    """
+    """A command with ``--quiet``, and ``--format`` for the tables that it prints."""
     kind = Annotated[TableFormat, typer.Option("--format", help=HELP)]
     return _with_option(with_quiet(run), "table_format", kind, chosen)
 
 
 def with_quiet(run: Callable[..., None]) -> Callable[..., None]:
-    """A command with the option ``--quiet``.
-
-    Args:
-        run: the command.
-    """
+    """A command with the option ``--quiet``."""
     return _with_option(run, "quiet", Annotated[bool, typer.Option("--quiet", "-q", help=QUIET_HELP)], quiet)
 
 

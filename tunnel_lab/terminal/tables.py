@@ -10,7 +10,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from identification.printing import estimate_tables as printing
 from identification.printing.numbers import SYMBOLS, concise, in_stds, significant, unit, with_std
 from tunnel_lab.terminal.stacked import is_too_wide, stacked
 from tunnel_lab.terminal.table_format import TableFormat, chosen, quiet, rendered
@@ -92,7 +91,7 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
         title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_edge=False
     )
     for column in columns:
-        # As text, not markup: units stand in brackets. Folded, not cut, so that no digit is lost.
+        # As text, not markup: units are in brackets. Folded, not cut, so that no digit is lost.
         result.add_column(Text(column), justify="right" if column in right else "left", overflow="fold")
     return result
 
@@ -103,15 +102,6 @@ def rich_table(plain: TextTable) -> Table:
     for row in plain.rows:
         result.add_row(*map(Text, row))
     return result
-
-
-def coefficients_table(estimate: Estimate) -> Table:
-    """The coefficients that were identified.
-
-    Returns:
-        A table; without rows when the campaign gives normalised form only.
-    """
-    return rich_table(printing.coefficients_table(estimate.to_json_dict()))
 
 
 def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Table:
@@ -188,15 +178,6 @@ def windows_table(run: RunEstimate) -> Table:
             _concise(window.omega_n),
         )
     return result
-
-
-def status_lines(estimate: Estimate) -> list[str]:
-    """The statuses of the estimate and its runs, each once.
-
-    Returns:
-        A line for each status other than "identified", with the runs it concerns and the remedy.
-    """
-    return printing.status_lines(estimate.to_json_dict())
 
 
 def _named(symbol: str, unit_name: str) -> Text:

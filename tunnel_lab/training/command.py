@@ -19,8 +19,6 @@ def train_posterior(out: Path, seed: int, shards: int, steps: int, *, jobs: int,
         out: the safetensors file; the record is written beside it.
         shards: of training samples, two hundred campaigns each.
         steps: number of batches of each network.
-        jobs: processes that simulate.
-        restart: forget unfinished work.
 
     Raises:
         TunnelError: when a file cannot be written, or unfinished work belongs to another seed.
@@ -30,12 +28,12 @@ def train_posterior(out: Path, seed: int, shards: int, steps: int, *, jobs: int,
     folder = out.with_suffix(".part")
     if restart and folder.exists():
         shutil.rmtree(folder)
-    with bar("training", 1) as tell:
+    with bar("training", 1) as progress:
         trained = train(
             TrainingSpec(seed, shards, steps),
             folder,
             jobs=jobs,
-            tell=lambda what, done, all_of_it: tell(done, all_of_it, what),
+            progress=lambda what, done, all_of_it: progress(done, all_of_it, what),
         )
     write_whole(out, trained.weights)
     write_json(out.with_suffix(".json"), trained.record)

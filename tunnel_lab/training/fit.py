@@ -85,13 +85,13 @@ def fit(
     samples: Mapping[str, Array],
     spec: FitSpec,
     state: State,
-    tell: Callable[[int, float], None] = lambda _step, _loss: None,
+    progress: Callable[[int, float], None] = lambda _step, _loss: None,
     until: int | None = None,
 ) -> State:
     """Continue a fit.
 
     Args:
-        tell: called with the step and its loss.
+        progress: called with the step and its loss.
         until: step to stop at; the last one where None.
     """
     import torch
@@ -125,7 +125,7 @@ def fit(
                 move = first[name] / (1.0 - 0.9 ** (step + 1))
                 size = (second[name] / (1.0 - 0.999 ** (step + 1))).sqrt() + 1e-8
                 weights[name] -= rate * (move / size + 1e-3 * weights[name])
-        tell(step, float(value.detach()))
+        progress(step, float(value.detach()))
     moments = {f"1.{n}": v.numpy() for n, v in first.items()} | {
         f"2.{n}": v.numpy() for n, v in second.items()
     }

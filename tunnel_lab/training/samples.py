@@ -55,7 +55,7 @@ class ShardSpec:
 
     @property
     def name(self) -> str:
-        """Of its file."""
+        """Name of its file."""
         return f"{self.part}-{self.number:04d}.safetensors"
 
 

@@ -75,14 +75,14 @@ class Result:
 
 
 def train(
-    spec: TrainingSpec, folder: Path, *, jobs: int, tell: Progress = lambda _what, _done, _all: None
+    spec: TrainingSpec, folder: Path, *, jobs: int, progress: Progress = lambda _what, _done, _all: None
 ) -> Result:
     """Simulate what is missing, and fit both networks; finished work in the folder is kept and used.
 
     Args:
         folder: of shards and checkpoints.
         jobs: processes that simulate; the result does not depend on their number.
-        tell: called with what is done, how much of it is finished, and of how much.
+        progress: called with what is done, how much of it is finished, and of how much.
 
     Raises:
         TunnelError: when the folder belongs to another seed, or cannot be written.
@@ -93,9 +93,9 @@ def train(
         ShardSpec(spec.seed, part, number, sizes) for part in PARTS for number in range(spec.of_part(part))
     ]
     for done, _ in enumerate(in_processes(partial(write_shard, folder=folder), shards, jobs), 1):
-        tell("simulating", done, len(shards))
+        progress("simulating", done, len(shards))
     parts = {part: read_shards(folder, part, spec.of_part(part)) for part in PARTS}
-    networks = {kind: _fitted(kind, spec, parts[PARTS[0]], folder, tell) for kind in KINDS}
+    networks = {kind: _fitted(kind, spec, parts[PARTS[0]], folder, progress) for kind in KINDS}
     found = {
         kind: judged(
             networks[kind], usable(parts[PARTS[0]], _LETTERS[kind]), usable(parts[PARTS[2]], _LETTERS[kind])
@@ -120,7 +120,7 @@ def _sizes(seed: int, folder: Path) -> tuple[tuple[str, float], ...]:
 
 
 def _fitted(
-    kind: str, spec: TrainingSpec, samples: Mapping[str, Array], folder: Path, tell: Progress
+    kind: str, spec: TrainingSpec, samples: Mapping[str, Array], folder: Path, progress: Progress
 ) -> dict[str, Array]:
     """The weights of one network, from its checkpoint on."""
     own = usable(samples, _LETTERS[kind])
@@ -133,7 +133,7 @@ def _fitted(
             f"m/{n}": v for n, v in state.moments.items()
         }
         write_whole(path, save(tensors, {"mark": mark, "step": str(state.step)}))
-        tell(f"fitting the network of a {kind}", state.step, spec.steps)
+        progress(f"fitting the network of a {kind}", state.step, spec.steps)
     return state.weights
 
 

@@ -169,7 +169,6 @@ class Effect:
         """Draw the random part of the effect in one run.
 
         Args:
-            stated: the run as the campaign states it.
             rng: the generator of this effect in this run.
 
         Returns:
@@ -180,9 +179,6 @@ class Effect:
 
     def drawn_number(self, drawn: Drawn) -> float:
         """The phase or instant that a run drew; without it the effect would silently do nothing.
-
-        Args:
-            drawn: what `draw` returned for the run.
 
         Returns:
             A phase in rad, or an instant as a share of the run.
@@ -196,9 +192,6 @@ class Effect:
 
     def drawn_numbers(self, drawn: Drawn) -> Array:
         """The random numbers that a run drew; without them the effect would silently do nothing.
-
-        Args:
-            drawn: what `draw` returned for the run.
 
         Returns:
             The numbers, shape (n,).
@@ -226,11 +219,6 @@ class Effect:
 
         Args:
             run: as the earlier effects left it.
-            stated: the run as the campaign states it.
-            drawn: what `draw` returned for the run.
-
-        Returns:
-            The changed physics.
         """
         del stated, drawn
         law = self.law()
@@ -238,9 +226,6 @@ class Effect:
 
     def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float] | None:
         """The moment that the effect adds, computed independently of its hooks, for ``tunnel effects check``.
-
-        Args:
-            stated: the run as the campaign states it.
 
         Returns:
             The moment (N m) as a function of time (s), angle (rad) and rate (rad/s); None: not stated.
@@ -253,8 +238,6 @@ class Effect:
 
         Args:
             time_s: by the time stamps, s, shape (n,).
-            stated: the run as the campaign states it.
-            drawn: what the run drew.
 
         Returns:
             The true times, s, shape (n,).
@@ -268,8 +251,6 @@ class Effect:
         Args:
             angle: of the rod's upper end, rad, shape (n,).
             time_s: true times, s, shape (n,).
-            stated: the run as the campaign states it.
-            drawn: what `draw` returned for the run.
 
         Returns:
             The changed angle, rad, shape (n,).
@@ -278,14 +259,7 @@ class Effect:
         return angle
 
     def on_sensor(self, sensor: SensorModel) -> SensorModel:
-        """Change the sensor itself.
-
-        Args:
-            sensor: as stated.
-
-        Returns:
-            The true one.
-        """
+        """Change the sensor itself."""
         return sensor
 
     def on_reading(self, reading: Array) -> Array:

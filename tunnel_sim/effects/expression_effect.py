@@ -146,9 +146,9 @@ def expression_effect(
     """
     text = moment if reading is None else reading
     if text is None or (moment is not None and reading is not None):
-        raise TunnelError("states not exactly one of moment and reading", remedy="state one of them")
+        raise TunnelError("does not state exactly one of moment and reading", remedy="state one of them")
     if (channel == "sensor") != (reading is not None):
-        raise TunnelError(f"channel {channel!r} is not that of a {'moment' if reading is None else 'reading'}",
+        raise TunnelError(f"channel {channel!r} is not for a {'moment' if reading is None else 'reading'}",
                           remedy="use sensor for a reading, and another channel for a moment")  # fmt: skip
     _check_names(parameters)
     formula = parse(text, frozenset(parameters) | (_MOMENT if reading is None else _READING))

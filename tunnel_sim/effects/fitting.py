@@ -1,4 +1,4 @@
-"""What a fit tells an effect of the runs, and the starting values that the effect answers with."""
+"""What a fit passes to an effect about the runs, and the starting values that the effect returns."""
 
 from __future__ import annotations
 

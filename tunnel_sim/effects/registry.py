@@ -60,9 +60,6 @@ def register_effect(kind: KindT) -> KindT:
     Args:
         kind: a frozen dataclass derived from `Effect`. It replaces an earlier one of the same name.
 
-    Returns:
-        The same class.
-
     Raises:
         TunnelError: when it has a built-in name, no severity, or lacks what the vocabulary needs.
     """
@@ -73,9 +70,6 @@ def register_effect(kind: KindT) -> KindT:
 
 def check_kind(kind: object) -> None:
     """Refuse what cannot be an effect of the vocabulary.
-
-    Args:
-        kind: a class.
 
     Raises:
         TunnelError: for the first fault.

@@ -71,7 +71,7 @@ class SensorClipping(Effect):
             return np.clip(reading, self.centre - self.limit, self.centre + self.limit)
         room = self.knee * self.limit
         size = np.abs(reading - self.centre)
-        straight = self.limit - room
-        over = np.maximum(size - straight, 0.0)
-        bent = np.minimum(size, straight) - room * np.expm1(-over / room)
-        return self.centre + np.copysign(bent, reading - self.centre)
+        linear = self.limit - room
+        over = np.maximum(size - linear, 0.0)
+        limited = np.minimum(size, linear) - room * np.expm1(-over / room)
+        return self.centre + np.copysign(limited, reading - self.centre)

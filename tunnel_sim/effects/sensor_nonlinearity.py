@@ -68,5 +68,5 @@ class SensorNonlinearity(Effect):
             cubed = angle**3
         else:
             cubed = np.sign(angle) * _REFERENCE**3 * (np.abs(angle) / _REFERENCE) ** self.exponent
-        bent = angle + self.coefficient * cubed
-        return bent if self.quadratic == 0.0 else bent + self.quadratic * angle**2
+        shown = angle + self.coefficient * cubed
+        return shown if self.quadratic == 0.0 else shown + self.quadratic * angle**2

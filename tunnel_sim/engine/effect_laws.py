@@ -94,7 +94,7 @@ def condition(kind: type[Effect]) -> str:
 
 
 def round_trip(kind: type[Effect]) -> str:
-    """It goes through JSON by name."""
+    """Written to JSON and read back by name, it is the same."""
     for effect in (example(kind), kind()):
         document = json.loads(json.dumps(effect.to_json_dict(), allow_nan=False))
         if document.get("name") != kind.name or make_effect(kind, document.get("parameters", {})) != effect:
@@ -146,7 +146,7 @@ def integration(kind: type[Effect]) -> str:
 
 
 def oracle(kind: type[Effect]) -> str:
-    """It moves the rig as the moment does that its class states independently."""
+    """It moves the rig like the moment that its class states independently."""
     worst = 0.0
     for run in (WIND_ON, WIND_OFF):
         moment = example(kind).moment_oracle(run)
@@ -161,12 +161,9 @@ def oracle(kind: type[Effect]) -> str:
 def _by_scipy(run: RunSettings, moment: Callable[[float, float, float], float], time_s: Array) -> Array:
     from scipy.integrate import solve_ivp  # only here: slow to load
 
-    body = load_rig().body
-    flow = {"air_density": run.air_density, "frontal_area": body.frontal_area, "wind_speed": run.wind_speed}
-    flow["reference_length"] = body.length
-    windy = run.wind_speed > 0.0
-    stiffness = aerodynamic_stiffness(run.derivatives.cn_beta, **flow) if windy else 0.0
-    damping = aerodynamic_damping(run.derivatives.cn_r, **flow) if windy else 0.0
+    flow = load_rig().body.flow(run.air_density, run.wind_speed)
+    stiffness = aerodynamic_stiffness(run.derivatives.cn_beta, **flow)
+    damping = aerodynamic_damping(run.derivatives.cn_r, **flow)
 
     def derivative(t: float, state: Array) -> tuple[float, float]:
         angle, rate = state

@@ -53,7 +53,6 @@ class Start:
     """Where a run starts.
 
     Args:
-        run: its id.
         time: since the start of the record, s.
         angle: displacement from rest, rad.
         rate: rad/s.
@@ -88,7 +87,6 @@ def patched(
     """The model with a law written into it.
 
     Args:
-        model: as given.
         patch: the law.
         starts: of the runs, written as keyframes.
 
@@ -196,7 +194,7 @@ def _write_spring(
     real = roots.real[np.abs(roots.imag) < 1e-6]
     if real.size == 0:
         raise TunnelError(
-            "the spring of the patched model would vanish nowhere", remedy="give it a spring of its own"
+            "the patched model would have no position of rest", remedy="give it a spring of its own"
         )
     usual = -offset if np.any(own.coef) else 0.0
     zero = float(real[np.argmin(np.abs(real - usual))])

@@ -168,14 +168,8 @@ def drawn_springs(rig: Rig) -> list[float]:
     Returns:
         N m/rad; all springs where none is stiff enough.
     """
-    body = rig.body
-    needed = STIFFNESS_MARGIN * aerodynamic_stiffness(
-        CN_BETA[1],
-        air_density=rig.air.density,
-        wind_speed=WIND_SPEED[1],
-        frontal_area=body.frontal_area,
-        reference_length=body.length,
-    )
+    flow = rig.body.flow(rig.air.density, WIND_SPEED[1])
+    needed = STIFFNESS_MARGIN * aerodynamic_stiffness(CN_BETA[1], **flow)
     return [value for value in rig.springs.values() if value > needed] or list(rig.springs.values())
 
 
@@ -224,7 +218,7 @@ def _check_time(effect: Effect) -> None:
     """An episode reads the motion as it goes: none of it can be passed over."""
     if effect.skips and not effect.is_null:
         raise TunnelError(
-            "an episode cannot pass over samples",
+            "an episode cannot drop samples",
             where=f"effect {effect.name}",
             remedy="inject it with tunnel simulate, which makes whole records",
         )

@@ -133,11 +133,7 @@ class OneRun:
         mujoco.mj_setState(self._model.mj, self._data, np.asarray(state, dtype=np.float64), STATE)
 
     def pose(self, row: int) -> tuple[float, float]:
-        """Angle of the rod's upper end, and of the body relative to it, rad.
-
-        Returns:
-            The two angles.
-        """
+        """Angle of the rod's upper end, and of the body relative to it, rad."""
         return _pose(self.get_qpos(row))
 
     def get_qpos(self, row: int) -> Array:

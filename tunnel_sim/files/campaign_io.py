@@ -99,9 +99,6 @@ def write_campaign(
         beside: further files of the folder, by name.
         checked: whether every record has passed `checked_record`, so that this need not be done again.
 
-    Returns:
-        The folder.
-
     Raises:
         TunnelError: the folder exists or may not be replaced; the campaign would not be readable; the disk
             reports an error.
@@ -191,7 +188,6 @@ def checked_record(
         column: that the readings are from, for messages.
         sensor: what is stated of the sensor.
         release_angle: as stated, rad.
-        where: file and run, for messages.
 
     Raises:
         TunnelError: times that do not increase, fewer than three cycles, or what looks like a wrong unit.
@@ -212,7 +208,7 @@ def _check_inside(folder: Path, path: Path, where: str) -> None:
     try:
         inside = path.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):
-        raise TunnelError("the path cannot be followed", where=where, remedy="correct 'file'") from None
+        raise TunnelError("the path cannot be resolved", where=where, remedy="correct 'file'") from None
     if not inside:
         raise TunnelError(
             "a symbolic link leads outside the campaign's folder",

@@ -85,12 +85,6 @@ class CampaignDocument(StrictModel):
 def read_document(path: Path) -> CampaignDocument:
     """Read and validate ``campaign.toml``; the run files are not opened.
 
-    Args:
-        path: the file.
-
-    Returns:
-        The validated document.
-
     Raises:
         TunnelError: for the first fault, naming file, run and remedy.
     """
@@ -101,11 +95,7 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
     """Validate the content of ``campaign.toml``.
 
     Args:
-        document: the tables.
         path: the file that is read or written, for the message.
-
-    Returns:
-        The validated document.
 
     Raises:
         TunnelError: for the first fault, naming file, run and remedy.
@@ -133,7 +123,6 @@ def run_place(path: Path, run_id: str) -> str:
 
     Args:
         path: of the run's file, or of the campaign's folder.
-        run_id: id of the run.
     """
     return f"{shown(path)}, run '{run_id}'"
 
@@ -174,7 +163,6 @@ def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, An
     """The tables of ``campaign.toml`` for a campaign.
 
     Args:
-        campaign: the campaign.
         files: the file of every run, by id, relative to the campaign's folder.
 
     Returns:

@@ -25,7 +25,6 @@ def export_campaign(campaign: Campaign, path: Path, kind: str) -> Path:
     """Write a campaign as one file, completely or not at all.
 
     Args:
-        campaign: what to write.
         path: the file; replaced when it exists.
         kind: ``mat``, ``csv``, ``xlsx`` or ``hdf5``.
 

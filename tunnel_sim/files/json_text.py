@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -41,6 +42,21 @@ def json_line(document: object, *, sort_keys: bool = False) -> str:
         TypeError: as for `json_text`.
     """
     return _encoded(document, sort_keys=sort_keys)
+
+
+def as_json(value: object) -> Any:
+    """A value in JSON's types: dataclasses by field unless they have a ``to_json_dict``, tuples as lists.
+
+    Args:
+        value: dataclasses, mappings, tuples and lists of them, and plain values.
+    """
+    if hasattr(value, "to_json_dict"):
+        return value.to_json_dict()
+    if dataclasses.is_dataclass(value):
+        return {own.name: as_json(getattr(value, own.name)) for own in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {key: as_json(one) for key, one in value.items()}
+    return [as_json(one) for one in value] if isinstance(value, tuple | list) else value
 
 
 def _encoded(document: object, **layout: Any) -> str:

@@ -40,12 +40,7 @@ def plan_from(document: PlanDocument, rig: Rig, where: str) -> CampaignPlan:
     """The plan defined by a validated campaign description.
 
     Args:
-        document: the description.
         rig: as in `load_plan`.
-        where: the file, for messages.
-
-    Returns:
-        The plan.
 
     Raises:
         TunnelError: when the rig has no such spring.

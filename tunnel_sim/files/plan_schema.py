@@ -90,12 +90,6 @@ class PlanDocument(StrictModel):
 def read_plan(path: Path) -> PlanDocument:
     """Read and validate a campaign description.
 
-    Args:
-        path: the file.
-
-    Returns:
-        The validated document.
-
     Raises:
         TunnelError: for the first fault, in one line that names file, key and remedy.
     """
@@ -148,7 +142,6 @@ def check_size(runs: int, duration: float, sample_rate: float, where: str) -> No
         runs: number of runs.
         duration: of each run, s.
         sample_rate: Hz.
-        where: file or option, for messages.
 
     Raises:
         TunnelError: too many runs, samples or integration steps, with their number and the limit.
@@ -179,7 +172,6 @@ def check_conditions(plan: ConditionKeys, where: str) -> None:
 
     Args:
         plan: a campaign description, or a table with the same keys.
-        where: the file, for messages.
 
     Raises:
         TunnelError: when no spring is given, or a value occurs twice.

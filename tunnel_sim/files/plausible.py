@@ -104,9 +104,7 @@ def plausible_run(record: Record, cycles: float, where: str, *, angle: bool = Tr
     """Refuse a record that appears to be in a wrong unit, or that is sampled too slowly.
 
     Args:
-        record: the run's reading.
         cycles: number of cycles in the record.
-        where: file and run, for messages.
         angle: whether the reading is an angle; rates and accelerations may have any size.
 
     Raises:

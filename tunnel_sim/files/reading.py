@@ -31,14 +31,10 @@ def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", 
     """Read a regular file.
 
     Args:
-        path: the file.
         limit: greatest size, bytes.
         where: its name in messages; its path when empty.
         missing: the remedy where there is no such file.
         readable: the remedy where it is not a regular file or cannot be read.
-
-    Returns:
-        Its content.
 
     Raises:
         TunnelError: no such file, not a regular file, not readable, or too large.
@@ -67,13 +63,9 @@ def read_text(path: Path, limit: int, *, where: str = "", missing: str = "") -> 
     """Read a regular file of UTF-8 text, without its byte order mark.
 
     Args:
-        path: the file.
         limit: greatest size, bytes.
         where: its name in messages; its path when empty.
         missing: the remedy where there is no such file.
-
-    Returns:
-        The text.
 
     Raises:
         TunnelError: as `read_regular`, or not UTF-8.
@@ -84,13 +76,6 @@ def read_text(path: Path, limit: int, *, where: str = "", missing: str = "") -> 
 
 def decoded(content: bytes, where: str) -> str:
     """UTF-8 text, without its byte order mark.
-
-    Args:
-        content: of the file.
-        where: its name in messages.
-
-    Returns:
-        The text.
 
     Raises:
         TunnelError: not UTF-8.
@@ -108,12 +93,8 @@ def read_json(path: Path, *, remedy: str, limit: int = limits.JSON_BYTES) -> dic
     """Read a JSON object.
 
     Args:
-        path: the file.
         remedy: what to do where it is missing or malformed.
         limit: greatest size, bytes.
-
-    Returns:
-        The object.
 
     Raises:
         TunnelError: as `read_regular` and `parse_json`.
@@ -126,7 +107,6 @@ def parse_json(content: bytes | str, where: str, remedy: str) -> dict[str, Any]:
 
     Args:
         content: UTF-8.
-        where: its name in messages.
         remedy: what to do where it is malformed.
 
     Returns:
@@ -153,7 +133,6 @@ def check_shape(document: Mapping[str, Any], where: str, remedy: str) -> None:
 
     Args:
         document: plain values.
-        where: its name in messages.
         remedy: what to do about it.
 
     Raises:
@@ -185,8 +164,6 @@ def frame_schema(
     """The columns of a Parquet file whose metadata says that it is not too large.
 
     Args:
-        content: of the file.
-        where: its name in messages.
         remedy: what to do where it is malformed.
         rows: greatest number of rows.
         counted: what a row is, in the plural, for messages.
@@ -202,7 +179,7 @@ def frame_schema(
     with _parquet_faults(where, remedy):
         schema = dict(pl.read_parquet_schema(io.BytesIO(content)))
         count = int(pl.scan_parquet(io.BytesIO(content)).select(pl.len()).collect().item())
-    check_count(len(schema), limits.COLUMNS, "columns", where, "leave out columns that nobody reads")
+    check_count(len(schema), limits.COLUMNS, "columns", where, "leave out columns that are not needed")
     check_count(count, rows, counted, where, "split the file, or thin it out")
     return schema
 
@@ -211,13 +188,8 @@ def read_frame(content: bytes, where: str, remedy: str, columns: Sequence[str]) 
     """Columns of a Parquet file that `frame_schema` has accepted.
 
     Args:
-        content: of the file.
-        where: its name in messages.
         remedy: what to do where it is malformed.
         columns: names of the columns to read; all must exist.
-
-    Returns:
-        The table.
 
     Raises:
         TunnelError: not a readable Parquet file.
@@ -249,7 +221,6 @@ def check_count(count: float, limit: int, what: str, where: str, remedy: str) ->
         count: the number, known before anything is expanded (a count).
         limit: see `tunnel_sim.vocabulary.limits`.
         what: what is counted, in the plural.
-        where: file or option, for the message.
         remedy: what to do about it.
 
     Raises:
@@ -266,7 +237,6 @@ def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
 
     Args:
         what: what is wrong, such as ``is not an estimate``.
-        where: name of the content.
         remedy: what to do about it.
 
     Raises:

@@ -32,9 +32,6 @@ def load_rig(path: Path | None = None) -> Rig:
         path: a TOML file with the sections of the packaged ``rig.toml``; None: the packaged file, which describes
             the rig of the paper.
 
-    Returns:
-        The rig.
-
     Raises:
         TunnelError: when the file cannot be read, or a key is missing, unknown or out of range.
     """
@@ -64,10 +61,6 @@ def parse_rig(document: Mapping[str, Any], where: str) -> Rig:
 
     Args:
         document: sections by name, as in the packaged ``rig.toml``; SI units.
-        where: the file, for messages.
-
-    Returns:
-        The rig.
 
     Raises:
         TunnelError: when a key is missing, unknown or out of range.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tunnel_sim.files.plausible import KEEP
+from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.cycles import count_cycles
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
@@ -26,7 +27,6 @@ def increasing_times(time_s: Array, sample_rate: float | None, where: str) -> No
     Args:
         time_s: sample times, shape (n,), s.
         sample_rate: as stated in the campaign, Hz; None where it is not stated.
-        where: file and run, for messages.
 
     Raises:
         TunnelError: a step back, a repeated time, or times in a unit other than s.
@@ -34,7 +34,7 @@ def increasing_times(time_s: Array, sample_rate: float | None, where: str) -> No
     if time_s.size < 2:
         raise TunnelError("only one sample", where=where, remedy="record three cycles or more")
     steps = np.diff(time_s)
-    back = np.flatnonzero(steps <= 0.0)
+    back = np.flatnonzero(steps < 1.0 / limits.FASTEST_RATE)
     if back.size:
         at = int(back[0])
         raise TunnelError(
@@ -63,7 +63,6 @@ def same_unit(angle: Array, column: str, release_angle: float | None, where: str
         angle: the reading, shape (n,), rad.
         column: ``yaw_rad`` or ``yaw_deg``, for messages.
         release_angle: nominal, rad; None where the campaign does not state it.
-        where: file and run, for messages.
 
     Raises:
         TunnelError: a factor of about 57.3 between reading and release angle.
@@ -91,10 +90,6 @@ def same_unit(angle: Array, column: str, release_angle: float | None, where: str
 
 def enough_cycles(record: Record, where: str) -> float:
     """Refuse a record with fewer than three cycles of oscillation.
-
-    Args:
-        record: the run's record.
-        where: file and run, for messages.
 
     Returns:
         Number of cycles in the record.

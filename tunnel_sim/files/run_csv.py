@@ -19,8 +19,6 @@ def read(content: bytes, where: str, most: int) -> FileTable:
     """The table as text.
 
     Args:
-        content: of the file.
-        where: file and run, for messages.
         most: how many samples it may hold (a count).
 
     Returns:
@@ -32,7 +30,7 @@ def read(content: bytes, where: str, most: int) -> FileTable:
     if not content.isascii():  # which needs no second copy of a large file
         decoded(content, where)
     columns = content.partition(b"\n")[0].count(b",") + 1
-    check_count(columns, limits.COLUMNS, "columns", where, "leave out columns that nobody reads")
+    check_count(columns, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
     check_count(content.count(b"\n") - 1, most, "samples", where, "split the file, or thin it out")
     try:
         rows = pl.read_csv(content, has_header=False, infer_schema=False, quote_char=None)
@@ -51,7 +49,7 @@ def read(content: bytes, where: str, most: int) -> FileTable:
         raise TunnelError("not comma-separated", where=where, remedy="put commas between the columns")
     twice = next((name for name in names if name in USED_COLUMNS and names.count(name) > 1), None)
     if twice is not None:
-        raise TunnelError(f"the column {twice} is there twice", where=where, remedy="leave one of them out")
+        raise TunnelError(f"the column {twice} occurs twice", where=where, remedy="leave one of them out")
     # Other columns that have no name, or share one, are kept apart by their position; nobody asks for them.
     rows.columns = [
         name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)

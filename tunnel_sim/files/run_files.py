@@ -46,7 +46,6 @@ def read_table(
 
     Args:
         path: a file with one of the endings in `READERS`.
-        where: file and run, for messages.
         timed: whether times are required because no ``sample_rate`` is stated.
         quantity: what the sensor measures, which names the column.
         most: greatest number of samples.
@@ -86,7 +85,6 @@ def table_bytes(record: Record, path: Path, quantity: Quantity = "angle") -> byt
     """The content of a run file with times and readings in radians; reading it gives the same numbers.
 
     Args:
-        record: what to write.
         path: the ``.csv`` or ``.parquet`` file, for the format and for messages.
         quantity: what the readings are, which names their column.
 

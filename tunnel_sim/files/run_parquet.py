@@ -17,8 +17,6 @@ def read(content: bytes, where: str, most: int) -> FileTable:
     """The columns that are used.
 
     Args:
-        content: of the file.
-        where: file and run, for messages.
         most: how many samples it may hold (a count).
 
     Raises:

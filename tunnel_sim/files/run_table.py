@@ -44,8 +44,6 @@ class RunReader(Protocol):
         """The table.
 
         Args:
-            content: of the file.
-            where: file and run, for messages.
             most: how many samples it may hold.
 
         Raises:

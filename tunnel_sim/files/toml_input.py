@@ -51,7 +51,6 @@ def load_toml(path: Path, *, missing: str) -> dict[str, Any]:
     """Read a TOML file.
 
     Args:
-        path: the file.
         missing: the remedy when there is no such file.
 
     Returns:
@@ -132,11 +131,7 @@ def read_document(model: type[ModelT], path: Path, *, missing: str) -> ModelT:
 
     Args:
         model: the model of the whole file.
-        path: the file.
         missing: the remedy when there is no such file.
-
-    Returns:
-        The validated document.
 
     Raises:
         TunnelError: for the first thing that is wrong.
@@ -153,9 +148,6 @@ def validate(model: type[ModelT], document: Mapping[str, Any], path: Path) -> Mo
         model: the model of the whole file.
         document: the document of :func:`load_toml`.
         path: its file, for the message.
-
-    Returns:
-        The validated document.
 
     Raises:
         TunnelError: for the first fault.

@@ -27,9 +27,6 @@ def output_folder(folder: Path) -> Path:
     Args:
         folder: where the output goes; it may exist.
 
-    Returns:
-        The same folder.
-
     Raises:
         TunnelError: when it is a file, or cannot be created or written to.
     """
@@ -63,10 +60,6 @@ def write_whole(path: Path, content: bytes) -> Path:
 
     Args:
         path: the file; replaced when it exists.
-        content: what to write.
-
-    Returns:
-        The same path.
 
     Raises:
         TunnelError: when it is a folder or a block device, or cannot be written.
@@ -90,9 +83,6 @@ def write_encoded(path: Path, encode: Callable[[BinaryIO], object]) -> Path:
         path: the file; replaced when it exists.
         encode: writes the content to a stream.
 
-    Returns:
-        The same path.
-
     Raises:
         TunnelError: when the writer fails, or as `write_whole`.
     """
@@ -105,9 +95,6 @@ def encoded(path: Path, encode: Callable[[BinaryIO], object]) -> bytes:
     Args:
         path: the file it is meant for, named in messages.
         encode: writes the content to a stream.
-
-    Returns:
-        The content.
 
     Raises:
         TunnelError: when the writer fails.
@@ -124,9 +111,6 @@ def write_json(path: Path, document: Mapping[str, object]) -> Path:
     Args:
         path: the file; replaced when it exists.
         document: as for `tunnel_sim.files.json_text.json_text`.
-
-    Returns:
-        The same path.
 
     Raises:
         TunnelError: when the file cannot be written.

@@ -100,9 +100,6 @@ def parse(text: str, names: frozenset[str]) -> Expression:
         text: numbers, names, ``+ - * / ^``, parentheses and `FUNCTIONS`; ``pi`` is a number.
         names: that it may contain.
 
-    Returns:
-        The expression.
-
     Raises:
         TunnelError: when it is too long or too deep, or holds anything else.
     """

@@ -109,12 +109,7 @@ def slow_motion(run: RunSettings, rig: Rig) -> SlowMotion | None:
     if twist is None:
         return None
     upper, lower = (share * run.yaw_inertia for share in (twist.inertia_share, 1.0 - twist.inertia_share))
-    flow = {
-        "air_density": run.air_density,
-        "wind_speed": run.wind_speed,
-        "frontal_area": rig.body.frontal_area,
-        "reference_length": rig.body.length,
-    }
+    flow = rig.body.flow(run.air_density, run.wind_speed)
     air = aerodynamic_stiffness(run.derivatives.cn_beta, **flow)
     air_damping = aerodynamic_damping(run.derivatives.cn_r, **flow)
     spring = run.spring_stiffness + run.parameters.get("gravity_stiffness", 0.0)

@@ -218,14 +218,10 @@ def body_rate(rig: Rig, run: RunSettings) -> float:
     damping += _slope(run, "quadratic_damping", 2.0, swing, 2.0)
     still = _largest_root(spring, damping, inertia)
     wind = run.series.get("wind_speed")
-    flow = {
-        "air_density": run.air_density,
-        "wind_speed": max(wind.values) if wind is not None else run.wind_speed,
-        "frontal_area": rig.body.frontal_area,
-        "reference_length": rig.body.length,
-    }
-    if flow["wind_speed"] == 0.0:
+    fastest = max(wind.values) if wind is not None else run.wind_speed
+    if fastest == 0.0:
         return still
+    flow = rig.body.flow(run.air_density, fastest)
     angle = abs(run.release_angle)
     air = aerodynamic_stiffness(run.derivatives.cn_beta, **flow)
     steeper = air * _slope(run, "moment_cubic", 3.0, angle, 0.2)

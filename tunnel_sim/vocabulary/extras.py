@@ -25,7 +25,6 @@ def library(name: str, use: str, extra: str, where: str = "") -> Any:
         name: of its module.
         use: what needs it, for the message.
         extra: one of `EXTRAS`.
-        where: the file or option concerned.
 
     Raises:
         TunnelError: when it is not installed; the remedy is the command that installs it.

@@ -48,6 +48,16 @@ class Body:
     frontal_area: float
     side_area: float
 
+    def flow(self, air_density: float, wind_speed: float) -> dict[str, float]:
+        """The named arguments of `aerodynamic_stiffness` and `aerodynamic_damping`.
+
+        Args:
+            air_density: ρ, kg/m³.
+            wind_speed: V, m/s.
+        """
+        sizes = {"frontal_area": self.frontal_area, "reference_length": self.length}
+        return {"air_density": air_density, "wind_speed": wind_speed, **sizes}
+
 
 @dataclass(frozen=True)
 class Rod:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -10,13 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
+from safetensors.numpy import save
 
 from identification.neural.posterior.network import shapes
-from identification.neural.stored import packaged, read_stored
-from tunnel_sim.files.reading import as_described, parse_json
-from tunnel_sim.vocabulary.errors import TunnelError
+from identification.neural.stored import opened, packaged, read_stored
 from tunnel_sim.vocabulary.record import Array
 
 SHIPPED = "posterior"
@@ -83,15 +79,7 @@ def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, Trained]:
     Raises:
         TunnelError: when they are malformed, or do not belong together.
     """
-    remedy = "train them again with tunnel train --estimator neural_posterior"
-    document = parse_json(record, where, remedy)
-    with as_described("not the weights and record of neural_posterior", where, remedy):
-        if document["weights_sha256"] != hashlib.sha256(weights).hexdigest():
-            raise TunnelError("weights and record do not belong together", where=where, remedy=remedy)
-        try:
-            tensors = load(weights)
-        except SafetensorError as error:
-            raise ValueError(error) from None
+    with opened(weights, record, where, estimator="neural_posterior") as (tensors, document):
         return {kind: _one(tensors, kind, document) for kind in KINDS}
 
 

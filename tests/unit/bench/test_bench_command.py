@@ -54,5 +54,5 @@ def test_a_port_that_is_taken_is_refused(tmp_path: Path) -> None:
         ]
         done = subprocess.run(words, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
-    assert done.stderr.startswith(f"tunnel: --port {port}: cannot be had")
+    assert done.stderr.startswith(f"tunnel: --port {port}: cannot be opened")
     assert done.stderr.count("\n") == 1

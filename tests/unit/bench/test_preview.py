@@ -53,7 +53,7 @@ def test_a_moved_mark_is_where_the_run_begins_also_for_the_command(session: Sess
 
 def test_a_mark_behind_its_end_is_refused_and_nothing_changes(session: Session) -> None:
     mark = preview.drawn(preview.read(session))[0].marks[0]
-    with pytest.raises(TunnelError, match=r"run '.*': the end .* is not behind the release"):
+    with pytest.raises(TunnelError, match=r"run '.*': the end .* is not after the release"):
         preview.move(session, mark, {"start": mark.end + 1.0})
     assert not session.choices.exists()
     preview.move(session, mark, {"start": 100.0, "end": 120.0})

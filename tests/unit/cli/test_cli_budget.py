@@ -35,12 +35,12 @@ def test_the_combined_uncertainty_is_what_is_reported(
     )
     assert (status, err) == (0, "")
     assert "Cnβ: wind_speed, common dominates" in out
-    told = json.loads((tmp_path / "e.json").read_text())
-    assert told["cn_beta"]["value"] == plain["cn_beta"]["value"]
+    stated = json.loads((tmp_path / "e.json").read_text())
+    assert stated["cn_beta"]["value"] == plain["cn_beta"]["value"]
     # 2 % of the speed are 4 % of Cnβ, beside little else.
-    assert told["cn_beta"]["std"] == pytest.approx(0.04 * abs(plain["cn_beta"]["value"]), rel=0.05)
-    assert told["budget"]["combined_std"]["cn_beta"] == told["cn_beta"]["std"]
-    assert told["yaw_inertia"]["std"] < 1.5 * plain["yaw_inertia"]["std"] + 1e-9
+    assert stated["cn_beta"]["std"] == pytest.approx(0.04 * abs(plain["cn_beta"]["value"]), rel=0.05)
+    assert stated["budget"]["combined_std"]["cn_beta"] == stated["cn_beta"]["std"]
+    assert stated["yaw_inertia"]["std"] < 1.5 * plain["yaw_inertia"]["std"] + 1e-9
     assert "budget" not in plain
 
 

@@ -28,7 +28,7 @@ def effects_file(tmp_path: Path) -> Path:
         (("-k*b*", "-k*r*"), "is in kg m2/s3, not in N m"),
         (("-k*b*", "-k*beta*"), "unknown name 'beta'; use one of Kr, V, b"),
         (('name = "gain"', 'name = "detent"'), "effect 'detent': is given twice"),
-        (('channel = "sensor"', 'channel = "damping"'), "effect 'gain': channel 'damping' is not that"),
+        (('channel = "sensor"', 'channel = "damping"'), "effect 'gain': channel 'damping' is not for a reading"),
         (("y + s*y^3", "y + s*y^3 + 0.1*y"), "is not y at s = 0"),
         (("y + s*y^3", "y*(1 + s*sqrt(y)^4)"), "no finite value"),
         (("y + s*y^3", "y + 0*s*y^3"), "does nothing"),

@@ -23,7 +23,7 @@ def test_an_import_says_what_it_read_and_writes_the_campaign(tunnel: Tunnel, tmp
         "import", record(tmp_path), "--out", out, "--yes", "--set", "spring_stiffness=16"
     )
     assert (status, err) == (0, "")
-    assert "2 columns between commas" in said
+    assert "2 columns separated by commas" in said
     assert "wind-off is assumed" in said
     assert sorted(path.name for path in out.iterdir()) == [
         "campaign.toml",
@@ -52,7 +52,7 @@ def test_a_preview_writes_the_picture_alone(tunnel: Tunnel, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("options", "what"),
     [
-        ([], "--out, --preview: give either of them"),
+        ([], "--out, --preview: give one of them"),
         (["--out", "rig"], "add --yes"),
         (["--out", "rig", "--delimiter", "x"], "'delimiter' = 'x'"),
         (["--out", "rig", "--unit", "furlong"], "unknown unit 'furlong'"),

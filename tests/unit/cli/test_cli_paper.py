@@ -56,7 +56,7 @@ def test_the_whole_page(tunnel: Tunnel, tmp_path: Path) -> None:
     assert page.count("<section") == 9
     assert out.count("reproduced") == 2
     assert "not reproducible" in out
-    for name in ("springs", "impulse", "network-errors", "windows", "table-3-explained", "responses"):
+    for name in ("springs", "impulse", "network-errors", "windows", "responses"):
         assert f'src="{name}.png"' in page
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert (tmp_path / f"{name}.pdf").read_bytes().startswith(b"%PDF")

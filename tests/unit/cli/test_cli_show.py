@@ -26,6 +26,7 @@ from tunnel_lab.show.trace import draw_trace
 from tunnel_lab.show.window import Controls, missing_display, window_loop
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
+from tunnel_sim.files.json_text import as_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
 Tunnel = Callable[..., tuple[int, str, str]]
@@ -154,7 +155,7 @@ def test_what_is_shown_is_the_plans_run() -> None:
     assert with_effect.settings.parameters["friction_moment"] == 0.01
     assert "coulomb friction" in with_effect.title
     request = Request(plan="p", effects=("a:b=1",), seed=3)
-    assert Request.from_json_dict(request.to_json_dict()) == request
+    assert Request.from_json_dict(as_json(request)) == request
 
 
 def test_the_live_run_is_the_simulated_one_and_begins_again() -> None:

@@ -77,16 +77,16 @@ def test_quiet_prints_nothing_but_errors_and_writes_all_the_same(
 
 
 def test_a_note_shows_the_command_of_its_remedy(tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path) -> None:
-    bent = tmp_path / "my rig"
-    shutil.copytree(tiny_campaign, bent)
-    run = bent / "runs" / "r01.csv"
+    spaced = tmp_path / "my rig"
+    shutil.copytree(tiny_campaign, spaced)
+    run = spaced / "runs" / "r01.csv"
     lines = run.read_text().splitlines()
     cubic = [
         f"{t},{float(y) * (1.0 + 3.0 * float(y) ** 2)}" for t, y in (line.split(",") for line in lines[1:])
     ]
     run.write_text("\n".join([lines[0], *cubic]))
-    out = tunnel("identify", bent)[1]
-    assert f"run: tunnel diagnose '{bent}'" in out
+    out = tunnel("identify", spaced)[1]
+    assert f"run: tunnel diagnose '{spaced}'" in out
     assert "run the diagnosis" not in out
 
 

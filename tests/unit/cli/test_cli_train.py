@@ -6,7 +6,7 @@ import pytest
 
 from tunnel_lab.cli import main
 
-QUICK = ["--starts", "1", "--damping-steps", "8", "--frequency-steps", "8"]
+QUICK = ["--starts", "1", "--steps", "8"]
 
 
 def test_trains_writes_both_files_and_says_what_came_of_it(tmp_path, capsys):

@@ -220,5 +220,5 @@ def test_a_state_of_another_configuration_is_refused() -> None:
 
 def test_an_episode_cannot_pass_over_samples() -> None:
     env = make(duration=0.3)
-    with pytest.raises(EnvError, match="cannot pass over samples"):
+    with pytest.raises(EnvError, match="cannot drop samples"):
         env.reset(seed=1, options=STATED | {"effects": {"dropped_samples": {"lost_time": 0.01}}})

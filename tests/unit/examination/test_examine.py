@@ -68,7 +68,7 @@ def test_winds_exchanged_between_two_runs():
     assert "wind_speed" in remark.what
 
 
-def test_exchanges_that_cannot_be_told_apart_are_all_named():
+def test_exchanges_that_cannot_be_distinguished_are_all_named():
     data = stated(grid((16.0, 35.0), (0.0, 20.0)), "k16-v0", wind_speed=20.0, air_density=1.2)
     data = stated(data, "k16-v20", wind_speed=0.0)
     remark = refused(data)

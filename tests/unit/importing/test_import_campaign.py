@@ -135,7 +135,7 @@ def test_conditions_from_a_table(tmp_path: Path) -> None:
         ("file,speed\na.csv,1\n", "no column of conditions"),
         ("file,wind_speed\nb.csv,1\n", "no row for run 'a' of a.csv"),
         ("file,wind_speed\na.csv,fast\n", "wind_speed = 'fast' is not a number"),
-        ("file,wind_speed\na.csv,1\na.csv,2\n", "'a.csv' is there twice"),
+        ("file,wind_speed\na.csv,1\na.csv,2\n", "'a.csv' occurs twice"),
         ("file,wind_speed\na.csv,-1\n", "greater than or equal to 0"),
         ("file,wind_speed\na.csv\n", "1 cells in line 2, but 2 names"),
     ],

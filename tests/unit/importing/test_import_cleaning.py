@@ -59,7 +59,7 @@ def test_the_pull_of_a_hand_is_cut_off(hold: float) -> None:
     assert piece.last == reading.size
 
 
-def test_runs_one_after_another_are_told_apart(tmp_path: Path) -> None:
+def test_runs_one_after_another_are_separated(tmp_path: Path) -> None:
     parts, begins = [], []
     for seed, amplitude in ((1, 0.35), (2, 0.3), (3, -0.35)):
         parts += [held(0.0, 1.5), pulled(amplitude, 1.2), held(amplitude, 0.8)]

@@ -140,7 +140,7 @@ def test_texts_among_the_numbers_are_said(tmp_path: Path) -> None:
     [
         (b"", "the file is empty", "name a file"),
         (b"\x89HDF\r\n\x1a\n", "it begins like an HDF5 file", "ending of its format"),
-        (b"time,angle\n0,1\0\n", "zero bytes", "ending of its format"),
+        (b"time,angle\n0,1\0\n", "NUL bytes", "ending of its format"),
         (b"all\nwords\nhere\n", "no columns of numbers", "--delimiter"),
         (b"a,b,c\n" + b"".join(b"%d.5,%d,%d\n" % (i, i * i % 7, i * i % 5) for i in range(99)),
          "2 columns may be the angle: 'b', 'c'", '--angle "b"'),

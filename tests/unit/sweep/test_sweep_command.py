@@ -75,7 +75,7 @@ def test_a_broken_file_is_one_line_and_leaves_nothing(
         (["FILE"], "--out is missing"),
         (["--out", "OUT"], "FILE is missing"),
         (["no.toml", "--out", "OUT"], "no such file"),
-        (["FILE", "--out", "OUT", "--summary", "OUT"], "takes no FILE"),
+        (["FILE", "--out", "OUT", "--summary", "OUT"], "takes neither FILE nor --out"),
         (["--summary", "OUT"], "sweep.json: no such file; name the folder of a sweep"),
         (["FILE", "--out", "TAKEN"], "the folder holds something else"),
         (["FILE", "--out", "FILE"], "cannot be written"),

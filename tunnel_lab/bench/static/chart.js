@@ -93,8 +93,8 @@ export default {
         mark().about = `${mark().label}: ${mark().at.toPrecision(4)} ${mark().unit}`;
         this.place();
       };
-      const tell = () => this.$emit("moved", { id, at: mark().at });
-      let telling;
+      const report = () => this.$emit("moved", { id, at: mark().at });
+      let pending;
       made.addEventListener("pointerdown", (event) => {
         event.preventDefault();
         event.stopPropagation();
@@ -105,7 +105,7 @@ export default {
           to(this.chart.posToVal(axis === "y" ? move.clientY - box.top : move.clientX - box.left, axis));
         made.onpointerup = () => {
           made.onpointermove = made.onpointerup = null;
-          if (mark().at !== before) tell(); // a click states nothing
+          if (mark().at !== before) report(); // a click states nothing
         };
       });
       made.addEventListener("mousedown", (event) => event.stopPropagation()); // uPlot would zoom
@@ -115,8 +115,8 @@ export default {
         event.preventDefault();
         const { min, max } = this.chart.scales[axis], { clientWidth, clientHeight } = this.chart.over;
         to(mark().at + steps * (max - min) / (axis === "y" ? clientHeight : clientWidth));
-        clearTimeout(telling);
-        telling = setTimeout(tell, 600);
+        clearTimeout(pending);
+        pending = setTimeout(report, 600);
       });
       this.handles.set(id, made);
       return made;

@@ -65,13 +65,12 @@ def check_size(count: int, where: str) -> None:
 
     Args:
         count: of all values (a count).
-        where: the file.
 
     Raises:
         TunnelError: too many.
     """
     most = limits.DATA_BYTES // 8
-    check_count(count, most, "numbers", where, "split the file, or leave out what nobody reads")
+    check_count(count, most, "numbers", where, "split the file, or leave out arrays that are not needed")
 
 
 def _part(group: str, groups: Mapping[tuple[str, int], list[Channel]]) -> str:

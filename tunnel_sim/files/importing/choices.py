@@ -65,9 +65,9 @@ class ImportChoices(StrictModel):
     )
     decimal: Literal[".", ","] | None = Field(default=None, description="'.' or ','")
     start: float | None = Field(
-        default=None, description="a time of the file in s: what is earlier is left out"
+        default=None, description="a time of the file in s: earlier samples are left out"
     )
-    end: float | None = Field(default=None, description="a time of the file in s: what is later is left out")
+    end: float | None = Field(default=None, description="a time of the file in s: later samples are left out")
     rest: float | None = Field(
         default=None, description="the reading at rest in rad, to be subtracted from every run"
     )
@@ -129,7 +129,6 @@ def parse_setting(text: str, where: str) -> Conditions:
 
     Args:
         text: such as ``wind_speed=12.5, air_density=1.2``.
-        where: the option, for messages.
 
     Raises:
         TunnelError: not of that form, an unknown key, or a value out of range.

@@ -83,7 +83,8 @@ def restarts(time: Array) -> list[int]:
     Returns:
         Index of the first sample of every further run; empty where rows are only out of order.
     """
-    back = np.flatnonzero(np.diff(time) < 0.0) + 1
+    with np.errstate(invalid="ignore"):  # rows without a finite time are left out later
+        back = np.flatnonzero(np.diff(time) < 0.0) + 1
     if not back.size or back.size > max(1.0, _RESTARTS * time.size):
         return []
     starts = [0, *back.tolist(), time.size]

@@ -62,8 +62,6 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[Pair]:
 
     Args:
         table: of a file.
-        choices: what the user has stated.
-        where: file and part, for messages.
 
     Returns:
         The columns of each run; at least one.

@@ -24,8 +24,6 @@ _FACTS = {
     "spring_stiffness": re.compile(r"(?i)^(spring[ _]?stiffness|stiffness)$"),
 }
 
-Stated = Mapping[str, float]
-
 
 def from_facts(facts: Mapping[str, float]) -> dict[str, float]:
     """Conditions that a file states beside its columns."""
@@ -56,7 +54,7 @@ def name_pattern(text: str) -> re.Pattern[str]:
             known = _ALIASES.get(key, key)
             if known not in RUN_KEYS or f"<{known}>" in expression:
                 raise TunnelError(
-                    f"'{part}' is not a condition" if known not in RUN_KEYS else f"'{part}' is there twice",
+                    f"'{part}' is not a condition" if known not in RUN_KEYS else f"'{part}' occurs twice",
                     where=f"--name {one_line(text, 60)}",
                     remedy=did_you_mean(key, (*_ALIASES, *RUN_KEYS)),
                 )
@@ -71,7 +69,6 @@ def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
 
     Args:
         pattern: of `name_pattern`; None: the name says nothing.
-        path: the file.
 
     Raises:
         TunnelError: when the name is not of that pattern.
@@ -95,7 +92,7 @@ class ConditionTable:
         path: a text file with a column ``file`` or ``run``, and columns named as in ``campaign.toml``.
 
     Raises:
-        TunnelError: not such a table, a name that is there twice, or a value out of range.
+        TunnelError: not such a table, a name that occurs twice, or a value out of range.
     """
 
     def __init__(self, path: Path) -> None:
@@ -117,7 +114,7 @@ class ConditionTable:
             name = row[self._key].strip()
             if name.lower() in self._rows:
                 raise TunnelError(
-                    f"'{one_line(name)}' is there twice", where=shown(path), remedy="leave one out"
+                    f"'{one_line(name)}' occurs twice", where=shown(path), remedy="leave one out"
                 )
             self._rows[name.lower()] = _numbers({key: row[i] for key, i in used.items()}, name, path)
 
@@ -126,7 +123,6 @@ class ConditionTable:
 
         Args:
             path: the file that holds it.
-            run: its id.
 
         Raises:
             TunnelError: when no row names the file or the run.

@@ -54,7 +54,6 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
 
     Args:
         facts: numbers of the file, by name.
-        choices: what the user has stated.
 
     Returns:
         The interval, s, None where nothing states it; and what states it.
@@ -73,7 +72,6 @@ def in_seconds(time: Channel, choices: ImportChoices, said: list[str]) -> Array:
 
     Args:
         time: the column, shape (n,).
-        choices: what the user has stated.
         said: a remark is added where the unit is guessed from the step.
 
     Returns:
@@ -97,10 +95,8 @@ def in_radians(
 
     Args:
         reading: the column, shape (n,).
-        choices: what the user has stated.
         calibration: of a voltage.
         said: a remark is added where the unit is guessed.
-        where: file and run, for messages.
 
     Returns:
         The readings, shape (n,), what they are, and the unit they were taken to have.

@@ -14,7 +14,6 @@ def faults(kind: str, where: str) -> Iterator[None]:
 
     Args:
         kind: what the file is not, with its article.
-        where: the file.
 
     Raises:
         TunnelError: instead of any other exception.

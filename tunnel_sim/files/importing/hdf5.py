@@ -33,7 +33,9 @@ def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Tabl
         attributes: dict[str, NDArray[np.generic]] = {}
 
         def visit(path: str, item: Any) -> None:
-            check_count(len(datasets), limits.COLUMNS, "datasets", where, "leave out what nobody reads")
+            check_count(
+                len(datasets), limits.COLUMNS, "datasets", where, "leave out datasets that are not needed"
+            )
             if isinstance(item, h5py.Dataset) and not path.startswith("#refs#") and not _is_text(item):
                 datasets[path] = item
             for name, value in item.attrs.items():

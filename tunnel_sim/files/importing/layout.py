@@ -23,7 +23,6 @@ def is_number(text: str, decimal: str = ".") -> bool:
     """Whether a text is a number.
 
     Args:
-        text: a cell.
         decimal: the decimal sign.
     """
     return _NUMBER[decimal].fullmatch(text) is not None
@@ -81,7 +80,7 @@ def find_layout(
     names = list(above[-1][1]) if above else []
     split = [split_unit(name) for name in names]
     named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
-    if len(set(named)) < len(named):  # ambiguous names: the position tells them apart
+    if len(set(named)) < len(named):  # ambiguous names: the position distinguishes them
         named = [name if named.count(name) == 1 else f"{name} #{i + 1}" for i, name in enumerate(named)]
     return Layout(
         first,

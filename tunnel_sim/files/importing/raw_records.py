@@ -59,7 +59,6 @@ def raw_records(
 
     Args:
         source: the file.
-        choices: what the user has stated.
         calibration: of a voltage.
         named: conditions in the file's name.
         several: whether ids must name the file, because there are others.

@@ -77,7 +77,7 @@ class Imported:
         """How the files were read and what was changed, each once with the runs that it concerns.
 
         Args:
-            path: of the file to speak of; None: of all files.
+            path: of the file; None: all files.
         """
         sources = [source for source in self.sources if path in (None, source.path)]
         parts = [part for part in self.parts if path in (None, part.raw.source)]

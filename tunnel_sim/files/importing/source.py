@@ -82,11 +82,6 @@ class Reader(Protocol):
     def read(self, content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
         """The tables, and how they were read, for the recipe.
 
-        Args:
-            content: of the file.
-            where: its name in messages.
-            choices: what the user has stated.
-
         Raises:
             TunnelError: when it is not such a file, or too large.
         """
@@ -119,10 +114,6 @@ _BEGINNINGS = {
 
 def read_source(path: Path, choices: ImportChoices) -> Source:
     """Read a file of any known format.
-
-    Args:
-        path: the file.
-        choices: what the user has stated.
 
     Returns:
         Its tables. Nothing is known yet about the meaning of their columns.

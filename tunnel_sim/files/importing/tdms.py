@@ -30,7 +30,9 @@ def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Tabl
     with faults(KIND, where), nptdms.TdmsFile.open(io.BytesIO(content)) as file:
         groups = file.groups()
         channels = [channel for group in groups for channel in group.channels()]
-        check_count(len(channels), limits.COLUMNS, "channels", where, "leave out what nobody reads")
+        check_count(
+            len(channels), limits.COLUMNS, "channels", where, "leave out channels that are not needed"
+        )
         check_size(sum(len(channel) for channel in channels), where)
         for group in groups:
             numeric = [c for c in group.channels() if len(c) and np.dtype(c.dtype).kind in "iufb"]

@@ -65,7 +65,7 @@ def read(content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table
         raise TunnelError(
             "no columns of numbers", where=where, remedy="give --delimiter and --decimal, or name a table"
         )
-    check_count(dialect.width, limits.COLUMNS, "columns", where, "leave out columns that nobody reads")
+    check_count(dialect.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
     check_count(
         content.count(b"\n"), limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out"
     )
@@ -74,12 +74,12 @@ def read(content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table
         raise TunnelError(
             f"no numbers in the first {len(head)} lines",
             where=where,
-            remedy="cut off what stands above the table",
+            remedy="remove the lines above the table",
         )
     channels, notes = _channels(content, dialect, layout, where)
     heading = "names in the line above the numbers" if layout.headed else "no names of columns"
     said = (
-        f"text ({encoding}), {dialect.width} columns between {_SAID[dialect.delimiter]}, decimal "
+        f"text ({encoding}), {dialect.width} columns separated by {_SAID[dialect.delimiter]}, decimal "
         f"{'comma' if dialect.decimal == ',' else 'point'}, numbers from line {layout.first + 1}, {heading}",
         *notes,
     )
@@ -131,7 +131,7 @@ def _as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
         content, encoding = content.decode("latin-1").encode(), "Latin-1"
     if b"\0" in content:
         remedy = "give the file the ending of its format (.xlsx, .mat, .tdms, .h5, .parquet)"
-        raise TunnelError("is not text: it holds zero bytes", where=where, remedy=remedy)
+        raise TunnelError("is not text: it contains NUL bytes", where=where, remedy=remedy)
     content = content.removeprefix(b"\xef\xbb\xbf")
     return (content if b"\n" in content else content.replace(b"\r", b"\n")), encoding
 
@@ -249,6 +249,6 @@ def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
         raise TunnelError(
             f"{len(rows[wrong])} cells in line {wrong + 1}, but {len(rows[0])} names of columns",
             where=where,
-            remedy=f"give every line one cell for each column, between {_SAID[delimiter]}",
+            remedy=f"give every line one cell for each column, with {_SAID[delimiter]} between",
         )
     return rows[0], rows[1:]

@@ -33,7 +33,7 @@ def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Tabl
         book = fastexcel.read_excel(content)
         for name in book.sheet_names:
             head = book.load_sheet(name, header_row=None, dtypes="string", n_rows=_HEAD)
-            check_count(head.width, limits.COLUMNS, "columns", where, "leave out columns that nobody reads")
+            check_count(head.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
             rows = (
                 [[cell or "" for cell in row] for row in head.to_polars().iter_rows()] if head.width else []
             )

@@ -70,7 +70,6 @@ def write_imported(
     """Write what was read as a campaign, with its recipe; arguments as in `import_records`.
 
     Args:
-        imported: of `read_records`.
         folder: where the campaign goes.
         overwrite: whether a campaign in the folder may be replaced.
         picture: draws what was read, as PNG; None: no picture.
@@ -102,7 +101,6 @@ def campaign_text(document: Mapping[str, Any], originals: Sequence[str]) -> str:
     """``campaign.toml`` with the originals, and the keys that nobody has stated, as comments.
 
     Args:
-        document: the tables.
         originals: comments that name the files it was made of.
     """
     tables = {key: value for key, value in document.items() if key != "runs"}

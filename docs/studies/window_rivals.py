@@ -15,8 +15,8 @@ from math import log
 import numpy as np
 from scipy.optimize import least_squares
 
+from docs.studies.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
 from identification.datasets import WindowRow, paper_windows
-from tunnel_lab.paper.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -28,8 +28,8 @@ _SCALES = (0.02, 5e-4)  # of the base ωn (rad/s) and ζ
 _SLOWEST, _LEAST_ZETA, _MOST_ZETA = 0.1, 0.05, 0.2  # bounds of the base: a share of ωn, and ζ
 _ADJUSTMENTS = 3  # of the base, which an effect of great severity moves far
 _MOVES = 3.84  # fall of a column's χ² by chance once in twenty: an effect that does more moves the column
-#: Odds of 20:1 as a difference of BIC; less is "cannot be told apart".
-TOLD_APART = 2.0 * log(20.0)
+#: Odds of 20:1 as a difference of BIC; less is "cannot be distinguished".
+DISTINGUISHED = 2.0 * log(20.0)
 
 Kinds = tuple[type[Effect], ...]
 
@@ -88,9 +88,9 @@ class WindowDiagnosis:
 
     @property
     def tied(self) -> tuple[Explanation, ...]:
-        """Those the table cannot tell from the best: odds of less than 20:1."""
+        """Those that the table cannot distinguish from the best: odds of less than 20:1."""
         best = self.explanations[0].bic
-        return tuple(e for e in self.explanations if e.bic - best < TOLD_APART)
+        return tuple(e for e in self.explanations if e.bic - best < DISTINGUISHED)
 
     def probability_of(self, *names: str) -> float:
         """Summed weight of the hypotheses that hold at least one of the effects named."""
@@ -203,6 +203,13 @@ def _residuals(columns: Columns, target: Columns, std: Columns) -> Array:
     return np.concatenate((zeta, (columns.omega_n - target.omega_n) / std.omega_n))
 
 
+def _effects(kinds: Kinds, x: Array) -> tuple[Effect, ...]:
+    return tuple(
+        kind(**{kind.parameters()[0].name: float(u) * kind.parameters()[0].scale})
+        for kind, u in zip(kinds, x, strict=False)
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class _Task:
     """A table to be fitted. Unknowns: severities in units of the effects' scales, then base ωn and ζ."""
@@ -221,12 +228,8 @@ class _Task:
         return kinds, x if start is None else start
 
     def columns(self, kinds: Kinds, x: Array) -> Columns | None:
-        effects = tuple(
-            kind(**{kind.parameters()[0].name: float(u) * kind.parameters()[0].scale})
-            for kind, u in zip(kinds, x, strict=False)
-        )
         omega_n, zeta = self._base(x)
-        return simulate_windows(self.state, effects, omega_n, zeta, self.measured.zeta.size)
+        return simulate_windows(self.state, _effects(kinds, x), omega_n, zeta, self.measured.zeta.size)
 
     def _base(self, x: Array) -> tuple[float, float]:
         mean_omega, mean_zeta = float(self.measured.omega_n.mean()), float(self.measured.zeta.mean())
@@ -301,8 +304,4 @@ class _Task:
         chi2, count = (float(zeta @ zeta), float(omega @ omega)), self.measured.zeta.size
         nu = freedom(count)
         bic = sum((nu + count) * log(1.0 + c / nu) for c in chi2) + x.size * log(2 * count)
-        effects = tuple(
-            kind(**{kind.parameters()[0].name: float(u) * kind.parameters()[0].scale})
-            for kind, u in zip(kinds, x, strict=False)
-        )
-        return Explanation(effects, *self._base(x), columns, *chi2, bic)
+        return Explanation(_effects(kinds, x), *self._base(x), columns, *chi2, bic)

@@ -1,20 +1,20 @@
-"""A table of windows, as the paper's Table III, and the simulation of one.
+"""A table of windows, as the paper's Table III, and the simulation of one, for the page on the paper's own gap.
 
 Such a table holds damping ratio and natural frequency of one wind-on run, three cycles at a time. The linear
-model leaves both columns constant; ``tunnel_lab.paper.window_rivals`` weighs what makes them drift. The paper does
-not name the run behind its table: `RigState` is an inference, see `infer_springs` and `rig_state`.
+model leaves both columns constant; `docs.studies.window_rivals` compares what makes them drift. The paper does not
+name the run behind its table: `RigState` is an inference, see `tunnel_lab.paper.network_study.infer_springs`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi, radians, sqrt
+from math import pi, radians
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from identification.datasets import WindowRow, paper_derivatives, paper_springs, paper_windows
+from identification.datasets import WindowRow, paper_derivatives
 from identification.decay.damped_oscillation import Decay
 from identification.decay.decay_fit import Reading, fit_run
 from tunnel_sim.effects import Effect, EffectChain
@@ -53,23 +53,6 @@ class RigState:
     air_density: float = 1.204
 
 
-@dataclass(frozen=True)
-class SpringInference:
-    """What one spring of Table II would imply for the run behind Table III.
-
-    Args:
-        spring: number.
-        wind_speed: V at which the printed Cnβ brings the spring's wind-off frequency down to the table's
-            mean, m/s.
-        mechanical_damping: Cr left of the table's mean damping once the printed Cnr is taken off, N m s/rad;
-            negative is impossible.
-    """
-
-    spring: int
-    wind_speed: float
-    mechanical_damping: float
-
-
 @dataclass(frozen=True, eq=False)
 class Columns:
     """Both columns of a table.
@@ -81,40 +64,6 @@ class Columns:
 
     zeta: Array
     omega_n: Array
-
-
-def infer_springs(table: Sequence[WindowRow] | None = None) -> tuple[SpringInference, ...]:
-    """Ask of every spring whether it can be the one behind the table: an inference, not the paper's word.
-
-    Each spring's own inertia is Kr/ω0², as in the paper's eqs 10 and 11; Cnβ and Cnr are Table IV's of the
-    neural network, which the paper took from the means of Table III.
-
-    Args:
-        table: None takes the paper's.
-
-    Returns:
-        One row per spring whose wind-off frequency lies above the table's mean, as a positive Cnβ demands.
-    """
-    rows = paper_windows() if table is None else table
-    omega = float(np.mean([row.omega_n_rad_per_s for row in rows]))
-    zeta = float(np.mean([row.zeta for row in rows]))
-    printed, rig = paper_derivatives()[0], load_rig()
-    air = {
-        "air_density": rig.air.density,
-        "frontal_area": rig.body.frontal_area,
-        "reference_length": rig.body.length,
-    }
-    found = []
-    for spring in paper_springs():
-        stiffness, omega_0 = spring.stiffness_n_m_per_rad, 2.0 * pi * spring.frequency_hz
-        if omega_0 <= omega:
-            continue
-        inertia = stiffness / omega_0**2
-        per_square = aerodynamic_stiffness(printed.cn_beta_per_rad, wind_speed=1.0, **air)
-        speed = sqrt((stiffness - inertia * omega**2) / per_square)
-        lost = aerodynamic_damping(printed.cn_r_per_rad, wind_speed=speed, **air)
-        found.append(SpringInference(spring.number, speed, 2.0 * zeta * omega * inertia + lost))
-    return tuple(found)
 
 
 def rig_state(spring: int = 5, wind_speed: float = 10.0, release_angle: float = radians(20.0)) -> RigState:
@@ -220,12 +169,7 @@ def base_dynamics(state: RigState, omega_n: float, zeta: float, rig: Rig) -> tup
     Returns:
         Izz in kg m² and Cr in N m s/rad.
     """
-    air = {
-        "air_density": state.air_density,
-        "wind_speed": state.wind_speed,
-        "frontal_area": rig.body.frontal_area,
-        "reference_length": rig.body.length,
-    }
+    air = rig.body.flow(state.air_density, state.wind_speed)
     inertia = (state.spring_stiffness - aerodynamic_stiffness(state.derivatives.cn_beta, **air)) / omega_n**2
     return inertia, 2.0 * zeta * omega_n * inertia + aerodynamic_damping(state.derivatives.cn_r, **air)
 

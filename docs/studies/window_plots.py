@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tunnel_lab.paper.window_rivals import Explanation, WindowDiagnosis
+from docs.studies.window_rivals import Explanation, WindowDiagnosis
 from tunnel_lab.plotting.common import WIDTH, figure, grid, styled
 from tunnel_lab.plotting.plots import COLOURS
 
