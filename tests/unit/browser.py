@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,16 +24,32 @@ LEAST_CONTRAST = 4.5
 
 
 @contextmanager
-def chromium() -> Iterator[Any]:
-    """The browser; it ends with the context."""
+def chromium(*switches: str) -> Iterator[Any]:
+    """The browser; it ends with the context. One runs at a time: on a loaded machine two disturb each other."""
+    import fcntl
+
     from playwright import sync_api
 
-    with sync_api.sync_playwright() as playwright:
-        # Chromium's own sandbox does not start for root.
-        arguments = ["--no-sandbox"] if os.getuid() == 0 else []
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        yield found
-        found.close()
+    with (Path(tempfile.gettempdir()) / f"tunnel-browser-{os.getuid()}.lock").open("w") as turn:
+        fcntl.flock(turn, fcntl.LOCK_EX)
+        with sync_api.sync_playwright() as playwright:
+            # Chromium's own sandbox does not start for root.
+            arguments = [*switches, *(["--no-sandbox"] if os.getuid() == 0 else [])]
+            found = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
+            yield found
+            found.close()
+
+
+def screenshot(page: Any, **given: Any) -> bytes:
+    """A picture of a page; a loaded machine may refuse the first attempt."""
+    from playwright import sync_api
+
+    try:
+        return bytes(page.screenshot(**given))
+    except sync_api.Error as error:
+        if "Protocol error (Page.captureScreenshot)" not in str(error):
+            raise
+        return bytes(page.screenshot(**given))
 
 
 CONTRASTS = """() => {

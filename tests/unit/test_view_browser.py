@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -18,10 +16,10 @@ import numpy as np
 import pytest
 from matplotlib import image
 
+from tests.unit.browser import IN_A_BROWSER, chromium
 from tunnel_lab.show.web import _free_port
 
-sync_api = pytest.importorskip("playwright.sync_api")
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = IN_A_BROWSER
 WIDTH, HEIGHT = 900, 600
 # Without this, what WebGL has drawn can be read in the same frame only.
 KEEP = """const plain = HTMLCanvasElement.prototype.getContext;
@@ -61,14 +59,10 @@ def served() -> Iterator[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
-@pytest.mark.filterwarnings("ignore::ResourceWarning")  # of Playwright's own pipes
 def test_the_page_shows_the_car_and_its_trace(served: str) -> None:
     graphics = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
-    arguments = [*graphics, *(["--no-sandbox"] if os.getuid() == 0 else [])]
     complaints: list[str] = []
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
+    with chromium(*graphics) as browser:
         page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
         page.set_default_timeout(180_000)
         page.on("console", lambda said: complaints.extend([said.text] if said.type == "error" else []))
@@ -81,7 +75,6 @@ def test_the_page_shows_the_car_and_its_trace(served: str) -> None:
             trace = ((blue > 0.5) & (blue > 1.5 * red))[30:300, WIDTH - 400 :]
             if trace.sum() > 50:
                 break
-        browser.close()
     assert red.shape == (HEIGHT, WIDTH)
     assert trace.sum() > 50  # pixels
     car = (red > 0.3) & (red > 1.8 * green) & (red > 1.8 * blue)

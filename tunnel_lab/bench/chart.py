@@ -17,7 +17,7 @@ class Chart(ui.element, component="static/chart.js"):
         y: label of the ordinate, with its unit.
         series: labels of the curves and the names of their colours (``before``, ``after``, ``soft``, …).
         data: abscissas and the ordinates of every curve; None is a gap.
-        moved: called with the id of a mark and where it was moved, in the unit of the abscissa; may be awaitable.
+        moved: called with the id of a mark and where it was moved, in the unit of its axis; may be awaitable.
     """
 
     def __init__(
@@ -31,7 +31,7 @@ class Chart(ui.element, component="static/chart.js"):
     ) -> None:
         super().__init__()
         self._props.update(title=title, x=x, y=y, series=[list(one) for one in series], data=data)
-        self._props.update(marks=[], levels=[])
+        self._props.update(marks=[])
         self.classes("chart")
         if moved is not None:
             self.on("moved", lambda event: moved(*_mark(event)))
@@ -41,16 +41,14 @@ class Chart(ui.element, component="static/chart.js"):
         self._props["data"] = data
         self.update()
 
-    def show_marks(
-        self, marks: Sequence[Mapping[str, Any]], levels: Sequence[Mapping[str, Any]] = ()
-    ) -> None:
+    def show_marks(self, marks: Sequence[Mapping[str, Any]]) -> None:
         """Show marks.
 
         Args:
-            marks: ``id``, ``label``, ``kind`` (``start`` or ``end``) and ``at`` (in the abscissa's unit) of each.
-            levels: ``from`` and ``to`` (in the abscissa's unit) and ``at`` (in the ordinate's) of each.
+            marks: ``id``, ``label``, ``kind``, ``at`` and its ``unit`` of each. A ``start`` or an ``end`` is on the
+                abscissa. A ``rest`` is on the ordinate, drawn from ``from`` to ``to`` with the words ``about``.
         """
-        self._props.update(marks=[dict(one) for one in marks], levels=[dict(one) for one in levels])
+        self._props.update(marks=[dict(one) for one in marks])
         self.update()
 
 

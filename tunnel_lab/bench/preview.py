@@ -31,7 +31,8 @@ class Mark:
         file: the file that holds it.
         start: of the run: the release, s.
         end: where it has come to rest, or the next run begins, s.
-        rest: the angle at which it rests at the end, in the reading's unit.
+        rest: the reading at which it rests, in the reading's unit.
+        about: the rest in words: how well it is known, or that it is stated.
         fault: why the run is left out; empty where it is used.
     """
 
@@ -40,6 +41,7 @@ class Mark:
     start: float
     end: float
     rest: float
+    about: str
     fault: str
 
 
@@ -88,35 +90,33 @@ def state(session: Session, changes: Mapping[str, Any]) -> None:
     now = choices_of(session).model_dump(exclude_defaults=True) | dict(changes)
     kept = {key: value for key, value in now.items() if value is not None}
     stated = validate(ImportChoices, kept, Path("choices")).model_dump(mode="json", exclude_defaults=True)
-    write_whole(
-        session.choices, tomli_w.dumps({"schema_version": 1, "choices": _without_none(stated)}).encode()
-    )
+    write_whole(session.choices, tomli_w.dumps({"schema_version": 1, "choices": stated}).encode())
 
 
-def move(session: Session, mark: Mark, *, start: float | None = None, end: float | None = None) -> None:
-    """State where a run begins or ends.
+def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> None:
+    """State where a run begins, ends or rests.
 
     Args:
         mark: the run as it is.
-        start: s from the record's first sample; None: as it is.
-        end: s from the record's first sample; None: as it is.
+        places: ``start`` and ``end`` in s from the record's first sample, ``rest`` in the reading's unit;
+            None: as found.
 
     Raises:
         TunnelError: when the end is not after the start.
     """
     choices = choices_of(session)
-    kept = {(one.file, one.run): one for one in choices.stretches}
-    now = kept.pop((mark.file, mark.run), None)
-    first, last = (mark.start, mark.end) if now is None else (now.start, now.end)
-    first, last = first if start is None else max(start, 0.0), last if end is None else end
+    now = choices.stretch_of(mark.file, mark.run)
+    others = [one for one in choices.stretches if (one.file, one.run) != (mark.file, mark.run)]
+    stated = now.model_dump() | dict(places)
+    first = mark.start if stated["start"] is None else stated["start"]
+    last = mark.end if stated["end"] is None else stated["end"]
     if last <= first:
         raise TunnelError(
             f"the end ({last:.4g} s) is not after the release ({first:.4g} s)",
             where=f"run '{mark.run}'",
             remedy="move one of them",
         )
-    stated = {"file": mark.file, "run": mark.run, "start": first, "end": last}
-    state(session, {"stretches": [*(one.model_dump() for one in kept.values()), stated]})
+    state(session, {"stretches": [*(one.model_dump() for one in others), stated]})
 
 
 def read(session: Session) -> Imported:
@@ -158,29 +158,33 @@ def _drawn(raw: Raw, parts: list[Part], unit: str) -> Drawn:
     from tunnel_lab.plotting.import_figure import thinned
 
     time, reading = thinned(raw.cleaned.time_s, raw.cleaned.reading)
-    marks = tuple(_mark(part) for part in parts)
+    marks = tuple(_mark(part, unit) for part in parts)
     return Drawn(raw.id, unit, time.tolist(), reading.tolist(), marks)
 
 
-def _mark(part: Part) -> Mark:
-    import numpy as np
-
-    time, reading = part.raw.cleaned.time_s, part.raw.cleaned.reading
-    last = part.piece.last - 1
-    end = reading[max(part.piece.first, last - max((last - part.piece.first) // 10, 1)) : last + 1]
-    fault = part.said[-1] if part.run is None else ""
+def _mark(part: Part, unit: str) -> Mark:
+    time = part.raw.cleaned.time_s
     return Mark(
         part.id,
         part.raw.source.name,
         float(time[part.piece.first]),
-        float(time[last]),
-        float(np.median(end)),
-        fault,
+        float(time[part.piece.last - 1]),
+        *_rest(part, unit),
+        part.said[-1] if part.run is None else "",
     )
 
 
-def _without_none(value: Any) -> Any:
-    """TOML has no null."""
-    if isinstance(value, dict):
-        return {key: _without_none(one) for key, one in value.items() if one is not None}
-    return [_without_none(one) for one in value] if isinstance(value, list) else value
+def _rest(part: Part, unit: str) -> tuple[float, str]:
+    """Where a run rests: as stated, at the centre of its oscillation, or at its end; and that in words."""
+    import numpy as np
+
+    from identification.examination.zeros import centre_of
+    from identification.printing.numbers import significant, with_std
+
+    if part.rest is not None:
+        return part.rest, f"{significant(part.rest)} {unit}, stated and subtracted"
+    centre = None if part.run is None else centre_of(part.run, 0.0)
+    if centre is not None:
+        return centre.zero, f"{with_std(centre.zero, centre.std)} {unit}, found"
+    end = float(np.median(part.reading[-max(part.reading.size // 10, 2) :]))
+    return end, f"about {significant(end, 2)} {unit}, found"

@@ -18,6 +18,7 @@ from tunnel_lab.commands.diagnose import STEPS
 WORK = "diagnosis"
 STOPPED = 130
 _AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one goes on where it was"
+_STOP = "Stop ends it: a stopped diagnosis starts again from the beginning."
 _POLL_S = 0.5
 
 
@@ -75,9 +76,9 @@ class _Diagnose:
             button("Stop", self._stop)
 
     def _show_clock(self, one: work.Work) -> None:
-        words = f"{_elapsed(one):.0f} s so far. It runs in a process of its own: this page may be closed."
-        paused = "Paused; it goes on where it was."
-        self._clock.set_text("" if not one.running else paused if one.paused else words)
+        since = f"{_elapsed(one):.0f} s so far. It runs in a process of its own: this page may be closed."
+        words = "Paused; it goes on where it was." if one.paused else since
+        self._clock.set_text(f"{words} {_STOP}" if one.running else "")
 
     async def _start(self) -> None:
         with self._fault.around():

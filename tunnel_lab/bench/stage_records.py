@@ -9,7 +9,8 @@ from nicegui import events, ui
 
 from tunnel_lab.bench import preview
 from tunnel_lab.bench.chart import Chart
-from tunnel_lab.bench.parts import Fault, Frame, address, button, show_command, show_parts
+from tunnel_lab.bench.choices_part import ChoicesPart
+from tunnel_lab.bench.parts import Fault, Frame, address, button, show_parts
 from tunnel_lab.bench.start import drop_zone, keep
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -18,10 +19,11 @@ if TYPE_CHECKING:
     from tunnel_sim.files.importing.records import Imported
 
 _TIME = "time [s], from the record's first sample"
-_KINDS = {"start": "release", "end": "rest"}
+_KINDS = {"start": "release", "end": "end", "rest": "rest"}
 _HELP = (
-    "Drag a mark, or move it with the arrow keys, to where a run is released (circle) or has come to rest "
-    "(square). Drag in a chart to zoom; double-click to see all of it."
+    "Drag a mark, or move it with the arrow keys, to where a run is released (circle) or ends (square), and the "
+    "dashed line to the angle at which it rests: that angle is then subtracted. Drag in a chart to zoom; "
+    "double-click to see all of it."
 )
 
 
@@ -50,6 +52,7 @@ class _Records:
         self._form_place = ui.expansion("What the files do not say, or was found wrongly").classes("choices")
         self._reading = 0
         self._charts: list[Chart] = []
+        self._rests: list[ui.number] = []
         self._drawn = ui.element("div")
         self._table = ui.element("div").props("role=status aria-live=polite")
         with self._table:
@@ -59,7 +62,7 @@ class _Records:
     async def _first(self) -> None:
         columns = await asyncio.to_thread(preview.column_names, self._session)
         with self._form_place:
-            _Choices(self._session, columns, self._changed)
+            ChoicesPart(self._session, columns, self._changed)
         self._show_files()
         await self._read()
         if self._imported is None:
@@ -70,13 +73,23 @@ class _Records:
             preview.state(self._session, {key: value})
             await self._read()
 
-    async def _moved(self, mark: preview.Mark, kind: str, at: float) -> None:
+    async def _moved(self, mark: preview.Mark, kind: str, at: float | None) -> None:
+        """Keep a mark where it was moved; it goes back where the files cannot be read like that."""
         with self._fault.around():
-            preview.move(self._session, mark, **{kind: at})
-            await self._read(redraw=False)
+            before = preview.choices_of(self._session).stretch_of(mark.file, mark.run)
+            preview.move(self._session, mark, {kind: at})
+            if await self._read(redraw=False):
+                return
+            preview.move(self._session, mark, {kind: getattr(before, kind)})
+        if self._imported is not None:
+            self._draw(self._imported)
 
-    async def _read(self, *, redraw: bool = True) -> None:
-        """Read the files with the choices as they are; the charts stay where only a mark was moved."""
+    async def _read(self, *, redraw: bool = True) -> bool:
+        """Read the files with the choices as they are; the charts stay where only a mark was moved.
+
+        Returns:
+            False where the files cannot be read.
+        """
         self._reading += 1
         mine = self._reading
         imported, error = None, None
@@ -87,18 +100,21 @@ class _Records:
         if (
             mine != self._reading or self._table.is_deleted
         ):  # a later choice is being read, or the page was left
-            return
-        self._imported = imported
+            return True
         self._fault.show(error or "")
+        if error is not None and not redraw:
+            return False
+        self._imported = imported
         self._table.clear()
-        if redraw or imported is None:
+        if redraw:
             self._drawn.clear()
         if imported is None:
-            return
+            return False
         with self._drawn:
             self._draw(imported)
         with self._table:
             _show(imported)
+        return True
 
     def _show_files(self) -> None:
         self._files.clear()
@@ -127,8 +143,23 @@ class _Records:
             left = len({id(part.raw) for part in imported.parts}) - len(records)
             if left > 0:
                 ui.label(f"{left} more records are not drawn.").classes("soft")
+            with ui.expansion("Resting angles as numbers"), ui.element("div").classes("fields"):
+                self._rests = [self._rest(mark, one.unit) for one in records for mark in one.marks]
         for chart, one in zip(self._charts, records, strict=True):
-            chart.show_marks(*_marks(one))
+            chart.show_marks(_marks(one))
+        for field, mark in zip(self._rests, (mark for one in records for mark in one.marks), strict=True):
+            field.set_value(float(f"{mark.rest:.6g}"))
+            field.props["hint"] = mark.about
+            field.update()
+
+    def _rest(self, mark: preview.Mark, unit: str) -> ui.number:
+        """A field for the reading at which a run rests; where it is emptied, the rest is found again."""
+
+        async def change() -> None:
+            await self._moved(mark, "rest", field.value)
+
+        field = ui.number(f"Rest of {mark.run}, to be subtracted [{unit}]").props("dense step=any")
+        return field.on("change", change)
 
     def _chart(self, one: preview.Drawn) -> Chart:
         marks = {f"{mark.run} {kind}": (mark, kind) for mark in one.marks for kind in _KINDS}
@@ -150,19 +181,22 @@ class _Records:
             ui.navigate.to(address(self._session, "conditions"))
 
 
-def _marks(one: preview.Drawn) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """The runs of a record as marks and resting levels of its chart."""
-    marks = [
+def _marks(one: preview.Drawn) -> list[dict[str, Any]]:
+    """The runs of a record as marks of its chart."""
+    return [
         {
             "id": f"{mark.run} {kind}",
             "at": getattr(mark, kind),
             "kind": kind,
             "label": f"{words} of {mark.run}",
+            "unit": one.unit if kind == "rest" else "s",
+            "from": mark.start,
+            "to": mark.end,
+            "about": f"rest {mark.about}",
         }
         for mark in one.marks
         for kind, words in _KINDS.items()
     ]
-    return marks, [{"from": mark.start, "to": mark.end, "at": mark.rest} for mark in one.marks]
 
 
 def _show(imported: Imported) -> None:
@@ -190,60 +224,6 @@ def write(session: Session, imported: Imported) -> None:
     write_imported(imported, session.campaign, overwrite=True, picture=import_picture)
     if before is not None:
         conditions.restore(session, before)
-
-
-class _Choices:
-    """Fields for what can be stated about the files, as the options of ``tunnel import``."""
-
-    def __init__(self, session: Session, columns: list[str], changed: Any) -> None:
-        from tunnel_sim.files.importing.units import UNITS
-
-        self._now = preview.choices_of(session)
-        self._changed = changed
-        angle = [unit for kind, units in UNITS.items() if kind != "time" for unit in units]
-        with ui.element("div").classes("fields"):
-            self._select("angle", "Column of the angle", columns, several=True)
-            self._select("unit", "Unit of the angle", angle)
-            self._select("time", "Column of the times", columns)
-            self._select("time_unit", "Unit of the times", list(UNITS["time"]))
-            self._number("rate", "Sample rate, where there are no times [Hz]")
-            self._number("counts_per_turn", "Counts of an encoder per turn")
-            self._text("calibration", "Angle of a voltage, such as 0.1 + 20*V")
-            self._number("start", "Leave out samples before [s]")
-            self._number("end", "Leave out samples after [s]")
-            self._text("name", "Conditions in the file names, such as S{spring}_V{wind_speed}_*")
-            ui.checkbox(
-                "Cut records at releases", value=self._now.cut, on_change=lambda e: changed("cut", e.value)
-            )
-        show_command(
-            f"tunnel import {session.uploads}/* --recipe {session.choices} --out {session.campaign} --yes"
-        )
-
-    def _select(self, key: str, label: str, options: list[str], *, several: bool = False) -> None:
-        now = getattr(self._now, key)
-        value = list(now) if several else now
-        shown = [*options, *(one for one in (value if several else [value]) if one and one not in options)]
-
-        async def change(event: events.ValueChangeEventArguments[Any]) -> None:
-            await self._changed(key, event.value or (() if several else None))
-
-        ui.select(shown, label=label, value=value, multiple=several, clearable=True, on_change=change).props(
-            "dense"
-        )
-
-    def _number(self, key: str, label: str) -> None:
-        async def change() -> None:
-            await self._changed(key, field.value)
-
-        field = ui.number(label, value=getattr(self._now, key)).props("dense step=any")
-        field.on("change", change)
-
-    def _text(self, key: str, label: str) -> None:
-        async def change() -> None:
-            await self._changed(key, field.value or None)
-
-        field = ui.input(label, value=getattr(self._now, key) or "").props("dense")
-        field.on("change", change)
 
 
 def _as_it_is(session: Session) -> None:

@@ -68,6 +68,9 @@ def run(
     ] = None,
     start: Annotated[float | None, typer.Option("--start", help="Leave out earlier samples, s.")] = None,
     end: Annotated[float | None, typer.Option("--end", help="Leave out later samples, s.")] = None,
+    rest: Annotated[
+        float | None, typer.Option("--rest", help="Reading at rest of every run, rad: it is subtracted.")
+    ] = None,
     cut: Annotated[
         bool | None, typer.Option("--cut/--no-cut", help="Cut records at releases.", show_default="--cut")
     ] = None,
@@ -130,6 +133,7 @@ def run(
         "name": name,
         "start": start,
         "end": end,
+        "rest": rest,
         "cut": cut,
         "delimiter": delimiter,
         "decimal": decimal,

@@ -40,7 +40,6 @@ def parts_table(imported: Imported) -> TextTable:
 
 def _figures(part: Part) -> tuple[str, ...]:
     time = part.raw.cleaned.time_s[part.piece.first : part.piece.last]
-    reading = part.raw.cleaned.reading[part.piece.first : part.piece.last]
     run = part.run
     if run is None:
         return (f"{time.size}", "left out", "", "", "", "", "")
@@ -49,7 +48,7 @@ def _figures(part: Part) -> tuple[str, ...]:
         f"{run.record.sample_rate:.4g}",
         f"{time[0]:.2f}",
         f"{time[-1]:.2f}",
-        f"±{0.5 * (reading.max() - reading.min()):.3g}",
+        f"±{0.5 * (part.reading.max() - part.reading.min()):.3g}",
         f"{run.wind_speed:g}",
         "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
     )

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.unit.browser import screenshot
+
 ROOT = Path(__file__).parents[3]
 _MOST_PICTURES = 60  # of a film
 
@@ -99,7 +101,7 @@ class Tab:
 
     def shoot(self) -> None:
         """Keep a picture for the film."""
-        self.film.append(self.page.screenshot(type="jpeg", quality=90))
+        self.film.append(screenshot(self.page, type="jpeg", quality=90))
 
     def wait(self, selector: str, seconds: float = 900.0) -> None:
         """Wait for an element, and keep a picture now and then."""

@@ -21,11 +21,13 @@ from tunnel_lab.bench.workspace import Session
 from tunnel_lab.terminal.given_campaign import file_hashes
 from tunnel_sim.files import import_records
 from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.importing.choices import read_recipe
 from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
 pytest.importorskip("nicegui")
 pytestmark = IN_A_BROWSER
+TWO_CHANNELS = Path(__file__).parents[3] / "docs" / "how-to" / "data" / "Measured_data2.mat"
 
 
 def log_text(seed: int = 1) -> str:
@@ -77,6 +79,57 @@ def test_dropped_files_are_read_marked_and_written(browser: Any, served: Bench, 
     kept = read_campaign(session.campaign).runs[0].record
     assert 1000 < kept.time_s.size < 1560
     assert "stretches" in session.choices.read_text()
+
+
+def test_a_resting_angle_is_dragged_and_typed(browser: Any, served: Bench, tmp_path: Path) -> None:
+    (tmp_path / "hung.csv").write_text(log_text())
+    session = Session(served.folder, "hung")
+    with tab(browser, served) as one:
+        page = one.page
+        page.set_input_files("input[type=file]", [str(tmp_path / "hung.csv")])
+        page.wait_for_url("**/hung/records")
+        line = page.get_by_role("slider", name="rest of hung")
+        assert line.inner_text().endswith("rad, found")
+        before = float(line.get_attribute("aria-valuenow"))
+        line.press("PageUp")
+        assert float(line.get_attribute("aria-valuenow")) > before
+        stated = line.filter(has_text="stated and subtracted")
+        stated.wait_for()
+        box = line.bounding_box()
+        page.mouse.move(box["x"] + 300, box["y"] + 7)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 300, box["y"] - 40, steps=4)
+        page.mouse.up()
+        stated.wait_for()
+        assert read_recipe(session.choices).stretches[0].rest == pytest.approx(0.2, abs=0.1)
+        page.get_by_text("Resting angles as numbers").click()
+        field = page.get_by_label("Rest of hung, to be subtracted [rad]")
+        for text, words in (("9", "never passes the stated rest of 9 rad"), ("0.05", "rest, 0.05 rad, is")):
+            field.fill(text)
+            field.press("Enter")
+            page.wait_for_selector(f"text={words}")
+        assert line.get_attribute("aria-valuenow") == "0.05"
+        one.click("Write the campaign")
+        page.wait_for_url("**/conditions")
+    (run,) = read_campaign(session.campaign).runs
+    assert run.record.yaw_rad == pytest.approx(decay()[1] - 0.05, abs=1e-6)
+
+
+def test_which_of_two_channels_is_the_angle_is_asked_for(browser: Any, served: Bench) -> None:
+    with tab(browser, served) as one:
+        page = one.page
+        page.set_input_files("input[type=file]", [str(TWO_CHANNELS)])
+        page.wait_for_url("**/Measured_data2/records")
+        page.wait_for_selector("text=2 columns may be the angle: 'data[1]', 'data[2]'")
+        page.get_by_label("Column of the angle").click()
+        page.get_by_role("option", name="data[1]").click()
+        page.keyboard.press("Escape")
+        page.wait_for_selector(".mark.rest")
+        assert page.get_by_role("alert").filter(has_text="tunnel: ").count() == 0
+        one.click("Write the campaign")
+        page.wait_for_url("**/conditions")
+    (run,) = read_campaign(served.folder / "Measured_data2").runs
+    assert run.record.sample_rate == pytest.approx(5000.0)
 
 
 def test_a_wrong_file_is_refused_in_the_words_of_the_command(

@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from tests.unit.bench.served import Tab, bench, tab
-from tests.unit.browser import IN_A_BROWSER, chromium
+from tests.unit.browser import IN_A_BROWSER, chromium, screenshot
 from tunnel_lab.bench import work
 
 pytest.importorskip("nicegui")
@@ -55,7 +55,7 @@ def picture(one: Tab, name: str) -> None:
         for scheme in ("light", "dark"):
             one.page.emulate_media(color_scheme=scheme)
             one.page.wait_for_timeout(600)
-            one.page.screenshot(path=f"{PICTURES}/bench-{name}-{scheme}.png")
+            screenshot(one.page, path=f"{PICTURES}/bench-{name}-{scheme}.png")
         one.page.emulate_media(color_scheme="light")
         one.page.set_viewport_size(before)
 
@@ -169,7 +169,7 @@ def test_a_diagnosis_survives_a_crash_is_paused_goes_on_and_is_stopped(browser: 
         one.click("Go on")
         one.page.wait_for_selector("button:has-text('Pause')")
         one.click("Stop")
-        one.page.wait_for_selector("text=a stopped diagnosis starts again")
+        one.page.wait_for_selector("text=a paused one goes on where it was")
         assert not work.work_of(log).running
         one.click("Diagnose")
         one.page.wait_for_selector("a:has-text('Continue: Next run')", timeout=LONG_MS)

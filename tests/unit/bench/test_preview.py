@@ -36,8 +36,8 @@ def test_a_moved_mark_is_where_the_run_begins_also_for_the_command(session: Sess
     (mark,) = record.marks
     assert mark.start == pytest.approx(1.0, abs=0.05)
     assert mark.rest == pytest.approx(0.0, abs=0.02)
-    preview.move(session, mark, start=2.0021)
-    preview.move(session, preview.drawn(preview.read(session))[0].marks[0], end=7.5)
+    preview.move(session, mark, {"start": 2.0021})
+    preview.move(session, preview.drawn(preview.read(session))[0].marks[0], {"end": 7.5})
     (moved,) = preview.drawn(preview.read(session))[0].marks
     assert (moved.start, moved.end) == (pytest.approx(2.0), pytest.approx(7.5))
     again = read_records(
@@ -54,10 +54,27 @@ def test_a_moved_mark_is_where_the_run_begins_also_for_the_command(session: Sess
 def test_a_mark_behind_its_end_is_refused_and_nothing_changes(session: Session) -> None:
     mark = preview.drawn(preview.read(session))[0].marks[0]
     with pytest.raises(TunnelError, match=r"run '.*': the end .* is not after the release"):
-        preview.move(session, mark, start=mark.end + 1.0)
+        preview.move(session, mark, {"start": mark.end + 1.0})
     assert not session.choices.exists()
-    preview.move(session, mark, start=100.0, end=120.0)
+    preview.move(session, mark, {"start": 100.0, "end": 120.0})
     with pytest.raises(TunnelError, match="no samples from 100 to 120 s"):
+        preview.read(session)
+
+
+def test_a_moved_rest_is_subtracted_also_by_the_command_and_can_be_taken_back(session: Session) -> None:
+    before = preview.read(session)
+    (mark,) = preview.drawn(before)[0].marks
+    assert mark.about.endswith("rad, found")
+    preview.move(session, mark, {"rest": 0.012})
+    (moved,) = preview.drawn(preview.read(session))[0].marks
+    assert (moved.rest, moved.start, moved.end) == (0.012, mark.start, mark.end)
+    assert moved.about == "0.01200 rad, stated and subtracted"
+    (run,) = read_records([session.uploads / "log.csv"], read_recipe(session.choices)).campaign.runs
+    np.testing.assert_array_equal(run.record.yaw_rad, before.campaign.runs[0].record.yaw_rad - 0.012)
+    preview.move(session, mark, {"rest": None})
+    assert preview.drawn(preview.read(session))[0].marks[0].rest == mark.rest
+    preview.move(session, mark, {"rest": 3.0})
+    with pytest.raises(TunnelError, match="never passes the stated rest of 3 rad"):
         preview.read(session)
 
 
@@ -77,7 +94,7 @@ def test_a_campaign_written_again_keeps_its_conditions(session: Session) -> None
     (run,) = (row for row in cells if row)
     cells[run]["spring_stiffness"] = "16.12"
     conditions.save(session, cells)
-    preview.move(session, preview.drawn(preview.read(session))[0].marks[0], start=3.0)
+    preview.move(session, preview.drawn(preview.read(session))[0].marks[0], {"start": 3.0})
     write(session, preview.read(session))
     found = read_campaign(session.campaign).runs[0]
     assert found.spring_stiffness == 16.12

@@ -59,6 +59,7 @@ def test_a_preview_writes_the_picture_alone(tunnel: Tunnel, tmp_path: Path) -> N
         (["--out", "rig", "--set", "speed=1"], "unknown key 'speed'"),
         (["--out", "rig", "--recipe", "none.toml"], "no such file"),
         (["--out", "rig", "--rate", "0"], "'rate' = 0.0"),
+        (["--out", "rig", "--rest", "20"], "run 'log': never passes the stated rest of 20 rad"),
     ],
 )
 def test_bad_options_leave_nothing(

@@ -15,7 +15,7 @@ import pytest
 from tests.unit.importing.import_files import RATE, csv, decay, written
 from tunnel_sim import TunnelError, read_campaign
 from tunnel_sim.files.exporting import WRITERS, export_campaign
-from tunnel_sim.files.importing.choices import Conditions, ImportChoices, parse_setting, read_recipe
+from tunnel_sim.files.importing.choices import Conditions, ImportChoices, Stretch, parse_setting, read_recipe
 from tunnel_sim.files.importing.conversion import read_calibration
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.writing import import_records
@@ -75,6 +75,44 @@ def test_a_recipe_makes_the_next_file_go_the_same_way(tmp_path: Path) -> None:
     assert second.campaign.runs[0].wind_speed == 12.0
     zero = angle + 2.0 * np.pi * 1000.0 / 4096.0
     np.testing.assert_allclose(first.campaign.runs[0].record.yaw_rad, zero, atol=1e-6)
+
+
+def test_a_stated_rest_is_subtracted_and_kept_in_the_recipe(tmp_path: Path) -> None:
+    path = csv(tmp_path)
+    imported = import_records([path], tmp_path / "rig", ImportChoices(rest=0.1))
+    assert imported.campaign.sensor.zero is None
+    assert any("0.1 rad, is subtracted" in line for line in imported.remarks())
+    again = import_records([path], tmp_path / "again", read_recipe(tmp_path / "rig"))
+    for run in (*again.campaign.runs, *read_campaign(tmp_path / "rig").runs):
+        np.testing.assert_allclose(run.record.yaw_rad, decay()[1] - 0.1, atol=6e-9)
+
+
+def test_a_rest_of_one_run_leaves_the_others_and_gives_every_run_its_own_zero(tmp_path: Path) -> None:
+    paths = [csv(tmp_path, f"{name}.csv") for name in "ab"]
+    (tmp_path / "recipe.toml").write_text(
+        'schema_version = 1\n[[choices.stretches]]\nfile = "b.csv"\nrun = "b"\nrest = -0.02\n'
+    )
+    imported = import_records(paths, tmp_path / "rig", read_recipe(tmp_path / "recipe.toml"))
+    assert [part.rest for part in imported.parts] == [None, -0.02]
+    assert any("zero of its own" in line for line in imported.remarks())
+    campaign = read_campaign(tmp_path / "rig")
+    assert campaign.sensor.zero == "per_run"
+    for run, rest in zip(campaign.runs, (0.0, -0.02), strict=True):
+        np.testing.assert_allclose(run.record.yaw_rad, decay()[1] - rest, atol=6e-9)
+        assert run.record.time_s.size == decay()[0].size  # start and end are as found
+
+
+def test_a_file_whose_name_no_recipe_can_hold_is_read(tmp_path: Path) -> None:
+    (part,) = read_records([csv(tmp_path, "two\nlines.csv")]).parts
+    assert part.rest is None
+
+
+def test_a_rest_between_two_levels_leaves_the_resolution(tmp_path: Path) -> None:
+    rows = "".join(f"{t:.3f},{round(y, 2):.2f}\n" for t, y in zip(*decay(), strict=True))
+    paths = [written(tmp_path, f"{name}.csv", f"time_s,yaw_rad\n{rows}") for name in "ab"]
+    stretch = Stretch(file="b.csv", run="b", rest=0.005)
+    campaign = read_records(paths, ImportChoices(stretches=(stretch,))).campaign
+    assert campaign.sensor.resolution == pytest.approx(0.01)
 
 
 def test_conditions_from_a_table(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 // A chart by uPlot with marks: handles above it that are dragged, or moved with the arrow keys.
 export default {
   template: `<figure><figcaption class="soft">{{ title }}</figcaption><div class="plot" ref="plot" role="img" :aria-label="title"></div></figure>`,
-  props: { title: String, x: String, y: String, series: Array, data: Array, marks: Array, levels: Array },
+  props: { title: String, x: String, y: String, series: Array, data: Array, marks: Array },
   mounted() {
     this.resize = new ResizeObserver(() => this.build());
     this.resize.observe(this.$el);
@@ -15,8 +15,7 @@ export default {
   },
   watch: {
     data() { this.chart ? this.chart.setData(this.data) : this.build(); },
-    marks: { handler() { this.chart?.redraw(false); this.place(); }, deep: true },
-    levels() { this.chart?.redraw(false); },
+    marks: { handler() { this.place(); }, deep: true },
   },
   methods: {
     colour(role) { return getComputedStyle(this.$el).getPropertyValue(`--${role}-now`).trim() || this.probe(role); },
@@ -48,30 +47,12 @@ export default {
           label, stroke: this.colour(role), width: 1.3, points: { show: false }, value: (_, v) => number(v),
         }))],
         legend: { show: this.series.length > 1 },
-        hooks: { draw: [(chart) => this.paint(chart)], setScale: [() => requestAnimationFrame(() => this.place())] },
+        hooks: { setScale: [() => requestAnimationFrame(() => this.place())] },
       }, this.data, this.$refs.plot);
       this.handles = new Map();
       this.place();
     },
     height(width) { return Math.max(180, Math.min(300, Math.round(0.32 * width))); },
-    paint(chart) {
-      const pen = chart.ctx, { left, top, width, height } = chart.bbox;
-      pen.save();
-      pen.beginPath();
-      pen.rect(left, top, width, height);
-      pen.clip();
-      pen.strokeStyle = this.colour("accent");
-      pen.lineWidth = 2 * devicePixelRatio;
-      pen.setLineDash([6 * devicePixelRatio, 4 * devicePixelRatio]);
-      for (const level of this.levels) {
-        const y = chart.valToPos(level.at, "y", true);
-        pen.beginPath();
-        pen.moveTo(chart.valToPos(level.from, "x", true), y);
-        pen.lineTo(chart.valToPos(level.to, "x", true), y);
-        pen.stroke();
-      }
-      pen.restore();
-    },
     place() {
       if (!this.chart || !this.handles) return;
       const wanted = new Set(this.marks.map((mark) => mark.id));
@@ -81,41 +62,61 @@ export default {
         handle.className = `mark ${mark.kind}`;
         handle.setAttribute("aria-label", mark.label);
         handle.setAttribute("aria-valuenow", mark.at);
-        handle.setAttribute("aria-valuetext", `${mark.at.toPrecision(5)} s`);
-        handle.title = `${mark.label}: ${mark.at.toPrecision(5)} s`;
-        const at = this.chart.valToPos(mark.at, "x");
-        handle.style.left = `${at}px`;
-        handle.hidden = at < -1 || at > this.chart.over.clientWidth + 1;
+        const said = `${mark.at.toPrecision(5)} ${mark.unit}`, { clientWidth, clientHeight } = this.chart.over;
+        handle.setAttribute("aria-valuetext", said);
+        handle.title = `${mark.label}: ${said}`;
+        const rest = mark.kind === "rest";
+        const at = this.chart.valToPos(mark.at, rest ? "y" : "x");
+        handle.style[rest ? "top" : "left"] = `${at}px`;
+        handle.hidden = at < -1 || at > (rest ? clientHeight : clientWidth) + 1;
+        if (!rest) continue;
+        const [from, to] = [mark.from, mark.to].map((x) => Math.min(Math.max(this.chart.valToPos(x, "x"), 0), clientWidth));
+        handle.style.left = `${from}px`;
+        handle.style.width = `${to - from}px`;
+        handle.hidden ||= to <= from;
+        handle.firstChild.textContent = mark.about;
       }
     },
     handle(id) {
       const made = this.chart.over.appendChild(document.createElement("div"));
+      made.appendChild(document.createElement("span"));
       made.tabIndex = 0;
       made.setAttribute("role", "slider");
-      const last = this.data[0][this.data[0].length - 1];
-      made.setAttribute("aria-valuemin", this.data[0][0]);
-      made.setAttribute("aria-valuemax", last);
       const mark = () => this.marks.find((one) => one.id === id);
-      const to = (at) => { mark().at = Math.min(Math.max(at, this.data[0][0]), last); this.place(); };
+      const [axis, values] = mark().kind === "rest" ? ["y", this.data[1]] : ["x", this.data[0]];
+      const least = Math.min(...values), most = Math.max(...values);
+      made.setAttribute("aria-orientation", axis === "y" ? "vertical" : "horizontal");
+      made.setAttribute("aria-valuemin", least);
+      made.setAttribute("aria-valuemax", most);
+      const to = (at) => {
+        mark().at = Math.min(Math.max(at, least), most);
+        mark().about = `${mark().label}: ${mark().at.toPrecision(4)} ${mark().unit}`;
+        this.place();
+      };
       const report = () => this.$emit("moved", { id, at: mark().at });
+      let pending;
       made.addEventListener("pointerdown", (event) => {
         event.preventDefault();
         event.stopPropagation();
         made.focus();
         made.setPointerCapture(event.pointerId);
-        const box = this.chart.over.getBoundingClientRect();
-        made.onpointermove = (move) => to(this.chart.posToVal(move.clientX - box.left, "x"));
-        made.onpointerup = () => { made.onpointermove = made.onpointerup = null; report(); };
+        const box = this.chart.over.getBoundingClientRect(), before = mark().at;
+        made.onpointermove = (move) =>
+          to(this.chart.posToVal(axis === "y" ? move.clientY - box.top : move.clientX - box.left, axis));
+        made.onpointerup = () => {
+          made.onpointermove = made.onpointerup = null;
+          if (mark().at !== before) report(); // a click states nothing
+        };
       });
       made.addEventListener("mousedown", (event) => event.stopPropagation()); // uPlot would zoom
       made.addEventListener("keydown", (event) => {
-        const steps = { ArrowLeft: -1, ArrowRight: 1, PageDown: -10, PageUp: 10 }[event.key];
+        const steps = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -10, PageUp: 10 }[event.key];
         if (!steps) return;
         event.preventDefault();
-        const { min, max } = this.chart.scales.x;
-        to(mark().at + steps * (max - min) / this.chart.over.clientWidth);
-        clearTimeout(this.pending);
-        this.pending = setTimeout(report, 600);
+        const { min, max } = this.chart.scales[axis], { clientWidth, clientHeight } = this.chart.over;
+        to(mark().at + steps * (max - min) / (axis === "y" ? clientHeight : clientWidth));
+        clearTimeout(pending);
+        pending = setTimeout(report, 600);
       });
       this.handles.set(id, made);
       return made;

@@ -33,12 +33,17 @@ RUN_KEYS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
 
 
 class Stretch(StrictModel):
-    """``[[choices.stretches]]``: where a run lies in its record, seconds from the record's first sample."""
+    """``[[choices.stretches]]``: where a run lies in its record, and its reading at rest; None: as found."""
 
     file: OneLine = Field(description="the name of the file")
     run: OneLine = Field(description="the name of the run")
-    start: NotNegative = Field(description="the time of the release in s")
-    end: Positive = Field(description="the time in s at which the run ends, after its start")
+    start: NotNegative | None = Field(
+        default=None, description="the time of the release in s from the record's first sample"
+    )
+    end: Positive | None = Field(
+        default=None, description="the time in s from the record's first sample at which the run ends"
+    )
+    rest: float | None = Field(default=None, description="the reading at rest in rad, to be subtracted")
 
 
 class ImportChoices(StrictModel):
@@ -63,14 +68,30 @@ class ImportChoices(StrictModel):
         default=None, description="a time of the file in s: earlier samples are left out"
     )
     end: float | None = Field(default=None, description="a time of the file in s: later samples are left out")
+    rest: float | None = Field(
+        default=None, description="the reading at rest in rad, to be subtracted from every run"
+    )
     cut: bool = Field(default=True, description="false to keep records whole")
     stretches: tuple[Stretch, ...] = Field(
-        default=(), strict=False, description="[[choices.stretches]] tables with file, run, start and end"
+        default=(),
+        strict=False,
+        description="[[choices.stretches]] tables with file, run, start, end and rest",
     )
     name: OneLine | None = Field(
         default=None, description="a pattern of file names such as 'S{spring}_V{wind_speed}_*'"
     )
     conditions: Conditions = Field(default=Conditions(), description="a [choices.conditions] table")
+
+    def stretch_of(self, file: str, run: str) -> Stretch:
+        """What is stated about where a run lies and rests.
+
+        Args:
+            file: the name of the file.
+            run: the name of the run.
+        """
+        found = (one for one in self.stretches if (one.file, one.run) == (file, run))
+        # A file may have a name that no recipe can hold: nothing is stated about it.
+        return next(found, Stretch.model_construct(file=file, run=run))
 
 
 class OriginalTable(StrictModel):

@@ -9,6 +9,7 @@ from math import floor, log10, pi
 
 import numpy as np
 
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 _COUNTERS = (2.0**8, 2.0**10, 2.0**12, 2.0**14, 2.0**16, 2.0**24, 2.0**32)
@@ -132,6 +133,33 @@ def from_zero(time: Array) -> Array:
         time - time[0], 6 - floor(log10(max(step, _FINEST)))
     )  # a millionth of a step is kept
     return counted
+
+
+def from_rest(reading: Array, rest: float, unit: str, said: list[str], where: str) -> Array:
+    """A reading without its value at rest.
+
+    Args:
+        reading: of a run, shape (n,), in the unit.
+        rest: as stated, in the unit.
+        unit: of the reading.
+        said: a remark is added.
+        where: file and run, for messages.
+
+    Returns:
+        Shape (n,), in the unit.
+
+    Raises:
+        TunnelError: when the reading never passes the rest, as that of a body that swings must.
+    """
+    least, most = float(reading.min()), float(reading.max())
+    if not least <= rest <= most:
+        raise TunnelError(
+            f"never passes the stated rest of {rest:.4g} {unit}: it lies from {least:.4g} to {most:.4g} {unit}",
+            where=where,
+            remedy=f"state the reading at rest in {unit}, for each run where they differ",
+        )
+    said.append(f"the stated reading at rest, {rest:.6g} {unit}, is subtracted")
+    return reading - rest
 
 
 def _without_repeats(time: Array, reading: Array, said: list[str]) -> tuple[Array, Array]:

@@ -14,6 +14,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from tunnel_sim.files.importing.choices import Stretch
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 _BAND = 0.05  # of the largest excursion: a smaller one counts as rest
@@ -96,6 +98,34 @@ def find_runs(time_s: Array, reading: Array) -> list[Piece]:
         if halves >= _LEAST_HALVES:
             pieces.append(Piece(first, last))
     return pieces or whole
+
+
+def stated_piece(time_s: Array, found: Piece, stated: Stretch, where: str) -> Piece:
+    """A run with the start and the end that are stated.
+
+    Args:
+        time_s: of the record, shape (n,), s.
+        found: the run as it was found.
+        stated: what is stated about it.
+        where: file and run, for messages.
+
+    Raises:
+        TunnelError: when fewer than two samples lie between start and end.
+    """
+    if stated.start is None and stated.end is None:
+        return found
+    start = time_s[found.first] if stated.start is None else stated.start
+    end = time_s[found.last - 1] if stated.end is None else stated.end
+    # Half a step of slack: a marker between two samples belongs to the closer one.
+    slack = 0.5 * float(np.median(np.diff(time_s)))
+    first, last = (int(place) for place in np.searchsorted(time_s, [start - slack, end + slack]))
+    if last - first < 2:
+        raise TunnelError(
+            f"no samples from {start:g} to {end:g} s",
+            where=where,
+            remedy="state a start before the end, within the record",
+        )
+    return Piece(first, last)
 
 
 def _noise(reading: Array) -> float:

@@ -8,20 +8,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from tunnel_sim.files.campaign_io import checked_record
 from tunnel_sim.files.importing.choices import RIG_KEYS, RUN_KEYS, Conditions, ImportChoices
-from tunnel_sim.files.importing.cleaning import (
-    from_zero,
-    resolution,
-)
+from tunnel_sim.files.importing.cleaning import from_rest, from_zero, resolution
 from tunnel_sim.files.importing.columns import stem
 from tunnel_sim.files.importing.conditions import ConditionTable, from_name, name_pattern
-from tunnel_sim.files.importing.conversion import (
-    read_calibration,
-)
-from tunnel_sim.files.importing.cutting import Piece, find_runs
+from tunnel_sim.files.importing.conversion import read_calibration
+from tunnel_sim.files.importing.cutting import Piece, find_runs, stated_piece
 from tunnel_sim.files.importing.raw_records import Raw, raw_records
 from tunnel_sim.files.importing.source import Source, read_source
 from tunnel_sim.files.plausible import plausible_values
@@ -46,6 +39,7 @@ class Part:
         piece: its samples.
         run: the run; None where it is left out.
         said: why it is left out, or what is assumed of it.
+        rest: the reading at rest that is stated and subtracted, rad (rad/s or rad/s²); None: not stated.
     """
 
     id: str
@@ -53,6 +47,12 @@ class Part:
     piece: Piece
     run: Run | None
     said: tuple[str, ...]
+    rest: float | None
+
+    @property
+    def reading(self) -> Array:
+        """Of the run, before its rest is subtracted: shape (n,), rad (rad/s or rad/s²)."""
+        return self.raw.cleaned.reading[self.piece.first : self.piece.last]
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,37 +169,22 @@ def _parts(
         pieces = find_runs(time, reading) if choices.cut and angle else [Piece(0, time.size)]
         for number, piece in enumerate(pieces, 1):
             name = label if len(pieces) == 1 else f"{label}-{number}"
-            parts.append(_part(name, raw, _stated_piece(name, raw, choices) or piece, choices, table))
+            parts.append(_part(name, raw, piece, choices, table))
     return parts
 
 
-def _stated_piece(name: str, raw: Raw, choices: ImportChoices) -> Piece | None:
-    """Where a run lies by the choices; None where they do not say it."""
-    stated = next((s for s in choices.stretches if (s.file, s.run) == (raw.source.name, name)), None)
-    if stated is None:
-        return None
-    # Half a step of slack: a marker between two samples belongs to the closer one.
-    slack = 0.5 * float(np.median(np.diff(raw.cleaned.time_s)))
-    first = int(np.searchsorted(raw.cleaned.time_s, stated.start - slack))
-    last = int(np.searchsorted(raw.cleaned.time_s, stated.end + slack))
-    if last - first < 2:
-        raise TunnelError(
-            f"no samples from {stated.start:g} to {stated.end:g} s",
-            where=f"{shown(raw.source)}, run '{name}'",
-            remedy="state a start before the end, within the record",
-        )
-    return Piece(first, last)
-
-
 def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: ConditionTable | None) -> Part:
-    time, reading = (
-        raw.cleaned.time_s[piece.first : piece.last],
-        raw.cleaned.reading[piece.first : piece.last],
-    )
+    where = f"{shown(raw.source)}, run '{name}'"
+    stretch = choices.stretch_of(raw.source.name, name)
+    piece = stated_piece(raw.cleaned.time_s, piece, stretch, where)
+    kept = slice(piece.first, piece.last)
+    time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
     said = _on_cut(raw.cleaned.time_s, piece)
+    rest = choices.rest if stretch.rest is None else stretch.rest
+    if rest is not None:
+        reading = from_rest(reading, rest, SensorProperties(quantity=raw.quantity).unit, said, where)
     given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
     stated = raw.stated | (table.of(raw.source, name) if table is not None else {}) | given
-    where = f"{shown(raw.source)}, run '{name}'"
     validate(Conditions, stated, raw.source)
     plausible_values(stated, where)
     if "wind_speed" not in stated:
@@ -219,9 +204,9 @@ def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: Cond
     try:
         record = _judged(from_zero(time), reading, raw.quantity, stated.get("release_angle"), where)
     except TunnelError as error:
-        return Part(name, raw, piece, None, (*said, f"left out: {error.what}"))
+        return Part(name, raw, piece, None, (*said, f"left out: {error.what}"), rest)
     run = Run(name, record, **({"wind_speed": 0.0} | stated))
-    return Part(name, raw, piece, run, tuple(said))
+    return Part(name, raw, piece, run, tuple(said), rest)
 
 
 def _judged(
@@ -263,8 +248,11 @@ def _campaign(parts: Sequence[Part], choices: ImportChoices, name: str, quantity
         name,
         RigProperties(**rig),
         SensorProperties(
-            resolution=resolution([run.record.yaw_rad for run in runs]),
+            # Of the readings as they are in the files: what is subtracted need not be a whole number of steps.
+            resolution=resolution([part.reading for part in parts if part.run is not None]),
             quantity=None if quantity == "angle" else quantity,
+            # What was subtracted is as uncertain as a line drawn by hand, in each run by itself.
+            zero="per_run" if len({part.rest for part in parts if part.run is not None}) > 1 else None,
         ),
         runs,
         one_line(f"Imported from {', '.join(files[:3])}{' and others' if len(files) > 3 else ''}"),
@@ -288,6 +276,10 @@ def _on_campaign(campaign: Campaign, table: ConditionTable | None) -> tuple[str,
     if step is not None:
         said.append(
             f"resolution {step:.4g} {campaign.sensor.unit}: the readings lie on levels that far apart"
+        )
+    if campaign.sensor.zero is not None:
+        said.append(
+            "the runs' stated rests differ: every run is fitted with a zero of its own (zero = 'per_run')"
         )
     if table is not None and table.ignored:
         said.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
