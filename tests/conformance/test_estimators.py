@@ -32,7 +32,7 @@ each_estimator = pytest.mark.parametrize("name", ALL_ESTIMATORS)
 
 
 def noisy_campaign():
-    return campaign(noise=5e-4, resolution=RESOLUTION, rate=500.0, rng=np.random.default_rng(11))
+    return campaign(TWELVE[:6], noise=5e-4, resolution=RESOLUTION, rate=500.0, rng=np.random.default_rng(11))
 
 
 @pytest.fixture(scope="module")

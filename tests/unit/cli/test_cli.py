@@ -138,7 +138,18 @@ def test_a_closed_pipe_is_no_error() -> None:
     assert (process.returncode, err) == (0, "")
 
 
-def test_help_imports_nothing_heavy_and_answers_in_half_a_second() -> None:
+def processor_time(script: str) -> tuple[float, subprocess.CompletedProcess[str]]:
+    """The least of three, s: what the machine does besides is not the script's."""
+    seconds = []
+    for _ in range(3):
+        before = os.times()
+        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+        after = os.times()
+        seconds.append(sum(after[2:4]) - sum(before[2:4]))
+    return min(seconds), done
+
+
+def test_help_imports_nothing_heavy_and_takes_hardly_longer_than_any_help() -> None:
     heavy = "{'mujoco', 'torch', 'matplotlib', 'scipy', 'polars', 'gymnasium', 'numpy'}"
     script = (
         "import sys\n"
@@ -146,16 +157,16 @@ def test_help_imports_nothing_heavy_and_answers_in_half_a_second() -> None:
         "main(['--help'])\n"
         f"print(sorted({heavy} & set(sys.modules)), file=sys.stderr)\n"
     )
-    seconds = []
-    for _ in range(3):
-        before = os.times()
-        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-        after = os.times()
-        assert done.stderr == "[]\n"
-        assert "tunnel demo" in done.stdout
-        # Processor time: what the machine does besides is not the help's.
-        seconds.append(sum(after[2:4]) - sum(before[2:4]))
-    assert min(seconds) < 0.5
+    bare = (
+        "import typer\n"
+        "app = typer.Typer()\n"
+        "app.command()(lambda: None)\n"
+        "app(['--help'], standalone_mode=False)\n"
+    )
+    seconds, done = processor_time(script)
+    assert done.stderr == "[]\n"
+    assert "tunnel demo" in done.stdout
+    assert seconds < 2.5 * processor_time(bare)[0]
 
 
 def test_a_shell_completes_commands(tunnel: Tunnel, monkeypatch: pytest.MonkeyPatch) -> None:
