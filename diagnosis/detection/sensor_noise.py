@@ -57,7 +57,8 @@ class Noise:
         Returns:
             Standard deviation of one sample, rad, by run id. Where the motion crosses a step in many samples, the
             spectrum above it does not show the rounding error's q²/12 but how often noise takes a reading across
-            the next edge: qσ/√π for noise of a third of a step or less.
+            the next edge: qσ/√π for noise of a third of a step or less. The edges that the motion itself crosses
+            add to that, so noise of less than a tenth of a step is overestimated.
         """
         found = {}
         for run, variance in self.variance.items():

@@ -47,6 +47,14 @@ def test_noise_that_blurs_the_steps_needs_no_allowance():
     assert judged(data)[0].problem.data.runs[0].noise_variance == noise.variance["r01"] / 2
 
 
+@pytest.mark.parametrize("share", [0.1, 0.2])
+def test_noise_hidden_by_a_coarse_step_is_measured_by_the_edges_it_crosses(share):
+    """Truth: the noise added before rounding. The motion crosses a step in hundreds of samples."""
+    data = decays(10_000.0, DEGREE, noise=share * DEGREE, duration=2.0)
+    for white in campaign_noise(data).white(lattice_step(data)).values():
+        assert white == pytest.approx(share * DEGREE, rel=0.3)
+
+
 def test_averaging_hardly_reduces_the_error_of_a_motion_slower_than_the_steps():
     """Truth: a motion that stays within a few steps is off by a twelfth of a step's square, averaged or not."""
     small = tuple(Setting(s.spring, s.speed, 2.0 * DEGREE) for s in SETTINGS)

@@ -17,15 +17,20 @@ _PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
 
 
 def is_too_wide(table: Table, width: int) -> bool:
-    """Whether cells other than sentences, or words of a heading, would be broken; else they never will be.
+    """Whether cells other than sentences, or words of a heading, would be broken.
 
     Args:
         width: of the terminal, columns (count).
     """
+    needed = sum(_least_width(column) + _PADDING for column in table.columns)
+    return needed + _BETWEEN * (len(table.columns) - 1) > width
+
+
+def keep_whole(table: Table) -> Table:
+    """The same table, with columns so wide that only headings and sentences are wrapped."""
     for column in table.columns:
         column.min_width = _least_width(column)
-    needed = sum((column.min_width or 0) + _PADDING for column in table.columns)
-    return needed + _BETWEEN * (len(table.columns) - 1) > width
+    return table
 
 
 def _least_width(column: Column) -> int:

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from identification.printing.numbers import SYMBOLS, concise, in_stds, significant, unit, with_std
-from tunnel_lab.terminal.stacked import is_too_wide, stacked
+from tunnel_lab.terminal.stacked import is_too_wide, keep_whole, stacked
 from tunnel_lab.terminal.table_format import TableFormat, chosen, quiet, rendered
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def show_tables(*tables: Table) -> None:
         if chosen.get() is TableFormat.TEXT and is_too_wide(one, out.width):
             out.print(stacked(one, out.width), soft_wrap=True)
         elif chosen.get() is TableFormat.TEXT:
-            out.print(one)
+            out.print(keep_whole(one))
         else:
             out.print(rendered(one, chosen.get()), soft_wrap=True, end="")
         if chosen.get() is not TableFormat.JSON:
