@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.attribution.decide import UNKNOWN, Weighed, weigh
-from diagnosis.attribution.grow import InStretches, grow, grow_in_stretches, prune
+from diagnosis.attribution.grow import InStretches, exchange, grow, grow_in_stretches, prune
 from diagnosis.attribution.hypothesis import Hypothesis, polish
 from diagnosis.attribution.outsiders import weigh_outsiders
 from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
@@ -124,7 +124,9 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     elif weighed[0].effects != UNKNOWN:
         with clock.step("polishing"):
             found = replace(found, hypotheses=_polished(found.hypotheses, weighed[0], random))
-    if weighed and _noise_explains(found):
+    if weighed and _noise_explains(found) and _read_off_explains(found):
+        weighed = []
+    elif weighed and _noise_explains(found):
         named = [replace(w, probability=0.0) for w in weighed if w.effects != UNKNOWN]
         weighed = [Weighed(UNKNOWN, 1.0, 1.0), *named]
     return replace(found, weighed=tuple(weighed))
@@ -156,12 +158,13 @@ def _with_whole_runs(found: Study, grown: InStretches) -> Study:
 
 
 def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
-    """The study with every set that has one effect less than the answer."""
+    """The study with every set that has one effect less than the answer, or another one that does the same."""
     best = found.hypothesis(_weighed(found, base)[0].effects)
     if best is None or len(best.effects) == 1:
         return found
     with clock.step("pruning"):
-        return replace(found, hypotheses=(*found.hypotheses, *prune(best, found.hypotheses)))
+        known = (*found.hypotheses, *prune(best, found.hypotheses))
+        return replace(found, hypotheses=(*known, *exchange(best, known, base)))
 
 
 def _weighed(found: Study, base: Fit) -> list[Weighed]:

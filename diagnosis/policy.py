@@ -75,6 +75,9 @@ PREDICTED_SHARE = 0.01
 GROWN_FROM, GROWN_BY = 2, 4
 #: Excess, in that of the best set of its size, up to which another set is grown. Judgement: time against coverage.
 BEAM_WIDTH = 3.0
+#: Share of the power by which two sets change the nominal prediction, by which they may differ and still count as
+#: one. Judgement: far below what the growth could tell apart.
+SAME_CHANGE = 0.02
 #: Factor by which the evidence for a set may fall when an effect is added, for the growth to go on. Judgement: of
 #: three equal causes that are missing, the first closes a third of what is left, which lowers the evidence to 0.2.
 #: Lowered from that very 0.2 when a foreign sample had stopped too early, so that this sample does not test it.

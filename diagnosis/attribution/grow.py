@@ -24,6 +24,7 @@ from diagnosis.policy import (
     LENGTHENED,
     MOST_CAUSES,
     PREDICTED_SHARE,
+    SAME_CHANGE,
 )
 from tunnel_sim.effects import Effect
 
@@ -55,8 +56,24 @@ def grow(nominal: Fit, kinds: Sequence[type[Effect]], progress: Progress | None 
         ranked = _by_evidence(children, nominal)
         if not ranked or not _goes_on(ranked[0], level[0], nominal):
             break
-        level = [h for h in ranked[:GROWN_FROM] if _left(h) <= BEAM_WIDTH * _left(ranked[0])]
+        near = [h for h in ranked if _left(h) <= BEAM_WIDTH * _left(ranked[0])]
+        level = _distinct(near, nominal)[:GROWN_FROM]
     return sorted(found.values(), key=lambda h: h.fit.total)
+
+
+def _distinct(ranked: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
+    """The hypotheses without those that change the readings as a better one does: they would grow alike."""
+    kept: list[Hypothesis] = []
+    for hypothesis in ranked:
+        if not any(_same_change(hypothesis.fit, other.fit, nominal) for other in kept):
+            kept.append(hypothesis)
+    return kept
+
+
+def _same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
+    """Whether two fits differ by less than `SAME_CHANGE` of the power by which they change the nominal one."""
+    apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.residuals, other.residuals, strict=True))
+    return apart < SAME_CHANGE * (nominal.total - max(one.total, other.total))
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,6 +202,34 @@ def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
             with suppress(FitError, np.linalg.LinAlgError):
                 smaller.append(Hypothesis(names, without(whole.fit, kind)))
     return smaller
+
+
+def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
+    """The sets in which one effect of a given set is replaced by another that changes the readings alike.
+
+    Args:
+        whole: with two effects or more.
+        found: fitted hypotheses, those with one effect less than ``whole`` among them.
+        nominal: the fit without any effect.
+
+    Returns:
+        Those that were not fitted yet. Two effects are alike where each was fitted alone and the fits are.
+    """
+    by_name = {hypothesis.names: hypothesis for hypothesis in found}
+    alone = {h.effects[0]: h for h in found if len(h.effects) == 1}
+    sets: list[Hypothesis] = []
+    for name in set(whole.effects) & set(alone):
+        others = tuple(sorted(set(whole.effects) - {name}))
+        alike = [
+            h.fit.problem.effects[0]
+            for other, h in alone.items()
+            if other not in whole.effects
+            and tuple(sorted((*others, other))) not in by_name
+            and _same_change(h.fit, alone[name].fit, nominal)
+        ]
+        if others in by_name:
+            sets += _children([by_name[others]], alike, None)
+    return sets
 
 
 def without(whole: Fit, kind: type[Effect]) -> Fit:

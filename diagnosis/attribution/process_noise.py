@@ -9,7 +9,7 @@ doi 10.1080/00207177808922455.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import expm
@@ -18,6 +18,7 @@ from scipy.signal import lfilter
 from scipy.stats import kurtosis
 
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.spectra import linear_coefficients, resonance
 from tunnel_sim.vocabulary.record import Array
 
@@ -28,6 +29,8 @@ _LEAST_STROUHAL = 0.05  # bluff bodies shed at 0.1 to 0.3
 _LINE_SPACING = 0.3  # Hz, in the search for a line
 _WIDEST_LINE = 0.5  # Hz: beyond it a wandering line is turbulence
 _HIGHEST_LINE = 30.0  # Hz
+_LONGEST_FILTER = 512  # taps of an innovations filter
+_FORGOTTEN = 1e-4  # a filter's response that is over
 _DOUBLINGS = 30  # of the Riccati equation: 2^30 steps of the filter
 _EVALUATIONS = 60  # of the likelihood beyond the starting grid
 
@@ -171,14 +174,45 @@ def _simplex(start: Array, bounds: Array) -> Array:
     return np.clip(corners, bounds[:, 0], bounds[:, 1])
 
 
-def _channel(fit: Fit, run_index: int) -> _Channel | None:
+def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
+    """The runs of a fit, the noise of those in the wind being the sensor's and the response to a random moment.
+
+    Args:
+        fit: its coefficients give the rig's response.
+        spectrum: of the moment.
+
+    Returns:
+        The data, whose whitening filters are the steady filters' innovations; None where no run is in the wind, or
+        a filter forgets too slowly to be one of finite length.
+    """
+    runs = list(fit.problem.data.runs)
+    channels = {i: c for i in range(len(runs)) if (c := _channel(fit, i, 0.0)) is not None}
+    for (i, channel), (numerator, denominator, spread) in zip(
+        channels.items(), _filters(list(channels.values()), spectrum), strict=True
+    ):
+        impulse = np.zeros(_LONGEST_FILTER)
+        impulse[0] = 1.0
+        taps = lfilter(numerator, denominator, impulse)
+        if not np.all(np.abs(taps[_LONGEST_FILTER // 2 :]) < _FORGOTTEN):
+            return None
+        taps = taps[: int(np.flatnonzero(np.abs(taps) > _FORGOTTEN * 1e-3)[-1]) + 1]
+        run = runs[i]
+        runs[i] = replace(
+            run,
+            whitening=np.convolve(run.whitening, taps),
+            noise_variance=run.noise_variance * spread / channel.variance,
+        )
+    return fit.problem.data.with_runs(tuple(runs)) if channels else None
+
+
+def _channel(fit: Fit, run_index: int, least_interval: float = _INTERVAL) -> _Channel | None:
     run = fit.problem.data.runs[run_index]
     if not run.wind_on or run.derivative:  # the filter's reading is an angle
         return None
     inertia, damping, stiffness = linear_coefficients(fit, run_index)
     if stiffness <= 0.0 or damping <= 0.0:
         return None
-    group = max(1, round(_INTERVAL / run.interval))
+    group = max(1, round(least_interval / run.interval))
     count = run.reading.size // group
     scale = np.sqrt(run.noise_variance)
     residual = (fit.residuals[run_index][: count * group] * scale).reshape(count, group).mean(axis=1)
@@ -204,6 +238,19 @@ def _skip(channel: _Channel) -> int:
 
 def _filtered(channels: Sequence[_Channel], spectrum: Spectrum) -> list[tuple[float, Array]]:
     """−2 ln L (without constants) and scaled innovations of the steady filter, by run."""
+    results = []
+    for channel, (numerator, denominator, spread) in zip(channels, _filters(channels, spectrum), strict=True):
+        if not (np.isfinite(spread) and spread > 0.0):
+            results.append((np.inf, np.zeros(0)))
+            continue
+        innovations = lfilter(numerator, denominator, channel.residual)[_skip(channel) :]
+        cost = float(innovations.size * np.log(spread) + innovations @ innovations / spread)
+        results.append((cost, innovations / np.sqrt(spread)))
+    return results
+
+
+def _filters(channels: Sequence[_Channel], spectrum: Spectrum) -> list[tuple[Array, Array, float]]:
+    """The filter from residuals to innovations, numerator and denominator, and their variance, rad², by run."""
     transition, disturbance = _discrete(channels, spectrum)
     variance = np.array([c.variance for c in channels])
     covariance = _steady_covariance(transition, disturbance, variance)
@@ -211,16 +258,13 @@ def _filtered(channels: Sequence[_Channel], spectrum: Spectrum) -> list[tuple[fl
     gain = np.einsum("rij,rj->ri", transition, covariance[:, :, 0]) / spread[:, None]
     closed = transition.copy()
     closed[:, :, 0] -= gain
-    results = []
-    for i, channel in enumerate(channels):
-        if not (np.isfinite(spread[i]) and spread[i] > 0.0):
-            results.append((np.inf, np.zeros(0)))
-            continue
-        numerator, denominator = np.real(np.poly(transition[i])), np.real(np.poly(closed[i]))
-        innovations = lfilter(numerator, denominator, channel.residual)[_skip(channel) :]
-        cost = float(innovations.size * np.log(spread[i]) + innovations @ innovations / spread[i])
-        results.append((cost, innovations / np.sqrt(spread[i])))
-    return results
+    finite = np.isfinite(spread)
+    return [
+        (np.real(np.poly(transition[i])), np.real(np.poly(closed[i])), float(spread[i]))
+        if finite[i]
+        else (np.ones(1), np.ones(1), np.inf)
+        for i in range(len(channels))
+    ]
 
 
 def _discrete(channels: Sequence[_Channel], spectrum: Spectrum) -> tuple[Array, Array]:

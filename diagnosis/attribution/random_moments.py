@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from diagnosis.attribution.beside_turbulence import beside_turbulence
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.process_noise import (
     ProcessNoise,
@@ -53,7 +54,9 @@ class RandomAnswer:
 
 
 def weigh_random_moments(
-    nominal: Fit, hypotheses: Sequence[Hypothesis], allowed: Collection[str]
+    nominal: Fit,
+    hypotheses: Sequence[Hypothesis],
+    allowed: Collection[str],
 ) -> list[RandomAnswer]:
     """Try turbulence, and vortices with a wandering phase, alone and beside the best single effects.
 
@@ -65,20 +68,30 @@ def weigh_random_moments(
         The most likely answer of each kind that passes, with as few effects beside it as the evidence asks for.
         To pass, the innovations must be white by band, steady in time and without heavy tails, and the wind-off
         runs free of a gap. Empty where none passes, or where deterministic effects close the gap.
+
+        A strong random motion misleads the fit of the effects beside it. Where no answer passes, the best set is
+        therefore fitted again with the rig's response to turbulence as part of the noise.
     """
     if any(
         max(hypothesis.fit.excess, 0.0) < CLOSED_WITHOUT_RANDOM * nominal.excess for hypothesis in hypotheses
     ):
         return []
+    answers = _passing(nominal, hypotheses, allowed)
+    if not answers and hypotheses:
+        answers = _passing(nominal, beside_turbulence(hypotheses[0], nominal.problem.data), allowed)
+    least = min((answer.process.cost for answer in answers), default=0.0)
+    return [answer for answer in answers if answer.process.cost < least + RIVAL_EVIDENCE]
+
+
+def _passing(nominal: Fit, hypotheses: Sequence[Hypothesis], allowed: Collection[str]) -> list[RandomAnswer]:
+    """The most likely answer of each kind that passes."""
     kinds: tuple[tuple[str, tuple[_Kind, ...]], ...] = (
         ("broad_band", (fit_turbulence, partial(fit_turbulence, centred=True))),
         ("narrow_band", (fit_wandering_shedding,)),
     )
     known = [(the_effect(random=random), fits) for random, fits in kinds]
     tried = [_likeliest(kind, fits, nominal, hypotheses) for kind, fits in known if kind.name in allowed]
-    answers = [answer for answer in tried if answer is not None]
-    least = min((answer.process.cost for answer in answers), default=0.0)
-    return [answer for answer in answers if answer.process.cost < least + RIVAL_EVIDENCE]
+    return [answer for answer in tried if answer is not None]
 
 
 _Kind = Callable[[Fit], ProcessNoise | None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,9 @@ from scipy.optimize import minimize_scalar
 from scipy.signal.windows import tukey
 from scipy.stats import chi2
 
+from diagnosis.detection.scattered_noise import beside_the_motion
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.similarity import frequency as motion_frequency
 from diagnosis.fitting.spectra import mains_line, smooth_spectra
 from diagnosis.policy import HUM_CONTRAST, HUM_RUN_DROP, HUM_RUNS, SWELL_FALSE_ALARM_RATE
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -66,9 +69,11 @@ def refine_frequency(campaign: Campaign, frequency: float) -> float:
     Returns:
         The frequency at which a sine and its harmonics remove most power from all records, Hz.
     """
+    cleared = [_without_motion(run.record, np.hanning(run.record.time_s.size)) for run in campaign.runs]
 
     def left(trial: float) -> float:
-        return -float(sum(_line_power(run.record, trial) for run in campaign.runs))
+        runs = zip(campaign.runs, cleared, strict=True)
+        return -float(sum(_line_power(run.record, reading, trial) for run, (_, reading) in runs))
 
     found = minimize_scalar(
         left, bounds=(frequency - 0.02, frequency + 0.02), method="bounded", options={"xatol": 1e-4}
@@ -120,10 +125,9 @@ def _frequency_std(records: list[Record], amplitude: float, variance: float) -> 
     return float(np.sqrt(2.0 * variance * scatter) / (amplitude * curvature * 2.0 * np.pi))
 
 
-def _line_power(record: Record, frequency: float) -> float:
-    """Squared amplitudes of the windowed record at a frequency and its harmonics, summed."""
+def _line_power(record: Record, values: Array, frequency: float) -> float:
+    """Squared amplitudes of the reading without motion at a frequency and its harmonics, summed."""
     time = record.time_s - record.time_s[0]
-    values = _detrended(record.yaw_rad) * np.hanning(time.size)
     wave = np.exp(-2j * np.pi * frequency * time)
     turn, total = wave, 0.0
     for k in range(1, _HARMONICS + 1):
@@ -171,21 +175,33 @@ def _swells(records: list[Record], frequency: float, variance: float) -> bool:
         if int(2.0 * _SWELL_UP_TO * (record.time_s[-1] - record.time_s[0])) < 1:
             continue
         steady, swelling = _lines(record, frequency), _swell(record, frequency)
-        window = np.hanning(record.time_s.size)[:, None]
-        both = np.linalg.qr(np.column_stack([steady, swelling]) * window)[0][:, steady.shape[1] :]
+        window = np.hanning(record.time_s.size)
+        clear, reading = _without_motion(record, window)
+        both = np.linalg.qr(clear(np.column_stack([steady, swelling])))[0][:, steady.shape[1] :]
         # windowed white noise has the window's mean square
-        share = both.T @ (both * window**2)
-        found = both.T @ (_detrended(record.yaw_rad) * window[:, 0])
+        share = both.T @ (both * window[:, None] ** 2)
+        found = both.T @ reading
         power += float(found @ np.linalg.solve(share, found)) / variance
         count += swelling.shape[1]
     return count > 0 and power > float(chi2.isf(SWELL_FALSE_ALARM_RATE, count))
 
 
 def _windowed_fit(record: Record, design: Array, window: Array) -> Array:
-    """Coefficients of the columns; the window keeps the slow motion from leaking into a line far above it."""
-    return np.asarray(
-        np.linalg.lstsq(design * window[:, None], _detrended(record.yaw_rad) * window, rcond=None)[0]
-    )
+    """Coefficients of the columns."""
+    clear, reading = _without_motion(record, window)
+    return np.asarray(np.linalg.lstsq(clear(design), reading, rcond=None)[0])
+
+
+def _without_motion(record: Record, window: Array) -> tuple[Callable[[Array], Array], Array]:
+    """What takes the slow motion out of columns of samples, and the windowed reading without it.
+
+    The window keeps the motion from leaking into a line far above it. Unevenly spaced samples spread it over all
+    frequencies, so that a curve takes it out first.
+    """
+    if record.uniform:
+        return lambda columns: columns * window[:, None], _detrended(record.yaw_rad) * window
+    curve = beside_the_motion(record, motion_frequency(record))
+    return lambda columns: curve.left(columns) * window[:, None], curve.left(record.yaw_rad) * window
 
 
 def _detrended(values: Array) -> Array:

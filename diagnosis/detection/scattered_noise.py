@@ -13,6 +13,7 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 _ORDER = 5
 _KNOTS = 24.0  # per cycle at most: the curve follows what is slower than twelve times the motion
+_KNOTS_OF_MOTION = 12.0  # per cycle: it follows what is slower than six times the motion
 _LONG_GAP = 0.25  # of a cycle: the curve is not drawn across it
 _LEAST_PIECES = 8  # of a curve
 
@@ -37,14 +38,36 @@ def scattered_variance(record: Record, frequency: float, block: int) -> tuple[fl
     absorbed = 1.0 - (block**2 - 1) * (np.pi / (2.0 * piece)) ** 2 / 9.0
     squares, freedom = 0.0, 0.0
     for place in whole or [np.arange(record.time_s.size)]:
-        means = mean_of_blocks(_left(record.time_s[place], record.yaw_rad[place], piece), block)
+        curve = SmoothCurve(record.time_s[place], piece)
+        means = mean_of_blocks(curve.left(record.yaw_rad[place]), block)
         squares += float(means @ means)
         freedom += means.size - absorbed * (place.size // piece + _ORDER)
     return block * squares / max(freedom, 1.0), float(np.sqrt(2.0 / max(freedom, 1.0)))
 
 
-def _left(time: Array, values: Array, piece: int) -> Array:
-    """What the best quintic spline with ``piece`` samples between its knots leaves."""
-    inner = time[piece : 1 - piece : piece]
-    knots = np.concatenate([np.full(_ORDER + 1, time[0]), inner, np.full(_ORDER + 1, time[-1])])
-    return np.asarray(values - make_lsq_spline(time, values, knots, _ORDER)(time), np.float64)
+def beside_the_motion(record: Record, frequency: float) -> SmoothCurve:
+    """A curve that follows the motion and nothing much faster.
+
+    Args:
+        frequency: of the motion, Hz.
+    """
+    return SmoothCurve(record.time_s, max(2, round(record.sample_rate / (_KNOTS_OF_MOTION * frequency))))
+
+
+class SmoothCurve:
+    """A quintic spline through some times, by least squares.
+
+    Args:
+        time: of the samples, shape (n,), s.
+        piece: samples between its knots.
+    """
+
+    def __init__(self, time: Array, piece: int) -> None:
+        inner = time[piece : 1 - piece : piece]
+        self.time = time
+        self.knots = np.concatenate([np.full(_ORDER + 1, time[0]), inner, np.full(_ORDER + 1, time[-1])])
+
+    def left(self, values: Array) -> Array:
+        """What the curve leaves of the values, shape (n,) or (n, k)."""
+        curve = make_lsq_spline(self.time, values, self.knots, _ORDER)
+        return np.asarray(values - curve(self.time), np.float64)

@@ -128,6 +128,24 @@ def fit(
     return state.result(converged)
 
 
+def fit_at(problem: Problem, point: Point) -> Fit:
+    """The fit that stands at a point found by other means.
+
+    Args:
+        problem: runs and effects.
+        point: parameter values.
+
+    Returns:
+        Residuals and sensitivities there.
+
+    Raises:
+        FitError: when the model cannot be integrated there.
+    """
+    state = _State(problem, clip(problem, point))
+    state.linearise(None)
+    return state.result(converged=True)
+
+
 class _State:
     """Where a minimisation stands."""
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.whitening import correlate
 from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION
 from tunnel_sim.vocabulary.record import Array
 
@@ -123,17 +124,21 @@ class _Step:
 class _Skipping:
     """One run, in which skips are sought by linear theory.
 
-    The reading from block k on changes by the rate of the motion for every second lost. What the run's own
-    sensitivities absorb of that is taken out for all k at once by sums from the end.
+    The reading from block k on changes by the rate of the motion for every second lost, and the residual by what
+    the whitening filter makes of that. What the run's own sensitivities absorb is taken out for all k at once by
+    sums from the end.
     """
 
     def __init__(self, fit: Fit, number: int) -> None:
         run, residual = fit.problem.data.runs[number], fit.residuals[number]
-        self.interval, self.duration = run.interval, run.duration
+        self.run = run
         self.basis = np.linalg.qr(np.column_stack(fit.jacobian[number]))[0]
-        self.slope = run.scaled(np.gradient(run.reading - run.unscaled(residual), run.interval))
+        self.rate = np.gradient(run.reading - run.unscaled(residual), run.interval)
+        self.slope = run.unwhitened(self.rate)
         self.left = self._unabsorbed(residual)
-        power = _after(self.slope**2) - np.sum(_after(self.slope[:, None] * self.basis) ** 2, axis=1)
+        power = _after(_squares(self.slope, run.whitening))
+        absorbed = _after(self.slope[:, None] * correlate(self.basis, run.whitening))
+        power -= np.sum(absorbed**2, axis=1)
         self.weight = np.maximum(power, 1e-9 * float(self.slope @ self.slope))
 
     def steps(self, count: int) -> list[_Step]:
@@ -149,7 +154,8 @@ class _Skipping:
     def _best(self, left: Array) -> _Step:
         inside = slice(_EDGE, left.size - _EDGE)
         weight = self.weight[inside]
-        times = np.maximum(_after(self.slope * left)[inside], 0.0) / weight
+        seen = _after(self.slope * correlate(left, self.run.whitening))[inside]
+        times = np.maximum(seen, 0.0) / weight
         best = int(np.argmax(times**2 * weight))
         return _Step(best + _EDGE, float(times[best]), float(weight[best]))
 
@@ -160,13 +166,13 @@ class _Skipping:
 
     def share(self, step: _Step) -> float:
         """Instant of a skip, as a share of the run."""
-        return float(step.block * self.interval / self.duration)
+        return float(step.block * self.run.interval / self.run.duration)
 
     def _change(self, steps: list[tuple[_Step, float]]) -> Array:
-        ahead = np.zeros(self.slope.size)
+        ahead = np.zeros(self.rate.size)
         for step, time in steps:
             ahead[step.block :] += time
-        return self._unabsorbed(self.slope * ahead)
+        return self._unabsorbed(self.run.scaled(self.rate * ahead))
 
     def _unabsorbed(self, values: Array) -> Array:
         return np.asarray(values - self.basis @ (self.basis.T @ values), np.float64)
@@ -175,3 +181,9 @@ class _Skipping:
 def _after(values: Array) -> Array:
     """Sums from each block to the last."""
     return np.asarray(np.cumsum(values[::-1], axis=0)[::-1], np.float64)
+
+
+def _squares(values: Array, whitening: Array) -> Array:
+    """Of which the sum from any value to the last is the power of the whitened values from there on."""
+    lags = np.correlate(whitening, whitening, "full")[whitening.size - 1 :]
+    return np.asarray(values * (2.0 * correlate(values, lags) - lags[0] * values), np.float64)

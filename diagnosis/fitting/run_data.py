@@ -105,6 +105,18 @@ class RunData:
         seen = np.where(self.samples.count > 0, difference, 0.0)
         return whiten(seen, self.whitening) * np.sqrt(self.samples.count / (self.block * self.noise_variance))
 
+    def unwhitened(self, difference: Array) -> Array:
+        """A difference of readings over the noise of its innovations, not whitened.
+
+        Args:
+            difference: of block means, in the unit of the reading, shape (n,).
+
+        Returns:
+            Dimensionless, shape (n,): `scaled` of it where the noise is white.
+        """
+        filled = 1.0 if self.samples is None else np.sqrt(self.samples.count / self.block)
+        return np.asarray(difference * filled / np.sqrt(self.noise_variance), np.float64)
+
     def unscaled(self, residual: Array) -> Array:
         """The inverse of `scaled`.
 

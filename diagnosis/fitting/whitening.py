@@ -53,6 +53,23 @@ def colour(errors: Array, whitening: Array) -> Array:
     return np.concatenate([first, lfilter([1.0], whitening, errors[len(start) :], zi=memory)[0]])
 
 
+def correlate(errors: Array, whitening: Array) -> Array:
+    """The transpose of the filter.
+
+    Args:
+        errors: of a record, or of several in columns, shape (n,) or (n, k), any unit.
+        whitening: the filter, shape (order + 1,).
+
+    Returns:
+        The sum of the filter's taps times the errors that follow each value, of the errors' shape and unit; errors
+        beyond the end count as 0.
+    """
+    if whitening.size == 1:
+        return np.asarray(errors * whitening[0], np.float64)
+    taps = whitening.reshape(-1, *[1] * (errors.ndim - 1))
+    return np.asarray(oaconvolve(errors[::-1], taps, axes=0)[: len(errors)][::-1], np.float64)
+
+
 def response(whitening: Array, frequency: Array) -> np.ndarray:
     """The frequency response of a whitening filter.
 
@@ -78,7 +95,7 @@ def colouring(whitening: Array) -> float:
     return 1.0 if whitening.size == 1 else 1.0 / float(_start(whitening.tobytes())[0, 0])
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)  # runs of a campaign
 def _start(filter_bytes: bytes) -> Array:
     """Predictors of the first values from all before them, over their standard deviation, shape (order, order).
 
