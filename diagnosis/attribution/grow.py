@@ -281,16 +281,18 @@ def _worth_fitting(
 
 
 def _best_fit(starts: Sequence[StartingPoint], base: Fit) -> Fit | None:
-    best: Fit | None = None
-    for start in starts:
-        try:
-            if is_gross(base):
-                found = fit(start.problem, start.point)
-            else:
-                found = fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
-        except (FitError, np.linalg.LinAlgError):
-            continue
-        better = best is None or found.total < best.total
-        if np.isfinite(found.total) and better and is_plausible(found):
-            best = found
-    return best
+    found = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
+    if all(fitted.total > base.total for fitted in found):  # linear theory led too far
+        near = [point for start in starts if (point := start.nearer()) is not None]
+        found += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
+    return min((f for f in found if is_plausible(f)), key=lambda f: f.total, default=None)
+
+
+def _fitted(start: StartingPoint, base: Fit) -> Fit | None:
+    with suppress(FitError, np.linalg.LinAlgError):
+        if is_gross(base):
+            found = fit(start.problem, start.point)
+        else:
+            found = fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
+        return found if np.isfinite(found.total) else None
+    return None

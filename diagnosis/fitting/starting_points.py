@@ -22,6 +22,7 @@ from tunnel_sim.vocabulary.record import Array
 
 _STILL = 0.02  # of the largest swing, below which a run or a stretch of it counts as at rest
 _PHASES = 64  # of a cycle, for its mean
+_NEARER = 0.02  # of the size that linear theory gives an effect
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
@@ -96,11 +97,24 @@ class StartingPoint:
         problem: the fit with the effect added.
         point: where to start.
         predicted_drop: of χ² by linear theory, dimensionless.
+        scaled: place of the common parameter that linear theory has scaled; None where it scaled none.
     """
 
     problem: Problem
     point: Point
     predicted_drop: float
+    scaled: int | None
+
+    def nearer(self) -> StartingPoint | None:
+        """The point with much less of the effect; None where linear theory did not say how much.
+
+        A fit from there goes down from the fit without the effect.
+        """
+        if self.scaled is None:
+            return None
+        common = self.point.common.copy()
+        common[self.scaled] *= _NEARER
+        return dataclasses.replace(self, point=Point(common, self.point.release))
 
 
 def _of_line(line: Line | None) -> OwnNumbers | None:
@@ -153,7 +167,8 @@ def _own_start(base: Fit, kind: type[Effect], found: OwnNumbers) -> StartingPoin
     infos = _own_parameters(problem, kind)
     values = [np.clip(value, info.lower, info.upper) for value, info in zip(found.values, infos, strict=True)]
     release = np.column_stack([base.point.release, found.numbers])
-    return StartingPoint(problem, Point(np.concatenate([base.point.common, values]), release), found.drop)
+    point = Point(np.concatenate([base.point.common, values]), release)
+    return StartingPoint(problem, point, found.drop, base.point.common.size)
 
 
 def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]:
@@ -163,7 +178,8 @@ def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]
 
 def _circumstances(data: Data) -> Circumstances:
     greatest = max(float(np.max(np.abs(run.reading))) for run in data.runs)
-    return Circumstances(data.springs, greatest, data.normalised)
+    slowest = min((run.wind_speed for run in data.runs if run.wind_on), default=0.0)
+    return Circumstances(data.springs, greatest, data.normalised, slowest)
 
 
 def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint | None:
@@ -187,11 +203,13 @@ def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint 
     slope = sum(float(c @ r) for c, r in zip(left, base.residuals, strict=True)) / power
     start, drop = values.copy(), slope * slope * power
     if scaled is not None:
-        start[scaled] = np.clip(slope * values[scaled], infos[scaled].lower, infos[scaled].upper)
+        moderate = np.clip(slope * values[scaled], -trial.at_most, trial.at_most)
+        start[scaled] = np.clip(moderate, infos[scaled].lower, infos[scaled].upper)
         if start[scaled] == 0.0:
             start[scaled], drop = 0.01 * values[scaled], 0.0
     point = Point(np.concatenate([base.point.common, start]), base.point.release)
-    return StartingPoint(problem, point, drop)
+    place = None if scaled is None else base.point.common.size + scaled
+    return StartingPoint(problem, point, drop, place)
 
 
 def _moderate_change(base: Fit, problem: Problem, values: Array, scaled: int | None) -> list[Array] | None:

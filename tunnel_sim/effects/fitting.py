@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 
 from tunnel_sim.effects.parameters import ParameterInfo
 
@@ -16,11 +17,13 @@ class Circumstances:
         springs: stated stiffnesses, ascending, N m/rad.
         greatest_reading: greatest absolute reading of any run, rad.
         normalised: whether runs are fitted per unit inertia.
+        slowest_wind: least stated speed of the runs with the wind on, m/s; 0 where there are none.
     """
 
     springs: tuple[float, ...]
     greatest_reading: float
     normalised: bool
+    slowest_wind: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -30,10 +33,12 @@ class Trial:
     Args:
         values: by parameter name; the others start at their defaults.
         scaled: name of the parameter that linear theory rescales; None where the values are used as they are.
+        at_most: greatest absolute value that linear theory may give it, in its unit.
     """
 
     values: Mapping[str, float]
     scaled: str | None
+    at_most: float = inf
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect
+from tunnel_sim.effects.fitting import Circumstances, Trial
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings, Series
 
@@ -32,6 +34,12 @@ class WindSpeedOffset(Effect):
     exponent: float = parameter(
         "n", "1", "power of the stated speed in the offset", scale=0.5, lower=-3.0, upper=3.0, form=True
     )
+
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """An offset that leaves half of the slowest wind at least: without wind there is no derivative to fit."""
+        at_most = 0.5 * campaign.slowest_wind
+        return [dataclasses.replace(trial, at_most=at_most) for trial in super().trials(campaign)]
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Use the true speed."""
