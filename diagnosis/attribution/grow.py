@@ -228,8 +228,16 @@ def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> li
             and _same_change(h.fit, alone[name].fit, nominal)
         ]
         if others in by_name:
-            sets += _children([by_name[others]], alike, None)
+            sets += [_to_the_end(child) for child in _children([by_name[others]], alike, None)]
     return sets
+
+
+def _to_the_end(child: Hypothesis) -> Hypothesis:
+    """The hypothesis with its fit converged, as that of its rival is."""
+    if not child.fit.converged:
+        with suppress(FitError, np.linalg.LinAlgError):
+            return replace(child, fit=fit(child.fit.problem, child.fit.point))
+    return child
 
 
 def without(whole: Fit, kind: type[Effect]) -> Fit:

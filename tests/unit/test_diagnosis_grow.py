@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagnosis.attribution.decide import weigh
-from diagnosis.attribution.grow import grow, prune, without
+from diagnosis.attribution.grow import exchange, grow, prune, without
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.starting_points import starting_points
 from diagnosis.policy import MOST_CAUSES
@@ -112,6 +112,38 @@ def test_pruning_fits_the_smaller_sets_that_are_missing(of_three):
         if hypothesis.names in grown:
             assert hypothesis.fit.total == pytest.approx(grown[hypothesis.names], rel=0.02)
     assert prune(whole, [*ranked, *smaller]) == []
+
+
+ALIKE = ("gravity_stiffness", "spring_miscalibration")  # two springs cannot tell one from the other
+
+
+def test_of_effects_that_do_the_same_one_is_grown_and_the_others_are_weighed_beside_it():
+    wrong = effect_from("spring_miscalibration", {"error": 0.004, "spring_stiffness": 16.12})
+    friction = effect_from("coulomb_friction", {"friction_moment": 0.002})
+    base, steps = nominal(campaign(wrong, friction)), []
+    kinds = [effect_class(name) for name in (*ALIKE, "coulomb_friction", "sensor_drift")]
+    ranked = grow(base, kinds, steps.append)
+    grown_from = {line.split(" + ")[0] for line in steps if " + " in line}
+    assert len(grown_from & set(ALIKE)) == 1
+    best = next(h for h in ranked if len(h.effects) == 2)
+    known = [*ranked, *prune(best, ranked)]
+    others = exchange(best, known, base)
+    assert {h.names for h in [*known, *others]} >= {
+        tuple(sorted((name, "coulomb_friction"))) for name in ALIKE
+    }
+    for hypothesis in others:
+        assert hypothesis.fit.total == pytest.approx(best.fit.total, rel=0.02)
+    assert exchange(best, [*known, *others], base) == []
+
+
+@pytest.mark.parametrize("offset", [-13.0, 6.0])
+def test_an_effect_beyond_linear_theory_is_fitted_from_nearby(offset):
+    """The slowest wind is 15 m/s: a fit from where linear theory leads ends worse than without the effect."""
+    kind = effect_class("wind_speed_offset")
+    base = nominal(campaign(effect_from(kind.name, {"offset": offset})))
+    found = grow(base, [kind])[0].fit
+    assert within_noise(found)
+    assert abs(found.value("wind_speed_offset.offset") - offset) < 4.0 * found.std("wind_speed_offset.offset")
 
 
 def test_an_effect_taken_out_leaves_the_fit_without_it():

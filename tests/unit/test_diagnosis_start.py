@@ -107,6 +107,25 @@ def test_a_wrong_spring_is_sought_among_the_springs_there_are():
     assert held == {16.12, 44.84}
 
 
+def test_an_offset_of_the_wind_speed_starts_with_wind_left():
+    """Linear theory asks for more than the slowest wind; without wind there is no derivative to fit."""
+    base = nominal(campaign(effect_from("wind_speed_offset", {"offset": -13.0})))
+    (lead,) = starting_points(base, effect_class("wind_speed_offset"))
+    slowest = min(run.wind_speed for run in base.problem.data.runs if run.wind_on)
+    assert lead.point.common[lead.scaled] == pytest.approx(-0.5 * slowest)
+
+
+def test_a_nearer_start_has_less_of_the_effect_and_nothing_else_changed():
+    base = nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003})))
+    (lead,) = starting_points(base, effect_class("quadratic_damping"))
+    near = lead.nearer()
+    assert near.problem is lead.problem
+    assert near.point.common[:-1] == pytest.approx(lead.point.common[:-1])
+    assert 0.0 < near.point.common[-1] < 0.1 * lead.point.common[-1]
+    clipped = starting_points(base, effect_class("sensor_clipping"))[0]
+    assert clipped.nearer() is None
+
+
 def readings_of(data, effect, common, own, noise=0.0):
     """The same runs with the readings of a model."""
     values = [getattr(effect, info.name) for info in effect.parameters() if not info.form]

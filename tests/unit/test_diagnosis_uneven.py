@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from diagnosis.answer.confirm import compare
+from diagnosis.detection.mains import refine_frequency, remove_hum
 from diagnosis.detection.scattered_noise import scattered_variance
 from diagnosis.detection.sensor_noise import campaign_noise
 from diagnosis.fitting.least_squares import fit, scaled_residuals
@@ -176,3 +179,23 @@ def test_noise_that_neighbours_share_counts_in_full():
     # A mean of four samples between those of the series has a little less of its noise.
     assert variance / NOISE**2 == pytest.approx(1.0, abs=0.1 + 4.0 * relative)
     assert np.var(np.diff(record.yaw_rad - 0.3 * np.cos(20.0 * time))) < 1.5 * NOISE**2
+
+
+def test_a_hum_is_removed_down_to_the_noise():
+    """An irregular clock spreads the motion over all frequencies, the hum's among them."""
+    data = uneven_campaign(lost=0.0, gap=(9.0, 9.0))
+
+    def hum(time):
+        return 4e-3 * np.sin(2.0 * np.pi * 50.03 * time) + 8e-4 * np.sin(6.0 * np.pi * 50.03 * time + 1.0)
+
+    def with_hum(run):
+        return replace(run, record=Record(run.record.time_s, run.record.yaw_rad + hum(run.record.time_s)))
+
+    noisy = replace(data, runs=tuple(with_hum(run) for run in data.runs))
+    frequency = refine_frequency(noisy, 50.02)
+    assert frequency == pytest.approx(50.03, abs=1e-3)
+    cleaned, found = remove_hum(noisy, frequency, NOISE**2)
+    assert found.amplitude == pytest.approx(4e-3, abs=5.0 * found.std)
+    for run, before in zip(cleaned.runs, data.runs, strict=True):
+        added = run.record.yaw_rad - before.record.yaw_rad
+        assert np.sqrt(np.mean((added - added.mean()) ** 2)) < 0.1 * NOISE

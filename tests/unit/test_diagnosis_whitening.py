@@ -6,7 +6,7 @@ from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
 from diagnosis.fitting.run_data import RunData
-from diagnosis.fitting.whitening import WHITE, colour, colouring, response, whiten
+from diagnosis.fitting.whitening import WHITE, colour, colouring, correlate, response, whiten
 
 FILTERS = (np.array([1.0, -0.9]), np.array([1.0, -1.2, 0.6]), np.array([1.0, 0.5, 0.0, -0.3]))
 
@@ -47,3 +47,11 @@ def test_a_run_scales_a_sinusoid_by_its_response():
     assert run.noise_at(3.0) == pytest.approx(1e-3 / abs(run.response(3.0)))
     assert run.unscaled(run.scaled(wave.real)) == pytest.approx(wave.real, abs=1e-9)
     assert run.noise_std == pytest.approx(1e-3 * np.sqrt(autocovariance(FILTERS[1], 1)[0]), rel=1e-9)
+
+
+@pytest.mark.parametrize("whitening", [WHITE, *FILTERS])
+def test_correlation_is_the_transpose_of_the_filter(whitening):
+    matrix = toeplitz(np.append(whitening, np.zeros(30 - whitening.size)), np.zeros(30))
+    values = np.random.default_rng(3).normal(size=(30, 2))
+    assert correlate(values, whitening) == pytest.approx(matrix.T @ values, abs=1e-12)
+    assert correlate(values[:, 0], whitening) == pytest.approx(matrix.T @ values[:, 0], abs=1e-12)
