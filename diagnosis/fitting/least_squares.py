@@ -118,7 +118,7 @@ def fit(
         iterations += 1
         state.linearise(base if borrowed else None)
         gain = state.improve()
-        poor = gain < max(0.1, 0.02 * state.cost) if borrowed else gain < max(0.1, tolerance * state.cost)
+        poor = gain < max(0.1, 0.1 * state.cost) if borrowed else gain < max(0.1, tolerance * state.cost)
         if poor and borrowed:
             borrowed = False  # once more with its own sensitivities
         elif poor:
