@@ -182,3 +182,14 @@ def test_releases_are_refitted_run_by_run(fits):
     chi2 = [float(r @ r) for r in residuals]
     np.testing.assert_allclose(chi2, base.chi2, rtol=1e-4)
     np.testing.assert_allclose(found.release, base.point.release, atol=2e-5)
+
+
+def test_a_run_that_grows_without_bound_keeps_its_release(fits):
+    """Negative damping that overflows in every run: there is nothing to refit, and nothing fails."""
+    base, _ = fits
+    common = base.point.common.copy()
+    common[base.problem.names.index("mechanical_damping")] = -50.0
+    slopes = [release for _, release in base.jacobian]
+    found, residuals = refit_releases(base.problem, Point(common, base.point.release), slopes)
+    assert not any(np.all(np.isfinite(r)) for r in residuals)
+    assert np.array_equal(found.release, base.point.release)
