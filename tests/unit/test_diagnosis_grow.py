@@ -166,3 +166,14 @@ def test_a_second_mode_is_neither_a_drift_nor_the_motion_itself() -> None:
     rates = (0.6, 6.0, 12.0, 14.0, 36.0)
     modes = [effect_from("second_mode", {"amplitude": 0.002, "frequency": rate}) for rate in rates]
     assert [mode.plausible(12.0) for mode in modes] == [False, True, False, False, True]
+
+
+def test_a_line_that_does_not_decay_is_no_mode() -> None:
+    """A fit to a vibration ends at the least damping allowed."""
+    least = next(i for i in effect_class("second_mode").parameters() if i.name == "damping_ratio").fit_lower
+    ratios = (least, 1.1 * least, 0.01)
+    modes = [
+        effect_from("second_mode", {"amplitude": 0.002, "frequency": 36.0, "damping_ratio": r})
+        for r in ratios
+    ]
+    assert [mode.plausible(12.0) for mode in modes] == [False, True, True]

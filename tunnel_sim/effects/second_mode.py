@@ -12,6 +12,7 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
 _LEAST_DAMPING = 1e-4  # of a structure: judgement; a line that does not decay is not a mode
+_DECAYS = 1.01  # a fit that ends at the least damping has found a line that something drives
 _SLOWEST = 0.1  # of the motion's frequency: judgement; what is slower is a drift in a record of ten cycles
 _REFERENCE_RELEASE = 0.35  # rad: where all exponents give the same amplitude
 
@@ -64,8 +65,11 @@ class SecondMode(Effect):
     )
 
     def plausible(self, omega: float) -> bool:
-        """Whether it is an oscillation of its own: not the motion's, and not so slow that it is a drift."""
-        return self.frequency > _SLOWEST * omega and abs(self.frequency / omega - 1.0) > NEAR_MOTION
+        """Whether it is an oscillation of its own: it decays, is not the motion's, and not as slow as a drift."""
+        decays = self.damping_ratio > _DECAYS * _LEAST_DAMPING
+        return (
+            decays and self.frequency > _SLOWEST * omega and abs(self.frequency / omega - 1.0) > NEAR_MOTION
+        )
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Add the oscillation at a phase of the run's own."""
