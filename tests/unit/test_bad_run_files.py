@@ -198,6 +198,11 @@ def test_a_slip_of_unit_too_small_to_see_without_the_release_angle(
         assert part in text
 
 
+def test_a_run_at_rest_beside_its_release_angle(folder: Path) -> None:
+    (folder / "runs" / "r1.csv").write_text(csv(TIME, 0.0 * YAW), encoding="utf-8")
+    assert "no oscillation" in refusal(folder)
+
+
 def test_a_link_out_of_the_folder(folder: Path) -> None:
     path = folder / "runs" / "r2.csv"
     path.unlink()

@@ -31,6 +31,13 @@ def test_effects_are_as_strong_as_they_should_be(cases):
     assert len({case.name for case in cases}) == len(cases)
 
 
+def test_a_case_is_named_for_its_effect_and_severity(monkeypatch):
+    monkeypatch.setattr(work, "size_effects", lambda draws, **_: draws)
+    cases = work.make_cases(1, realisations=1, effects=EFFECTS[:1], severities=(10.0,), duration=0.2)
+    assert [(case.effect, case.severity) for case in cases] == [("no effect", 0.0), (EFFECTS[0], 10.0)]
+    assert [case.name for case in cases] == ["no_effect-0-0", "coulomb_friction-10-0"]
+
+
 @pytest.mark.slow
 def test_realisations_differ_in_their_noise_only(cases):
     first, second = (case.campaign.runs[0].record.yaw_rad for case in cases[2:4])

@@ -19,6 +19,7 @@ from docs.studies.campaign_policies import (
     play,
     to_csv,
 )
+from tunnel_lab.envs import policies
 from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_lab.envs.policies import best_rivals, expected_gain, greedy, run_campaign, scripted, separating
 
@@ -88,7 +89,7 @@ def test_separating_follows_the_script_until_there_is_something_to_separate():
     assert separating(env.known) == scripted(env.known)  # no wind yet
 
 
-def test_separating_prefers_the_run_that_distinguishes_the_rivals():
+def test_separating_prefers_the_run_that_distinguishes_the_rivals(monkeypatch):
     """A damping effect seen at one speed alone: air or rig? A run with the wind off shows it, for a minute more."""
     env = CampaignEnv(
         preset="diagnosis",
@@ -105,6 +106,11 @@ def test_separating_prefers_the_run_that_distinguishes_the_rivals():
     assert rivals is not None
     assert {fit.problem.effects[0].name for fit in rivals} == {"quadratic_damping", "nonlinear_yaw_damping"}
     assert separating(env.known) == (0, 1, 0, 0)
+    # The wind off costs 125 s instead of 65 s, and the log-likelihood ratio grows with the separation's square.
+    for still, chosen in ((1.3, 0), (1.5, 1)):
+        apart = {10.0: 1.0, 0.0: still}
+        monkeypatch.setattr(policies, "separation", lambda *given, apart=apart: apart[given[2].wind_speed])
+        assert separating(env.known) == (0, chosen, 0, 0)
 
 
 @pytest.mark.slow

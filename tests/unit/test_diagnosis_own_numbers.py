@@ -75,6 +75,16 @@ def test_a_ringing_is_seen_beside_the_motion() -> None:
     assert found.numbers == pytest.approx(OWN, abs=0.7)
 
 
+def test_no_ringing_is_sought_near_the_motion_or_its_harmonics() -> None:
+    """The nominal fit leaves the harmonics of a hardening spring, by far the strongest lines of its residual."""
+    found = ringing(nominal(campaign(effect_from("cubic_stiffness", {"coefficient": 0.3}))))
+    assert found is not None
+    line = found.values[1] * np.sqrt(1.0 - found.values[2] ** 2)
+    for spring in {spring for spring, _ in gap_campaigns.CONDITIONS}:
+        own = np.sqrt(spring / gap_campaigns.INERTIA)
+        assert all(abs(line - k * own) > 0.25 * own for k in (1.0, 2.0, 3.0))
+
+
 def test_a_skip_is_placed_to_within_a_few_blocks() -> None:
     found = skip(nominal(campaign(LOST)))
     assert found is not None

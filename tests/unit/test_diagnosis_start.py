@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.attribution.hypothesis import _within
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import prepare
@@ -13,7 +14,7 @@ from diagnosis.fitting.starting_points import is_gross, nominal_start, project_o
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, campaign, nominal
-from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 
 NOISE = 4e-4
 SIX = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
@@ -44,6 +45,13 @@ def test_the_nominal_start_of_runs_without_wind_or_stiffness():
     assert still.common[0] == pytest.approx(Truth().yaw_inertia, rel=5e-3)
     normalised = nominal_start(prepared((Setting(None, 0.0), Setting(None, 0.0, 0.2))))
     assert normalised.common[0] == pytest.approx(16.12 / Truth().yaw_inertia, rel=5e-3)
+
+
+def test_a_free_form_starts_at_the_textbook_value_or_inside_its_bounds():
+    for info in (info for kind in ALL_EFFECTS for info in kind.parameters() if info.form):
+        start = _within(info)
+        assert info.lower < start < info.upper
+        assert start == info.default or info.default == info.lower
 
 
 def test_nothing_that_the_fit_can_absorb_is_left_of_a_change():

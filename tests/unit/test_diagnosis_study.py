@@ -23,11 +23,11 @@ def _with_excess(fitted: Fit, excess: float) -> Fit:
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    """The nominal fit's excess is 10, and a fit with vortex shedding leaves 5 of it."""
+    """The nominal fit's excess is 1, and a fit with vortex shedding leaves half of it."""
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
     base = nominal(data)
-    found = studied(data, _with_excess(base, 10.0))
-    steady = _with_excess(base, 5.0)
+    found = studied(data, _with_excess(base, 1.0))
+    steady = _with_excess(base, 0.5)
     return replace(found, hypotheses=(Hypothesis(("vortex_shedding",), steady),))
 
 

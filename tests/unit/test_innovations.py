@@ -7,6 +7,7 @@ from scipy.linalg import expm, solve_discrete_are
 from identification import Estimate, identify
 from identification.decay.damped_oscillation import Decay, free_decay
 from identification.decay.decay_fit import Reading, projected_cost
+from identification.decay.filter_fit import fit_driven
 from identification.decay.innovations import Driven, innovations
 from tests.reference.free_decays import TWELVE, Setting, campaign, with_records
 
@@ -54,6 +55,28 @@ def test_innovations_are_the_kalman_filters_own(corner):
     basis = np.array(columns).T
     rest = plain - basis @ np.linalg.lstsq(basis, plain, rcond=None)[0]
     np.testing.assert_allclose(found.values, rest, atol=1e-6 * np.abs(rest).max())
+
+
+def test_a_moment_is_half_as_strong_at_its_corner_as_at_low_frequency():
+    assert Driven(DECAY, 8e-4).intensity_at_resonance == 8e-4
+    at_corner = Driven(DECAY, 8e-4, DECAY.omega_n / (2.0 * np.pi))
+    assert at_corner.intensity_at_resonance == pytest.approx(4e-4)
+
+
+def test_a_driven_fit_is_at_the_maximum_of_its_likelihood():
+    rng = np.random.default_rng(8)
+    clock = INTERVAL * np.arange(600)
+    kicks = np.sqrt(1e-3 * INTERVAL) * rng.standard_normal(600)
+    shaken = np.convolve(kicks, free_decay(clock, DECAY, 0.0, 1.0))[:600]
+    yaw = free_decay(clock, DECAY, 0.3, 0.0) + shaken + 1e-4 * rng.standard_normal(600)
+    start = Decay(1.2 * DECAY.rate, 1.01 * DECAY.stiffness)
+    found = fit_driven(yaw, INTERVAL, start, np.array([0.005, 0.1]), VARIANCE)
+    stds, best = np.sqrt(np.diag(found.covariance)), found.model
+    assert abs(np.log(best.intensity / 1e-3)) < 4.0 * stds[2]
+    for away in 0.3 * np.vstack((np.diag(stds), -np.diag(stds))):
+        decay = Decay(best.decay.rate + away[0], best.decay.stiffness + away[1])
+        moved = Driven(decay, best.intensity * np.exp(away[2]))
+        assert innovations(yaw, INTERVAL, moved, VARIANCE).cost > found.innovations.cost
 
 
 def test_without_a_moment_innovations_are_output_errors_residual():

@@ -114,6 +114,11 @@ def test_noise_reaches_the_results_as_the_propagation_says():
     np.testing.assert_allclose(np.mean(claimed, axis=0), scatter, rtol=0.22)
 
 
+def test_a_record_of_a_small_part_of_a_cycle_has_no_windows():
+    given = record(0.01, 12.5, cycles=0.005, rate=400_000.0)
+    assert find_windows(given, 1e-6)[0] == ()
+
+
 def test_weights_that_are_not_there_are_bad_input(tmp_path):
     with pytest.raises(TunnelError, match=r"nothing\.safetensors: no such file"):
         estimated(record(0.01, 12.5), tmp_path / "nothing.safetensors")

@@ -133,6 +133,13 @@ def test_rig_xml_repeats_no_number_of_the_rig_description() -> None:
     assert not found & owned
 
 
+def test_a_run_of_more_steps_than_are_recorded_at_once_is_integrated_by_itself(monkeypatch) -> None:
+    together = simulate_motions(RIG, MIXED[:2], 1000.0)
+    monkeypatch.setattr("tunnel_sim.engine.simulate._CHUNK_STEPS", 1000)
+    for one, other in zip(simulate_motions(RIG, MIXED[:2], 1000.0), together, strict=True):
+        np.testing.assert_array_equal(one.angle, other.angle)
+
+
 def test_progress_counts_all_runs() -> None:
     seen: list[tuple[int, int]] = []
     simulate_motions(RIG, MIXED[:4], 1000.0, progress=lambda done, total: seen.append((done, total)))

@@ -6,6 +6,8 @@ import json
 import os
 from pathlib import Path
 
+import pytest
+
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench.stages import STAGES, closed
 from tunnel_lab.bench.workspace import Session
@@ -54,3 +56,27 @@ def test_an_estimate_that_failed_does_not_open_the_diagnosis(tmp_path: Path) -> 
     words = "$ tunnel identify rig (process 1, started 2026-01-01T00:00:00+00:00)"
     session.log("output_error").write_text(f"{words}\nexit status 1\n")
     assert "could not be identified" in closed(session, "diagnose")
+
+
+@pytest.mark.parametrize("changed", [False, True])
+def test_an_answer_is_shown_unless_the_campaign_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: bool
+) -> None:
+    pytest.importorskip("nicegui")
+    from nicegui import Client, ui
+    from starlette.requests import Request
+
+    from tunnel_lab.bench import stage_diagnose
+    from tunnel_lab.bench.parts import Frame
+
+    session = Session(tmp_path, "rig")
+    run = Run("a", Record(*decay()), 0.0)
+    write_campaign(Campaign("rig", RigProperties(), SensorProperties(), (run,)), session.campaign)
+    hashes = {} if changed else file_hashes(session.campaign)
+    session.diagnosis.write_text(json.dumps({"verdict": "A gap.", "provenance": {"sha256": hashes}}))
+    monkeypatch.setattr(stage_diagnose, "_Answer", lambda _, document: ui.label(document["verdict"]))
+    with Client(ui.page("/"), request=Request({"type": "http", "path": "/", "headers": []})) as client:
+        stage_diagnose.build(session, Frame("Diagnose", session, "diagnose"))
+    shown = [one.text for one in client.elements.values() if isinstance(one, ui.label)]
+    assert ("A gap." in shown) is not changed
+    assert any("has changed since it was diagnosed" in text for text in shown) is changed

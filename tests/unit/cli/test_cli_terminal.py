@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
+from tunnel_lab.terminal import progress
 from tunnel_lab.terminal.stacked import is_too_wide, stacked
 from tunnel_lab.terminal.tables import table
 from tunnel_sim.files.nearby import inside, nearest
@@ -48,6 +51,19 @@ def test_a_stacked_table_of_two_columns_has_a_line_for_each_row() -> None:
         " plugin:",
         " /a/path/that/is/longer/than/the/terminal/is/wide",
     ]
+
+
+def test_what_was_finished_before_does_not_count_for_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Console(file=io.StringIO(), force_terminal=True, width=100, color_system=None)
+    now = 0.0
+    monkeypatch.setattr(terminal, "get_time", lambda: now)
+    monkeypatch.setattr(progress, "console", lambda **_: terminal)
+    with progress.bar("scoring") as advance:
+        now = 5.0
+        advance(90, 100)
+        now = 25.0
+        advance(92, 100, "drift")
+    assert "92/100 0:00:25 left 0:01:20" in terminal.file.getvalue()
 
 
 @pytest.mark.parametrize("width", [60, 70, 80])

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from diagnosis.answer.coefficients import coefficients, rival_fits
 from diagnosis.answer.held_out import HeldOut, folds, predict_held_out
+from diagnosis.answer.native_closure import native_closure
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import fit
@@ -17,6 +18,10 @@ from diagnosis.fitting.starting_points import starting_points
 from diagnosis.policy import EVEN_SHARE
 from tests.unit.gap_campaigns import nominal
 from tunnel_sim.effects import effect_class
+from tunnel_sim.engine.joint_patch import Start
+from tunnel_sim.physics.motion import Motion
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
 
 CAUSE = "quadratic_damping"
 
@@ -153,3 +158,25 @@ def test_truths_lie_inside_the_intervals_before_and_after(data, base, best):
     for found in (before, after):
         assert abs(found["cn_beta"].value - 0.45) < 3.0 * found["cn_beta"].std
         assert abs(found["cn_r"].value + 0.25) < 3.0 * found["cn_r"].std
+
+
+def test_a_patched_model_that_is_right_closes_the_gap_of_swings_of_a_milliradian():
+    """The start is fitted again with steps in proportion to the swing, whose frequency depends on its size here."""
+
+    def swing(_common, _own, start, duration):
+        time = np.arange(0.0, duration, 2e-3)
+        size = np.hypot(start.angle, start.rate / 12.0)
+        omega = 12.0 * (1.0 + 0.02 * (size / 1e-3) ** 2)
+        state = size * np.exp((1j * omega - 0.1) * time + 1j * np.arctan2(-start.rate / 12.0, start.angle))
+        return Motion(time, state.real, ((1j * omega - 0.1) * state).real)
+
+    noise, truth = 1e-7, Start("a", 0.0, 1e-3, 1e-3)
+    motion = swing(None, None, truth, 5.0)
+    reading = motion.angle + noise * np.random.default_rng(1).standard_normal(motion.angle.size)
+    run = Run("a", Record(motion.time_s, reading), 0.0, 16.0)
+    fitted = nominal(Campaign("small", RigProperties(), SensorProperties(500.0, None, noise), (run,)))
+    common = np.where([name == "zero" for name in fitted.problem.names], 0.0, fitted.point.common)
+    point = (common, np.array([1.03e-3, 0.9e-3]))
+    out = HeldOut({"a": fitted.residuals[0]}, {"a": point}, common[None], fitted.problem.names)
+    closure = native_closure(fitted, fitted, out, out, swing)
+    assert closure.native == pytest.approx(1.0, abs=0.2)

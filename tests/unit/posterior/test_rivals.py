@@ -5,10 +5,10 @@ import pytest
 
 from identification.decay.damped_oscillation import Decay, free_decay
 from identification.neural.posterior.demodulated import Demodulated, demodulate
-from identification.neural.posterior.features import record_features
+from identification.neural.posterior.features import OWN, record_features
 from identification.neural.posterior.mixture import distribution, quantiles
 from identification.neural.posterior.rivals import fit_rivals, forward
-from identification.neural.posterior.shapes import Windows, best_step
+from identification.neural.posterior.shapes import Conditions, Windows, best_step, campaign_columns
 from identification.status import Status
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_sim.vocabulary.record import Record
@@ -83,6 +83,40 @@ def test_a_softening_spring_is_found_by_its_own_column():
     assert abs(nominal) > 40.0
     width = float(np.sqrt(found.covariances[square, 1, 1]))
     assert abs(nominal + found.shifts[square, 1]) < 4.0 * width < 0.5 * abs(nominal)
+
+
+def test_a_reading_with_a_square_shows_in_the_second_harmonic_and_not_in_the_third():
+    plain = record(np.random.default_rng(10))
+    squared = Record(plain.time_s, plain.yaw_rad + 0.05 * plain.yaw_rad**2)
+    before, after = (features(one)[0].runs[0][-OWN:][3:9].reshape(2, 3) for one in (plain, squared))
+    assert np.all(after[0] > before[0] + 0.5)
+    assert np.all(after[1] < before[1] + 0.5)
+    assert before[:, 2] == pytest.approx(0.0, abs=0.9)  # the power of white noise is one
+
+
+@pytest.mark.parametrize("power", [0.0, -0.35])
+def test_an_error_of_the_wind_speed_that_is_a_power_of_it_is_a_rival(power):
+    """Truth: the exact rates and frequencies at the stated speeds and at speeds off by a millionth of the power."""
+    speed, inertia, stiffness, cn_beta, cn_r = np.array([0.0, 10.0, 17.0, 25.0]), 0.1, 16.0, 0.5, -0.3
+
+    def loads(v):
+        return 0.5 * 1.2 * v**2 * 0.036 * 0.625, 0.5 * 1.2 * v * 0.036 * 0.625**2
+
+    def motion(v):
+        stiff, damped = loads(v)
+        return (0.02 - cn_r * damped) / (2.0 * inertia), np.sqrt((stiffness - cn_beta * stiff) / inertia)
+
+    (rate, omega), share = motion(speed), speed / 25.0
+    away = np.where(speed > 0.0, 1e-6 * np.where(speed > 0.0, share, 1.0) ** (power - 1.0), 0.0)
+    slower, faster = (np.array(motion(speed * (1.0 + sign * away))) for sign in (-1.0, 1.0))
+    change = (faster - slower) / 2e-6
+    decays = [Decay.from_modal(o, r / o) for r, o in zip(rate, omega, strict=True)]
+    seen = [demodulate(Record(TIME, free_decay(TIME, decay, 0.3, 0.0))) for decay in decays]
+    w = Windows.of(seen)
+    given = Conditions(np.full(4, stiffness), *loads(speed), share, np.zeros(4, int), (cn_beta, cn_r))
+    expected = w.joined([(-change[0][w.run] * w.time, change[1][w.run] * w.time)])
+    distances = np.abs(campaign_columns(w, given) / inertia - expected).max(axis=0)
+    assert distances.min() < 0.01 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize(

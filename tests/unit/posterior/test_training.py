@@ -73,6 +73,19 @@ def test_rare_and_outside_forms_are_never_drawn():
     assert all(form.group is not Group.RARE and form.family != "unknown" for form in forms)
 
 
+@pytest.mark.parametrize("factor", [0.1, 10.0])
+def test_a_size_of_an_effect_that_diverges_is_moved_towards_its_usual_size(factor):
+    from dataclasses import replace
+
+    from tunnel_lab.training.draw import _nearer
+    from tunnel_reference.draw import Mixture, draw_campaign
+
+    drawn = draw_campaign(np.random.default_rng(1), kind="single", mixture=Mixture(rare=0.0))
+    effect = replace(drawn.effects[0], value=factor * drawn.effects[0].form.start)
+    moved = _nearer(replace(drawn, effects=(effect,)), np.inf).effects[0].value
+    assert abs(np.log(moved / effect.form.start)) < abs(np.log(factor))
+
+
 def test_the_flexible_rod_moves_as_the_reference_integrator_says():
     from dataclasses import replace
 
