@@ -8,8 +8,15 @@ from scipy.linalg import expm
 from scipy.signal import lfilter, lsim
 
 from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.attribution.process_noise import fit_turbulence, fit_wandering_shedding, whiteness
+from diagnosis.attribution.process_noise import (
+    fit_turbulence,
+    fit_wandering_shedding,
+    whiteness,
+    with_response,
+)
 from diagnosis.attribution.random_moments import weigh_random_moments, wind_off_excess
+from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.starting_points import starting_points
 from tests.unit.gap_campaigns import (
     CN_BETA,
     CN_R,
@@ -22,7 +29,7 @@ from tests.unit.gap_campaigns import (
     nominal,
     with_blow,
 )
-from tunnel_sim.effects import effect_from
+from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.record import Record
 
 AREA, LENGTH = 0.036, 0.625
@@ -106,6 +113,32 @@ def test_buffeting_is_offered_where_it_blows(windy):
     (answer,) = weigh_random_moments(windy, [], BOTH)
     assert answer.effects == ("buffeting",)
     assert answer.share < 0.1
+
+
+def test_skips_beside_strong_turbulence_are_placed_where_they_are():
+    """Least squares takes the motion that turbulence drives for white noise, and misplaces them."""
+    base = nominal(buffeted(campaign(effect_from("dropped_samples", {"lost_time": 0.006})), 0.01, 4.0))
+    (start,) = starting_points(base, effect_class("dropped_samples"))
+    white = fit(start.problem, start.point, base=base)
+    planted = np.linspace(0.2, 0.8, len(CONDITIONS))  # shares of the runs
+    assert np.max(np.abs(white.point.release[:, -1] - planted)) > 0.05
+    (answer,) = weigh_random_moments(base, [Hypothesis(("dropped_samples",), white)], ("buffeting",))
+    assert answer.effects == ("buffeting", "dropped_samples")
+    found = answer.beside.fit
+    assert found.point.release[:, -1] == pytest.approx(planted, abs=0.005)
+    assert found.value("dropped_samples.lost_time") == pytest.approx(0.006, rel=0.01)
+    assert abs(wind_off_excess(found)) < 0.1
+
+
+def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy):
+    found = fit_turbulence(windy)
+    data = with_response(windy, found.spectrum)
+    again = fit(replace(windy.problem, data=data), windy.point)
+    for run, residual in zip(data.runs, again.residuals, strict=True):
+        assert np.mean(residual**2) == pytest.approx(1.0, abs=0.2)
+        assert (run.whitening.size > 1) == run.wind_on
+        neighbours = float(residual[1:] @ residual[:-1]) / float(residual @ residual)
+        assert abs(neighbours) < 4.0 / np.sqrt(residual.size)
 
 
 def test_one_gust_is_no_buffeting():
