@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -219,18 +219,25 @@ class Problem:
 
         Returns:
             For every point, for every run, the reading's block means, rad; infinite where the motion grows
-            without bound.
+            without bound, or a parameter is not finite.
         """
-        jobs = [
-            _Job(self, point, r, effects)
-            for point, effects in zip(points, map(self.effects_at, (p.common for p in points)), strict=True)
-            for r in range(len(self.data.runs))
-        ]
-        half = (len(jobs) + _THREADS - 1) // _THREADS
-        results = list(_POOL.map(_run_jobs, [jobs[i : i + half] for i in range(0, len(jobs), half)]))
-        flat = [values for part in results for values in part]
-        count = len(self.data.runs)
-        return [flat[i * count : (i + 1) * count] for i in range(len(points))]
+        found = [[np.full(run.reading.size, np.inf) for run in self.data.runs] for _ in points]
+        jobs = {(i, r): job for i, point in enumerate(points) for r, job in self._jobs(point)}
+        places = list(jobs)
+        half = max(1, (len(jobs) + _THREADS - 1) // _THREADS)
+        parts = [[jobs[place] for place in places[i : i + half]] for i in range(0, len(jobs), half)]
+        results = (values for part in _POOL.map(_run_jobs, parts) for values in part)
+        for (i, r), values in zip(places, results, strict=True):
+            found[i][r] = values
+        return found
+
+    def _jobs(self, point: Point) -> Iterator[tuple[int, _Job]]:
+        """What there is to integrate at a point, by run."""
+        if np.all(np.isfinite(point.common)):
+            effects = self.effects_at(point.common)
+            for r in range(len(self.data.runs)):
+                if np.all(np.isfinite(point.release[r])):
+                    yield r, _Job(self, point, r, effects)
 
 
 class _Job:

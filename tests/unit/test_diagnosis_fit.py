@@ -185,6 +185,18 @@ def test_a_model_that_grows_without_bound_is_refused():
         fit(Problem(data), Point(wild, start.release))
 
 
+def test_a_parameter_that_is_not_finite_predicts_what_grows_without_bound():
+    base = nominal(campaign())
+    release = base.point.release.copy()
+    release[2, 0] = np.nan
+    common = np.where(np.arange(base.point.common.size) == 0, np.nan, base.point.common)
+    spoilt = [Point(base.point.common, release), Point(common, base.point.release), base.point]
+    one, all_of_them, none = base.problem.predict(spoilt)
+    assert [bool(np.all(np.isposinf(values))) for values in one] == [r == 2 for r in range(len(one))]
+    assert all(np.all(np.isposinf(values)) for values in all_of_them)
+    assert all(np.array_equal(a, b) for a, b in zip(none, base.problem.predict([base.point])[0], strict=True))
+
+
 def test_what_a_release_cannot_absorb_is_orthogonal_to_it():
     rng = np.random.default_rng(5)
     slopes, change = rng.normal(size=(50, 2)), rng.normal(size=50)
