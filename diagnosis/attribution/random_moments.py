@@ -69,15 +69,15 @@ def weigh_random_moments(
         To pass, the innovations must be white by band, steady in time and without heavy tails, and the wind-off
         runs free of a gap. Empty where none passes, or where deterministic effects close the gap.
 
-        A strong random motion misleads the fit of the effects beside it. Where no answer passes, the best set is
-        therefore fitted again with the rig's response to turbulence as part of the noise.
+        A strong random motion misleads the fit of the effects beside it. Where no answer passes, though the best
+        set leaves no gap in still air, it is therefore fitted again with the response to turbulence as noise.
     """
     if any(
         max(hypothesis.fit.excess, 0.0) < CLOSED_WITHOUT_RANDOM * nominal.excess for hypothesis in hypotheses
     ):
         return []
     answers = _passing(nominal, hypotheses, allowed)
-    if not answers and hypotheses:
+    if not answers and hypotheses and not _still_open(hypotheses[0].fit, nominal):
         answers = _passing(nominal, beside_turbulence(hypotheses[0], nominal.problem.data), allowed)
     least = min((answer.process.cost for answer in answers), default=0.0)
     return [answer for answer in answers if answer.process.cost < least + RIVAL_EVIDENCE]
@@ -120,8 +120,7 @@ def _partners(kind: type[Effect], hypotheses: Sequence[Hypothesis]) -> list[Hypo
 def _try(
     kind: type[Effect], explain: _Kind, fit: Fit, beside: Hypothesis | None, nominal: Fit
 ) -> RandomAnswer | None:
-    off = wind_off_excess(fit)
-    if off > max(WIND_OFF_SHARE * nominal.excess, WIND_OFF_LEAST):
+    if _still_open(fit, nominal):
         return None
     process = explain(fit)
     if process is None or process.drop <= 0.0:
@@ -129,8 +128,13 @@ def _try(
     band, quarter, tails = whiteness(process)
     if band > WHITE_BY_BAND or quarter > STEADY_IN_TIME or tails > HEAVY_TAILS:
         return None
-    share = (abs(process.excess) + max(off, 0.0)) / max(nominal.excess, 1e-9)
+    share = (abs(process.excess) + max(wind_off_excess(fit), 0.0)) / max(nominal.excess, 1e-9)
     return RandomAnswer(kind, process, beside, share)
+
+
+def _still_open(fit: Fit, nominal: Fit) -> bool:
+    """Whether the wind-off runs show a gap, which no random moment of the wind explains."""
+    return wind_off_excess(fit) > max(WIND_OFF_SHARE * nominal.excess, WIND_OFF_LEAST)
 
 
 def wind_off_excess(fit: Fit) -> float:
