@@ -54,9 +54,10 @@ def grow(nominal: Fit, kinds: Sequence[type[Effect]], progress: Progress | None 
             children = with_forms(children, level[0].fit, count)
         found |= {child.names: child for child in children}
         ranked = _by_evidence(children, nominal)
-        if not ranked or not _goes_on(ranked[0], level[0], nominal):
+        going = [child for child in ranked if _goes_on(child, level, nominal)]
+        if not going or not _may_gain(ranked[0], nominal):
             break
-        near = [h for h in ranked if _left(h) <= BEAM_WIDTH * _left(ranked[0])]
+        near = [h for h in going if _left(h) <= BEAM_WIDTH * _left(going[0])]
         level = _distinct(near, nominal)[:GROWN_FROM]
     return sorted(found.values(), key=lambda h: h.fit.total)
 
@@ -142,9 +143,10 @@ def grow_in_stretches(
         grown = [g for h in tried[:LENGTHENED] if (g := _lengthened(h, short, data)) is not None]
         found += [g.long for g in grown]
         grown.sort(key=lambda g: -_evidence(g.long, nominal))
-        if not grown or not _goes_on(grown[0].long, level[0].long, nominal):
+        parents = [g.long for g in level]
+        level = [g for g in grown if _goes_on(g.long, parents, nominal)][:GROWN_FROM]
+        if not level or not _may_gain(grown[0].long, nominal):
             break
-        level = grown[:GROWN_FROM]
     return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
 
 
@@ -177,11 +179,13 @@ def _may_gain(hypothesis: Hypothesis, nominal: Fit) -> bool:
     return len(hypothesis.effects) < MOST_CAUSES and best > _evidence(hypothesis, nominal)
 
 
-def _goes_on(child: Hypothesis, parent: Hypothesis, nominal: Fit) -> bool:
-    """Whether a larger set may still lead on: one of two equal causes closes only half of what is left."""
-    if not parent.effects:
+def _goes_on(child: Hypothesis, level: Sequence[Hypothesis], nominal: Fit) -> bool:
+    """Whether a set may still lead on from the best it grew from: one of two equal causes closes only half."""
+    parents = [h for h in level if set(h.effects) < set(child.effects)]
+    if not any(parent.effects for parent in parents):
         return child.fit.excess > 0.0
-    return _evidence(child, nominal) > GROWTH_EVIDENCE * _evidence(parent, nominal)
+    best = max(_evidence(parent, nominal) for parent in parents)
+    return _evidence(child, nominal) > GROWTH_EVIDENCE * best
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
