@@ -14,7 +14,8 @@ from tunnel_sim.vocabulary.record import Array
 
 INPUTS = ("rivals", "runs", "valid", "shifts")
 """The network's arguments, by their names among the samples."""
-_FAR = 3e4  # standard deviations beyond which a sample is left out: the nominal fit is of another oscillation
+FAR = 3e4
+"""Standard deviations beyond which a sample is left out: the nominal fit is of another oscillation."""
 _EFFECTS_WEIGHT = 0.1  # of the effects' cross entropy beside the posterior's
 _LEAST_STD = 0.05  # of an input over the training set
 _GREATEST_GRADIENT = 5.0
@@ -55,7 +56,7 @@ def usable(samples: Mapping[str, Array], kind: str) -> dict[str, Array]:
     own = {name[2:]: values for name, values in samples.items() if name.startswith(f"{kind}.")}
     if not all(np.all(np.isfinite(values)) for values in own.values()):
         raise ValueError("internal error: a training sample is not finite")
-    near = np.abs(own["target"]).max(axis=1) < _FAR
+    near = np.abs(own["target"]).max(axis=1) < FAR
     return {name: values[near] for name, values in own.items()}
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import load_file, save
 
-from identification.campaign.derivatives import Design, build_design
+from identification.campaign.derivatives import build_design
 from identification.neural.posterior.demodulated import Demodulated, demodulate
 from identification.neural.posterior.features import Features, campaign_features, record_features
 from tunnel_lab.training.draw import draw_for_training
@@ -27,7 +27,7 @@ from tunnel_reference.readings import ReadingTerm, read_motion
 from tunnel_reference.severity import Simulated, bind_effects
 from tunnel_reference.terms import Motion
 from tunnel_sim.files.writing import write_whole
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.record import Array, Record
 
 PARTS = ("training", "tuning", "calibration")
@@ -83,6 +83,17 @@ def samples_of(spec: ShardSpec) -> Iterator[dict[str, Array]]:
     Yields:
         A sample for each campaign (``c.`` before the names) or each of its records (``r.``).
     """
+    for campaign, conditions, families, number in readings_of(spec):
+        yield from reduced(campaign, truth_of(conditions), families, first_run=number)
+
+
+def readings_of(spec: ShardSpec) -> Iterator[tuple[Campaign, Conditions, list[str], int]]:
+    """Draw and simulate the campaigns of a shard.
+
+    Yields:
+        Each reading of a campaign with its true conditions, the families of its effects and its number among the
+        readings of that campaign.
+    """
     root = np.random.SeedSequence([spec.seed, PARTS.index(spec.part), spec.number])
     rngs = [np.random.default_rng(child) for child in root.spawn(CAMPAIGNS)]
     sizes = dict(spec.sizes)
@@ -91,8 +102,8 @@ def samples_of(spec: ShardSpec) -> Iterator[dict[str, Array]]:
         if not np.all(np.isfinite(motion.angle)) or np.abs(motion.angle).max() > 1.0:
             continue
         for number in range(VARIANTS):
-            campaign, c = _variant(draw, motion, rng, first=number == 0)
-            yield from reduced(campaign, truth_of(c), [e.form.family for e in draw.effects], first_run=number)
+            campaign, conditions = _variant(draw, motion, rng, first=number == 0)
+            yield campaign, conditions, [e.form.family for e in draw.effects], number
 
 
 def _variant(
@@ -157,8 +168,7 @@ def reduced(
     if not LINEAR_IN_A_RECORD & set(families):
         for place in {(5 * first_run) % len(kept), (5 * first_run + 2) % len(kept)}:
             run, _, (alone, _) = kept[place]
-            one_design = build_design([run], campaign.rig)
-            yield _sample("r", alone, _decay(coefficients, run.spring_stiffness or 1.0, one_design), labels)
+            yield _sample("r", alone, decay_of(coefficients, run, campaign.rig), labels)
     design = build_design([run for run, _, _ in kept], campaign.rig)
     if "g" not in design.columns and "d" not in design.columns:
         return
@@ -169,11 +179,19 @@ def reduced(
         yield _sample("c", whole, coefficients, labels)
 
 
-def _decay(coefficients: Array, spring: float, design: Design) -> Array:
-    """ζ and ωn of a run at small amplitude."""
+def decay_of(coefficients: Array, run: Run, rig: RigProperties) -> Array:
+    """ζ and ωn of a run at small amplitude.
+
+    Args:
+        coefficients: true Cnβ, Cnr, Izz and Cr, SI, shape (4,).
+
+    Returns:
+        ζ and ωn in rad/s, shape (2,).
+    """
     cn_beta, cn_r, inertia, damping = coefficients
+    design = build_design([run], rig)
     load, drag = design.stiffness_loads[0], design.damping_loads[0]
-    omega = np.sqrt((spring - load * cn_beta) / inertia)
+    omega = np.sqrt(((run.spring_stiffness or 1.0) - load * cn_beta) / inertia)
     return np.array([(damping - drag * cn_r) / (2.0 * inertia * omega), omega])
 
 
