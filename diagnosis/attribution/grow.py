@@ -222,7 +222,7 @@ def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> li
     by_name = {hypothesis.names: hypothesis for hypothesis in found}
     alone = {h.effects[0]: h for h in found if len(h.effects) == 1}
     sets: list[Hypothesis] = []
-    for name in set(whole.effects) & set(alone):
+    for name in filter(alone.__contains__, whole.effects):
         others = tuple(sorted(set(whole.effects) - {name}))
         alike = [
             h.fit.problem.effects[0]
