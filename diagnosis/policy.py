@@ -110,7 +110,7 @@ UNKNOWN_SHARE = 0.2
 #: Factor on that share for every further effect of the set that is compared with ``unknown``. Tuned (0018): on 15
 #: campaigns whose cause was not among the effects tried, four effects seldom closed much more than one.
 UNKNOWN_FURTHER = 0.7
-#: A further effect must leave less than this share of what is left without it. Tuned, at last on 118 campaigns of
+#: A further effect must leave less than this share of what is left without it. Tuned, at last on 79 campaigns of
 #: one to four causes (0007).
 PAIR_SHARE = 0.44
 #: A freed form must leave less than this share of what is left without it. Tuned.
