@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.fitting.least_squares import Fit, FitError, clip, damped_step, scaled_residuals
+from diagnosis.fitting.least_squares import Fit, FitError, clip, scaled_residuals
+from diagnosis.fitting.normal_equations import damped_step
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData
 from tunnel_sim.vocabulary.record import Array

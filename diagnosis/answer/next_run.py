@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.fitting.least_squares import Fit, project_release
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.normal_equations import project_release
 from diagnosis.fitting.problem import Point
 from diagnosis.fitting.run_data import RunData
 from tunnel_sim.vocabulary.record import Array

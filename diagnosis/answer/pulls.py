@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.answer.small_swings import coefficient_gradient
-from diagnosis.fitting.least_squares import Fit, normal_equations
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.normal_equations import normal_equations
 from diagnosis.fitting.spectra import resonance
 from diagnosis.policy import CHANCE_STDS, LEAST_HALF
 from tunnel_sim.vocabulary.record import Array

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.fitting.least_squares import Fit, normal_equations
+from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.normal_equations import normal_equations
 from diagnosis.fitting.own_numbers import OwnNumbers, ringing, skip
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData, departure

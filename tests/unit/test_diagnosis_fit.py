@@ -9,14 +9,12 @@ from scipy.optimize import lsq_linear
 
 from diagnosis.fitting.least_squares import (
     FitError,
-    bounded_step,
     clip,
     fit,
-    normal_equations,
-    project_release,
     scaled_residuals,
     sensitivities,
 )
+from diagnosis.fitting.normal_equations import bounded_step, normal_equations, project_release
 from diagnosis.fitting.problem import Point, Problem, condensed
 from diagnosis.fitting.run_data import prepare
 from diagnosis.fitting.starting_points import nominal_start
