@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import io
 import tempfile
 import time
 import warnings
@@ -30,6 +31,7 @@ from tunnel_lab.training.draw import sizes_at_unit_excess
 from tunnel_lab.training.fit import FAR
 from tunnel_lab.training.samples import ShardSpec, decay_of, readings_of, truth_of
 from tunnel_reference.linear_families import LINEAR_IN_A_RECORD
+from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.record import Array, Record
 
 NAMES = ("zeta", "omega_n")
@@ -177,7 +179,9 @@ def main() -> None:
     if not options.samples.exists():
         begun = time.process_time()
         rows = list(simulated(options.seed, options.shards))
-        np.savez(options.samples, **{name: np.stack([row[name] for row in rows]) for name in rows[0]})
+        file = io.BytesIO()
+        np.savez(file, **{name: np.stack([row[name] for row in rows]) for name in rows[0]})
+        write_whole(options.samples, file.getvalue())
         console.print(f"simulated in {(time.process_time() - begun) / 60.0:.1f} min of processor time")
     samples = np.load(options.samples)
     x, theta = samples[f"{options.variant}.x"], samples[f"{options.variant}.theta"]

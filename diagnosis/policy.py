@@ -73,7 +73,8 @@ ALWAYS_FITTED = 7
 PREDICTED_SHARE = 0.01
 #: Sets of each size to which another effect is added, and effects fitted to each. Judgement: time against coverage.
 GROWN_FROM, GROWN_BY = 2, 4
-#: Excess, in that of the best set of its size, up to which another set is grown. Judgement: time against coverage.
+#: Excess, in that of the best set of its size that goes on, up to which another is grown. Judgement: time against
+#: coverage.
 BEAM_WIDTH = 3.0
 #: Share of the power by which two sets change the nominal prediction, by which they may differ and still count as
 #: one. Judgement: far below what the growth could tell apart.

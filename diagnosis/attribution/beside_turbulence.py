@@ -32,9 +32,9 @@ def beside_turbulence(best: Hypothesis, data: Data) -> list[Hypothesis]:
         data: the runs with the sensor's noise alone.
 
     Returns:
-        The sets, largest first; none where no turbulence is seen. Their residuals hold the response to it.
+        The sets, largest first; none where no run is in the wind or a fit fails. Their residuals hold the response
+        to the turbulence.
     """
-    found: list[Hypothesis] = []
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):
             process = fit_turbulence(best.fit)
@@ -43,8 +43,8 @@ def beside_turbulence(best: Hypothesis, data: Data) -> list[Hypothesis]:
                 return []
             fitted = replace(best, fit=_again(best.fit, noisy), textbook=None)
             best = _seen_in(fitted, data)
-        found = [_seen_in(one, data) for one in _smaller(fitted)]
-    return found
+        return [_seen_in(one, data) for one in _smaller(fitted)]
+    return []
 
 
 def _again(known: Fit, data: Data) -> Fit:

@@ -23,7 +23,7 @@ class Circumstances:
     springs: tuple[float, ...]
     greatest_reading: float
     normalised: bool
-    slowest_wind: float = 0.0
+    slowest_wind: float
 
 
 @dataclass(frozen=True)
