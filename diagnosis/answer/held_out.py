@@ -126,12 +126,10 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
     """
     best, residuals = start, scaled_residuals(problem, start)
     for _ in range(_RELEASE_STEPS):
-        # a prediction that grows without bound is left as it is
-        known = [np.where(np.all(np.isfinite(r)), r, 0.0) for r in residuals]
-        steps = [np.linalg.lstsq(s, r, rcond=1e-10)[0] for s, r in zip(slopes, known, strict=True)]
+        steps = [np.linalg.lstsq(s, r, rcond=1e-10)[0] for s, r in zip(slopes, residuals, strict=True)]
         trial = Point(best.common, best.release + np.stack(steps))
         moved = scaled_residuals(problem, trial)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore"):  # a prediction that grows without bound is left as it is
             gains = [float(r @ r - m @ m) for r, m in zip(residuals, moved, strict=True)]
         better = [gain > _RELEASE_GAIN * float(r @ r) for gain, r in zip(gains, residuals, strict=True)]
         if not any(better):
