@@ -127,9 +127,9 @@ EVEN_SHARE = 0.03
 WHITE_BY_BAND = 7.0
 #: The same for quarters of the record in time. Judgement.
 STEADY_IN_TIME = 5.5
-#: Excess kurtosis of the innovations that real turbulence may have, beyond four standard deviations of chance.
-#: Judgement, made when a blow to one run of a blind campaign had been taken for buffeting.
-HEAVY_TAILS = 0.3
+#: Power of a short time, over the greatest that chance explains at this rate, that real turbulence may have. The
+#: rate is a convention, for all windows of a campaign. The factor is a judgement: turbulence is not quite steady.
+BURST_FALSE_ALARM_RATE, BURST = 0.001, 1.5
 #: Excess of the wind-off runs up to which they count as free of a gap: a share of the nominal model's excess, and
 #: at least so many noise variances. Judgement.
 WIND_OFF_SHARE, WIND_OFF_LEAST = 0.05, 0.1

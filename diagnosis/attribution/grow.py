@@ -47,16 +47,13 @@ def grow(nominal: Fit, kinds: Sequence[type[Effect]], progress: Progress | None 
     """
     found: dict[tuple[str, ...], Hypothesis] = {}
     level = [Hypothesis((), nominal)]
-    while _may_gain(level[0], nominal):
+    while level:
         children = _children(level, kinds, progress)
         if all(_may_gain(child, nominal) for child in children):  # else freeing a form gains nothing
             count = FREED_HYPOTHESES if not level[0].effects else 1
             children = with_forms(children, level[0].fit, count)
         found |= {child.names: child for child in children}
-        ranked = _by_evidence(children, nominal)
-        going = [child for child in ranked if _goes_on(child, level, nominal)]
-        if not going or not _may_gain(ranked[0], nominal):
-            break
+        going = _going_on(children, level, nominal)
         near = [h for h in going if _left(h) <= BEAM_WIDTH * _left(going[0])]
         level = _distinct(near, nominal)[:GROWN_FROM]
     return sorted(found.values(), key=lambda h: h.fit.total)
@@ -138,15 +135,13 @@ def grow_in_stretches(
         nominal, long = first, short
     level, found = [_Grown(Hypothesis((), first), Hypothesis((), nominal))], []
     able = [kind for kind in kinds if kind.autonomous]
-    while _may_gain(level[0].long, nominal):
+    while level:
         tried = sorted(_children([g.short for g in level], able, progress), key=lambda h: h.fit.total)
         grown = [g for h in tried[:LENGTHENED] if (g := _lengthened(h, short, data)) is not None]
+        by_name = {g.long.names: g for g in grown}
         found += [g.long for g in grown]
-        grown.sort(key=lambda g: -_evidence(g.long, nominal))
-        parents = [g.long for g in level]
-        level = [g for g in grown if _goes_on(g.long, parents, nominal)][:GROWN_FROM]
-        if not level or not _may_gain(grown[0].long, nominal):
-            break
+        going = _going_on([g.long for g in grown], [g.long for g in level], nominal)
+        level = [by_name[h.names] for h in going[:GROWN_FROM]]
     return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
 
 
@@ -166,8 +161,14 @@ def _evidence(hypothesis: Hypothesis, nominal: Fit) -> float:
     return evidence(hypothesis.effects, share, hypothesis.forms, nominal.excess, nominal.chance)
 
 
-def _by_evidence(found: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
-    return sorted(found, key=lambda h: -_evidence(h, nominal))
+def _going_on(
+    children: Sequence[Hypothesis], parents: Sequence[Hypothesis], nominal: Fit
+) -> list[Hypothesis]:
+    """The sets to grow further, best first; none where the best of all could gain nothing."""
+    ranked = sorted(children, key=lambda h: -_evidence(h, nominal))
+    if not ranked or not _may_gain(ranked[0], nominal):
+        return []
+    return [child for child in ranked if _goes_on(child, parents, nominal)]
 
 
 def _may_gain(hypothesis: Hypothesis, nominal: Fit) -> bool:

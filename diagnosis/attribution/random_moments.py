@@ -12,6 +12,7 @@ from diagnosis.attribution.beside_turbulence import beside_turbulence
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.process_noise import (
     ProcessNoise,
+    bursts,
     fit_turbulence,
     fit_wandering_shedding,
     whiteness,
@@ -19,8 +20,9 @@ from diagnosis.attribution.process_noise import (
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.policy import (
     BESIDE_EVIDENCE,
+    BURST,
+    BURST_FALSE_ALARM_RATE,
     CLOSED_WITHOUT_RANDOM,
-    HEAVY_TAILS,
     RANDOM_PARTNERS,
     RIVAL_EVIDENCE,
     STEADY_IN_TIME,
@@ -66,8 +68,8 @@ def weigh_random_moments(
 
     Returns:
         The most likely answer of each kind that passes, with as few effects beside it as the evidence asks for.
-        To pass, the innovations must be white by band, steady in time and without heavy tails, and the wind-off
-        runs free of a gap. Empty where none passes, or where deterministic effects close the gap.
+        To pass, the innovations must be white by band, steady in time and without bursts, and the wind-off runs
+        free of a gap. Empty where none passes, or where deterministic effects close the gap.
 
         A strong random motion misleads the fit of the effects beside it. Where no answer passes, though the best
         set leaves no gap in still air, it is therefore fitted again with the response to turbulence as noise.
@@ -125,8 +127,10 @@ def _try(
     process = explain(fit)
     if process is None or process.drop <= 0.0:
         return None
-    band, quarter, tails = whiteness(process)
-    if band > WHITE_BY_BAND or quarter > STEADY_IN_TIME or tails > HEAVY_TAILS:
+    band, quarter = whiteness(process)
+    if band > WHITE_BY_BAND or quarter > STEADY_IN_TIME:
+        return None
+    if bursts(process, BURST_FALSE_ALARM_RATE) > BURST:
         return None
     share = (abs(process.excess) + max(wind_off_excess(fit), 0.0)) / max(nominal.excess, 1e-9)
     return RandomAnswer(kind, process, beside, share)

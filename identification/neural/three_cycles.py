@@ -17,6 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from identification.decay.first_guess import starting_decay
+from identification.decay.thinning import mean_of_blocks
 from identification.neural.shape import CYCLES, POINTS, Shape, normalise
 from identification.policy import LEAST_SAMPLES
 from tunnel_sim.vocabulary.record import Array, Record
@@ -149,9 +150,8 @@ def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, .
 def _thinned(record: Record, period: float, noise_std: float) -> _Trace:
     samples = record.time_s.size
     block = max(1, int(min(period / record.sample_interval / _SAMPLES_PER_CYCLE, samples / LEAST_SAMPLES)))
-    kept = samples // block * block
-    time = (record.time_s[:kept] - record.time_s[0]).reshape(-1, block).mean(axis=1)
-    yaw = record.yaw_rad[:kept].reshape(-1, block).mean(axis=1)
+    time = mean_of_blocks(record.time_s - record.time_s[0], block)
+    yaw = mean_of_blocks(record.yaw_rad, block)
     spline = CubicSpline(time, yaw)
     return _Trace(time, yaw, spline, spline.antiderivative(), noise_std / np.sqrt(block))
 

@@ -1,6 +1,7 @@
 """Sets of causes grown effect by effect: what is put in comes out first, whatever its number."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from diagnosis.attribution import grow as growth
 from diagnosis.attribution.decide import weigh
 from diagnosis.attribution.grow import exchange, grow, prune, without
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Point
 from diagnosis.fitting.starting_points import starting_points
@@ -103,6 +105,26 @@ def test_growth_ends_where_a_further_effect_closes_nothing():
     ranked = grow(base, kinds, steps.append)
     assert all(h.fit.excess > 0.99 * base.excess for h in ranked)
     assert max(line.count(" + ") for line in steps) == 1
+
+
+def left(*effects, excess):
+    """A set whose fit leaves an excess; nothing else is read of it."""
+    problem = SimpleNamespace(effects=(), free_forms=())
+    return Hypothesis(effects, SimpleNamespace(problem=problem, excess=excess, chance=0.001))
+
+
+def test_a_set_goes_on_from_its_own_parent_though_the_best_set_is_a_dead_end():
+    nothing = left(excess=100.0)
+    parents = [left("a", excess=20.0), left("b", excess=30.0)]
+    children = [left("a", "c", excess=19.0), left("b", "d", excess=20.0)]
+    assert [h.effects for h in growth._going_on(children, parents, nothing.fit)] == [("b", "d")]
+    assert growth._going_on(children[:1], parents, nothing.fit) == []
+
+
+def test_growth_ends_where_the_best_set_leaves_nothing_to_gain():
+    nothing, parents = left(excess=100.0), [left("a", excess=20.0)]
+    assert growth._going_on([left("a", "c", excess=0.0)], parents, nothing.fit) == []
+    assert growth._going_on([left("a", "c", excess=5.0)], parents, nothing.fit) != []
 
 
 def test_pruning_fits_the_smaller_sets_that_are_missing(of_three):

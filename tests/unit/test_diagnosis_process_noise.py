@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.signal import lfilter, lsim
+from scipy.stats import binom
 
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.process_noise import (
+    bursts,
     fit_turbulence,
     fit_wandering_shedding,
     whiteness,
@@ -89,18 +91,26 @@ def test_intensity_and_bandwidth_are_recovered(windy):
 def test_innovations_of_the_right_model_are_white_and_steady(windy):
     found = fit_turbulence(windy)
     assert found is not None
-    band, quarter, tails = whiteness(found)
+    band, quarter = whiteness(found)
     assert band < 5.0
     assert quarter < 5.0
-    assert tails < 0.0
+    assert bursts(found, 0.001) < 1.0
     assert len(found.innovations) == sum(speed > 0.0 for _, speed in CONDITIONS)
 
 
-def test_a_blow_in_steady_turbulence_shows_as_heavy_tails(windy):
+@pytest.mark.parametrize("length", [1, 4, 16, 60])
+def test_a_blow_in_steady_turbulence_is_a_burst(windy, length):
     found = fit_turbulence(windy)
     struck = [i.copy() for i in found.innovations]
-    struck[0][100:104] += 5.0  # five standard deviations during four of the filter's samples
-    assert whiteness(replace(found, innovations=struck))[2] > 0.3
+    struck[0][100 : 100 + length] += 8.0 / length**0.25  # standard deviations
+    assert bursts(replace(found, innovations=struck), 0.001) > 1.5
+
+
+def test_steady_innovations_burst_at_the_stated_rate_at_most(windy):
+    found, rng = fit_turbulence(windy), np.random.default_rng(11)
+    drawn = [[rng.standard_normal(400) for _ in range(3)] for _ in range(300)]
+    alarms = sum(bursts(replace(found, innovations=innovations), 0.05) > 1.0 for innovations in drawn)
+    assert 1 <= alarms <= binom.ppf(0.999, 300, 0.05)  # none at all would mean that it cannot fail
 
 
 def test_without_a_random_moment_there_is_nothing_to_gain():
