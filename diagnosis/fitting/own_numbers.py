@@ -14,6 +14,7 @@ from tunnel_sim.vocabulary.record import Array
 _PADDING = 4  # zero padding of the spectra
 _DECAYS = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of a ringing in one run, nepers
 _MOST_SKIPS, _SWEEPS = 3, 4  # skips sought in a run, and how often each is sought again beside the others
+_ROUNDS = 3  # of the search: the first with a time for every skip, the others with the one common time found
 _EDGE = (
     8  # blocks at either end of a run in which a skip cannot be distinguished from the release or seen at all
 )
@@ -100,16 +101,22 @@ def skip(fit: Fit) -> OwnNumbers | None:
 
 def _skips(runs: list[_Skipping], count: int) -> OwnNumbers:
     """So many skips in every run, all of one time."""
-    steps = [run.steps(count) for run in runs]
-    times, weights = (
-        np.array([[getattr(step, name) for step in run] for run in steps]) for name in ("time", "weight")
-    )
-    lost = float(np.sum(times * weights) / np.sum(weights))
+    steps, lost = [run.steps(count) for run in runs], 0.0
+    for number in range(_ROUNDS):
+        if (
+            number > 0
+        ):  # two skips close together were found as one of twice the time, and another one of nothing
+            steps = [run.steps(count, of_run, lost) for run, of_run in zip(runs, steps, strict=True)]
+        times, weights = (
+            np.array([[getattr(step, name) for step in of_run] for of_run in steps])
+            for name in ("time", "weight")
+        )
+        lost = max(float(np.sum(times * weights) / np.sum(weights)), 0.0)
     drop = sum(run.drop(of_run, lost) for run, of_run in zip(runs, steps, strict=True))
     numbers = np.array(
         [[run.share(step) for step in of_run] for run, of_run in zip(runs, steps, strict=True)]
     )
-    return OwnNumbers((max(lost, 0.0) * count,), numbers, drop)
+    return OwnNumbers((lost * count,), numbers, drop)
 
 
 @dataclass(frozen=True)
@@ -141,23 +148,29 @@ class _Skipping:
         power -= np.sum(absorbed**2, axis=1)
         self.weight = np.maximum(power, 1e-9 * float(self.slope @ self.slope))
 
-    def steps(self, count: int) -> list[_Step]:
-        """The skips that leave least, each sought again beside the others."""
-        found: list[_Step] = []
-        for sweep in range(1 if count == 1 else _SWEEPS):
+    def steps(self, count: int, found: list[_Step] | None = None, time: float | None = None) -> list[_Step]:
+        """The skips that leave least, each sought again beside the others.
+
+        Args:
+            found: where the search starts; None starts without any.
+            time: lost at every skip, s; None for a time of its own at each.
+        """
+        found = list(found or [])
+        for _ in range(1 if count == 1 else _SWEEPS):
             for place in range(count):
-                others = [step for i, step in enumerate(found) if i != place]
-                step = self._best(self.left - self._change([(s, s.time) for s in others]))
-                found = [*found[:place], step, *found[place + 1 :]] if sweep else [*found, step]
+                others = found[:place] + found[place + 1 :]
+                change = self._change([(step, step.time if time is None else time) for step in others])
+                found[place : place + 1] = [self._best(self.left - change, time)]
         return found
 
-    def _best(self, left: Array) -> _Step:
+    def _best(self, left: Array, time: float | None) -> _Step:
         inside = slice(_EDGE, left.size - _EDGE)
         weight = self.weight[inside]
         seen = _after(self.slope * correlate(left, self.run.whitening))[inside]
-        times = np.maximum(seen, 0.0) / weight
-        best = int(np.argmax(times**2 * weight))
-        return _Step(best + _EDGE, float(times[best]), float(weight[best]))
+        own = seen / weight
+        tried = np.maximum(own, 0.0) if time is None else time
+        best = int(np.argmax(tried * (2.0 * seen - tried * weight)))
+        return _Step(best + _EDGE, float(own[best]), float(weight[best]))
 
     def drop(self, steps: list[_Step], time: float) -> float:
         """Of χ² by skips of one time (s)."""

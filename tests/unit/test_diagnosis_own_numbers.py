@@ -18,7 +18,7 @@ from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import Effect, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.record import Array, Record
 
 MODE = effect_from("second_mode", {"amplitude": 0.002, "frequency": 70.0, "damping_ratio": 0.01})
 LOST = effect_from("dropped_samples", {"lost_time": 0.006})
@@ -26,15 +26,17 @@ OWN = np.linspace(0.2, 0.8, 6)  # as planted: rad, or share of the run
 
 
 INSTANTS = np.sort(np.random.default_rng(8).uniform(0.1, 0.9, (6, 3)), axis=1)  # shares of the run
+CLOSE = INSTANTS[:, :2] * [0.3, 1.0] + [0.0, 0.1]
+CLOSE = np.column_stack((CLOSE, CLOSE[:, 1] + 0.005))  # the last two within a tenth of a period
 
 
-def thrice_skipped() -> Campaign:
+def thrice_skipped(shares: Array) -> Campaign:
     """The same motions with 10 ms lost at each of three instants of every run."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gap_campaigns, "NOISE", 1e-12)
         quiet = campaign()
     rng, runs = np.random.default_rng(9), []
-    for run, instants in zip(quiet.runs, INSTANTS, strict=True):
+    for run, instants in zip(quiet.runs, shares, strict=True):
         time = run.record.time_s
         read = time + 0.01 * np.sum(time[:, None] >= instants * time[-1], axis=1)
         reading = CubicSpline(time, run.record.yaw_rad)(read)[read <= time[-1]]
@@ -94,12 +96,13 @@ def test_a_skip_is_placed_to_within_a_few_blocks() -> None:
     )  # 50 ms: at a turn of the motion a skip is not seen
 
 
-def test_three_skips_in_every_run_are_found_and_fitted() -> None:
-    base = nominal(thrice_skipped())
+@pytest.mark.parametrize("instants", [INSTANTS, CLOSE], ids=["apart", "close"])
+def test_three_skips_in_every_run_are_found_and_fitted(instants: Array) -> None:
+    base = nominal(thrice_skipped(instants))
     found = skip(base)
     assert found is not None
     assert found.numbers.shape == (6, 3)
-    assert np.sort(found.numbers, axis=1) == pytest.approx(INSTANTS, abs=0.02)
+    assert np.sort(found.numbers, axis=1) == pytest.approx(instants, abs=0.02)
     (start,) = starting_points(base, type(LOST))
     fit_found = fit(start.problem, start.point, base=base)
     assert fit_found.excess < 0.02 * base.excess
