@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +18,7 @@ import polars as pl
 import pytest
 
 from identification.estimators.matrix_pencil import MatrixPencil
+from tunnel_lab.cli import main
 
 Outcome = tuple[int, str, str]
 Tunnel = Callable[..., Outcome]
@@ -42,13 +45,26 @@ def grid(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The baseline of the grid, and what the command that wrote it printed."""
+    folder = tmp_path_factory.mktemp("baseline")
+    (folder / "grid.toml").write_text(GRID)
+    path = folder / "base.parquet"
+    printed = io.StringIO()
+    with redirect_stdout(printed):
+        assert main(["score", str(folder / "grid.toml"), *HERE, "--write-baseline", str(path)]) == 0
+    return path, printed.getvalue()
+
+
 @pytest.fixture
-def baseline(tunnel: Tunnel, grid: Path, tmp_path: Path) -> Path:
-    path = tmp_path / "base.parquet"
-    status, out, err = tunnel("score", grid, *HERE, "--write-baseline", path)
-    assert (status, err) == (0, "")
-    assert f"Written: {path}" in out
-    return path
+def baseline(written: tuple[Path, str]) -> Path:
+    return written[0]
+
+
+def test_a_baseline_that_was_written_is_named(written: tuple[Path, str]) -> None:
+    assert "Written: " in written[1]
+    assert written[0].name in written[1]
 
 
 def planted(monkeypatch: pytest.MonkeyPatch, change: Callable[..., object]) -> None:
