@@ -155,7 +155,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 success, 1 a check or an estimate failed, 2 bad input, 130 interrupted.
     """
     try:
-        status = _command().main(args=arguments, prog_name="tunnel", standalone_mode=False)
+        status = _whole().main(args=arguments, prog_name="tunnel", standalone_mode=False)
         _flush()
     except TunnelError as error:
         return _refuse(str(error))
@@ -178,8 +178,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 @cache
-def _command() -> Any:
-    """The commands with all their options; a process that calls `main` often makes them once."""
+def _whole() -> Any:
+    """``tunnel`` with all its commands and options, built once however often a process calls `main`."""
     return typer.main.get_command(app)
 
 

@@ -66,7 +66,7 @@ def fit_modes(values: Array, interval: float, count: int, vectors: Array) -> Mod
         values: evenly spaced readings, shape (n,), rad.
         interval: between them, s.
         count: number of oscillations.
-        vectors: of `left_vectors`.
+        vectors: of `left_vectors`, shape (rows, rows).
 
     Returns:
         The modes; None where the poles are not those of so many oscillations.

@@ -46,7 +46,9 @@ class Oracle:
         ka, ca = pressure * self.cn_beta, 0.5 * self.density * speed * AREA * LENGTH**2 * self.cn_r
         lag = self.term("aero_lag")
         seen = angle if lag == 0.0 else lagged if lag > 0.0 else angle + (angle - lagged)
-        moment = ka * seen * (1.0 + self.raised(abs(angle), "moment_cubic", 2.0)) + ka * self.term("flow_angle")
+        moment = ka * seen * (1.0 + self.raised(abs(angle), "moment_cubic", 2.0)) + ka * self.term(
+            "flow_angle"
+        )
         moment += ca * (1.0 + self.raised(abs(angle), "damping_quadratic", 2.0)) * rate
         if self.term("shedding_amplitude"):
             cycles = self.term("strouhal_number") * speed * t / WIDTH
@@ -55,7 +57,7 @@ class Oracle:
         return moment + pressure * self.forcing(t)
 
     def raised(self, size: float, term: str, textbook: float, reference: float = 0.2) -> float:
-        """A term's coefficient times the textbook's power of an angle or rate, or one equal to it at the reference."""
+        """A coefficient times the textbook's power of the size, or times one that equals it at the reference."""
         coefficient = self.term(term)
         if coefficient == 0.0:
             return 0.0

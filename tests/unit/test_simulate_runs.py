@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import mujoco
@@ -14,6 +15,7 @@ from tunnel_sim.engine.model import build_model, build_spec, numerics
 from tunnel_sim.engine.simulate import simulate, simulate_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.moment_law import parameter_names
+from tunnel_sim.physics.motion import Motion
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
 from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -50,11 +52,17 @@ def _log_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its log into the working directory
 
 
+@cache
+def _alone(number: int) -> Motion:
+    return simulate_motion(build_model(RIG, MIXED[number]), 500.0)
+
+
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_batch_equals_the_loop_to_the_bit(threads: int) -> None:
     motions = simulate_motions(RIG, MIXED, 500.0, nthread=threads)
-    for motion, settings in zip(motions, MIXED, strict=True):
-        alone = simulate_motion(build_model(RIG, settings), 500.0)
+    assert len(motions) == len(MIXED)
+    for number, motion in enumerate(motions):
+        alone = _alone(number)
         assert np.array_equal(motion.angle, alone.angle)
         assert np.array_equal(motion.rate, alone.rate)
 

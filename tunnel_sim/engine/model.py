@@ -24,7 +24,9 @@ from tunnel_sim.vocabulary.rig import Rig
 
 _SERIES = ("wind_speed", "forcing")
 _THINNEST = 1e-3  # least width over length: MuJoCo refuses the inertias of a body of zero width
-_COMPILED: dict[tuple[object, ...], mujoco.MjModel] = {}  # by what cannot be changed afterwards; never handed out
+_COMPILED: dict[
+    tuple[object, ...], mujoco.MjModel
+] = {}  # by what cannot be changed afterwards; never handed out
 _MOST_COMPILED = 16
 _NATIVE = frozenset({"spring_stiffness", "mechanical_damping", "yaw_inertia"})  # attributes of joint and body
 
@@ -97,7 +99,7 @@ class Model:
 
 
 def build_model(rig: Rig, settings: RunSettings) -> Model:
-    """Build the model of one run; compiled once for all runs of a layout, which takes ten times as long as the rest.
+    """Build the model of one run; compiled, which takes nearly all of the time, once for all runs of a layout.
 
     Args:
         settings: spring, damper, inertia, air and every further term of the moment law.
@@ -106,7 +108,7 @@ def build_model(rig: Rig, settings: RunSettings) -> Model:
         TunnelError: when MuJoCo or the plugin refuses the settings, or the steps are too long for them.
     """
     check_stable(rig, settings)
-    key = (rig.working_section, rig.body, rig.rod, settings.layout())
+    key = (repr(rig), settings.layout())
     compiled = _COMPILED.get(key)
     if compiled is None:
         try:
