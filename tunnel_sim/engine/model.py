@@ -24,9 +24,7 @@ from tunnel_sim.vocabulary.rig import Rig
 
 _SERIES = ("wind_speed", "forcing")
 _THINNEST = 1e-3  # least width over length: MuJoCo refuses the inertias of a body of zero width
-_COMPILED: dict[
-    tuple[object, ...], mujoco.MjModel
-] = {}  # by what cannot be changed afterwards; never handed out
+_COMPILED: dict[tuple[object, ...], mujoco.MjModel] = {}  # by rig and layout; only copies are given away
 _MOST_COMPILED = 16
 _NATIVE = frozenset({"spring_stiffness", "mechanical_damping", "yaw_inertia"})  # attributes of joint and body
 
