@@ -46,9 +46,8 @@ class Oracle:
         ka, ca = pressure * self.cn_beta, 0.5 * self.density * speed * AREA * LENGTH**2 * self.cn_r
         lag = self.term("aero_lag")
         seen = angle if lag == 0.0 else lagged if lag > 0.0 else angle + (angle - lagged)
-        moment = ka * seen * (1.0 + self.raised(abs(angle), "moment_cubic", 2.0)) + ka * self.term(
-            "flow_angle"
-        )
+        moment = ka * seen * (1.0 + self.raised(abs(angle), "moment_cubic", 2.0))
+        moment += ka * self.term("flow_angle")
         moment += ca * (1.0 + self.raised(abs(angle), "damping_quadratic", 2.0)) * rate
         if self.term("shedding_amplitude"):
             cycles = self.term("strouhal_number") * speed * t / WIDTH

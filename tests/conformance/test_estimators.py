@@ -185,7 +185,7 @@ def test_same_input_same_answer_and_input_untouched(name, noisy, of_noisy):
     assert not noisy.runs[0].record.yaw_rad.flags.writeable
     again = noisy_campaign()  # examined again, too
     assert identify(again, name) == of_noisy(name)
-    for run, untouched in zip(noisy.runs, again.runs, strict=True):
+    for run, untouched in zip(again.runs, noisy_campaign().runs, strict=True):
         np.testing.assert_array_equal(run.record.yaw_rad, untouched.record.yaw_rad)
 
 

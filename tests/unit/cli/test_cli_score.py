@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from contextlib import redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,25 +46,16 @@ def grid(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The baseline of the grid, and what the command that wrote it printed."""
+def baseline(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("baseline")
-    (folder / "grid.toml").write_text(GRID)
-    path = folder / "base.parquet"
-    printed = io.StringIO()
-    with redirect_stdout(printed):
-        assert main(["score", str(folder / "grid.toml"), *HERE, "--write-baseline", str(path)]) == 0
-    return path, printed.getvalue()
-
-
-@pytest.fixture
-def baseline(written: tuple[Path, str]) -> Path:
-    return written[0]
-
-
-def test_a_baseline_that_was_written_is_named(written: tuple[Path, str]) -> None:
-    assert "Written: " in written[1]
-    assert written[0].name in written[1]
+    grid, path = folder / "grid.toml", folder / "base.parquet"
+    grid.write_text(GRID)
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        assert main(["score", str(grid), *HERE, "--write-baseline", str(path)]) == 0
+    assert err.getvalue() == ""
+    assert f"Written: {path}" in out.getvalue()
+    return path
 
 
 def planted(monkeypatch: pytest.MonkeyPatch, change: Callable[..., object]) -> None:
