@@ -9,7 +9,8 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, cast
+from functools import cache
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -153,9 +154,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 success, 1 a check or an estimate failed, 2 bad input, 130 interrupted.
     """
-    command = typer.main.get_command(app)
     try:
-        status = command.main(args=arguments, prog_name="tunnel", standalone_mode=False)
+        status = _whole().main(args=arguments, prog_name="tunnel", standalone_mode=False)
         _flush()
     except TunnelError as error:
         return _refuse(str(error))
@@ -175,6 +175,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if status == INTERRUPTED:
         print("tunnel: interrupted; no file is left half written", file=sys.stderr)
     return status if isinstance(status, int) else 0
+
+
+@cache
+def _whole() -> Any:
+    """``tunnel`` with all its commands and options, built once however often a process calls `main`."""
+    return typer.main.get_command(app)
 
 
 def _flush() -> None:

@@ -75,6 +75,8 @@ class _Batch:
         self.size = int(self.offsets[-1])
         self.flexible = conditions[0].rod is not None
         self.groups = _group_terms(terms, [int(o) for o in self.offsets[:-1]], runs)
+        self.early = [group for group in self.groups if group.phase in (Phase.WIND, Phase.ANGLE)]
+        self.late = [group for group in self.groups if group.phase in (Phase.MOMENT, Phase.FRICTION)]
         self.stiffness = np.concatenate([c.true_stiffness * np.ones(c.runs) for c in conditions])
         self.air_stiffness = np.concatenate([c.air_stiffness for c in conditions])
         self.air_damping = np.concatenate([c.air_damping for c in conditions])
@@ -129,50 +131,54 @@ class _Batch:
         n = self.size
         beta, rate = state[:n], state[n : 2 * n]
         theta, omega = (state[2 * n : 3 * n], state[3 * n : 4 * n]) if self.flexible else (beta, rate)
+        changed = (self.ones, beta, theta)  # by early laws
+        if self.early:
+            changed = (self.ones.copy(), beta.copy(), theta.copy())
         return Stage(
             time, beta, rate, theta, omega, self.stiffness, self.air_stiffness, self.air_damping,
-            self.ones.copy(), beta.copy(), theta.copy(), self.ones, self.ones, np.zeros(n),
+            *changed, self.ones, self.ones, np.zeros(n),
         )  # fmt: skip
 
     def derivative(self, time: float, state: Array) -> Array:
         """Time derivative of the state vector with the present sign of friction."""
         n = self.size
         stage = self._new_stage(time, state)
-        out = np.zeros_like(state)
-        self._apply(stage, state, out, (Phase.WIND, Phase.ANGLE))
+        out = np.zeros(state.size)
+        self._apply(stage, state, out, self.early)
         stage.top = -self.stiffness * stage.spring_angle - self.damping * stage.omega
-        stage.body = stage.speed_ratio * (
-            stage.speed_ratio * self.air_stiffness * stage.air_angle + self.air_damping * stage.rate
-        )
+        air_stiffness = stage.speed_ratio * self.air_stiffness if self.early else self.air_stiffness
+        stage.body = air_stiffness * stage.air_angle + self.air_damping * stage.rate
+        if self.early:
+            stage.body *= stage.speed_ratio
         if self.flexible:
             twist = stage.theta - stage.beta
             rod = self.rod_stiffness * twist * (1.0 + self.rod_hardening * twist * twist)
             rod += self.rod_damping * (stage.omega - stage.rate)
             stage.top -= rod
             stage.body += rod
-        self._apply(stage, state, out, (Phase.MOMENT, Phase.FRICTION))
+        self._apply(stage, state, out, self.late)
         if not self.flexible:
             stage.top = stage.top + stage.body
-        friction = self.sign * stage.level
         self.stage = stage
         if self.flexible:
             out[:n], out[n : 2 * n] = stage.rate, stage.body / self.body_inertia
-            out[2 * n : 3 * n] = stage.omega * self.moving
-            out[3 * n : 4 * n] = (stage.top - friction) / self.top_inertia * self.moving
+        top = out[2 * n : 4 * n] if self.flexible else out[: 2 * n]
+        if self.dry.size:
+            top[:n] = stage.omega * self.moving
+            top[n:] = (stage.top - self.sign * stage.level) / self.top_inertia * self.moving
         else:
-            out[:n] = stage.rate * self.moving
-            out[n : 2 * n] = (stage.top - friction) / self.inertia * self.moving
+            top[:n] = stage.omega
+            top[n:] = stage.top / self.top_inertia
         return out
 
-    def _apply(self, stage: Stage, state: Array, out: Array, phases: tuple[Phase, ...]) -> None:
-        """Apply the laws of these phases."""
-        for group in self.groups:
-            if group.phase in phases:
-                shape = group.memory.shape
+    def _apply(self, stage: Stage, state: Array, out: Array, groups: Sequence[_Group]) -> None:
+        """Apply the laws of these groups."""
+        for group in groups:
+            present = change = group.memory
+            if group.memory.size:
                 block = slice(group.start, group.start + group.memory.size)
-                group.law(
-                    stage, group.rows, group.params, state[block].reshape(shape), out[block].reshape(shape)
-                )
+                present, change = (whole[block].reshape(group.memory.shape) for whole in (state, out))
+            group.law(stage, group.rows, group.params, present, change)
 
     def start_friction(self) -> None:
         """Set the sign of friction at rest: opposed to the other moments, or sticking."""

@@ -45,21 +45,33 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
     return tuple(words for run in campaign.runs if (words := _second_mode(run.id, run.record)))
 
 
-def fit_modes(values: Array, interval: float, count: int) -> Modes | None:
+def left_vectors(values: Array) -> Array:
+    """Left singular vectors of the Hankel matrix of evenly spaced readings.
+
+    Args:
+        values: shape (n,), rad.
+
+    Returns:
+        Shape (rows, rows), the leading vectors first.
+    """
+    rows = int(values.size * _ROWS)
+    hankel = np.lib.stride_tricks.sliding_window_view(values, values.size - rows + 1)
+    return np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)[0]
+
+
+def fit_modes(values: Array, interval: float, count: int, vectors: Array) -> Modes | None:
     """Fit a sum of decaying oscillations by the poles of a Hankel matrix.
 
     Args:
         values: evenly spaced readings, shape (n,), rad.
         interval: between them, s.
         count: number of oscillations.
+        vectors: of `left_vectors`, shape (rows, rows).
 
     Returns:
         The modes; None where the poles are not those of so many oscillations.
     """
-    rows = int(values.size * _ROWS)
-    hankel = np.lib.stride_tricks.sliding_window_view(values, values.size - rows + 1)
-    hankel = hankel - hankel.mean(axis=1, keepdims=True)
-    left = np.linalg.svd(hankel, full_matrices=False)[0][:, : 2 * count]
+    left = vectors[:, : 2 * count]
     poles = np.linalg.eigvals(np.linalg.pinv(left[:-1]) @ left[1:]).astype(np.complex128)
     exponents = np.asarray(np.log(poles[np.abs(poles) > 0.0]) / interval, np.complex128)
     upper = exponents[exponents.imag > 0.0]
@@ -87,7 +99,8 @@ def _second_mode(name: str, record: Record) -> str:
 
 
 def _two_modes(name: str, values: Array, interval: float) -> str:
-    one, two = fit_modes(values, interval, 1), fit_modes(values, interval, 2)
+    vectors = left_vectors(values)
+    one, two = (fit_modes(values, interval, count, vectors) for count in (1, 2))
     if one is None or two is None or two.left > SECOND_MODE_LEFT * one.left or two.rate.min() < 0.0:
         return ""
     order = np.argsort(np.abs(two.frequency - one.frequency[0]))

@@ -6,7 +6,7 @@ anew. Where a term has a kink or a jump, integration stops there and starts agai
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import copysign, pi, sin, sqrt
 
@@ -46,44 +46,36 @@ class Oracle:
         ka, ca = pressure * self.cn_beta, 0.5 * self.density * speed * AREA * LENGTH**2 * self.cn_r
         lag = self.term("aero_lag")
         seen = angle if lag == 0.0 else lagged if lag > 0.0 else angle + (angle - lagged)
-        moment = ka * seen * (
-            1.0 + self.term("moment_cubic") * self.raised(abs(angle), "moment_cubic", 2.0)
-        ) + ka * self.term("flow_angle")
-        moment += (
-            ca
-            * (1.0 + self.term("damping_quadratic") * self.raised(abs(angle), "damping_quadratic", 2.0))
-            * rate
-        )
-        cycles = self.term("strouhal_number") * speed * t / WIDTH
-        moment += (
-            pressure * self.term("shedding_amplitude") * sin(2 * pi * cycles + self.term("shedding_phase"))
-        )
+        moment = ka * seen * (1.0 + self.raised(abs(angle), "moment_cubic", 2.0))
+        moment += ka * self.term("flow_angle")
+        moment += ca * (1.0 + self.raised(abs(angle), "damping_quadratic", 2.0)) * rate
+        if self.term("shedding_amplitude"):
+            cycles = self.term("strouhal_number") * speed * t / WIDTH
+            phase = 2 * pi * cycles + self.term("shedding_phase")
+            moment += pressure * self.term("shedding_amplitude") * sin(phase)
         return moment + pressure * self.forcing(t)
 
     def raised(self, size: float, term: str, textbook: float, reference: float = 0.2) -> float:
-        """The textbook's power of an angle or rate, or another that equals it at the reference."""
+        """A coefficient times the textbook's power of the size, or times one that equals it at the reference."""
+        coefficient = self.term(term)
+        if coefficient == 0.0:
+            return 0.0
         power = self.term(f"{term}_exponent") or textbook
-        return size**power * reference ** (textbook - power)
+        return coefficient * size**power * reference ** (textbook - power)
 
     def mechanism(self, angle: float, rate: float) -> float:
         play = self.term("free_play")
         stretched = max(angle - play, 0.0) + min(angle + play, 0.0) if play > 0.0 else angle
         moment = -self.stiffness * stretched - self.damping * rate
-        moment -= (
-            self.term("quadratic_damping")
-            * self.raised(abs(rate), "quadratic_damping", 2.0, 2.0)
-            * copysign(1.0, rate)
-        )
+        moment -= self.raised(abs(rate), "quadratic_damping", 2.0, 2.0) * copysign(1.0, rate)
         moment -= self.term("loss_factor") * self.stiffness / sqrt(self.stiffness / self.inertia) * rate
         moment -= self.stiffness * (
-            self.term("stiffness_cubic")
-            * self.raised(abs(angle), "stiffness_cubic", 3.0)
-            * copysign(1.0, angle)
-            + self.term("stiffness_quadratic") * self.raised(abs(angle), "stiffness_quadratic", 2.0)
+            self.raised(abs(angle), "stiffness_cubic", 3.0) * copysign(1.0, angle)
+            + self.raised(abs(angle), "stiffness_quadratic", 2.0)
         )
         return moment - self.term("gravity_stiffness") * sin(angle - self.term("gravity_angle"))
 
-    def others(self, t: float, y: np.ndarray) -> tuple[float, float]:
+    def others(self, t: float, y: Sequence[float]) -> tuple[float, float]:
         """Moments on the spring's end without friction, and on the body (0 where the rod is rigid)."""
         angle, rate, twist, twist_rate, lagged, _ = y
         air = self.air(t, angle + twist, rate + twist_rate, lagged)
@@ -94,8 +86,8 @@ class Oracle:
 
     def derivative(self, t: float, y: np.ndarray, slip: int | None) -> list[float]:
         """`slip` is the sign of the rate under friction, None at rest."""
-        angle, rate, twist, twist_rate, lagged, deflection = y
-        end, body = self.others(t, y)
+        angle, rate, twist, twist_rate, lagged, deflection = state = y.tolist()
+        end, body = self.others(t, state)
         friction, reach, yielding = self.term("friction_moment"), self.term("presliding"), 0.0
         share = 1.0  # of the friction's moment, against the slip
         if reach > 0.0 and slip is not None:  # Dahl's: slip is the side to which the motion goes

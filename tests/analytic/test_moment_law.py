@@ -72,7 +72,7 @@ def test_friction_loses_a_fixed_angle_per_half_cycle_and_holds_at_rest() -> None
     # exact for Coulomb friction with a linear spring alone: amplitude falls by 2 Tc/Kr every half cycle
     friction, spring, release = 0.05, 16.12, 0.1
     case = Case("", {"friction_moment": friction}, spring=spring, speed=0.0)
-    settings = replace(case.settings(), release_angle=release, mechanical_damping=0.0)
+    settings = replace(case.settings(), release_angle=release, mechanical_damping=0.0, duration=6.0)
     angle = simulate_motion(build_model(RIG, settings), SAMPLE_RATE).angle
     loss, amplitudes = 2.0 * friction / spring, []
     amplitude, sign = release, 1.0

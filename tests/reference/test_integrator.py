@@ -147,7 +147,7 @@ def test_lag_and_speed_drift_match_an_adaptive_solver():
 
 def test_flexible_rod_matches_the_exponential_of_its_matrix():
     rod = Rod(compliance=1e-3, share=0.15, damping_ratio=0.02)
-    c = rig(duration=1.0, rod=rod)
+    c = rig(duration=0.5, rod=rod)
     (motion,) = integrate([c], [[]], substeps=20)
     k, inertia = 1.0 / rod.compliance, c.yaw_inertia
     top, body = rod.share * inertia, (1 - rod.share) * inertia
@@ -215,7 +215,7 @@ def test_coulomb_friction_matches_its_closed_form_to_rest(tc):
 
 
 def test_friction_sticks_at_release_and_breaks_loose_under_a_rising_moment():
-    c = rig(stiffness=(20.0,), speed=(0.0,), angle=(0.001,), duration=1.0)
+    c = rig(stiffness=(20.0,), speed=(0.0,), angle=(0.001,), duration=0.5)
     stick = Term(m.coulomb_level, Phase.FRICTION, {"moment": np.array([0.05])})
     push = Term(
         air.harmonic_moment,
@@ -235,7 +235,7 @@ def test_friction_sticks_at_release_and_breaks_loose_under_a_rising_moment():
 
 
 def test_energy_is_kept_without_damping_and_falls_by_the_friction_work():
-    c = rig(stiffness=(40.0,), speed=(0.0,), angle=(0.3,), mechanical_damping=0.0, duration=2.0)
+    c = rig(stiffness=(40.0,), speed=(0.0,), angle=(0.3,), mechanical_damping=0.0, duration=1.0)
     (motion,) = integrate([c], [[]], substeps=5)
     energy = 0.5 * 40.0 * motion.angle[:, 0] ** 2 + 0.05 * motion.rate[:, 0] ** 2
     assert np.ptp(energy) / energy[0] < 1e-9

@@ -1,6 +1,7 @@
 """The budget's arithmetic against the estimators themselves and against closed forms."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,8 +20,17 @@ EIGHT = (
 SHAPE = {"duration": 5.0, "rate": 200.0}
 
 
+@cache
 def by(name):
-    return lambda data: identify(data, name, throw=False)
+    """An estimator that estimates from the same campaign once."""
+    kept = {}  # with the campaigns, so that no other object takes the place of one
+
+    def estimated(data):
+        if id(data) not in kept:
+            kept[id(data)] = data, identify(data, name, throw=False)
+        return kept[id(data)][1]
+
+    return estimated
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """Sets of causes grown effect by effect: what is put in comes out first, whatever its number."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,9 +15,12 @@ from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Point
 from diagnosis.fitting.starting_points import starting_points
 from diagnosis.policy import MOST_CAUSES
-from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, nominal
+from tests.unit import gap_campaigns
+from tests.unit.gap_campaigns import INTERVAL, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 
+DURATION = 6.0
+campaign = partial(gap_campaigns.campaign, duration=DURATION)
 FEW = tuple(
     effect_class(name)
     for name in (
@@ -146,7 +150,7 @@ ALIKE = ("gravity_stiffness", "spring_miscalibration")  # two springs cannot tel
 def test_of_effects_that_do_the_same_one_is_grown_and_the_others_are_weighed_beside_it():
     wrong = effect_from("spring_miscalibration", {"error": 0.004, "spring_stiffness": 16.12})
     friction = effect_from("coulomb_friction", {"friction_moment": 0.002})
-    base, steps = nominal(campaign(wrong, friction)), []
+    base, steps = nominal(campaign(wrong, friction, duration=10.0)), []
     kinds = [effect_class(name) for name in (*ALIKE, "coulomb_friction", "sensor_drift")]
     ranked = grow(base, kinds, steps.append)
     grown_from = {line.split(" + ")[0] for line in steps if " + " in line}

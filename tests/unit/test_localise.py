@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,9 +17,12 @@ from diagnosis.localisation.backbone import backbones, drift
 from diagnosis.localisation.excess import RunExcess, run_excesses, shortest_interval
 from diagnosis.localisation.localise import localise, runs_beyond_chance
 from diagnosis.localisation.phase_plane import apparent_moment
-from tests.unit.gap_campaigns import DURATION, INTERVAL, campaign, nominal, studied, with_blow
+from tests.unit import gap_campaigns
+from tests.unit.gap_campaigns import INTERVAL, nominal, studied, with_blow
 from tunnel_sim.effects import effect_class, effect_from
 
+DURATION = 7.0
+campaign = partial(gap_campaigns.campaign, duration=DURATION)
 UNKNOWN = ("unknown",)
 
 
@@ -204,8 +208,8 @@ def test_times_count_from_the_start_of_the_record_though_the_fit_begins_later():
 
 
 def test_a_line_beside_the_harmonics_has_its_frequency_and_amplitude():
-    time = INTERVAL * np.arange(round(DURATION / INTERVAL))
-    data = campaign(added=5e-4 * np.sin(2.0 * np.pi * 33.3 * time))
+    time = INTERVAL * np.arange(round(10.0 / INTERVAL))
+    data = campaign(added=5e-4 * np.sin(2.0 * np.pi * 33.3 * time), duration=10.0)
     where, maps = localise(studied(data, nominal(data), UNKNOWN))
     assert where.channel == "sensor"
     assert {line.run for line in maps.lines} == {run.id for run in data.runs}

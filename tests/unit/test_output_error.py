@@ -86,8 +86,14 @@ def drifting_stiffness(data, share):
     )
 
 
+@pytest.fixture(scope="module")
+def honest():
+    """The estimate where the model does not depart."""
+    return identify(campaign(noise=5e-4, rng=np.random.default_rng(6)))
+
+
 @pytest.mark.parametrize("stated", [5e-4, None])
-def test_a_departing_model_is_flagged_and_the_intervals_widened(stated):
+def test_a_departing_model_is_flagged_and_the_intervals_widened(stated, honest):
     rng = np.random.default_rng(6)
     clean = campaign(noise=0.0, stated_noise=stated)
     curved = with_records(
@@ -96,7 +102,6 @@ def test_a_departing_model_is_flagged_and_the_intervals_widened(stated):
     estimate = identify(curved)
     assert Status.MODEL_DEPARTS in estimate.statuses
     assert estimate.noise.slow_ratio > 2.0
-    honest = identify(campaign(noise=5e-4, rng=np.random.default_rng(6)))
     assert estimate.cn_beta.std > 1.4 * honest.cn_beta.std
     # The widened interval holds the truth although the fit is off by many nominal deviations.
     assert abs(estimate.mechanical_damping.value - Truth().mechanical_damping) < (

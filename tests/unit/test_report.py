@@ -90,6 +90,13 @@ def page(document, data):
     return render_report(document, data)
 
 
+@pytest.fixture
+def written(monkeypatch, data):
+    """Renders a page whose figures are built but not drawn: drawing takes nearly all of the time."""
+    monkeypatch.setattr("tunnel_lab.diagnosis_view.page.inline_svg", lambda *_: "")
+    return lambda document, *byline: render_report(document, data, *byline)
+
+
 class Page(HTMLParser):
     """Collects ids, outside references and text."""
 
@@ -176,16 +183,14 @@ def test_numbers_are_those_of_the_document(page, document):
     assert effect_class(CAUSE).signature in text
 
 
-def test_what_could_be_closed_is_on_the_page_only_where_something_remains(page, document, data):
+def test_what_could_be_closed_is_on_the_page_only_where_something_remains(page, document, written):
     text = Page(page).text
     assert "What could be closed: A moment." in text
     assert "a moment of the angle alone 41.7 ± 2.3 %" in text
     assert "0.0 ± 100.0 %" in text  # worse than nothing, and beyond any meaning
     explained = document | {"closable": None, "maps": None}
-    assert "What could be closed" not in render_report(explained, data)
-    page = render_report(
-        explained | {"rest": {"significant": False, "p_value": 0.4321, "material": False}}, data
-    )
+    assert "What could be closed" not in written(explained)
+    page = written(explained | {"rest": {"significant": False, "p_value": 0.4321, "material": False}})
     assert "What could be closed: nothing beyond chance (p = 0.43)." in Page(page).text
     assert 'id="closable"' not in page
 
@@ -198,27 +203,27 @@ MODEL = {
 }  # fmt: skip
 
 
-def test_the_patched_model_and_its_closure_are_on_the_page(document, data):
+def test_the_patched_model_and_its_closure_are_on_the_page(document, written):
     given = document | {"model": MODEL, "maps": None}
-    text = Page(render_report(given, data, Byline(patch="out.xml"))).text
+    text = Page(written(given, Byline(patch="out.xml"))).text
     assert "closes 94.7 % of the gap on runs held out of the fit; the fit itself 96.8 %." in text
     assert "yaw +0.0123 rad. Written to out.xml ." in text
     assert "Changes to rig.xml" in text
     assert "joint frictionloss 0 0.004560 N m" in text
     assert "frictionloss is a soft constraint." in text
-    assert "Written to" not in render_report(given, data)
-    unnamed = render_report(given | {"causes": ["unknown"]}, data)
+    assert "Written to" not in written(given)
+    unnamed = written(given | {"causes": ["unknown"]})
     assert "No cause is written into the patched model, only what was free: inertia, damping." in unnamed
     assert "94.7 %" not in unnamed
 
 
-def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, document, data):
+def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, document, written):
     assert "There is one run only." in page
     assert "the MuJoCo model" in page
     assert "1.2e-05 rad at most" in page
     assert "within 4.0e-05 rad" in page
     changed = {"maps": None, "cautions": [], "confirmation": document["confirmation"] | {"agrees": False}}
-    other = render_report(document | changed, data)
+    other = written(document | changed)
     assert "beyond 4.0e-05 rad" in other
     assert 'id="cautions"' not in other
 
@@ -235,16 +240,17 @@ def test_a_document_without_maps_is_rendered_too(document, data, tmp_path):
     assert text.count("<svg") == 5
 
 
-def test_no_gap_is_said_so(document, data):
+def test_no_gap_is_said_so(document, written):
     calm = document | {
         "causes": [], "verdict": "No gap: all is noise.", "ambiguous_with": [], "next_run": None, "maps": None,
         "where": document["where"] | {"channel": None, "condition": None, "runs": [], "time_s": None},
     }  # fmt: skip
-    text = Page(render_report(calm, data)).text
+    text = Page(written(calm)).text
     assert "No gap: all is noise." in text
     assert "Share closed" not in text
 
 
+@pytest.mark.usefixtures("written")
 def test_a_page_that_cannot_be_written_is_one_line(document, data, tmp_path):
     with pytest.raises(TunnelError, match="cannot be written"):
         write_report(document | {"maps": None}, data, tmp_path / "nowhere" / "report.html")
@@ -256,22 +262,21 @@ def test_every_figure_is_described(document, data):
     assert list(diagnosis_figures(document, data)) == list(DESCRIPTIONS)
 
 
-def test_figures_take_the_colours_of_the_theme(document, data):
-    page = render_report(document, data)
+def test_figures_take_the_colours_of_the_theme(page):
     used = set(re.findall(r"var\(--([a-z]+)\)", page))
     assert set(THEMED.values()) <= used
     assert used <= set(re.findall(r"--([a-z]+): light-dark", page))
     assert 'font-family: "DejaVu Sans"; src: url(data:font/woff' in page
 
 
-def test_date_and_author_are_of_the_page_and_not_of_the_document(document, data, page):
-    text = Page(render_report(document | {"maps": None}, data, Byline("2026-05-31", "A. Smith <b>"))).text
+def test_date_and_author_are_of_the_page_and_not_of_the_document(document, written, page):
+    text = Page(written(document | {"maps": None}, Byline("2026-05-31", "A. Smith <b>"))).text
     assert "2026-05-31 · A. Smith <b>" in text
     assert "A. Smith" not in page
 
 
-def test_hashes_and_versions_are_on_the_page(document, data):
+def test_hashes_and_versions_are_on_the_page(document, written):
     provenance = {"versions": {"numpy": "9.8.7"}, "sha256": {"runs/a.csv": "ab" * 32}}
-    text = Page(render_report(document | {"provenance": provenance, "maps": None}, data)).text
+    text = Page(written(document | {"provenance": provenance, "maps": None})).text
     for part in ("9.8.7", "runs/a.csv", "ab" * 32):
         assert part in text

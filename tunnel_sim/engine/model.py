@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 
@@ -24,21 +24,23 @@ from tunnel_sim.vocabulary.rig import Rig
 
 _SERIES = ("wind_speed", "forcing")
 _THINNEST = 1e-3  # least width over length: MuJoCo refuses the inertias of a body of zero width
+_COMPILED: dict[tuple[object, ...], mujoco.MjModel] = {}  # by rig and layout; only copies are given away
+_MOST_COMPILED = 16
 _NATIVE = frozenset({"spring_stiffness", "mechanical_damping", "yaw_inertia"})  # attributes of joint and body
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A compiled model of the rig in one run.
-
-    Args:
-        spec: the complete MJCF specification; ``spec.to_xml()`` writes it.
-    """
+    """A compiled model of the rig in one run."""
 
     mj: mujoco.MjModel
     rig: Rig
     settings: RunSettings
-    spec: mujoco.MjSpec = field(repr=False)
+
+    @cached_property
+    def spec(self) -> mujoco.MjSpec:
+        """The complete MJCF specification; ``spec.to_xml()`` writes it."""
+        return build_spec(self.rig, self.settings)
 
     @cached_property
     def yaw_address(self) -> int:
@@ -52,7 +54,7 @@ class Model:
             settings: must have the same layout: see `RunSettings.layout`.
 
         Returns:
-            A model whose physics is bit-identical to that of ``build_model(rig, settings)``.
+            A model whose physics is bit-identical to that of one compiled from ``build_spec(rig, settings)``.
 
         Raises:
             TunnelError: when the plugin refuses the numbers, or the steps are too long for them.
@@ -73,7 +75,7 @@ class Model:
             mujoco.mj_setConst(mj, mujoco.MjData(mj))
         except (ValueError, mujoco.FatalError) as error:
             raise _refusal(error) from error
-        return Model(mj, self.rig, settings, self.spec)
+        return Model(mj, self.rig, settings)
 
     def release_state(self) -> mujoco.MjData:
         """The state at the release, where the body has been held at its angle until now.
@@ -95,7 +97,7 @@ class Model:
 
 
 def build_model(rig: Rig, settings: RunSettings) -> Model:
-    """Build and compile the model of one run.
+    """Build the model of one run; compiled, which takes nearly all of the time, once for all runs of a layout.
 
     Args:
         settings: spring, damper, inertia, air and every further term of the moment law.
@@ -104,12 +106,17 @@ def build_model(rig: Rig, settings: RunSettings) -> Model:
         TunnelError: when MuJoCo or the plugin refuses the settings, or the steps are too long for them.
     """
     check_stable(rig, settings)
-    spec = build_spec(rig, settings)
-    try:
-        compiled = spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
-        raise _refusal(error) from error
-    return Model(compiled, rig, settings, spec)
+    key = (repr(rig), settings.layout())
+    compiled = _COMPILED.get(key)
+    if compiled is None:
+        try:
+            compiled = build_spec(rig, settings).compile()
+        except (ValueError, mujoco.FatalError) as error:
+            raise _refusal(error) from error
+        if len(_COMPILED) >= _MOST_COMPILED:
+            _COMPILED.clear()
+        _COMPILED[key] = compiled
+    return Model(compiled, rig, settings).with_settings(settings)
 
 
 def _refusal(error: Exception) -> TunnelError:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +18,7 @@ import polars as pl
 import pytest
 
 from identification.estimators.matrix_pencil import MatrixPencil
+from tunnel_lab.cli import main
 
 Outcome = tuple[int, str, str]
 Tunnel = Callable[..., Outcome]
@@ -42,12 +45,16 @@ def grid(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def baseline(tunnel: Tunnel, grid: Path, tmp_path: Path) -> Path:
-    path = tmp_path / "base.parquet"
-    status, out, err = tunnel("score", grid, *HERE, "--write-baseline", path)
-    assert (status, err) == (0, "")
-    assert f"Written: {path}" in out
+@pytest.fixture(scope="module")
+def baseline(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("baseline")
+    grid, path = folder / "grid.toml", folder / "base.parquet"
+    grid.write_text(GRID)
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        assert main(["score", str(grid), *HERE, "--write-baseline", str(path)]) == 0
+    assert err.getvalue() == ""
+    assert f"Written: {path}" in out.getvalue()
     return path
 
 
