@@ -23,6 +23,7 @@ from diagnosis.policy import (
     BURST,
     BURST_FALSE_ALARM_RATE,
     CLOSED_WITHOUT_RANDOM,
+    MOST_CAUSES,
     RANDOM_PARTNERS,
     RIVAL_EVIDENCE,
     STEADY_IN_TIME,
@@ -71,18 +72,35 @@ def weigh_random_moments(
         To pass, the innovations must be white by band, steady in time and without bursts, and the wind-off runs
         free of a gap. Empty where none passes, or where deterministic effects close the gap.
 
-        A strong random motion misleads the fit of the effects beside it. Where no answer passes, though the best
-        set leaves no gap in still air, it is therefore fitted again with the response to turbulence as noise.
+        A strong random motion misleads the fit of the effects beside it. Where no answer passes, or only one with
+        more effects than still air asks for, the best set is therefore fitted again with the response to turbulence
+        as noise.
     """
     if any(
         max(hypothesis.fit.excess, 0.0) < CLOSED_WITHOUT_RANDOM * nominal.excess for hypothesis in hypotheses
     ):
         return []
     answers = _passing(nominal, hypotheses, allowed)
-    if not answers and hypotheses and not _still_open(hypotheses[0].fit, nominal):
-        answers = _passing(nominal, beside_turbulence(hypotheses[0], nominal.problem.data), allowed)
+    if hypotheses and _beside_too_many(answers, nominal, hypotheses):
+        again = beside_turbulence(hypotheses[0], nominal.problem.data)
+        tried = sorted([*answers, *_passing(nominal, again, allowed)], key=_cost, reverse=True)
+        answers = list({answer.kind: answer for answer in tried}.values())
     least = min((answer.process.cost for answer in answers), default=0.0)
     return [answer for answer in answers if answer.process.cost < least + RIVAL_EVIDENCE]
+
+
+def _beside_too_many(answers: Sequence[RandomAnswer], nominal: Fit, hypotheses: Sequence[Hypothesis]) -> bool:
+    """Whether no answer passes, or only beside more effects than still air asks for, though its gap can close."""
+    sets = [Hypothesis((), nominal), *hypotheses]
+    enough = [len(one.effects) for one in sets if not _still_open(one.fit, nominal)]
+    if not enough:
+        return False
+    beside = [0 if a.beside is None else len(a.beside.effects) for a in answers]
+    return min(beside, default=MOST_CAUSES) > min(enough) + 1
+
+
+def _cost(answer: RandomAnswer) -> float:
+    return answer.process.cost + BESIDE_EVIDENCE * len(answer.effects)
 
 
 def _passing(nominal: Fit, hypotheses: Sequence[Hypothesis], allowed: Collection[str]) -> list[RandomAnswer]:
@@ -107,7 +125,7 @@ def _likeliest(
         tried += [_try(kind, explain, s.fit, s, nominal) for s in _partners(kind, hypotheses)]
         passed = [answer for answer in tried if answer is not None]
         if passed:
-            return min(passed, key=lambda a: a.process.cost + BESIDE_EVIDENCE * len(a.effects))
+            return min(passed, key=_cost)
     return None
 
 

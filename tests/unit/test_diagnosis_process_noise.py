@@ -1,6 +1,7 @@
 """A random moment: its likelihood finds what drove the rig, and it is not called for anything else."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from diagnosis.attribution.process_noise import (
     whiteness,
     with_response,
 )
-from diagnosis.attribution.random_moments import weigh_random_moments, wind_off_excess
+from diagnosis.attribution.random_moments import _beside_too_many, weigh_random_moments, wind_off_excess
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.starting_points import starting_points
 from tests.unit.gap_campaigns import (
@@ -138,6 +139,22 @@ def test_skips_beside_strong_turbulence_are_placed_where_they_are():
     assert found.point.release[:, -1] == pytest.approx(planted, abs=0.005)
     assert found.value("dropped_samples.lost_time") == pytest.approx(0.006, rel=0.01)
     assert abs(wind_off_excess(found)) < 0.1
+
+
+def of(*effects, still_air):
+    """A set of effects whose fit leaves an excess in still air; nothing else is read of it."""
+    run, residual = SimpleNamespace(wind_on=False), np.full(4, np.sqrt(1.0 + still_air))
+    problem = SimpleNamespace(data=SimpleNamespace(runs=[run]))
+    return Hypothesis(effects, SimpleNamespace(excess=10.0, residuals=[residual], problem=problem))
+
+
+@pytest.mark.parametrize(("beside", "wanted"), [(None, True), (1, False), (2, False), (3, True)])
+def test_the_best_set_is_sought_again_where_more_effects_pass_than_still_air_asks_for(beside, wanted):
+    sets = [of("a", "b", "c", still_air=0.0), of("a", "b", still_air=0.0), of("a", still_air=0.0)]
+    nothing = of(still_air=5.0).fit
+    answers = [] if beside is None else [SimpleNamespace(beside=sets[3 - beside])]
+    assert _beside_too_many(answers, nothing, sets) is wanted
+    assert not _beside_too_many(answers, nothing, [of("a", still_air=5.0)])
 
 
 def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy):
