@@ -130,8 +130,8 @@ STEADY_IN_TIME = 5.5
 #: Power of a short time, over the greatest that chance explains at this rate, that real turbulence may have. The
 #: rate is a convention, for all windows of a campaign. The factor is a judgement: turbulence is not quite steady.
 BURST_FALSE_ALARM_RATE, BURST = 0.001, 1.5
-#: Excess of the wind-off runs up to which they count as free of a gap: a share of the nominal model's excess, and
-#: at least so many noise variances. Judgement.
+#: Excess of the wind-off runs up to which they count as free of a gap: a share of the fit's excess, and at least so
+#: many noise variances, and the misfit of form that counts as none. Judgement.
 WIND_OFF_SHARE, WIND_OFF_LEAST = 0.05, 0.1
 #: Single effects beside which a random moment is tried. Judgement: time against coverage.
 RANDOM_PARTNERS = 3
@@ -140,8 +140,6 @@ RANDOM_PARTNERS = 3
 BESIDE_EVIDENCE = 60.0
 #: −2 ln L beyond which a likelier kind of random moment rules another out. Convention: odds of e^10.
 RIVAL_EVIDENCE = 20.0
-#: Where deterministic effects leave a smaller share of the gap, no random moment is tried (0009).
-CLOSED_WITHOUT_RANDOM = 0.015
 
 # ---- Where the gap is -----------------------------------------------------------------------------------------
 

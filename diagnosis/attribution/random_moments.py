@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from diagnosis.attribution.beside_turbulence import beside_turbulence
+from diagnosis.attribution.decide import form_floor
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.process_noise import (
     ProcessNoise,
@@ -22,7 +23,6 @@ from diagnosis.policy import (
     BESIDE_EVIDENCE,
     BURST,
     BURST_FALSE_ALARM_RATE,
-    CLOSED_WITHOUT_RANDOM,
     MOST_CAUSES,
     RANDOM_PARTNERS,
     RIVAL_EVIDENCE,
@@ -77,7 +77,8 @@ def weigh_random_moments(
         as noise.
     """
     if any(
-        max(hypothesis.fit.excess, 0.0) < CLOSED_WITHOUT_RANDOM * nominal.excess for hypothesis in hypotheses
+        max(hypothesis.fit.excess, 0.0) < form_floor(nominal.excess) * nominal.excess
+        for hypothesis in hypotheses
     ):
         return []
     answers = _passing(nominal, hypotheses, allowed)
@@ -156,7 +157,8 @@ def _try(
 
 def _still_open(fit: Fit, nominal: Fit) -> bool:
     """Whether the wind-off runs show a gap, which no random moment of the wind explains."""
-    return wind_off_excess(fit) > max(WIND_OFF_SHARE * nominal.excess, WIND_OFF_LEAST)
+    misfit = form_floor(nominal.excess) * nominal.excess
+    return wind_off_excess(fit) > max(WIND_OFF_SHARE * fit.excess, misfit, WIND_OFF_LEAST)
 
 
 def wind_off_excess(fit: Fit) -> float:
