@@ -344,7 +344,7 @@ def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
 
     Args:
         result: a fit of process noise.
-        false_alarm_rate: at which a steady normal moment exceeds 1 in any window, at most.
+        false_alarm_rate: probability that a steady normal moment exceeds 1 in any window, at most, a fraction.
 
     Returns:
         A ratio.
