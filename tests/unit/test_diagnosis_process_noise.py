@@ -126,6 +126,16 @@ def test_buffeting_is_offered_where_it_blows(windy):
     assert answer.share < 0.1
 
 
+def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth_of_the_gap():
+    strong = effect_from("cubic_stiffness", {"coefficient": -0.2})
+    base = nominal(buffeted(campaign(strong), 0.0012, 4.0))
+    (start, *_) = starting_points(base, type(strong))
+    spring = Hypothesis(("cubic_stiffness",), fit(start.problem, start.point, base=base))
+    assert 0.005 < spring.fit.excess / base.excess < 0.015
+    (answer,) = weigh_random_moments(base, [spring], ("buffeting",))
+    assert answer.effects == ("buffeting", "cubic_stiffness")
+
+
 def test_skips_beside_strong_turbulence_are_placed_where_they_are():
     """Least squares takes the motion that turbulence drives for white noise, and misplaces them."""
     base = nominal(buffeted(campaign(effect_from("dropped_samples", {"lost_time": 0.006})), 0.01, 4.0))
