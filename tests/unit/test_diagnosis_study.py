@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.random_moments import RandomAnswer
+from diagnosis.investigate import _polished
 from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -38,3 +40,14 @@ def test_a_random_moment_answers_where_it_leaves_less_than_the_steady_one(
     moment = RandomAnswer(effect_class("vortex_shedding"), None, None, share)  # type: ignore[arg-type]
     asked = replace(study, random=(moment,)).random_answer(("vortex_shedding",))
     assert (asked is moment) == is_random
+
+
+@pytest.mark.parametrize("random", [False, True])
+def test_the_answer_is_polished_unless_a_random_moment_gives_it(
+    study: Study, monkeypatch: pytest.MonkeyPatch, random: bool
+) -> None:
+    polished = replace(study.hypotheses[0], textbook=study.nominal)
+    monkeypatch.setattr("diagnosis.investigate.polish", lambda _: polished)
+    moment = RandomAnswer(effect_class("vortex_shedding"), None, None, 0.4)  # type: ignore[arg-type]
+    found = _polished(study.hypotheses, Weighed(("vortex_shedding",), 0.5, 0.9), (moment,) if random else ())
+    assert found == (study.hypotheses if random else (polished,))

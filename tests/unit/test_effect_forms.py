@@ -10,6 +10,7 @@ import pytest
 from tests.reference.effect_cases import VALUES, settings
 from tests.reference.effect_oracle import Setting
 from tunnel_sim.effects import ALL_EFFECTS, EffectChain, effect_from
+from tunnel_sim.effects.fitting import WindOnRun
 
 TIME = np.linspace(0.0, 10.0, 1001)
 ANGLE = 0.3 * np.exp(-0.1 * TIME) * np.cos(9.0 * TIME)
@@ -99,3 +100,15 @@ def test_a_soft_limit_bends_over_without_a_kink() -> None:
 def test_rounded_backlash_is_the_mean_of_two_plays() -> None:
     wide, narrow = (read("sensor_hysteresis", half_width=w) for w in (0.013, 0.007))
     assert read("sensor_hysteresis", half_width=0.01, roundness=0.3) == pytest.approx(0.5 * (wide + narrow))
+
+
+def test_the_loss_may_follow_the_motion_or_the_rig_in_still_air():
+    """Worked out by hand for η = 0.01 and 20 N m/rad: 10 rad/s in still air, 8 and 12 rad/s in the wind."""
+    damping = effect_from("structural_damping", {"loss_factor": 0.01})
+    runs = [WindOnRun(20.0, omega, 10.0, per_cn_beta=2.0, per_cn_r=0.5) for omega in (8.0, 12.0)]
+    moment, rate = damping.unseen_form(0.5, runs)
+    stiffer = 2.0 / np.pi * 0.01 * 20.0 * np.log([10.0 / 8.0, 10.0 / 12.0]) / 2.0
+    lost = 0.01 * np.array([20.0 / 8.0 - 2.0, 20.0 / 12.0 - 2.0]) / 0.5
+    assert moment == pytest.approx(abs(stiffer.mean()) / np.sqrt(3.0))
+    assert rate == pytest.approx(abs(lost.mean()) / np.sqrt(3.0))
+    assert damping.unseen_form(0.5, []) == (0.0, 0.0)

@@ -17,6 +17,7 @@ from tunnel_lab.diagnosis_view import figures_answer as answer
 from tunnel_lab.diagnosis_view import figures_where as where
 from tunnel_lab.diagnosis_view.figures_backbone import backbone_figure
 from tunnel_lab.diagnosis_view.figures_common import run_label
+from tunnel_lab.diagnosis_view.figures_law import law_figure
 from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
 
 Document = dict[str, Any]
@@ -335,3 +336,20 @@ def test_the_label_of_a_run_holds_its_conditions() -> None:
             n.value for n in numbers(run_label({"id": name, "spring_stiffness": spring, "wind_speed": speed}))
         ]
         assert found == ([] if spring is None else [v for v in (spring, speed) if v])
+
+
+def test_the_band_of_a_proposed_law_holds_two_standard_deviations(given: Document) -> None:
+    law = {
+        "over": ["angle"],
+        "places": [[-0.1, 0.0, 0.1]],
+        "values": [3.0, 1.0, -2.0],
+        "std": [0.1, 0.2, 0.3],
+    }
+    fig = law_figure(given | {"closable": {"curve": law | {"unit": "N m"}}})
+    assert fig is not None
+    (axes,) = fig.axes
+    (line,) = axes.lines
+    assert curve(line) == [(-0.1, 3.0), (0.0, 1.0), (0.1, -2.0)]
+    low_high = [(-0.1, 2.804), (-0.1, 3.196), (0.0, 0.608), (0.0, 1.392), (0.1, -2.588), (0.1, -1.412)]
+    assert band(axes.collections[0]) == pytest.approx(np.array(low_high))
+    assert axes.get_ylabel() == "missing moment [N m]"

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from diagnosis.fitting.spectra import linear_coefficients
 from diagnosis.fitting.starting_points import nominal_start, starting_points
 from diagnosis.localisation.backbone import backbones, drift
 from diagnosis.localisation.excess import RunExcess, run_excesses, shortest_interval
+from diagnosis.localisation.inference import _lone_run
 from diagnosis.localisation.localise import localise, runs_beyond_chance
 from diagnosis.localisation.phase_plane import apparent_moment
 from tests.unit import gap_campaigns
@@ -223,3 +225,11 @@ def test_a_centre_that_shifts_with_the_second_harmonic_is_the_springs():
     where, _ = localise(studied(data, nominal(data), UNKNOWN))
     assert where.channel == "stiffness"
     assert "second harmonic" in where.words
+
+
+@pytest.mark.parametrize(
+    ("shares", "lone"), [((0.9, 0.05, 0.05), "r1"), ((0.8, 0.1, 0.1), None), ((0.9, 0.1), None)]
+)
+def test_one_run_of_three_or_more_that_has_nearly_all_of_the_gap_is_lone(shares, lone):
+    runs = [SimpleNamespace(id=f"r{number}", share=share) for number, share in enumerate(shares, 1)]
+    assert _lone_run(SimpleNamespace(maps=SimpleNamespace(runs=runs))) == lone

@@ -82,6 +82,9 @@ def test_units_are_not_mixed():
 
 
 def test_cells_are_added_in_squares():
-    one, other = score(collect(outcomes([3.0, -3.0]))), score(collect(outcomes([4.0, -4.0])))
-    assert overall([one, other]).value == pytest.approx(np.sqrt(12.5))
+    one, other = score(collect(outcomes([3.0, -3.5]))), score(collect(outcomes([4.0, -4.5])))
+    (a, u), (b, v) = ((found.rmse_over_bound.value, found.rmse_over_bound.std) for found in (one, other))
+    root = np.sqrt((a**2 + b**2) / 2.0)
+    assert overall([one, other]).value == pytest.approx(root)
+    assert overall([one, other]).std == pytest.approx(np.hypot(a * u, b * v) / 2.0 / root)
     assert overall([score(collect([Outcome(1.0, None)]))]) is None

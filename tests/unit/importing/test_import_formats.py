@@ -23,6 +23,7 @@ import xlsxwriter
 from tests.unit.importing.import_files import RATE, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.matlab import _unpacked
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.vocabulary import limits
 
@@ -186,6 +187,13 @@ def test_sizes_are_counted_before_anything_is_unpacked(
     monkeypatch.setattr(limits, "DATA_BYTES", 2**20)
     with pytest.raises(TunnelError, match="numbers, more than"):
         read_records([tmp_path / "zeros.mat"])
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_the_size_of_a_mat_file_is_that_of_all_its_arrays(tmp_path: Path, compressed: bool) -> None:
+    arrays = {name: np.zeros(1000) for name in ("a", "b", "c")}
+    scipy.io.savemat(tmp_path / "three.mat", arrays, do_compression=compressed)
+    assert 3 * 8000 <= _unpacked((tmp_path / "three.mat").read_bytes()) < 3 * 8100
 
 
 def test_a_link_out_of_an_hdf5_file_is_not_followed(tmp_path: Path) -> None:

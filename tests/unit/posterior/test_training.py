@@ -1,6 +1,7 @@
 """``tunnel train --estimator neural_posterior`` on a few short campaigns: resumed work and the same bits."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,9 +9,11 @@ import pytest
 from identification import identify
 from identification.estimators.neural_posterior import NeuralPosterior
 from tests.reference.free_decays import TWELVE, campaign
+from tests.reference.rigs import rig
 from tunnel_lab.cli import main
 from tunnel_reference.catalogue import Group
 from tunnel_reference.forms import FORMS
+from tunnel_sim.effects import ALL_EFFECTS
 
 WORDS = ["-e", "neural_posterior", "--shards", "1", "--steps", "4", "--jobs", "0"]
 
@@ -100,3 +103,26 @@ def test_the_flexible_rod_moves_as_the_reference_integrator_says():
         exact, stepped = flexible_motion(c), integrate([c], [[]], substeps=20)[0]
         assert np.abs(exact.angle - stepped.angle).max() < 1e-7
         assert np.abs(exact.rate - stepped.rate).max() < 1e-4
+
+
+def test_white_noise_tells_as_much_at_the_rate_of_training():
+    """Its power per hertz is the same; coloured noise, far below either rate, keeps its level."""
+    from tunnel_lab.training.draw import SAMPLE_RATE, at_low_rate
+
+    fast = rig(sample_rate=1000.0, noise_std=3e-3, coloured_share=0.25)
+    slow = at_low_rate(fast)
+    assert slow.sample_rate == SAMPLE_RATE
+
+    def parts(c):
+        return (1.0 - c.coloured_share) * c.noise_std**2 / c.sample_rate, c.coloured_share * c.noise_std**2
+
+    assert parts(slow) == pytest.approx(parts(fast))
+
+
+def test_effects_are_weighed_without_the_runs_that_cannot_be_read():
+    whole = campaign(TWELVE[:5], noise=5e-4, rate=500.0, rng=np.random.default_rng(3))
+    swing = whole.runs[-1].record
+    dead = replace(whole.runs[-1], record=replace(swing, yaw_rad=np.zeros_like(swing.yaw_rad)))
+    found = NeuralPosterior().effects(replace(whole, runs=(*whole.runs[:-1], dead)))
+    assert found == NeuralPosterior().effects(replace(whole, runs=whole.runs[:-1]))
+    assert set(found) == {kind.name for kind in ALL_EFFECTS}
