@@ -40,6 +40,13 @@ def test_the_same_trials_are_no_change():
         assert (change.before, change.p_value) == (change.now, 1.0)
 
 
+def test_where_every_trial_failed_coverage_has_not_changed():
+    none = np.zeros(0)
+    failed = [Trials(none, none, none, none, 5)]
+    found = {change.aspect: change for change in changes(failed, failed)}
+    assert (found["coverage"].before, found["coverage"].now, found["coverage"].p_value) == (1.0, 1.0, 1.0)
+
+
 PLANTED = {
     "bias": {"shift": 0.5},
     "spread": {"scale": 1.5},

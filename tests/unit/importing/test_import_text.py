@@ -13,7 +13,9 @@ import pytest
 from tests.unit.importing.import_files import Text, any_dialect, csv, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.columns import _blocks
 from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.source import Channel
 from tunnel_sim.files.importing.text import find_dialect
 from tunnel_sim.files.importing.units import known_unit, split_unit
 
@@ -165,3 +167,15 @@ def test_bad_input_says_what_to_give(tmp_path: Path, content: bytes, what: str, 
 def test_an_unknown_column_has_a_suggestion(tmp_path: Path) -> None:
     with pytest.raises(TunnelError, match=r"no column 'yw'.*did you mean 'yaw'"):
         read_records([csv(tmp_path)], ImportChoices(angle=("yw",)))
+
+
+@pytest.mark.parametrize(
+    ("names", "blocks"),
+    [(("time", "a", "time", "b"), 2), (("t#1", "a", "clock#2", "b"), 2), (("time", "a", "clock", "b"), 1)],
+)
+def test_columns_are_several_records_where_the_times_are_repeated(
+    names: tuple[str, ...], blocks: int
+) -> None:
+    units = ("s", "rad", "s", "rad")
+    channels = [Channel(name, np.zeros(3), unit) for name, unit in zip(names, units, strict=True)]
+    assert len(_blocks(channels, ImportChoices())) == blocks
