@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from identification import identify
-from identification.uncertainty.budget import make_budget, with_budget
+from identification.uncertainty.budget import _common, make_budget, with_budget
 from identification.uncertainty.input_uncertainty import InputUncertainties
 from tests.reference.free_decays import TWELVE, Setting, campaign, with_records
 from tunnel_sim.vocabulary.record import Record
@@ -159,3 +160,11 @@ def test_scatter_beyond_noise_is_flagged_as_rarely_as_stated():
         found = side_scatter(data, by("matrix_pencil")(data).runs, {})
         flagged += any(side.covariance.any() for side in found)
     assert flagged <= 8  # of 60 at 4 %: more with probability 1e-3
+
+
+@pytest.mark.parametrize("windy", [False, True])
+def test_what_common_errors_of_the_wind_need_is_said(windy):
+    budget = SimpleNamespace(names=("yaw_inertia", "mechanical_damping"), values=np.array([0.1, 0.01]))
+    inputs = SimpleNamespace(common={"wind_speed": 0.01}, correlation=lambda given: np.eye(len(given)))
+    (found,) = _common(budget, inputs, windy)
+    assert found.note == ("" if windy else "no wind-on run")

@@ -143,5 +143,7 @@ def test_what_is_said_of_the_noise():
     _, noise, _ = judged(data)
     said = [str(remark) for remark in noise_remarks(noise, slow)]
     assert f"noise is coloured: {noise.std:.3g} rad" in said[0]
+    low, high = noise.colour.frequency[[0, -1]]
+    assert f"over a factor of {high / low:.3g} in frequency" in said[0]
     assert "too slowly" in said[1]
     assert noise_remarks(campaign_noise(campaign()), NoiseTrend(0.0, 0.0, 0.0)) == ()

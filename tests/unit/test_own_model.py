@@ -148,6 +148,7 @@ def reread(found: JointModel, patch: JointPatch, folder: Path) -> JointModel:
     spec, _ = patched(found, patch)
     path = folder / "out.xml"
     path.write_text(patched_xml(spec, found, folder))
+    assert 'armature="-' not in path.read_text()
     return read_joint_model(path, "hinge", 0.05 if found.law.slide else 1.0)
 
 

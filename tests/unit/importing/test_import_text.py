@@ -6,6 +6,7 @@ Truth: the numbers that each file was made from.
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from tests.unit.importing.import_files import Text, any_dialect, csv, decay, wri
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.columns import _blocks
-from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.records import _with_unique_ids, read_records
 from tunnel_sim.files.importing.source import Channel
 from tunnel_sim.files.importing.text import find_dialect
 from tunnel_sim.files.importing.units import known_unit, split_unit
@@ -179,3 +180,15 @@ def test_columns_are_several_records_where_the_times_are_repeated(
     units = ("s", "rad", "s", "rad")
     channels = [Channel(name, np.zeros(3), unit) for name, unit in zip(names, units, strict=True)]
     assert len(_blocks(channels, ImportChoices())) == blocks
+
+
+def test_records_of_one_name_are_numbered() -> None:
+    raws = [SimpleNamespace(id=name) for name in ("a", "b", "a")]
+    assert [name for name, _ in _with_unique_ids(raws)] == ["a-1", "b", "a-2"]  # type: ignore[arg-type]
+
+
+def test_names_and_units_in_two_rows(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = "".join(f"{t:.3f},{np.rad2deg(a):.6f}\n" for t, a in zip(time, angle, strict=True))
+    (tmp_path / "log.csv").write_text("clock,swing\ns,deg\n" + rows)
+    assert read_records([tmp_path / "log.csv"]).choices.angle == ("swing",)
