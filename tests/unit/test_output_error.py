@@ -109,6 +109,20 @@ def test_a_departing_model_is_flagged_and_the_intervals_widened(stated, honest):
     )
 
 
+def test_a_departing_model_with_a_zero_in_every_run_is_as_uncertain_as_with_one():
+    curved = drifting_stiffness(campaign(noise=5e-4, rng=np.random.default_rng(6)), -2e-3)
+    shift = np.random.default_rng(7)
+    moved = with_records(curved, lambda _, yaw: yaw + 0.01 * shift.standard_normal())
+    one = identify(curved)
+    each = identify(replace(moved, sensor=replace(moved.sensor, zero="per_run")))
+    assert Status.MODEL_DEPARTS in each.statuses
+    assert each.sensor_zero is None
+    for name in ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping"):
+        first, other = getattr(one, name), getattr(each, name)
+        assert other.value == pytest.approx(first.value, abs=0.1 * first.std)
+        assert other.std == pytest.approx(first.std, rel=0.05)
+
+
 def test_wind_on_alone_separates_by_spring_and_speed():
     def given(*settings):
         return identify(campaign(settings, noise=5e-4, rng=np.random.default_rng(7)))
