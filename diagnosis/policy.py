@@ -127,11 +127,11 @@ EVEN_SHARE = 0.03
 WHITE_BY_BAND = 7.0
 #: The same for quarters of the record in time. Judgement.
 STEADY_IN_TIME = 5.5
-#: Power of a short time, over the greatest that chance explains at this rate, that real turbulence may have. The
-#: rate is a convention, for all windows of a campaign. The factor is a judgement: turbulence is not quite steady.
+#: Rate at which steady turbulence is taken for a burst, all windows of a campaign together: a convention. And the
+#: factor by which real turbulence, which is not quite steady, may exceed that limit: a judgement.
 BURST_FALSE_ALARM_RATE, BURST = 0.001, 1.5
-#: Excess of the wind-off runs up to which they count as free of a gap: a share of the fit's excess, and at least so
-#: many noise variances, and the misfit of form that counts as none. Judgement.
+#: Excess of the wind-off runs up to which they count as free of a gap: the greatest of a share of the fit's excess,
+#: so many noise variances, and the misfit of form that counts as none. Judgement.
 WIND_OFF_SHARE, WIND_OFF_LEAST = 0.05, 0.1
 #: Single effects beside which a random moment is tried. Judgement: time against coverage.
 RANDOM_PARTNERS = 3

@@ -11,19 +11,17 @@ import numpy as np
 from diagnosis.attribution.beside_turbulence import beside_turbulence
 from diagnosis.attribution.decide import form_floor
 from diagnosis.attribution.hypothesis import Hypothesis
+from diagnosis.attribution.innovation_tests import bursts, whiteness
 from diagnosis.attribution.process_noise import (
     ProcessNoise,
-    bursts,
     fit_turbulence,
     fit_wandering_shedding,
-    whiteness,
 )
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.policy import (
     BESIDE_EVIDENCE,
     BURST,
     BURST_FALSE_ALARM_RATE,
-    MOST_CAUSES,
     RANDOM_PARTNERS,
     RIVAL_EVIDENCE,
     STEADY_IN_TIME,
@@ -97,7 +95,7 @@ def _beside_too_many(answers: Sequence[RandomAnswer], nominal: Fit, hypotheses: 
     if not enough:
         return False
     beside = [0 if a.beside is None else len(a.beside.effects) for a in answers]
-    return min(beside, default=MOST_CAUSES) > min(enough) + 1
+    return not beside or min(beside) > min(enough) + 1
 
 
 def _cost(answer: RandomAnswer) -> float:

@@ -10,11 +10,10 @@ from scipy.signal import lfilter, lsim
 from scipy.stats import binom
 
 from diagnosis.attribution.hypothesis import Hypothesis
+from diagnosis.attribution.innovation_tests import bursts, whiteness
 from diagnosis.attribution.process_noise import (
-    bursts,
     fit_turbulence,
     fit_wandering_shedding,
-    whiteness,
     with_response,
 )
 from diagnosis.attribution.random_moments import _beside_too_many, weigh_random_moments, wind_off_excess
@@ -165,6 +164,11 @@ def test_the_best_set_is_sought_again_where_more_effects_pass_than_still_air_ask
     answers = [] if beside is None else [SimpleNamespace(beside=sets[3 - beside])]
     assert _beside_too_many(answers, nothing, sets) is wanted
     assert not _beside_too_many(answers, nothing, [of("a", still_air=5.0)])
+
+
+def test_the_best_set_is_sought_again_where_none_passes_however_large_it_is():
+    four = of("a", "b", "c", "d", still_air=0.0)
+    assert _beside_too_many([], of(still_air=5.0).fit, [four])
 
 
 def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy):
