@@ -131,12 +131,9 @@ class _Batch:
         n = self.size
         beta, rate = state[:n], state[n : 2 * n]
         theta, omega = (state[2 * n : 3 * n], state[3 * n : 4 * n]) if self.flexible else (beta, rate)
-        changed = (self.ones, beta, theta)  # by early laws
-        if self.early:
-            changed = (self.ones.copy(), beta.copy(), theta.copy())
         return Stage(
             time, beta, rate, theta, omega, self.stiffness, self.air_stiffness, self.air_damping,
-            *changed, self.ones, self.ones, np.zeros(n),
+            self.ones.copy(), beta.copy(), theta.copy(), self.ones, self.ones, np.zeros(n),
         )  # fmt: skip
 
     def derivative(self, time: float, state: Array) -> Array:
@@ -146,10 +143,9 @@ class _Batch:
         out = np.zeros(state.size)
         self._apply(stage, state, out, self.early)
         stage.top = -self.stiffness * stage.spring_angle - self.damping * stage.omega
-        air_stiffness = stage.speed_ratio * self.air_stiffness if self.early else self.air_stiffness
-        stage.body = air_stiffness * stage.air_angle + self.air_damping * stage.rate
-        if self.early:
-            stage.body *= stage.speed_ratio
+        stage.body = stage.speed_ratio * (
+            stage.speed_ratio * self.air_stiffness * stage.air_angle + self.air_damping * stage.rate
+        )
         if self.flexible:
             twist = stage.theta - stage.beta
             rod = self.rod_stiffness * twist * (1.0 + self.rod_hardening * twist * twist)
@@ -159,16 +155,13 @@ class _Batch:
         self._apply(stage, state, out, self.late)
         if not self.flexible:
             stage.top = stage.top + stage.body
+        friction = self.sign * stage.level
         self.stage = stage
         if self.flexible:
             out[:n], out[n : 2 * n] = stage.rate, stage.body / self.body_inertia
         top = out[2 * n : 4 * n] if self.flexible else out[: 2 * n]
-        if self.dry.size:
-            top[:n] = stage.omega * self.moving
-            top[n:] = (stage.top - self.sign * stage.level) / self.top_inertia * self.moving
-        else:
-            top[:n] = stage.omega
-            top[n:] = stage.top / self.top_inertia
+        top[:n] = stage.omega * self.moving
+        top[n:] = (stage.top - friction) / self.top_inertia * self.moving
         return out
 
     def _apply(self, stage: Stage, state: Array, out: Array, groups: Sequence[_Group]) -> None:
