@@ -20,7 +20,7 @@ from diagnosis.detection.refusal import refuse_indefinite
 from diagnosis.detection.sensor_noise import campaign_noise, noise_trend, reading_step
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Problem
-from diagnosis.fitting.run_data import Data, prepare, without_start
+from diagnosis.fitting.run_data import Data, prepare, without_rest, without_start
 from diagnosis.fitting.similarity import Similarity, similar_campaign
 from diagnosis.fitting.starting_points import is_gross, nominal_start
 from diagnosis.policy import COARSE_STEP_POWER, COARSER_STEP, HUM_LEFT, NOISE_EXPLAINS_UP_TO, UNKNOWN_SHARE
@@ -102,7 +102,7 @@ def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: 
             nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
         started_late = is_gross(nominal)
         if started_late:
-            nominal = fit_nominal(without_start(nominal.problem.data))
+            nominal = fit_nominal(without_rest(without_start(nominal.problem.data)))
         nominal, noise, test = judge(nominal, noise, trend, step=step, coarse_step=coarse)
     return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.attribution.decide import evidence
+from diagnosis.attribution.decide import evidence, form_floor
 from diagnosis.attribution.hypothesis import Hypothesis, is_plausible, restricted, with_forms
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.run_data import Data
@@ -17,6 +17,7 @@ from diagnosis.fitting.stretches import Stretches, fit_longer, in_stretches, lon
 from diagnosis.policy import (
     ALWAYS_FITTED,
     BEAM_WIDTH,
+    FREED_FROM,
     FREED_HYPOTHESES,
     GROWN_BY,
     GROWN_FROM,
@@ -51,7 +52,7 @@ def grow(nominal: Fit, kinds: Sequence[type[Effect]], progress: Progress | None 
         children = _children(level, kinds, progress)
         if all(_may_gain(child, nominal) for child in children):  # else freeing a form gains nothing
             count = FREED_HYPOTHESES if not level[0].effects else 1
-            children = with_forms(children, level[0].fit, count)
+            children = with_forms(children, FREED_FROM * level[0].fit.excess, count)
         found |= {child.names: child for child in children}
         going = _going_on(children, level, nominal)
         near = [h for h in going if _left(h) <= BEAM_WIDTH * _left(going[0])]
@@ -104,10 +105,10 @@ class InStretches:
 
 @dataclass(frozen=True, eq=False)
 class _Grown:
-    """A set of causes fitted to short and to long stretches of the runs."""
+    """A set of causes fitted to long stretches of the runs, and to short ones where it was found there."""
 
-    short: Hypothesis
     long: Hypothesis
+    short: Hypothesis | None = None
 
 
 def grow_in_stretches(
@@ -124,8 +125,8 @@ def grow_in_stretches(
         progress: called with the names of each set.
 
     Returns:
-        The best sets of each size, with textbook forms. Effects are added in short stretches, in which the phase
-        cannot be lost, and compared in long ones.
+        The best sets of each size, compared in long stretches. Effects are added in short ones, in which the phase
+        cannot be lost, and in long ones to the sets that keep it there: a slow loss hardly shows in two cycles.
     """
     short = in_stretches(data)
     first = fit_nominal(short.data)
@@ -133,22 +134,51 @@ def grow_in_stretches(
         nominal, long = fit_longer(first, short, data, long_stretch(short))
     except (FitError, np.linalg.LinAlgError):  # a model without the causes may run away in long stretches
         nominal, long = first, short
-    level, found = [_Grown(Hypothesis((), first), Hypothesis((), nominal))], []
+    level, found = [_Grown(Hypothesis((), nominal), Hypothesis((), first))], []
     able = [kind for kind in kinds if kind.autonomous]
     while level:
-        tried = sorted(_children([g.short for g in level], able, progress), key=lambda h: h.fit.total)
-        grown = [g for h in tried[:LENGTHENED] if (g := _lengthened(h, short, data)) is not None]
-        by_name = {g.long.names: g for g in grown}
-        found += [g.long for g in grown]
-        going = _going_on([g.long for g in grown], [g.long for g in level], nominal)
-        level = [by_name[h.names] for h in going[:GROWN_FROM]]
+        grown = _longer_sets(level, short, data, able, progress)
+        least = min(FREED_FROM * level[0].long.fit.excess, form_floor(nominal.excess) * nominal.excess)
+        children = with_forms([child.long for child in grown.values()], least)
+        found += children
+        parents = [g.long for g in level]
+        going = _of_each(parents, _going_on(children, parents, nominal))
+        level = [replace(grown[h.names], long=h) for h in going[:GROWN_FROM]]
     return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
+
+
+def _of_each(parents: Sequence[Hypothesis], ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The best child of each parent, then the others: what fits better at first may be a dead end."""
+    first: list[Hypothesis] = []
+    for parent in parents:
+        own = (h for h in ranked if h not in first and set(parent.effects) < set(h.effects))
+        first += [child for child in [next(own, None)] if child is not None]
+    return first + [h for h in ranked if h not in first]
+
+
+def _longer_sets(
+    level: Sequence[_Grown],
+    short: Stretches,
+    data: Data,
+    kinds: Sequence[type[Effect]],
+    progress: Progress | None,
+) -> dict[tuple[str, ...], _Grown]:
+    """The sets with one effect more, by their names, from the better of two starts where there are two."""
+    tried = _children([g.short for g in level if g.short is not None], kinds, progress)
+    best = sorted(tried, key=lambda h: h.fit.total)[:LENGTHENED]
+    grown = {h.names: g for h in best if (g := _lengthened(h, short, data)) is not None}
+    following = [g.long for g in level if g.long.effects and not is_gross(g.long.fit)]
+    for child in _children(following, kinds, progress):
+        other = grown.get(child.names)
+        if other is None or child.fit.total < other.long.fit.total:
+            grown[child.names] = _Grown(child, None if other is None else other.short)
+    return grown
 
 
 def _lengthened(hypothesis: Hypothesis, short: Stretches, data: Data) -> _Grown | None:
     with suppress(FitError, np.linalg.LinAlgError):
         found, _ = fit_longer(hypothesis.fit, short, data, long_stretch(short))
-        return _Grown(hypothesis, replace(hypothesis, fit=found))
+        return _Grown(replace(hypothesis, fit=found), hypothesis)
     return None
 
 

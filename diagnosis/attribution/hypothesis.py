@@ -12,7 +12,7 @@ import numpy as np
 from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.spectra import resonance
-from diagnosis.policy import FORM_SHARE, FREED_FROM, FREED_HYPOTHESES
+from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES
 from tunnel_sim.effects.parameters import ParameterInfo
 
 _POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
@@ -82,26 +82,26 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
     )
 
 
-def with_forms(found: Sequence[Hypothesis], base: Fit, count: int = FREED_HYPOTHESES) -> list[Hypothesis]:
+def with_forms(found: Sequence[Hypothesis], least: float, count: int = FREED_HYPOTHESES) -> list[Hypothesis]:
     """Free the forms of the best hypotheses where the textbook form leaves a good part open.
 
     Args:
         found: fitted hypotheses.
-        base: the best fit with one effect less.
+        least: excess of a textbook form from which freeing it is tried, dimensionless (noise variances).
         count: how many of the best are tried with free forms.
 
     Returns:
         All hypotheses, best first.
     """
     ranked = sorted(found, key=lambda h: h.fit.total)
-    freed = [_freed_if_it_pays(h, base) for h in ranked[:count]]
+    freed = [_freed_if_it_pays(h, least) for h in ranked[:count]]
     return sorted([*freed, *ranked[count:]], key=lambda h: h.fit.total)
 
 
-def _freed_if_it_pays(hypothesis: Hypothesis, base: Fit) -> Hypothesis:
+def _freed_if_it_pays(hypothesis: Hypothesis, least: float) -> Hypothesis:
     """The hypothesis with its forms free, where they close enough; else as it is."""
     fitted = hypothesis.fit
-    freed = _free_forms(fitted) if fitted.excess > FREED_FROM * max(base.excess, 0.0) else None
+    freed = _free_forms(fitted) if fitted.excess > least else None
     if freed is None:
         return hypothesis
     found = Hypothesis(hypothesis.effects, freed)

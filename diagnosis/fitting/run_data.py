@@ -20,6 +20,8 @@ from tunnel_sim.vocabulary.record import Array
 
 #: Interval of the block means, s: the motion stays below 10 Hz and the mains at 50 Hz.
 BLOCK_INTERVAL = 4e-3
+_END = 50  # a run ends where its last fiftieth stands
+_STILL = 0.02  # of the largest swing, within which a body counts as at rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -362,3 +364,22 @@ def _without_start(run: RunData) -> RunData:
     if later.size == 0 or later[0] > values.size // 4:
         return run
     return run.part(int(later[0]) + 1)
+
+
+def without_rest(data: Data) -> Data:
+    """The runs up to where their motion ends.
+
+    Where dry friction stops a body depends on its last swing discontinuously, so that χ² has many minima.
+
+    Returns:
+        The data with every run cut after its last reading that differs from its end by more than a fiftieth of its
+        largest swing.
+    """
+    return dataclasses.replace(data, runs=tuple(_without_rest(run) for run in data.runs))
+
+
+def _without_rest(run: RunData) -> RunData:
+    at_end = np.median(run.reading[-max(1, run.reading.size // _END) :])
+    away = np.abs(run.reading - at_end)
+    moving = np.flatnonzero(away > _STILL * away.max())
+    return run.part(last=int(moving[-1]) + 1) if moving.size else run

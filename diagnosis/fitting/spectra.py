@@ -212,7 +212,7 @@ def resonance(fit: Fit, run_index: int) -> float:
 
 
 def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
-    """Inertia, damping and stiffness of a run in the fitted model, air included.
+    """Inertia, damping and stiffness of a run in the fitted model, air and gravity included.
 
     Args:
         fit: parameter values.
@@ -225,6 +225,8 @@ def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
     stated = problem.stated(fit.point.common, fit.point.release[run_index], run)
     pressure = problem.data.air_moment(run)
     stiffness = stated.spring_stiffness - pressure * stated.derivatives.cn_beta
+    for law in (effect.law() for effect in problem.effects_at(fit.point.common)):
+        stiffness += law.get("gravity_stiffness", 0.0) * np.cos(law.get("gravity_angle", 0.0))
     rate = pressure * problem.data.reference_length / run.wind_speed if run.wind_on else 0.0
     return stated.yaw_inertia, stated.mechanical_damping - rate * stated.derivatives.cn_r, stiffness
 

@@ -88,13 +88,13 @@ class Path:
 
     @property
     def stiffness(self) -> float:
-        """Of the spring, stated or fitted where none is stated, N m/rad."""
-        return self._stated.spring_stiffness
+        """Of the spring, stated or fitted where none is stated, N m/rad; the rig's at rest where no spring acts."""
+        return self._stated.spring_stiffness or float(linear_coefficients(self.fit, self.index)[2])
 
     @property
     def still_omega(self) -> float:
         """√(Kr/Izz), rad/s, as the expressions of effects have it."""
-        return float(np.sqrt(self._stated.spring_stiffness / self._stated.yaw_inertia))
+        return float(np.sqrt(self.stiffness / self._stated.yaw_inertia))
 
     @cached_property
     def _stated(self) -> RunSettings:

@@ -1,4 +1,4 @@
-"""Runs in stretches: their boundaries, the fits that grow from them, and a motion far from any linear one."""
+"""Runs in stretches: their boundaries, and the fits that grow from them."""
 
 import numpy as np
 import pytest
@@ -8,15 +8,9 @@ from diagnosis.fitting.least_squares import FitError, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
 from diagnosis.fitting.stretches import fit_longer, in_stretches, long_stretch
-from diagnosis.investigate import fit_nominal, investigate
+from diagnosis.investigate import fit_nominal
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, INTERVAL, campaign, nominal
-from tunnel_reference import moments
-from tunnel_reference.conditions import Conditions
-from tunnel_reference.integrator import integrate
-from tunnel_reference.terms import Phase, Term
-from tunnel_sim.effects import ALL_EFFECTS, effect_class
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.effects import effect_class
 
 
 @pytest.fixture(scope="module")
@@ -101,40 +95,3 @@ def test_a_nominal_model_that_runs_away_on_long_stretches_stays_on_short_ones(da
     found = grow_in_stretches(data, fit_nominal, [effect_class("quadratic_damping")])
     assert found.hypotheses == ()
     assert max(run.reading.size for run in found.nominal.problem.data.runs) == in_stretches(data).length
-
-
-GRAVITY, DRY, QUADRATIC, VISCOUS = 30.9, 0.2, 0.02, 0.02  # per unit inertia
-
-
-def pendulum(amplitude=2.5, duration=40.0, noise=1e-3):
-    """A heavy pendulum with dry and quadratic damping, integrated by the reference simulator."""
-    one = np.ones(1)
-    conditions = Conditions(
-        1e-9 * one, 0.0 * one, amplitude * one, amplitude * one, 1.2, duration, 1.0, VISCOUS, 0.0, 0.0, noise,
-        sample_rate=100.0,
-    )  # fmt: skip
-    terms = [
-        Term(moments.gravity, Phase.MOMENT, {"stiffness": GRAVITY * one, "angle": 0.0 * one, "second": 0.0 * one}),
-        Term(moments.quadratic_damping, Phase.MOMENT, {"coefficient": QUADRATIC * one}),
-        Term(moments.coulomb_level, Phase.FRICTION, {"moment": DRY * one}),
-    ]  # fmt: skip
-    (motion,) = integrate([conditions], [terms])
-    reading = motion.angle[:, 0] + np.random.default_rng(6).normal(0.0, noise, conditions.samples)
-    run = Run("swing", Record(conditions.time, reading), 0.0, None, None)
-    return Campaign("pendulum", RigProperties(), SensorProperties(100.0, None, noise), (run,))
-
-
-@pytest.mark.slow
-def test_what_acts_on_a_pendulum_of_large_amplitude_is_found():
-    kinds = [kind for kind in ALL_EFFECTS if kind.fitted and kind.condition == "always"]
-    study = investigate(pendulum(), kinds)
-    assert study.causes == ("coulomb_friction", "gravity_stiffness", "quadratic_damping")
-    assert abs(study.chosen.excess) < 6.0 * np.sqrt(2.0 / study.chosen.count)
-    truth = {
-        "gravity_stiffness.stiffness": (GRAVITY, "1/s2"),
-        "coulomb_friction.friction_moment": (DRY, "1/s2"),
-        "quadratic_damping.coefficient": (QUADRATIC, "1"),
-    }
-    for name, (value, unit) in truth.items():
-        found = study.similarity.own(study.chosen.value(name), unit)
-        assert found == pytest.approx(value, rel=0.03)

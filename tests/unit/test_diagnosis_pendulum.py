@@ -1,0 +1,134 @@
+"""A pendulum, whose spring is gravity: what acts on it, its frequency, and where it comes to rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.attribution.grow import _of_each, grow_in_stretches
+from diagnosis.attribution.hypothesis import Hypothesis
+from diagnosis.fitting.least_squares import fit_at
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.run_data import prepare, without_rest, without_start
+from diagnosis.fitting.spectra import resonance
+from diagnosis.investigate import fit_nominal, investigate
+from diagnosis.law.bases import COMMON, SINGLE, ranges
+from diagnosis.law.paths import paths
+from tunnel_reference import moments
+from tunnel_reference.conditions import Conditions
+from tunnel_reference.integrator import integrate
+from tunnel_reference.terms import Phase, Term
+from tunnel_sim.effects import ALL_EFFECTS, effect_class
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
+
+GRAVITY, DRY, QUADRATIC, VISCOUS, SLIDE = 30.9, 0.2, 0.02, 0.02, 0.012  # per unit inertia; slide: rad
+ONE = np.ones(1)
+FRICTION = {
+    "sign": Term(moments.coulomb_level, Phase.FRICTION, {"moment": DRY * ONE}),
+    "dahl": Term(
+        moments.dahl_friction, Phase.MOMENT, {"moment": DRY * ONE, "slide": SLIDE * ONE}, np.zeros((1, 1))
+    ),
+}  # fmt: skip
+
+
+def pendulum(amplitude=2.5, duration=40.0, noise=1e-3, friction="sign", quadratic=QUADRATIC):
+    """A heavy pendulum with dry and quadratic damping, integrated by the reference simulator."""
+    conditions = Conditions(
+        1e-9 * ONE, 0.0 * ONE, amplitude * ONE, amplitude * ONE, 1.2, duration, 1.0, VISCOUS, 0.0, 0.0, noise,
+        sample_rate=100.0,
+    )  # fmt: skip
+    terms = [
+        Term(moments.gravity, Phase.MOMENT, {"stiffness": GRAVITY * ONE, "angle": 0.0 * ONE, "second": 0.0 * ONE}),
+        Term(moments.quadratic_damping, Phase.MOMENT, {"coefficient": quadratic * ONE}),
+        FRICTION[friction],
+    ]  # fmt: skip
+    (motion,) = integrate([conditions], [terms])
+    reading = motion.angle[:, 0] + np.random.default_rng(6).normal(0.0, noise, conditions.samples)
+    run = Run("swing", Record(conditions.time, reading), 0.0, None, None)
+    return Campaign("pendulum", RigProperties(), SensorProperties(100.0, None, noise), (run,))
+
+
+def prepared(campaign, noise=1e-3):
+    return prepare(campaign, {run.id: noise**2 for run in campaign.runs})
+
+
+@pytest.fixture(scope="module")
+def without_spring():
+    """The model of gravity alone, at the truth."""
+    problem = Problem(prepared(pendulum(0.3, 6.0)), (effect_class("gravity_stiffness"),))
+    value = {"mechanical_damping": VISCOUS, "gravity_stiffness.stiffness": GRAVITY}
+    common = np.array([value.get(name, 0.0) for name in problem.names])
+    return fit_at(problem, Point(common, np.array([[0.3, 0.0]])))
+
+
+def test_gravity_counts_in_the_frequency(without_spring):
+    assert 2.0 * np.pi * resonance(without_spring, 0) == pytest.approx(np.sqrt(GRAVITY), rel=1e-9)
+
+
+def test_a_steady_moment_moves_a_pendulum_by_what_gravity_allows(without_spring):
+    """The response swings about the moment over the stiffness."""
+    (path,) = paths(without_spring)
+    rows = path.response(np.ones((path.time.size, 1)))[:, 0]
+    moved = rows * path.run.noise_std / np.sqrt(path.group)
+    assert np.mean(moved) == pytest.approx(1.0 / GRAVITY, rel=0.05)
+
+
+@pytest.mark.parametrize("kind", sorted({*COMMON, *SINGLE} - {"wind"}))
+def test_laws_of_a_rig_without_a_spring_are_finite(without_spring, kind):
+    found = paths(without_spring)
+    assert np.isfinite({**COMMON, **SINGLE}[kind](found[0], ranges(found))).all()
+
+
+def test_the_end_of_a_run_at_rest_is_left_out():
+    """The angle at which dry friction stops the body is off its equilibrium; the swing before stays."""
+    data = prepared(pendulum(0.5, 40.0))
+    (whole,), (cut,) = data.runs, without_rest(data).runs
+    gone = whole.reading[cut.reading.size :]
+    np.testing.assert_array_equal(cut.reading, whole.reading[: cut.reading.size])
+    assert np.ptp(gone) < 0.04 * np.max(np.abs(whole.reading))
+    assert np.ptp(cut.reading[-60:]) > 0.02 * np.max(np.abs(whole.reading))  # half a cycle is 57 samples
+    assert 5.0 < cut.reading.size * cut.interval < 20.0
+
+
+def test_a_run_that_still_swings_loses_half_a_cycle_at_most():
+    data = prepared(pendulum(2.5, 10.0))
+    (whole,), (cut,) = data.runs, without_rest(data).runs
+    assert (
+        0 <= whole.reading.size - cut.reading.size <= 70
+    )  # a cycle at this swing is longer than 113 samples
+
+
+def test_presliding_friction_is_fitted_in_stretches():
+    """With the textbook form alone, its misfit hides whatever else acts."""
+    data = without_rest(without_start(prepared(pendulum(1.0, 20.0, friction="dahl", quadratic=0.0))))
+    kinds = [effect_class(name) for name in ("coulomb_friction", "gravity_stiffness")]
+    found = grow_in_stretches(data, fit_nominal, kinds).hypotheses
+    both = next(h for h in found if len(h.effects) == 2)
+    assert both.forms > 0
+    assert abs(both.fit.excess) < 6.0 * np.sqrt(2.0 / both.fit.count)
+
+
+def test_each_set_is_followed_by_its_best_child():
+    ranked = [Hypothesis(names, None) for names in (("a", "c"), ("a", "d"), ("b", "c"), ("a", "b"))]
+    parents = [Hypothesis(("a",), None), Hypothesis(("b",), None)]
+    assert [h.effects for h in _of_each(parents, ranked)] == [("a", "c"), ("b", "c"), ("a", "d"), ("a", "b")]
+    assert _of_each([*parents, Hypothesis(("x",), None)], ranked)[:2] == [ranked[0], ranked[2]]
+    assert _of_each(parents, []) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("amplitude", "friction"), [(2.5, "sign"), (1.8, "dahl")])
+def test_what_acts_on_a_pendulum_of_large_amplitude_is_found(amplitude, friction):
+    kinds = [kind for kind in ALL_EFFECTS if kind.fitted and kind.condition == "always"]
+    study = investigate(pendulum(amplitude, friction=friction), kinds)
+    assert study.causes == ("coulomb_friction", "gravity_stiffness", "quadratic_damping")
+    assert abs(study.chosen.excess) < 6.0 * np.sqrt(2.0 / study.chosen.count)
+    truth = {
+        "gravity_stiffness.stiffness": (GRAVITY, "1/s2"),
+        "coulomb_friction.friction_moment": (DRY, "1/s2"),
+        "quadratic_damping.coefficient": (QUADRATIC, "1"),
+    }
+    for name, (value, unit) in truth.items():
+        found = study.similarity.own(study.chosen.value(name), unit)
+        assert found == pytest.approx(value, rel=0.03)
