@@ -19,7 +19,7 @@ from diagnosis.law.formula import Formula, effect_of, effect_table
 from diagnosis.law.library import Term, terms
 from diagnosis.law.line import steady_line
 from diagnosis.law.paths import paths
-from diagnosis.law.ridge import Rows, best_ridge, held_out, normal, total
+from diagnosis.law.ridge import Rows, best_ridge, held_out, normal, ratio, total
 from tests.reference.rigs import rig
 from tests.unit.gap_campaigns import campaign
 from tunnel_lab.commands.diagnose import write_proposal
@@ -266,6 +266,16 @@ def test_the_prior_shrinks_what_is_noise_and_keeps_what_is_not():
 
 def evidence(kind, share):
     return Evidence(Ceiling(kind, share, 0.001, "runs"), 0.0, 1.0)
+
+
+def test_the_share_closed_is_a_ratio_of_sums_with_its_standard_error():
+    """Where as much was left in every unit: the mean of the drops over it, and that mean's standard error."""
+    drop = np.array([3.0, 5.0, 4.0, 8.0])
+    closed, std = ratio(drop, np.full(4, 10.0))
+    assert closed == pytest.approx(drop.mean() / 10.0)
+    assert std == pytest.approx(drop.std(ddof=1) / np.sqrt(4.0) / 10.0)
+    assert ratio(drop, 2.0 * drop) == pytest.approx((0.5, 0.0))  # the same share of every unit: no scatter
+    assert ratio(np.array([3.0]), np.array([10.0])) == pytest.approx((0.3, 0.0))
 
 
 @pytest.mark.parametrize(

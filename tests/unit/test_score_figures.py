@@ -12,10 +12,10 @@ from tunnel_lab.scoring.results import packaged_baseline
 
 
 def row(
-    effect: str, severity: float, name: str, percent: float | None, stds: float | None
+    effect: str, severity: float, name: str, percent: float | None, stds: float | None, of: str = "cn_r"
 ) -> dict[str, object]:
     return {
-        "effect": effect, "severity_noise_powers": severity, "estimator": name, "quantity": "cn_r",
+        "effect": effect, "severity_noise_powers": severity, "estimator": name, "quantity": of,
         "bias_percent": percent, "bias_in_stds": stds,
     }  # fmt: skip
 
@@ -39,6 +39,8 @@ def test_only_what_exceeds_one_standard_deviation_is_printed() -> None:
         ("free_play", 10.0, "one"): (40.0, 300.0),
     }
     assert exceeding(FRAME, "cn_beta") == {}
+    others = pl.DataFrame([row("free_play", 1.0, "one", 5.0, 2.0, of) for of in ("cn_beta", "yaw_inertia")])
+    assert exceeding(pl.concat([others, FRAME]), "cn_r") == exceeding(FRAME, "cn_r")
     axes = breakdown_figure(FRAME, "cn_r").axes[0]
     assert [text.get_text() for text in axes.texts] == ["+0.20", "−3.0", "+40"]
     assert [text.get_position() for text in axes.texts] == [(0.5, 0), (0.25, 1), (0.75, 1)]
