@@ -40,7 +40,7 @@ def test_only_what_exceeds_one_standard_deviation_is_printed() -> None:
     }
     assert exceeding(FRAME, "cn_beta") == {}
     others = pl.DataFrame([row("free_play", 1.0, "one", 5.0, 2.0, of) for of in ("cn_beta", "yaw_inertia")])
-    assert exceeding(pl.concat([others, FRAME]), "cn_r") == exceeding(FRAME, "cn_r")
+    assert exceeding(pl.concat([FRAME, others]), "cn_r") == exceeding(FRAME, "cn_r")
     axes = breakdown_figure(FRAME, "cn_r").axes[0]
     assert [text.get_text() for text in axes.texts] == ["+0.20", "−3.0", "+40"]
     assert [text.get_position() for text in axes.texts] == [(0.5, 0), (0.25, 1), (0.75, 1)]
