@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
+from identification.campaign.derivatives import build_design
 from identification.decay.damped_oscillation import Decay, free_decay
 from identification.neural.posterior.demodulated import Demodulated, demodulate
-from identification.neural.posterior.features import OWN, record_features
+from identification.neural.posterior.features import OWN, _conditions, record_features
 from identification.neural.posterior.mixture import distribution, quantiles
 from identification.neural.posterior.rivals import fit_rivals, forward
 from identification.neural.posterior.shapes import Conditions, Windows, best_step, campaign_columns
 from identification.status import Status
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+from tests.reference.free_decays import AREA, DENSITY, LENGTH, Setting, campaign
 from tunnel_sim.vocabulary.record import Record
 
 ZETA, OMEGA, NOISE = 0.01, 12.0, 1e-3
@@ -117,6 +119,20 @@ def test_an_error_of_the_wind_speed_that_is_a_power_of_it_is_a_rival(power):
     expected = w.joined([(-change[0][w.run] * w.time, change[1][w.run] * w.time)])
     distances = np.abs(campaign_columns(w, given) / inertia - expected).max(axis=0)
     assert distances.min() < 0.01 * np.abs(expected).max()
+
+
+def test_conditions_of_the_runs_are_shares_of_the_fastest_and_places_of_the_springs():
+    plan = ((44.84, 12.0), (16.12, 0.0), (16.12, 24.0), (21.02, 18.0))
+    data = campaign(tuple(Setting(*of) for of in plan), duration=1.0)
+    found = _conditions(data.runs, build_design(data.runs, data.rig), (0.5, -0.3))
+    assert found.speed == pytest.approx([0.5, 0.0, 1.0, 0.75])
+    assert found.spring.tolist() == [2, 0, 0, 1]
+    assert found.stiffness.tolist() == [spring for spring, _ in plan]
+    speed = np.array([speed for _, speed in plan])
+    assert found.stiffness_load == pytest.approx(0.5 * DENSITY * speed**2 * AREA * LENGTH)
+    assert found.damping_load == pytest.approx(0.5 * DENSITY * speed * AREA * LENGTH**2)
+    still = data.runs[1:2]
+    assert _conditions(still, build_design(still, data.rig), (0.0, 0.0)).speed.tolist() == [0.0]
 
 
 @pytest.mark.parametrize(
