@@ -189,6 +189,20 @@ def test_a_shedding_line_gives_its_strouhal_number_amplitude_and_phase():
     np.testing.assert_allclose(np.angle(np.exp(1j * turn)), 0.0, atol=0.3)
 
 
+def test_what_the_damping_leaves_at_the_bodys_own_frequency_is_not_a_shedding_line():
+    """In one wind-on run a line of any frequency has a Strouhal number, and the own one is the stronger here.
+
+    The record is long enough for 8 % of the frequency to be ten times its resolution.
+    """
+    shed = effect_from("vortex_shedding", {"amplitude": 0.008, "strouhal_number": 0.16})
+    damping = effect_from("quadratic_damping", {"coefficient": 5e-4})
+    data = campaign(damping, shed, duration=40.0)
+    base = nominal(replace(data, runs=data.runs[3:5]))
+    own, spectrum = resonance(base, 1), residual_spectra(base)[1]
+    assert spectrum.power(own) > 5.0 * spectrum.power(0.16 * 15.0 / 0.225)
+    assert shedding_line(base).parameter == pytest.approx(0.16, abs=0.002)
+
+
 def test_a_shedding_line_follows_the_wind_speed_that_the_fit_has_corrected():
     shed = effect_from("vortex_shedding", {"amplitude": 0.02, "strouhal_number": 0.19})
     offset = effect_from("wind_speed_offset", {"offset": -1.5})
