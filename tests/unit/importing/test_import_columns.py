@@ -86,7 +86,11 @@ def test_the_first_of_several_columns_of_times_is_taken() -> None:
 
 @pytest.mark.parametrize(("share", "left_out"), [(0.015, True), (0.025, False)])
 def test_a_column_that_hardly_moves_beside_another_is_left_out(share: float, left_out: bool) -> None:
-    columns = (Channel("time", TIME, "s"), Channel("yaw", SWING, "rad"), Channel("roll", share * SWING, "rad"))
+    columns = (
+        Channel("time", TIME, "s"),
+        Channel("yaw", SWING, "rad"),
+        Channel("roll", share * SWING, "rad"),
+    )
     if left_out:
         taken, said = pairs(*columns)
         assert taken == [("", "time", "yaw")]
