@@ -135,6 +135,20 @@ def test_conditions_of_the_runs_are_shares_of_the_fastest_and_places_of_the_spri
     assert _conditions(still, build_design(still, data.rig), (0.0, 0.0)).speed.tolist() == [0.0]
 
 
+@pytest.mark.parametrize(("zeta", "noise"), [(0.07, 5e-3), (0.1, 1e-3), (0.1, 5e-3)])
+def test_a_decay_is_used_until_it_falls_to_half_the_noise_of_a_window(zeta, noise):
+    """A window is two unknowns of so many block means; the end is known to one window."""
+    decay = Decay.from_modal(OMEGA, zeta)
+    found = demodulate(
+        record(np.random.default_rng(0), noise=noise, change=lambda time: free_decay(time, decay, 0.3, 0.0))
+    )
+    window = found.time[1] - found.time[0]
+    least = 0.5 * found.noise * np.sqrt(2.0 / found.samples.mean())
+    end = np.log(0.3 / least) / (zeta * OMEGA)
+    assert end < TIME[-1]
+    assert end - window < found.time[-1] + 0.5 * window < end
+
+
 @pytest.mark.parametrize(
     ("seconds", "noise", "status"), [(1.0, 1e-3, Status.TOO_FEW_CYCLES), (10.0, 30.0, None)]
 )
