@@ -15,7 +15,7 @@ from diagnosis.closable import KINDS, Ceiling, closable_table, closable_words
 from diagnosis.investigate import investigate
 from diagnosis.law.ceiling import Evidence, Rest
 from diagnosis.law.explain import chosen_kind, closable
-from diagnosis.law.formula import Formula, effect_of, effect_table
+from diagnosis.law.formula import Formula, choose, effect_of, effect_table
 from diagnosis.law.library import Term, terms
 from diagnosis.law.line import steady_line
 from diagnosis.law.paths import paths
@@ -266,6 +266,37 @@ def test_the_prior_shrinks_what_is_noise_and_keeps_what_is_not():
 
 def evidence(kind, share):
     return Evidence(Ceiling(kind, share, 0.001, "runs"), 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "own", "wider", "chosen"),
+    [
+        (
+            "angle",
+            9.9,
+            20.0,
+            "own",
+        ),  # it reaches nearly all that its kind closes: no terms of the state are tried
+        ("angle", 3.0, 4.0, "wider"),
+        ("rate", 3.0, 3.0, "own"),
+        ("rate", 3.0, 2.0, "own"),
+        ("angle", 3.0, None, "own"),
+        ("angle", None, 4.0, "wider"),
+        ("angle", None, None, None),
+        ("time", 3.0, 4.0, "own"),
+    ],
+)
+def test_terms_of_the_state_are_taken_where_those_of_angle_or_rate_close_less(
+    monkeypatch, kind, own, wider, chosen
+):
+    found = {kind: own, "state": wider}
+    formulas = {
+        name: None if gained is None else Formula((), (), False, np.zeros(0), gained)
+        for name, gained in found.items()
+    }
+    monkeypatch.setattr("diagnosis.law.formula._chosen", lambda _, of, __: formulas[of])
+    expected = {"own": formulas[kind], "wider": formulas["state"], None: None}[chosen]
+    assert choose(None, kind, 10.0) is expected
 
 
 def test_the_share_closed_is_a_ratio_of_sums_with_its_standard_error():

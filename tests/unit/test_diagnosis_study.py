@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -12,7 +13,8 @@ from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.random_moments import RandomAnswer
 from diagnosis.detection.mains import Hum
-from diagnosis.investigate import _polished
+from diagnosis.investigate import _noise_explains, _polished, _read_off_explains
+from diagnosis.policy import COARSE_STEP_POWER, HUM_LEFT
 from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -92,3 +94,35 @@ def test_an_excess_is_measured_against_the_noise_of_a_perfect_model(
     assert found.variance * (1.0 + found.extra) == pytest.approx(max(LEVEL, base))
     assert found.hum * found.variance == pytest.approx(0.2 * LEVEL)
     assert excess_base(replace(asked, hum=None)).hum == 0.0
+
+
+def _left(excess: float, block: int, **given: object) -> Study:
+    """A study whose nominal fit leaves an excess in noise variances of a sample, of readings in blocks."""
+    data = SimpleNamespace(runs=(SimpleNamespace(block=block),))
+    fitted = SimpleNamespace(excess=excess * block, problem=SimpleNamespace(data=data))
+    noise = SimpleNamespace(variance={"r1": 0.5 * LEVEL, "r2": 1.5 * LEVEL})
+    found = {"nominal": fitted, "noise": noise, "coarse": False, "step": 0.0, "hum": None}
+    return SimpleNamespace(**(found | given))  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("block", [1, 4])
+@pytest.mark.parametrize(
+    ("excess", "noisy", "explains"), [(0.9, True, True), (1.1, True, False), (0.1, False, False)]
+)
+def test_noise_that_misbehaves_explains_a_gap_up_to_its_own_power(
+    block: int, excess: float, noisy: bool, explains: bool
+) -> None:
+    assert _noise_explains(_left(excess, block, test=SimpleNamespace(noisy=noisy))) is explains
+
+
+@pytest.mark.parametrize("block", [1, 4])
+def test_what_is_read_off_explains_no_more_than_it_leaves_by_itself(block: int) -> None:
+    """The power of a coarse step's error is step²/12: 0.75 noise variances here."""
+    step = 3e-3
+    power = step**2 / 12.0 / LEVEL
+    assert _read_off_explains(_left(0.9 * COARSE_STEP_POWER * power, block, coarse=True, step=step))
+    assert not _read_off_explains(_left(1.1 * COARSE_STEP_POWER * power, block, coarse=True, step=step))
+    assert not _read_off_explains(_left(0.1 * power, block, step=step))  # a step as fine as stated
+    hum = Hum(50.0, 1e-4, 1e-6, None, 2.0)
+    assert _read_off_explains(_left(0.9 * HUM_LEFT * 2.0, block, hum=hum))
+    assert not _read_off_explains(_left(1.1 * HUM_LEFT * 2.0, block, hum=hum))

@@ -16,7 +16,7 @@ from diagnosis.fitting.spectra import linear_coefficients
 from diagnosis.fitting.starting_points import nominal_start, starting_points
 from diagnosis.localisation.backbone import backbones, drift
 from diagnosis.localisation.excess import RunExcess, run_excesses, shortest_interval
-from diagnosis.localisation.inference import _by_band, _by_drift, _lone_run
+from diagnosis.localisation.inference import _between_runs, _by_band, _by_drift, _lone_run
 from diagnosis.localisation.localise import localise, runs_beyond_chance
 from diagnosis.localisation.phase_plane import apparent_moment
 from tests.unit import gap_campaigns
@@ -267,6 +267,36 @@ def test_the_larger_drift_decides_from_one_and_a_half_times_the_other(
 ):
     monkeypatch.setattr("diagnosis.localisation.inference.drift", lambda _: (frequency, damping))
     assert _by_drift(SimpleNamespace(maps=SimpleNamespace(backbones=()))).value == channel
+
+
+def _curve(frequency, damping, alone):
+    """A run whose own fit departs by these from the nominal model, and leaves an excess."""
+    return SimpleNamespace(
+        alone_excess=alone, alone_frequency=2.0 * (1.0 + frequency), nominal_frequency=2.0,
+        alone_zeta=0.01 + damping, nominal_zeta=0.01,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("curves", "channel"),
+    [
+        ([(0.02, 0.001, 0.0), (-0.02, 0.001, 0.1)], "calibration"),
+        ([(0.001, 0.02, 0.0), (0.001, -0.02, 0.1)], "damping"),
+        ([(0.02, 0.001, 0.0), (-0.02, 0.001, 0.1), (0.0, 0.0, 0.0)], "calibration"),
+        ([(0.02, 0.001, 0.0), (-0.02, 0.001, 0.5)], None),  # a quarter of the excess is within the runs
+        ([(0.02, 0.001, 0.0), (-0.02, 0.001, None)], None),  # a run that could not be fitted by itself
+        ([(0.02, 0.001, 0.0)], None),
+    ],
+)
+def test_runs_that_are_linear_each_and_do_not_agree_are_a_matter_of_calibration_or_damping(curves, channel):
+    runs = [SimpleNamespace(reading=np.zeros(100)) for _ in curves]
+    data = SimpleNamespace(problem=SimpleNamespace(data=SimpleNamespace(runs=runs)))
+    found = SimpleNamespace(
+        maps=SimpleNamespace(backbones=[_curve(*values) for values in curves]),
+        excesses=[SimpleNamespace(excess=1.0) for _ in curves],
+    )
+    chosen = _between_runs(data, found)
+    assert (None if chosen is None else chosen.value) == channel
 
 
 def test_runs_have_their_amplitude_frequency_and_share_of_the_gap():

@@ -94,6 +94,12 @@ def test_a_reading_with_a_square_shows_in_the_second_harmonic_and_not_in_the_thi
     assert np.all(after[0] > before[0] + 0.5)
     assert np.all(after[1] < before[1] + 0.5)
     assert before[:, 2] == pytest.approx(0.0, abs=0.9)  # the power of white noise is one
+    assert np.all(np.abs(before[:, :2]) < np.arcsinh(5.0))  # and of variance one are its projections
+    # 0.05 A² cos²: the second harmonic is 0.025 A of the amplitude, in its phase.
+    seen = demodulate(squared)
+    pattern = np.sqrt(seen.information) * seen.amplitude / seen.amplitude[0]
+    expected = 0.025 * seen.amplitude[0] * np.sqrt(pattern @ pattern)
+    assert np.sinh(after[0][0]) == pytest.approx(expected, abs=5.0 + 0.01 * expected)
 
 
 @pytest.mark.parametrize("power", [0.0, -0.35])
@@ -147,6 +153,31 @@ def test_a_decay_is_used_until_it_falls_to_half_the_noise_of_a_window(zeta, nois
     end = np.log(0.3 / least) / (zeta * OMEGA)
     assert end < TIME[-1]
     assert end - window < found.time[-1] + 0.5 * window < end
+
+
+@pytest.mark.parametrize("lag", [-0.3, 0.2, 0.8])
+def test_a_moment_of_the_air_that_lags_is_a_rival(lag):
+    """Truth: the roots of (s²I + sC + K)(1 + sτ) = Ka, τ in units of l/V, less those without a lag, for a small Ka."""
+    speed, inertia, stiffness, damping, cn_beta = np.array([0.0, 10.0, 25.0]), 0.1, 16.0, 0.03, 1e-6
+    area, length = 0.036, 0.625
+    moment, loss = 0.6 * speed**2 * area * length, 0.6 * speed * area * length**2
+    change, decays = [], []
+    for load, v in zip(moment, speed, strict=True):
+        tau = lag * length / v if v else 0.0
+        free, ka = np.array([inertia, damping, stiffness]), cn_beta * load
+        lagging = np.polyadd(np.polymul(free, [tau, 1.0]), [-ka])
+        plain = np.polyadd(free, [-ka])
+        root = max(np.roots(plain), key=lambda s: s.imag)
+        nearest = min(np.roots(np.trim_zeros(lagging, "f")), key=lambda s: abs(s - root))
+        change.append(nearest - root)
+        decays.append(Decay(-root.real, abs(root) ** 2))
+    seen = [demodulate(Record(TIME, free_decay(TIME, decay, 0.3, 0.0))) for decay in decays]
+    w = Windows.of(seen)
+    given = Conditions(np.full(3, stiffness), moment, loss, speed / 25.0, np.zeros(3, int), (cn_beta, -0.3))
+    shift = np.array(change)[w.run] * w.time
+    expected = w.joined([(shift.real, shift.imag)])
+    distances = np.abs(campaign_columns(w, given) / inertia - expected).max(axis=0)
+    assert distances.min() < 0.01 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize(
