@@ -157,7 +157,7 @@ def test_a_decay_is_used_until_it_falls_to_half_the_noise_of_a_window(zeta, nois
 
 @pytest.mark.parametrize("lag", [-0.3, 0.2, 0.8])
 def test_a_moment_of_the_air_that_lags_is_a_rival(lag):
-    """Truth: the roots of (s²I + sC + K)(1 + sτ) = Ka, τ in units of l/V, less those without a lag, for a small Ka."""
+    """Truth: the roots of (s²I + sC + K)(1 + sτ) = Ka less those without a lag, for a small Ka; τ is lag · l/V."""
     speed, inertia, stiffness, damping, cn_beta = np.array([0.0, 10.0, 25.0]), 0.1, 16.0, 0.03, 1e-6
     area, length = 0.036, 0.625
     moment, loss = 0.6 * speed**2 * area * length, 0.6 * speed * area * length**2
