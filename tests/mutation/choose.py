@@ -58,10 +58,14 @@ class Chooser:
         return {name for name in found if name in self._seconds}
 
     def _importing(self, path: str, done: set[str]) -> list[str]:
-        """Tests of the files that import a module; of a file without a record all, unseen."""
+        """Tests of the files that import a module; of a file without a record all, unseen.
+
+        Also those that run no line of the project: what they test may be made where the file is imported.
+        """
         files = _importing_tests(self._root, path)
-        known = self._tests(f"{name}|run" for file in files for name in self._by_file.get(file, ()))
-        unseen = (file for file in files if file not in self._by_file)
+        known = {name for name in self._seconds if name.partition("::")[0] in files}
+        seen = {name.partition("::")[0] for name in known}
+        unseen = (file for file in files if file not in seen)
         return [*unseen, *self._cheapest(known - done), READS_SOURCES]
 
     def _importers(self, path: str) -> Iterable[str]:

@@ -137,7 +137,7 @@ def test_using_the_networks_does_not_import_torch():
 
 
 def test_the_mean_of_a_window_takes_each_sample_for_the_step_around_it():
-    """At edges between samples: weights of 1/n, whose mean time is the middle; elsewhere the parts of two samples."""
+    """At edges between samples: weights of 1/n, whose mean time is the middle; elsewhere parts of two samples."""
     step = 0.01
     trace = SimpleNamespace(time=step * np.arange(40), step=step)
     edges = step * (np.array([3, 8, 10, 20]) - 0.5)
