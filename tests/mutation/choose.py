@@ -116,11 +116,13 @@ def _statement(text: str, line: int) -> range:
 
 
 def _durations(work: Path) -> dict[str, float]:
-    """Seconds by test of those that passed."""
-    found: dict[str, float] = {}
-    for report in sorted(work.glob("*.xml")):
+    """Seconds by test of those that passed; the latest report of a file tells which tests it has."""
+    by_file: dict[str, dict[str, float]] = {}
+    for report in sorted(work.glob("*.xml"), key=lambda path: (len(path.name), path.name)):
+        found: dict[str, dict[str, float]] = defaultdict(dict)
         for case in ET.parse(report).getroot().iter("testcase"):
+            path = str(case.get("classname")).replace(".", "/") + ".py"
             if not len(case):
-                path = str(case.get("classname")).replace(".", "/") + ".py"
-                found[f"{path}::{case.get('name')}"] = float(case.get("time") or 0.0)
-    return found
+                found[path][f"{path}::{case.get('name')}"] = float(case.get("time") or 0.0)
+        by_file |= found
+    return {name: seconds for tests in by_file.values() for name, seconds in tests.items()}
