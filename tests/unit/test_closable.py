@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 
 from diagnosis import _diagnose, diagnose
 from diagnosis.closable import KINDS, Ceiling, closable_table, closable_words
+from diagnosis.fitting.spectra import linear_coefficients
 from diagnosis.investigate import investigate
 from diagnosis.law.ceiling import Evidence, Rest
 from diagnosis.law.explain import chosen_kind, closable
@@ -21,7 +22,7 @@ from diagnosis.law.line import steady_line
 from diagnosis.law.paths import paths
 from diagnosis.law.ridge import Rows, best_ridge, held_out, normal, ratio, total
 from tests.reference.rigs import rig
-from tests.unit.gap_campaigns import campaign
+from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_lab.commands.diagnose import write_proposal
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.make import as_campaign
@@ -266,6 +267,26 @@ def test_the_prior_shrinks_what_is_noise_and_keeps_what_is_not():
 
 def evidence(kind, share):
     return Evidence(Ceiling(kind, share, 0.001, "runs"), 0.0, 1.0)
+
+
+@pytest.mark.parametrize("quantity", ["angle", "rate"])
+@pytest.mark.parametrize("stated", [True, False])
+def test_responses_along_the_path_are_the_fits_own_sensitivities_where_the_model_is_right(quantity, stated):
+    """Beside the release, which both leave free; 1 %: the fit's motion is in blocks, and the path is smoothed.
+
+    The derivative of a rate departs from −ω² times the angle by 2ζ, which the path of a rate leaves out.
+    """
+    data = campaign(quantity=quantity)
+    if not stated:
+        data = replace(data, runs=tuple(replace(run, spring_stiffness=None) for run in data.runs[:1]))
+    base = nominal(data)
+    for index, path in enumerate(paths(base)):
+        inertia, damping, stiffness = linear_coefficients(base, index)
+        limit = 0.01 + (damping / np.sqrt(inertia * stiffness) if quantity == "rate" else 0.0)
+        both = path.nominal, path.rows(base.jacobian[index][0])
+        found, expected = (values - path.release @ (path.release.T @ values) for values in both)
+        for one, other in zip(found.T, expected.T, strict=True):
+            assert np.linalg.norm(one - other) <= limit * np.linalg.norm(other)
 
 
 @pytest.mark.parametrize(
