@@ -91,8 +91,8 @@ class ByHand:
             if one not in self._held_out:
                 self._held_out[one] = predict_held_out(one)
         hypotheses = (Hypothesis(tuple(sorted(names)), fitted),) if names else ()
-        share = max(fitted.excess, 0.0) / max(self._study.nominal.excess, 1e-9)
-        weighed = (Weighed(tuple(sorted(names)), share, 1.0),) if names else ()
+        # Of the one candidate only the parameters are taken: its share and its probability do not matter.
+        weighed = (Weighed(tuple(sorted(names)), 0.0, 1.0),) if names else ()
         study = replace(self._study, hypotheses=hypotheses, weighed=weighed)
         ends = both_ends(study, self._base, self._held_out)
         parameters = candidates(study, self._base)[0].parameters if names else {}

@@ -198,8 +198,7 @@ def _steady(power: Array, count: Array) -> np.ndarray:
     """
     total = count.sum(axis=0)
     mean = np.sum(power * count, axis=0) / np.maximum(total, 1e-300)
-    ratio = np.where(count > 0, power, 1.0) / np.where(mean > 0.0, mean, 1.0)
-    ratio = np.maximum(np.where(count > 0, ratio, 1.0), 1e-300)
+    ratio = np.maximum(power / np.where(mean > 0.0, mean, 1.0), 1e-300)  # any number where the count is 0
     corrected = count / (1.0 + 1.0 / (6.0 * np.maximum(count, 1e-300)))
     statistic = 2.0 * np.sum(corrected * (ratio - 1.0 - np.log(ratio)), axis=0)
     freedom = np.sum(count > 0, axis=0) - 1

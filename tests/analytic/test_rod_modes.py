@@ -11,7 +11,7 @@ from law_cases import RIG
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.release import spring_end_angle
-from tunnel_sim.physics.rod_modes import slow_motion
+from tunnel_sim.physics.rod_modes import Ringing, slow_motion
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
 from tunnel_sim.physics.steps import compensated, fit_stride
 from tunnel_sim.vocabulary.aero import AeroDerivatives
@@ -131,3 +131,16 @@ def test_a_wind_that_stiffens_shortens_the_steps():
 )
 def test_kinks_and_curved_springs_keep_short_steps(rough):
     assert fit_stride(RIG, replace(run(spring=15.0, **rough), rod_twist=None), INTERVAL) == 1
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-10, 3e-7, 0.02])
+def test_the_ringing_is_added_until_it_is_below_a_nanoradian(size):
+    """Re(c e^{st}) and its derivative, which is at most |s| times as large."""
+    root, time = -8.0 + 300.0j, 1e-3 * np.arange(2000)
+    angle, rate = np.cos(10.0 * time), -10.0 * np.sin(10.0 * time)
+    ringing = Ringing(size * np.exp(0.7j), root)
+    found = ringing.added(angle, rate, 1e-3)
+    whole = ringing.amplitude * np.exp(root * time)
+    assert np.abs(found[0] - angle - whole.real).max() <= 1e-9
+    assert np.abs(found[1] - rate - (root * whole).real).max() <= 1e-9 * abs(root)
+    assert angle[0] == 1.0  # what was given is not changed

@@ -298,6 +298,17 @@ def test_wind_without_density_is_bad_input(name, noisy):
         identify(data, name, throw=False)
 
 
+@each_estimator
+@pytest.mark.parametrize("factor", [0.6, 1.7])
+def test_a_wrong_statement_of_the_noise_is_said_and_a_right_one_is_not(name, factor, noisy, of_noisy):
+    """0.6 and 1.7: beyond a tolerance of 3.29 times 5 %, with what two runs can say of their noise."""
+    assert Status.NOISE_DISAGREES not in of_noisy(name).statuses
+    stated = replace(noisy.sensor, noise_std=factor * noisy.sensor.noise_std)
+    estimate = identify(replace(noisy, runs=noisy.runs[:2], sensor=stated), name)
+    assert Status.NOISE_DISAGREES in estimate.statuses
+    assert all(Status.NOISE_DISAGREES in run.statuses for run in estimate.runs)
+
+
 def test_unknown_names_get_the_closest_one(noisy):
     with pytest.raises(TunnelError, match="did you mean 'output_error'"):
         identify(noisy, "output_eror")

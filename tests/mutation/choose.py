@@ -58,10 +58,14 @@ class Chooser:
         return {name for name in found if name in self._seconds}
 
     def _importing(self, path: str, done: set[str]) -> list[str]:
-        """Tests of the files that import a module; of a file without a record all, unseen."""
+        """Tests of the files that import a module; of a file without a record all, unseen.
+
+        Also those that run no line of the project: what they test may be made where the file is imported.
+        """
         files = _importing_tests(self._root, path)
-        known = self._tests(f"{name}|run" for file in files for name in self._by_file.get(file, ()))
-        unseen = (file for file in files if file not in self._by_file)
+        known = {name for name in self._seconds if name.partition("::")[0] in files}
+        seen = {name.partition("::")[0] for name in known}
+        unseen = (file for file in files if file not in seen)
         return [*unseen, *self._cheapest(known - done), READS_SOURCES]
 
     def _importers(self, path: str) -> Iterable[str]:
@@ -112,11 +116,13 @@ def _statement(text: str, line: int) -> range:
 
 
 def _durations(work: Path) -> dict[str, float]:
-    """Seconds by test of those that passed."""
-    found: dict[str, float] = {}
-    for report in sorted(work.glob("*.xml")):
+    """Seconds by test of those that passed; the latest report of a file tells which tests it has."""
+    by_file: dict[str, dict[str, float]] = {}
+    for report in sorted(work.glob("*.xml"), key=lambda path: (len(path.name), path.name)):
+        found: dict[str, dict[str, float]] = defaultdict(dict)
         for case in ET.parse(report).getroot().iter("testcase"):
+            path = str(case.get("classname")).replace(".", "/") + ".py"
             if not len(case):
-                path = str(case.get("classname")).replace(".", "/") + ".py"
-                found[f"{path}::{case.get('name')}"] = float(case.get("time") or 0.0)
-    return found
+                found[path][f"{path}::{case.get('name')}"] = float(case.get("time") or 0.0)
+        by_file |= found
+    return {name: seconds for tests in by_file.values() for name, seconds in tests.items()}

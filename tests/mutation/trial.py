@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -27,6 +28,8 @@ PRELOADED = ["numpy", "scipy.signal", "scipy.optimize", "scipy.stats", "matplotl
 
 #: pytest's status: tests passed, failed, or could not be collected. A crash is a negative status.
 _MEANING = {0: "survived", 1: "killed", 2: "killed"}
+#: A conftest or a test file that cannot be imported; where single tests of it are named, pytest's status is 4.
+_NO_IMPORT = re.compile(r"^(ImportError while loading conftest|ERROR tests/)", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,10 @@ def run(tests: Sequence[str], copy: Path, limit: float) -> tuple[str, str]:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(child.pid, signal.SIGKILL)
     child.join()
-    end = "\n".join(log.read_text("utf-8", errors="replace").splitlines()[-12:]) if log.exists() else ""
+    text = log.read_text("utf-8", errors="replace") if log.exists() else ""
+    end = "\n".join(text.splitlines()[-12:])
+    if _NO_IMPORT.search(text):
+        return "killed", end
     if late:  # a test may have failed before something hung at the end
         return ("killed" if "\nFAILED " in f"\n{end}" else "timeout"), end
     return _MEANING.get(child.exitcode or 0, "killed" if (child.exitcode or 0) < 0 else "broken"), end

@@ -135,6 +135,29 @@ def test_the_page_holds_every_figure_and_no_empty_cell_of_the_matrix(score):
     json.dumps(score.to_json_dict(), allow_nan=False)
 
 
+def test_times_are_on_the_page_where_they_are_known(score):
+    """Linear interpolation between the order statistics: the 90th percentile of 1, 2, ..., 11 is 10."""
+    title = "Seconds for each campaign"
+    assert title not in [section.title for section in blind_page.sections(score)]
+    timed = tuple(
+        case(f"c{i}", {**TRUTH, "effects": []}, document([]) | {"wall_s": float(i)}) for i in range(1, 12)
+    )
+    (found,) = [s for s in blind_page.sections(Score(timed, (), "", "", {}, False)) if s.title == title]
+    assert found.rows == (("6.0", "10.0", "11.0"),)
+
+
+def test_answers_are_listed_by_truth_with_what_was_answered_otherwise(score):
+    (found,) = [s for s in blind_page.sections(score) if s.title == "Answers by truth"]
+    assert set(found.rows) == {
+        ("coulomb_friction", "2", "1", "quadratic_damping 1"),
+        ("free_play", "2", "1", "unknown 1"),
+        ("two or more", "2", "1", "free_play 1"),
+        ("none", "2", "1", "mains_hum 1"),
+        ("unknown", "1", "1", ""),
+        ("sensor_drift", "1", "0", "none 1"),
+    }
+
+
 @pytest.mark.parametrize(
     ("key", "value"),
     [("causes", 3), ("causes", [1]), ("causes", ...), ("candidates", [{"effect": "x"}]), ("candidates", 1),

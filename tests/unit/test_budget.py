@@ -96,6 +96,16 @@ def test_independent_errors_of_runs_average_out_and_common_ones_do_not(noisy):
     assert 0.2 < ratio < 0.95  # four wind-on runs: 1/4 if they counted alike
 
 
+def test_an_error_of_zero_has_no_component_and_leaves_the_others(noisy):
+    alone = budget_of(noisy, InputUncertainties({"air_density": 0.01}, {"wind_speed": 0.01}))
+    zeros = InputUncertainties(
+        {"clock": 0.0, "air_density": 0.01}, {"spring_stiffness": 0.0, "wind_speed": 0.01}
+    )
+    both = budget_of(noisy, zeros)
+    assert [one.name for one in both.components] == [one.name for one in alone.components]
+    assert np.array_equal(both.covariance, alone.covariance)
+
+
 def test_correlated_inputs_add_or_cancel(noisy):
     inputs = {"wind_speed": 0.01, "air_density": 0.02}
     for coefficient, percent in ((1.0, 4.0), (-1.0, 0.0), (0.0, np.sqrt(8.0))):

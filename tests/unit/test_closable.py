@@ -12,16 +12,17 @@ from scipy.signal import lfilter
 
 from diagnosis import _diagnose, diagnose
 from diagnosis.closable import KINDS, Ceiling, closable_table, closable_words
+from diagnosis.fitting.spectra import linear_coefficients
 from diagnosis.investigate import investigate
 from diagnosis.law.ceiling import Evidence, Rest
 from diagnosis.law.explain import chosen_kind, closable
-from diagnosis.law.formula import Formula, effect_of, effect_table
+from diagnosis.law.formula import Formula, choose, effect_of, effect_table
 from diagnosis.law.library import Term, terms
 from diagnosis.law.line import steady_line
 from diagnosis.law.paths import paths
-from diagnosis.law.ridge import Rows, best_ridge, held_out, normal, total
+from diagnosis.law.ridge import Rows, best_ridge, held_out, normal, ratio, total
 from tests.reference.rigs import rig
-from tests.unit.gap_campaigns import campaign
+from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_lab.commands.diagnose import write_proposal
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.make import as_campaign
@@ -266,6 +267,67 @@ def test_the_prior_shrinks_what_is_noise_and_keeps_what_is_not():
 
 def evidence(kind, share):
     return Evidence(Ceiling(kind, share, 0.001, "runs"), 0.0, 1.0)
+
+
+@pytest.mark.parametrize("quantity", ["angle", "rate"])
+@pytest.mark.parametrize("stated", [True, False])
+def test_responses_along_the_path_are_the_fits_own_sensitivities_where_the_model_is_right(quantity, stated):
+    """Beside the release, which both leave free; 1 %: the fit's motion is in blocks, and the path is smoothed.
+
+    The derivative of a rate departs from −ω² times the angle by 2ζ, which the path of a rate leaves out.
+    """
+    data = campaign(quantity=quantity)
+    if not stated:
+        data = replace(data, runs=tuple(replace(run, spring_stiffness=None) for run in data.runs[:1]))
+    base = nominal(data)
+    for index, path in enumerate(paths(base)):
+        inertia, damping, stiffness = linear_coefficients(base, index)
+        limit = 0.01 + (damping / np.sqrt(inertia * stiffness) if quantity == "rate" else 0.0)
+        both = path.nominal, path.rows(base.jacobian[index][0])
+        found, expected = (values - path.release @ (path.release.T @ values) for values in both)
+        for one, other in zip(found.T, expected.T, strict=True):
+            assert np.linalg.norm(one - other) <= limit * np.linalg.norm(other)
+
+
+@pytest.mark.parametrize(
+    ("kind", "own", "wider", "chosen"),
+    [
+        (
+            "angle",
+            9.9,
+            20.0,
+            "own",
+        ),  # it reaches nearly all that its kind closes: no terms of the state are tried
+        ("angle", 3.0, 4.0, "wider"),
+        ("rate", 3.0, 3.0, "own"),
+        ("rate", 3.0, 2.0, "own"),
+        ("angle", 3.0, None, "own"),
+        ("angle", None, 4.0, "wider"),
+        ("angle", None, None, None),
+        ("time", 3.0, 4.0, "own"),
+    ],
+)
+def test_terms_of_the_state_are_taken_where_those_of_angle_or_rate_close_less(
+    monkeypatch, kind, own, wider, chosen
+):
+    found = {kind: own, "state": wider}
+    formulas = {
+        name: None if gained is None else Formula((), (), False, np.zeros(0), gained)
+        for name, gained in found.items()
+    }
+    monkeypatch.setattr("diagnosis.law.formula._chosen", lambda _, of, __: formulas[of])
+    expected = {"own": formulas[kind], "wider": formulas["state"], None: None}[chosen]
+    assert choose(None, kind, 10.0) is expected
+
+
+def test_the_share_closed_is_a_ratio_of_sums_with_its_standard_error():
+    """Where as much was left in every unit: the mean of the drops over it, and that mean's standard error."""
+    drop = np.array([3.0, 5.0, 4.0, 8.0])
+    closed, std = ratio(drop, np.full(4, 10.0))
+    assert closed == pytest.approx(drop.mean() / 10.0)
+    assert std == pytest.approx(drop.std(ddof=1) / np.sqrt(4.0) / 10.0)
+    assert ratio(drop, 2.0 * drop) == pytest.approx((0.5, 0.0))  # the same share of every unit: no scatter
+    assert ratio(np.array([3.0]), np.array([10.0])) == pytest.approx((0.3, 0.0))
 
 
 @pytest.mark.parametrize(

@@ -64,6 +64,19 @@ def test_each_aspect_is_caught_by_its_own_test(aspect):
     assert better[aspect].p_value == 1.0  # an improvement is never an alarm
 
 
+def test_an_outlier_is_six_times_the_median_error_of_its_cell_old_and_new():
+    """Cells of medians 1 and 10: in the one 7 is an outlier and in the other it is not."""
+
+    def cell(*errors):
+        ones = np.ones(len(errors))
+        return Trials(np.array(errors), ones, ones, ones, 0)
+
+    before = [cell(1.0, -1.0, 1.0, 5.9), cell(10.0, -10.0, 10.0, 7.0)]
+    now = [cell(1.0, -1.0, 7.0, -7.0), cell(10.0, 59.0, -61.0, 7.0)]
+    found = {change.aspect: change for change in changes(before, now)}["outliers"]
+    assert (found.before, found.now) == (0.0, 3.0 / 8.0)
+
+
 def test_intervals_that_became_too_wide_are_worse_too():
     found = {change.aspect: change for change in changes(several(1), several(2, std=3.0))}
     assert found["coverage"].p_value < 1e-3

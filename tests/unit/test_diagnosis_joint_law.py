@@ -58,6 +58,7 @@ def pendulum(folder: Path, friction: float = 0.0) -> tuple[Campaign, Path]:
         ("gravity_stiffness", (3.0, 0.4), 2.0, "misses"),
         ("quadratic_damping", (0.05, 2.0), 0.05, ""),
         ("quadratic_damping", (0.05, 2.4), 0.1, "plugin"),
+        ("quadratic_damping", (0.02, 3.0), 0.05, ""),  # the cube of the rate is native
         ("structural_damping", (0.05,), 0.05, ""),
         ("coulomb_friction", (0.1, 0.0), 3.0, "soft constraint"),
         ("sensor_nonlinearity", (0.05,), 0.5, "Of the sensor"),

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from diagnosis.detection import gap
-from diagnosis.detection.noise_colour import noise_colour
+from diagnosis.detection.noise_colour import _steady, noise_colour
 from diagnosis.detection.noise_remarks import noise_remarks
 from diagnosis.detection.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from tests.unit.gap_campaigns import NOISE, campaign, nominal, with_blow
@@ -147,3 +147,19 @@ def test_what_is_said_of_the_noise():
     assert f"over a factor of {high / low:.3g} in frequency" in said[0]
     assert "too slowly" in said[1]
     assert noise_remarks(campaign_noise(campaign()), NoiseTrend(0.0, 0.0, 0.0)) == ()
+
+
+def test_a_band_is_steady_as_often_as_stated_and_empty_parts_do_not_count():
+    """Mean powers of n independent ordinates of one level are gamma variables of shape n."""
+    rng = np.random.default_rng(4)
+    count = np.tile(np.array([[3.0], [5.0], [10.0], [20.0]]), 4000)
+    power = rng.gamma(count) / count
+    found = _steady(power, count)
+    refused = int(np.sum(~found))
+    assert 17 <= refused <= 68  # of 4000 at 1 %: outside with probability 3e-5
+    louder = power * np.array([[1.0], [1.0], [1.0], [10.0]])
+    assert np.mean(_steady(louder, count)) < 0.5
+    with_empty = (np.vstack((values, np.zeros(4000))) for values in (louder, count))
+    assert np.array_equal(_steady(*with_empty), _steady(louder, count))
+    alone = np.where(np.arange(4)[:, None] == 0, count, 0.0)
+    assert not _steady(power * (alone > 0.0), alone).any()  # one part cannot show that the level is steady

@@ -10,13 +10,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, read_model, vocabulary
-from diagnosis.detection.own_model import with_law
+from diagnosis.detection.own_model import reach, with_law
 from diagnosis.fitting.run_data import prepare
 from diagnosis.fitting.similarity import similar_campaign
 from diagnosis.investigate import fit_nominal, investigate
 from diagnosis.patch import NativeClosure
 from tunnel_sim.engine.joint_model import JointModel
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
@@ -55,6 +55,19 @@ def own_model(
     path = folder / "pendulum.xml"
     path.write_text(XML.format(ref))
     return read_model(path, "hinge", data, free)
+
+
+@pytest.mark.parametrize("quantity", ["angle", "rate", "acceleration"])
+def test_the_reach_of_a_sensor_of_any_quantity_is_in_radians(quantity: Quantity) -> None:
+    """0.4 cos ωt has the rate 0.4 ω and the acceleration 0.4 ω²; a smaller run does not matter."""
+    omega, time = 7.0, np.arange(2000) / RATE
+    size = 0.4 * omega ** ("angle", "rate", "acceleration").index(quantity)
+    runs = tuple(
+        Run(name, Record(time, ZERO + share * size * np.cos(omega * time)), 0.0)
+        for name, share in (("large", 1.0), ("small", 0.5))
+    )
+    data = Campaign("swing", RigProperties(), SensorProperties(RATE, quantity=quantity), runs)
+    assert reach(data) == pytest.approx(0.4, rel=0.02)  # the frequency of ten cycles is known to 1 %
 
 
 @pytest.mark.parametrize("ref", [0.0, 180.0])

@@ -15,6 +15,7 @@ from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
+from tunnel_sim.vocabulary.joint_law import JointLaw, Term
 
 NOISE = 4e-4
 SIX = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
@@ -45,6 +46,22 @@ def test_the_nominal_start_of_runs_without_wind_or_stiffness():
     assert still.common[0] == pytest.approx(Truth().yaw_inertia, rel=5e-3)
     normalised = nominal_start(prepared((Setting(None, 0.0), Setting(None, 0.0, 0.2))))
     assert normalised.common[0] == pytest.approx(16.12 / Truth().yaw_inertia, rel=5e-3)
+
+
+@pytest.mark.parametrize(("cubic", "square"), [(60.0, 0.0), (-30.0, 0.0), (0.0, 20.0)])
+def test_the_nominal_start_sees_the_stiffness_of_a_joints_law_at_the_amplitude(cubic, square):
+    """Harmonic balance: K + ¾ c A² of c b³, and K + 8/(3π) q A of q b |b|."""
+    inertia, amplitude, data = 0.11, 0.3, prepared((Setting(16.12, 0.0), Setting(44.84, 0.0)))
+    runs = []
+    for run in data.runs:
+        seen = run.spring_stiffness + 0.75 * cubic * amplitude**2 + 8.0 / (3.0 * np.pi) * square * amplitude
+        time = run.interval * np.arange(run.reading.size)
+        runs.append(replace(run, reading=amplitude * np.cos(np.sqrt(seen / inertia) * time)))
+    terms = (Term("b^3", cubic, "N m/rad3"), Term("b*abs(b)", square, "N m/rad2"))
+    law = JointLaw(inertia, 16.12, terms=terms)
+    start = nominal_start(replace(data.with_runs(tuple(runs)), law=law))
+    names = Problem(replace(data, law=law)).nominal_names
+    assert start.common[names.index("yaw_inertia")] == pytest.approx(inertia, rel=0.01)
 
 
 def test_a_free_form_starts_at_the_textbook_value_or_inside_its_bounds():
@@ -170,6 +187,20 @@ def test_a_shedding_line_gives_its_strouhal_number_amplitude_and_phase():
     windy = [i for i, run in enumerate(data.runs) if run.wind_on]
     turn = found.point.release[windy, 2] - phases[windy]
     np.testing.assert_allclose(np.angle(np.exp(1j * turn)), 0.0, atol=0.3)
+
+
+def test_what_the_damping_leaves_at_the_bodys_own_frequency_is_not_a_shedding_line():
+    """In one wind-on run a line of any frequency has a Strouhal number, and the own one is the stronger here.
+
+    The record is long enough for 8 % of the frequency to be ten times its resolution.
+    """
+    shed = effect_from("vortex_shedding", {"amplitude": 0.008, "strouhal_number": 0.16})
+    damping = effect_from("quadratic_damping", {"coefficient": 5e-4})
+    data = campaign(damping, shed, duration=40.0)
+    base = nominal(replace(data, runs=data.runs[3:5]))
+    own, spectrum = resonance(base, 1), residual_spectra(base)[1]
+    assert spectrum.power(own) > 5.0 * spectrum.power(0.16 * 15.0 / 0.225)
+    assert shedding_line(base).parameter == pytest.approx(0.16, abs=0.002)
 
 
 def test_a_shedding_line_follows_the_wind_speed_that_the_fit_has_corrected():

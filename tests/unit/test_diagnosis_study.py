@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import pytest
 
+from diagnosis.answer.reported import excess_base
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.random_moments import RandomAnswer
-from diagnosis.investigate import _polished
+from diagnosis.detection.mains import Hum
+from diagnosis.investigate import _noise_explains, _polished, _read_off_explains
+from diagnosis.policy import COARSE_STEP_POWER, HUM_LEFT
 from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -51,3 +55,74 @@ def test_the_answer_is_polished_unless_a_random_moment_gives_it(
     moment = RandomAnswer(effect_class("vortex_shedding"), None, None, 0.4)  # type: ignore[arg-type]
     found = _polished(study.hypotheses, Weighed(("vortex_shedding",), 0.5, 0.9), (moment,) if random else ())
     assert found == (study.hypotheses if random else (polished,))
+
+
+LEVEL = 1e-6  # rad², the records' own variance
+
+
+@pytest.mark.parametrize(
+    ("stated", "coarse", "noisy", "step", "resolution", "base"),
+    [
+        (0.5e-6, False, False, 0.0, None, LEVEL),  # the statement is not needed
+        (0.5e-6, False, True, 0.0, None, 0.5e-6),
+        (0.5e-6, True, False, 3e-3, None, 0.5e-6),
+        (1.25e-6, False, True, 0.0, None, 1.25e-6),
+        (None, False, True, 0.0, None, LEVEL),
+        (None, True, False, 3e-3, None, 0.25e-6),  # without the step's 3²/12 = 0.75
+        (None, True, False, 3e-3, 1.2e-3, 0.37e-6),  # with the stated resolution's 1.2²/12 = 0.12 instead
+        (None, True, False, 4e-3, None, 0.05e-6),  # the step's 1.33 is more than all: a twentieth is left
+    ],
+)
+def test_an_excess_is_measured_against_the_noise_of_a_perfect_model(
+    study: Study, stated: float | None, coarse: bool, noisy: bool, step: float, resolution: float | None,
+    base: float,
+) -> None:  # fmt: skip
+    """In every case base, extra and hum add up to what the records contain, unless the statement is above them."""
+    noise = replace(study.noise, variance={"r1": 0.5 * LEVEL, "r2": 1.5 * LEVEL}, stated_variance=stated)
+    sensor = replace(study.campaign.sensor, resolution=resolution)
+    asked = replace(
+        study,
+        noise=noise,
+        campaign=replace(study.campaign, sensor=sensor),
+        coarse=coarse,
+        step=step,
+        test=replace(study.test, noisy=noisy),
+        hum=Hum(50.0, 1e-4, 1e-6, None, 0.2),
+    )
+    found = excess_base(asked)
+    assert found.variance == pytest.approx(base)
+    assert found.variance * (1.0 + found.extra) == pytest.approx(max(LEVEL, base))
+    assert found.hum * found.variance == pytest.approx(0.2 * LEVEL)
+    assert excess_base(replace(asked, hum=None)).hum == 0.0
+
+
+def _left(excess: float, block: int, **given: object) -> Study:
+    """A study whose nominal fit leaves an excess in noise variances of a sample, of readings in blocks."""
+    data = SimpleNamespace(runs=(SimpleNamespace(block=block),))
+    fitted = SimpleNamespace(excess=excess * block, problem=SimpleNamespace(data=data))
+    noise = SimpleNamespace(variance={"r1": 0.5 * LEVEL, "r2": 1.5 * LEVEL})
+    found = {"nominal": fitted, "noise": noise, "coarse": False, "step": 0.0, "hum": None}
+    return SimpleNamespace(**(found | given))  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("block", [1, 4])
+@pytest.mark.parametrize(
+    ("excess", "noisy", "explains"), [(0.9, True, True), (1.1, True, False), (0.1, False, False)]
+)
+def test_noise_that_misbehaves_explains_a_gap_up_to_its_own_power(
+    block: int, excess: float, noisy: bool, explains: bool
+) -> None:
+    assert _noise_explains(_left(excess, block, test=SimpleNamespace(noisy=noisy))) is explains
+
+
+@pytest.mark.parametrize("block", [1, 4])
+def test_what_is_read_off_explains_no_more_than_it_leaves_by_itself(block: int) -> None:
+    """The power of a coarse step's error is step²/12: 0.75 noise variances here."""
+    step = 3e-3
+    power = step**2 / 12.0 / LEVEL
+    assert _read_off_explains(_left(0.9 * COARSE_STEP_POWER * power, block, coarse=True, step=step))
+    assert not _read_off_explains(_left(1.1 * COARSE_STEP_POWER * power, block, coarse=True, step=step))
+    assert not _read_off_explains(_left(0.1 * power, block, step=step))  # a step as fine as stated
+    hum = Hum(50.0, 1e-4, 1e-6, None, 2.0)
+    assert _read_off_explains(_left(0.9 * HUM_LEFT * 2.0, block, hum=hum))
+    assert not _read_off_explains(_left(1.1 * HUM_LEFT * 2.0, block, hum=hum))

@@ -83,6 +83,7 @@ def test_bars_of_the_waterfall(given: Document) -> None:
     assert (box.x0, box.x1) == pytest.approx((0.1 * noise, noise))
     wanted = [(2.75, 28.45), (0.1345, 2.75)]
     assert np.array(ends) == pytest.approx(np.array(wanted))
+    assert [bar.get_y() + 0.5 * bar.get_height() for bar in bars] == pytest.approx([1.0, 2.0])
     texts = [text.get_text() for text in axes.texts]
     for text, value in zip(texts, (28.45, 2.75, 0.1345, 0.1345), strict=True):
         assert_shows(text, [value])

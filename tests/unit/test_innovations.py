@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are
 
-from identification import Estimate, identify
+from identification import Estimate, Status, identify
 from identification.decay.damped_oscillation import Decay, free_decay
 from identification.decay.decay_fit import Reading, projected_cost
 from identification.decay.filter_fit import fit_driven
@@ -112,18 +112,33 @@ def test_filter_error_is_output_error_where_nothing_drives_the_rig():
         assert one.std == pytest.approx(other.std, rel=0.1)
 
 
+def shaken(clock, yaw, rng):
+    """A moment that is white, of q = 1e-3 rad²/s³: each step of 1 ms kicks the rate by √(q · 1 ms)."""
+    kicks = 1e-3 * rng.standard_normal(clock.size)
+    path = np.convolve(kicks, np.exp(-0.15 * clock) * np.sin(12.5 * clock) / 12.5)[: clock.size]
+    return yaw + path
+
+
 def test_a_random_moment_is_seen_and_written_down():
     rng = np.random.default_rng(7)
-
-    def shaken(clock, yaw):
-        # White of q = 1e-3 rad²/s³: each step of 1 ms kicks the rate by √(q · 1 ms).
-        kicks = 1e-3 * rng.standard_normal(clock.size)
-        path = np.convolve(kicks, np.exp(-0.15 * clock) * np.sin(12.5 * clock) / 12.5)[: clock.size]
-        return yaw + path
-
-    data = with_records(campaign((Setting(16.12, 0.0), Setting(15.5, 0.0)), noise=5e-4, rng=rng), shaken)
+    plain = campaign((Setting(16.12, 0.0), Setting(15.5, 0.0)), noise=5e-4, rng=rng)
+    data = with_records(plain, lambda clock, yaw: shaken(clock, yaw, rng))
     estimate = identify(data, "filter_error")
     for run in estimate.runs:
         assert run.process_noise.value == pytest.approx(1e-3, rel=0.6)
         assert run.process_noise.unit == "rad2/s3"
+        assert (run.noise.departs, run.noise.slow_ratio) == (False, 1.0)
     assert Estimate.from_json_dict(estimate.to_json_dict()) == estimate
+
+
+def test_innovations_that_are_not_white_widen_what_the_filter_finds():
+    """A steady vibration of four times the noise beside the random moment: no white moment explains both."""
+    rng = np.random.default_rng(7)
+    plain = campaign((Setting(16.12, 0.0),), noise=5e-4, rng=rng)
+    data = with_records(
+        plain, lambda clock, yaw: shaken(clock, yaw, rng) + 2e-3 * np.sin(16.0 * np.pi * clock)
+    )
+    (run,) = identify(data, "filter_error").runs
+    assert run.process_noise is not None
+    assert Status.MODEL_DEPARTS in run.statuses
+    assert run.noise.slow_ratio > 1.0

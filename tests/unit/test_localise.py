@@ -16,7 +16,7 @@ from diagnosis.fitting.spectra import linear_coefficients
 from diagnosis.fitting.starting_points import nominal_start, starting_points
 from diagnosis.localisation.backbone import backbones, drift
 from diagnosis.localisation.excess import RunExcess, run_excesses, shortest_interval
-from diagnosis.localisation.inference import _lone_run
+from diagnosis.localisation.inference import _between_runs, _by_band, _by_drift, _lone_run
 from diagnosis.localisation.localise import localise, runs_beyond_chance
 from diagnosis.localisation.phase_plane import apparent_moment
 from tests.unit import gap_campaigns
@@ -209,14 +209,16 @@ def test_times_count_from_the_start_of_the_record_though_the_fit_begins_later():
     assert all(trace.time[-1] == pytest.approx(DURATION, abs=0.05) for trace in maps.traces)
 
 
-def test_a_line_beside_the_harmonics_has_its_frequency_and_amplitude():
+@pytest.mark.parametrize(("frequency", "channel"), [(33.3, "sensor"), (13.7, "forcing")])
+def test_a_line_beside_the_harmonics_has_its_frequency_and_amplitude(frequency, channel):
+    """Above 30 Hz no moment moves a rig of this inertia: the line is then the sensor's."""
     time = INTERVAL * np.arange(round(10.0 / INTERVAL))
-    data = campaign(added=5e-4 * np.sin(2.0 * np.pi * 33.3 * time), duration=10.0)
+    data = campaign(added=5e-4 * np.sin(2.0 * np.pi * frequency * time), duration=10.0)
     where, maps = localise(studied(data, nominal(data), UNKNOWN))
-    assert where.channel == "sensor"
+    assert where.channel == channel
     assert {line.run for line in maps.lines} == {run.id for run in data.runs}
     for line in maps.lines:
-        assert line.frequency == pytest.approx(33.3, abs=0.1)
+        assert line.frequency == pytest.approx(frequency, abs=0.1)
         assert line.amplitude == pytest.approx(5e-4, rel=0.1)
 
 
@@ -225,6 +227,92 @@ def test_a_centre_that_shifts_with_the_second_harmonic_is_the_springs():
     where, _ = localise(studied(data, nominal(data), UNKNOWN))
     assert where.channel == "stiffness"
     assert "second harmonic" in where.words
+
+
+@pytest.mark.parametrize(
+    ("bands", "condition", "channel"),
+    [
+        ({"above": 0.9, "f0": 0.1}, "always", "sensor"),
+        ({"0": 0.9, "f0": 0.1}, "always", "sensor"),
+        ({"0": 0.9, "f0": 0.1}, "wind_on", "forcing"),
+        ({"0": 0.9, "2f0": 0.1}, "wind_on", "stiffness"),
+        ({"0": 0.9, "2f0": 0.01, "f0": 0.09}, "wind_on", "forcing"),
+        ({"2f0": 0.4, "3f0": 0.4, "f0": 0.2}, "always", "sensor"),
+        ({"2f0": 0.1, "3f0": 0.2, "f0": 0.7}, "always", None),
+        ({"above": 0.4, "0": 0.4, "f0": 0.2}, "always", None),  # neither has three fifths of the excess
+        ({"above": 0.9, "f0": -5.0}, "always", "sensor"),  # less than the noise is none
+    ],
+)
+def test_the_band_of_most_of_the_excess_decides_the_channel(bands, condition, channel):
+    given = tuple(SimpleNamespace(band=name, excess=excess) for name, excess in bands.items())
+    maps = SimpleNamespace(bands=given, lines=(), runs=())
+    found = _by_band(None, SimpleNamespace(maps=maps), condition)
+    assert (None if found is None else found.value) == channel
+
+
+@pytest.mark.parametrize(
+    ("frequency", "damping", "channel"),
+    [
+        (1.6, 1.0, "stiffness"),
+        (1.4, 1.0, None),
+        (1.0, 1.6, "damping"),
+        (1.0, 1.4, None),
+        (1.0, -2.0, "stiffness"),
+        (-2.0, 1.0, "damping"),
+        (-2.0, -1.0, None),
+    ],
+)
+def test_the_larger_drift_decides_from_one_and_a_half_times_the_other(
+    monkeypatch, frequency, damping, channel
+):
+    monkeypatch.setattr("diagnosis.localisation.inference.drift", lambda _: (frequency, damping))
+    assert _by_drift(SimpleNamespace(maps=SimpleNamespace(backbones=()))).value == channel
+
+
+def _curve(frequency, damping, alone):
+    """A run whose own fit departs by these from the nominal model, and leaves an excess."""
+    return SimpleNamespace(
+        alone_excess=alone, alone_frequency=2.0 * (1.0 + frequency), nominal_frequency=2.0,
+        alone_zeta=0.01 + damping, nominal_zeta=0.01,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("curves", "channel"),
+    [
+        ([(0.02, 0.001, 0.0), (-0.02, 0.001, 0.1)], "calibration"),
+        ([(0.001, 0.02, 0.0), (0.001, -0.02, 0.1)], "damping"),
+        ([(0.02, 0.001, 0.0), (-0.02, 0.001, 0.1), (0.0, 0.0, 0.0)], "calibration"),
+        ([(0.02, 0.001, 0.0), (-0.02, 0.001, 0.5)], None),  # a quarter of the excess is within the runs
+        ([(0.02, 0.001, 0.0), (-0.02, 0.001, None)], None),  # a run that could not be fitted by itself
+        ([(0.02, 0.001, 0.0)], None),
+    ],
+)
+def test_runs_that_are_linear_each_and_do_not_agree_are_a_matter_of_calibration_or_damping(curves, channel):
+    runs = [SimpleNamespace(reading=np.zeros(100)) for _ in curves]
+    data = SimpleNamespace(problem=SimpleNamespace(data=SimpleNamespace(runs=runs)))
+    found = SimpleNamespace(
+        maps=SimpleNamespace(backbones=[_curve(*values) for values in curves]),
+        excesses=[SimpleNamespace(excess=1.0) for _ in curves],
+    )
+    chosen = _between_runs(data, found)
+    assert (None if chosen is None else chosen.value) == channel
+
+
+def test_runs_have_their_amplitude_frequency_and_share_of_the_gap():
+    data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
+    base = nominal(data)
+    _, maps = localise(studied(data, base, UNKNOWN))
+    assert sum(run.share for run in maps.runs) == pytest.approx(1.0)
+    for i, (one, run) in enumerate(zip(maps.runs, base.problem.data.runs, strict=True)):
+        inertia, _, stiffness = linear_coefficients(base, i)
+        omega = np.sqrt(stiffness / inertia)
+        assert one.frequency == pytest.approx(omega / (2.0 * np.pi))
+        assert one.amplitude == pytest.approx(np.hypot(*(base.point.release[i] / (1.0, omega))), rel=2e-3)
+        assert (one.id, one.wind_speed) == (run.id, run.wind_speed)
+        assert one.spring_stiffness == pytest.approx(run.spring_stiffness)
+        assert one.excess == pytest.approx(float(np.mean(base.residuals[i] ** 2)) - 1.0, rel=0.01)
+        assert one.share == pytest.approx(one.excess / sum(run.excess for run in maps.runs), rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -53,6 +53,40 @@ def test_surface_is_closed_and_faces_outward(piece: scenery.Mesh) -> None:
     assert volume > 0.0
 
 
+def ends(piece: scenery.Mesh) -> list[float]:
+    """Least x, y and z, then greatest x, y and z, m."""
+    return [*piece.vertices.min(axis=0), *piece.vertices.max(axis=0)]
+
+
+def test_a_box_reaches_from_corner_to_corner() -> None:
+    assert ends(scenery.box((1.0, -2.0, 3.0), (1.5, 4.0, 7.0))) == [1.0, -2.0, 3.0, 1.5, 4.0, 7.0]
+    quarter = scenery.box((1.0, -2.0, 3.0), (1.5, 4.0, 7.0), np.pi / 2.0)
+    assert ends(quarter) == pytest.approx([-4.0, 1.0, 3.0, 2.0, 1.5, 7.0])
+
+
+def test_the_working_section_has_its_sizes() -> None:
+    section = RIG.working_section
+    x, y, z = 0.5 * section.length, 0.5 * section.width, section.height
+    low, high = np.split(np.array(ends(PIECES["floor"])), 2)
+    assert (low[0], low[1], high[0], high[1], high[2]) == pytest.approx((-x, -y, x, y, 0.0))
+    low, high = np.split(np.array(ends(PIECES["glass"])), 2)
+    thickness = high[2] - z  # walls and ceiling are equally thick, outside the section
+    assert 0.0 < thickness < 0.05
+    assert (*low, *high[:2]) == pytest.approx((-x, -y - thickness, 0.0, x, y + thickness))
+    low, high = np.split(np.array(ends(PIECES["frame"])), 2)
+    beam = high[1] - y
+    assert 0.0 < beam < 0.1
+    assert (*low, high[0]) == pytest.approx((-x, -y - beam, -beam, x))
+    assert high[2] == pytest.approx(z + RIG.rod.length_above_ceiling + 0.5 * beam)
+
+
+def test_the_coil_has_its_radius_and_height() -> None:
+    low, high = np.split(np.array(ends(PIECES["coil"])), 2)
+    assert (low[2], high[2]) == pytest.approx((1.0, 1.2))
+    radii = np.hypot(*PIECES["coil"].vertices[:, :2].T)
+    assert (radii.min(), radii.max()) == pytest.approx((0.045, 0.055))
+
+
 def test_scenery_neither_collides_nor_weighs() -> None:
     settings = RunSettings(16.12, AeroDerivatives(0.35, -0.7), 0.1014, 0.018)
     model = build_model(RIG, settings).mj

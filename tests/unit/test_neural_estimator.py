@@ -4,6 +4,7 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from identification import Status, identify
 from identification.estimators.neural_network import NeuralNetwork, read_window
 from identification.neural.files import shipped_networks
-from identification.neural.three_cycles import find_windows
+from identification.neural.three_cycles import _shares, find_windows
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -133,3 +134,16 @@ def test_using_the_networks_does_not_import_torch():
         "assert not {'torch', 'mujoco', 'matplotlib'} & set(sys.modules), sorted(sys.modules)\n"
     )
     subprocess.run([sys.executable, "-c", script], cwd=ROOT, check=True)
+
+
+def test_the_mean_of_a_window_takes_each_sample_for_the_step_around_it():
+    """At edges between samples: weights of 1/n, whose mean time is the middle; elsewhere parts of two samples."""
+    step = 0.01
+    trace = SimpleNamespace(time=step * np.arange(40), step=step)
+    edges = step * (np.array([3, 8, 10, 20]) - 0.5)
+    shares = _shares(trace, edges, slice(0, 40))
+    assert shares.sum(axis=1) == pytest.approx(1.0)
+    assert shares @ trace.time == pytest.approx(0.5 * (edges[1:] + edges[:-1]))
+    assert shares[0, 2:9] == pytest.approx([0.0, 0.2, 0.2, 0.2, 0.2, 0.2, 0.0])
+    (apart,) = _shares(trace, step * np.array([5.0, 6.0]), slice(4, 8))
+    assert apart == pytest.approx([0.0, 0.5, 0.5, 0.0])

@@ -219,6 +219,7 @@ def test_tests_and_times(given: Document, page: Sections) -> None:
         document = given | {"gap": given["gap"] | {"tests": {name: 0.5}}}
         ((_, words, p),) = provenance.test_rows(document)
         assert (words, p) == (provenance.TESTS[name], "0.5")
+    assert_shows(provenance.false_alarms(given), [given["gap"]["false_alarm_rate"]])
 
 
 def test_the_uncertainty_budget(given: Document) -> None:

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification import identify
+from identification import NoiseLevel, identify
+from identification.decay.residual_check import ResidualCheck
 from identification.estimators.hilbert import Hilbert
 from tests.reference.free_decays import TWELVE, Setting, campaign
 from tunnel_sim.vocabulary.record import Record
@@ -48,6 +49,19 @@ def test_deviations_are_raised_where_a_line_does_not_fit(name):
     linear = identify(decaying(lambda a: 0.2 * a, noise=2e-4), name).runs[0]
     assert curved.zeta.std > 5.0 * linear.zeta.std
     assert linear.zeta.value == pytest.approx(0.2 / (4.0 * np.pi), abs=5.0 * linear.zeta.std)
+
+
+def test_deviations_are_raised_to_those_of_least_squares_where_the_model_departs_only():
+    own, least_squares = np.array([[1.0, 0.5], [0.5, 9.0]]), np.diag([4.0, 1.0])
+
+    def widened(departs):
+        noise = NoiseLevel(1e-3, "residual", 1e-3, 2.0, departs, False)
+        return ResidualCheck(noise, least_squares).widened(own)
+
+    assert np.array_equal(widened(False), own)
+    assert np.sqrt(np.diag(widened(True))) == pytest.approx([2.0, 3.0])  # the larger one of each
+    correlation = widened(True)[0, 1] / 6.0
+    assert correlation == pytest.approx(0.5 / 3.0)
 
 
 @pytest.mark.parametrize("name", ["matrix_pencil", "log_decrement", "filter_error", "bayesian"])

@@ -5,17 +5,19 @@ from __future__ import annotations
 import polars as pl
 import pytest
 
+from identification.estimators import ALL_ESTIMATORS
 from tunnel_lab.scoring.breakdown_view import breakdown_figure, exceeding
 from tunnel_lab.scoring.figures import cell_labels, score_figure
 from tunnel_lab.scoring.grid import Cell
-from tunnel_lab.scoring.results import packaged_baseline
+from tunnel_lab.scoring.results import packaged_baseline, packaged_breakdown
+from tunnel_sim.effects import ALL_EFFECTS
 
 
 def row(
-    effect: str, severity: float, name: str, percent: float | None, stds: float | None
+    effect: str, severity: float, name: str, percent: float | None, stds: float | None, of: str = "cn_r"
 ) -> dict[str, object]:
     return {
-        "effect": effect, "severity_noise_powers": severity, "estimator": name, "quantity": "cn_r",
+        "effect": effect, "severity_noise_powers": severity, "estimator": name, "quantity": of,
         "bias_percent": percent, "bias_in_stds": stds,
     }  # fmt: skip
 
@@ -39,10 +41,20 @@ def test_only_what_exceeds_one_standard_deviation_is_printed() -> None:
         ("free_play", 10.0, "one"): (40.0, 300.0),
     }
     assert exceeding(FRAME, "cn_beta") == {}
+    others = pl.DataFrame([row("free_play", 1.0, "one", 5.0, 2.0, of) for of in ("cn_beta", "yaw_inertia")])
+    assert exceeding(pl.concat([FRAME, others]), "cn_r") == exceeding(FRAME, "cn_r")
     axes = breakdown_figure(FRAME, "cn_r").axes[0]
     assert [text.get_text() for text in axes.texts] == ["+0.20", "−3.0", "+40"]
     assert [text.get_position() for text in axes.texts] == [(0.5, 0), (0.25, 1), (0.75, 1)]
     assert [label.get_text() for label in axes.get_yticklabels()] == ["no effect", "free play"]
+
+
+def test_the_packaged_breakdown_has_every_effect_and_estimator() -> None:
+    frame = packaged_breakdown()
+    assert set(frame["effect"]) == {"no effect", *(kind.name for kind in ALL_EFFECTS)}
+    assert set(frame["estimator"]) == set(ALL_ESTIMATORS)
+    at_ten = frame.filter(pl.col("severity_noise_powers") == 10.0)
+    assert at_ten.height == len(ALL_EFFECTS) * len(ALL_ESTIMATORS) * 4
 
 
 def test_the_label_of_a_cell_leaves_out_what_all_have() -> None:

@@ -31,6 +31,11 @@ def test_what_a_cell_does_not_give_is_a_dash() -> None:
     assert _cell(score(trials([1.0, 1.0, 1.0])))[3:] == ("100 (44–100)", "0")
 
 
+def test_two_trials_have_a_bias_and_one_has_none() -> None:
+    assert float(_summary([trials([1.0, 2.0])])[2].partition("(")[0]) == pytest.approx(1.5, abs=0.05)
+    assert _summary([trials([1.0])])[2] == "–"
+
+
 def test_a_cell_has_its_bias_in_per_cent_and_in_deviations() -> None:
     over_bound, per_cent, deviations, *_ = _cell(score(trials([1.0, 2.0, 3.0])))
     assert float(over_bound.partition("(")[0]) == pytest.approx((14.0 / 3.0) ** 0.5, abs=0.05)

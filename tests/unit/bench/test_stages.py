@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 from tests.unit.importing.import_files import decay
+from tunnel_lab.bench import work
 from tunnel_lab.bench.stages import STAGES, closed
 from tunnel_lab.bench.workspace import Session
 from tunnel_lab.terminal.given_campaign import file_hashes
@@ -80,3 +83,38 @@ def test_an_answer_is_shown_unless_the_campaign_has_changed(
     shown = [one.text for one in client.elements.values() if isinstance(one, ui.label)]
     assert ("A gap." in shown) is not changed
     assert any("has changed since it was diagnosed" in text for text in shown) is changed
+
+
+@pytest.mark.parametrize("processors", [1, 3])
+def test_as_many_estimators_run_at_a_time_as_there_are_processors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, processors: int
+) -> None:
+    pytest.importorskip("nicegui")
+    from tunnel_lab.bench import stage_identify
+
+    looks: Counter[Path] = Counter()
+    started: list[tuple[str, ...]] = []
+    ended: list[Path] = []
+    at_a_time: list[int] = []
+
+    def start(words: tuple[str, ...], _: Path) -> None:
+        started.append(words)
+
+    def look(log: Path) -> work.Work:
+        """Every command ends at the third look."""
+        at_a_time.append(len(started) - len(ended))
+        looks[log] += 1
+        if looks[log] == 3:
+            ended.append(log)
+        return work.Work(running=looks[log] < 3)
+
+    monkeypatch.setattr(work, "start", start)
+    monkeypatch.setattr(work, "work_of", look)
+    monkeypatch.setattr(os, "cpu_count", lambda: processors)
+    monkeypatch.setattr(stage_identify, "_POLL_S", 0.01)
+    session = Session(tmp_path, "rig")
+    orders = [(name, ("-e", name)) for name in ("a", "b", "c", "d", "e")]
+    asyncio.run(stage_identify.run_commands(session, orders))
+    assert max(at_a_time) == processors
+    assert sorted(started) == [("identify", str(session.campaign), "-e", name) for name, _ in orders]
+    assert len(ended) == 5

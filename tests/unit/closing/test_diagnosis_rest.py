@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.answer.coefficients import coefficients
+from diagnosis.answer.coefficients import _wind_on_runs, coefficients
 from diagnosis.answer.determined import meant_coefficient, meant_parameter
 from diagnosis.answer.held_out import predict_held_out
 from diagnosis.answer.pulls import coefficient_move
@@ -17,8 +17,9 @@ from diagnosis.answer.small_swings import coefficient_gradient, coefficient_valu
 from diagnosis.attribution.decide import Weighed
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.starting_points import nominal_start
 from diagnosis.result import ParameterEstimate
-from tests.unit.gap_campaigns import campaign, nominal, studied
+from tests.unit.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, campaign, nominal, studied
 from tunnel_sim.effects import effect_class
 
 CAUSE = "quadratic_damping"
@@ -152,6 +153,51 @@ def test_a_coefficient_that_could_be_anything_is_not_determined(base, name, valu
     found = meant_coefficient(ParameterEstimate(value, std, "1"), base, name)
     assert (found.determined, found.std) == (determined, std if determined else None)
     assert found.to_json_dict().get("determined", True) is determined
+
+
+AREA, LENGTH, DENSITY = 0.036, 0.625, 1.2
+WINDY = tuple((spring, speed) for spring, speed in CONDITIONS if speed > 0.0)
+
+
+def loads(speed):
+    """½ρV²Al in N m and ½ρVAl² in N m s."""
+    return 0.5 * DENSITY * speed**2 * AREA * LENGTH, 0.5 * DENSITY * speed * AREA * LENGTH**2
+
+
+@pytest.mark.parametrize("name", ["cn_beta", "cn_r"])
+def test_the_limit_is_the_stiffness_or_the_critical_damping_in_the_fastest_wind(base, name):
+    """2 √(I K) over ½ρVAl² and K over ½ρV²Al, with the moment of the air in K; 1 %: the campaign has a gap."""
+    greatest = []
+    for spring, speed in WINDY:
+        stiffness = spring - loads(speed)[0] * CN_BETA
+        moments = {"cn_beta": stiffness, "cn_r": 2.0 * np.sqrt(INERTIA * stiffness)}
+        greatest.append(moments[name] / loads(speed)[name == "cn_r"])
+    for share, determined in ((0.99, True), (1.01, False)):
+        given = ParameterEstimate(0.1, share * min(greatest), "1/rad")
+        assert meant_coefficient(given, base, name).determined is determined
+
+
+def test_causes_are_told_of_the_wind_on_runs_in_si(base):
+    """1 %: the campaign has a gap, which moves the inertia a little."""
+    found = _wind_on_runs(base)
+    for run, (spring, speed) in zip(found, WINDY, strict=True):
+        moment, rate = loads(speed)
+        assert (run.per_cn_beta, run.per_cn_r) == pytest.approx((moment, rate))
+        assert run.spring_stiffness == pytest.approx(spring)
+        assert run.still_omega == pytest.approx(np.sqrt(spring / INERTIA), rel=0.01)
+        assert run.omega == pytest.approx(np.sqrt((spring - moment * CN_BETA) / INERTIA), rel=0.01)
+
+
+def test_the_zero_of_a_run_does_not_move_a_coefficient(base):
+    """Pieces are ordered by their amplitude about the run's own zero."""
+
+    def move(zeros):
+        runs = base.problem.data.runs
+        shifted = tuple(replace(run, reading=run.reading + z) for run, z in zip(runs, zeros, strict=True))
+        data = replace(base.problem.data, own_zeros=True).with_runs(shifted)
+        return coefficient_move(fit(Problem(data), nominal_start(data)), "cn_r")
+
+    assert move((0.0, 0.3, -0.2, 0.1, -0.4, 0.2)) == pytest.approx(move((0.0,) * 6), rel=1e-3)
 
 
 NAMES = (

@@ -52,6 +52,7 @@ def test_the_options_apply_to_every_run():
     assert seen[:, -1].tolist() == [12.0, 12.0]
     assert bridge.get_attr("num_envs") == [2, 2]
     assert bridge.env_method("information", indices=[1])[0].shape == (7, 7)
+    assert bridge.env_is_wrapped(NormalizeObservation) == [False, False]
     with pytest.raises(EnvError, match="give it to make_vec"):
         bridge.set_attr("rig", None)
 

@@ -51,6 +51,14 @@ def test_growth_to_a_limit_cycle_is_recognised_with_its_figures() -> None:
     assert Remark.from_json_dict(remark.to_json_dict()) == remark
 
 
+def test_four_windows_of_linear_growth_are_enough() -> None:
+    """Of three cycles each: from 0.002 rad to 0.3 of the limit cycle in 3.8 s."""
+    (remark,) = examine(campaign([excited(0.002, 14.0, growth=1.0)])).remarks
+    assert remark.outcome is Outcome.CUT
+    assert remark.figures["growth_rate_per_s"] == pytest.approx(1.0, rel=0.02)
+    assert sum(np.array(remark.figures["amplitude_rad"]) < 0.3 * SETTLED) == 4
+
+
 def test_damping_is_that_of_the_linear_growth() -> None:
     estimate = identify(campaign([excited(0.01)]))
     found = estimate.runs[0].zeta

@@ -12,7 +12,7 @@ import pytest
 
 from tests.unit.importing.import_files import RATE, decay, written
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.cleaning import cleaned, resolution, restarts, without_overflow
+from tunnel_sim.files.importing.cleaning import cleaned, from_zero, resolution, restarts, without_overflow
 from tunnel_sim.files.importing.cutting import find_runs
 from tunnel_sim.files.importing.records import read_records
 
@@ -118,6 +118,19 @@ def test_uneven_stamps_are_kept_and_said() -> None:
     uneven = cleaned(time + 4e-4 * np.sin(np.arange(time.size)), angle)
     assert "differ from an even clock by up to" in "; ".join(uneven.said)
     np.testing.assert_allclose(uneven.time_s, time + 4e-4 * np.sin(np.arange(time.size)), atol=1e-8)
+
+
+def test_times_count_from_the_first_sample_to_a_millionth_of_a_step() -> None:
+    time = np.cumsum(np.random.default_rng(1).uniform(4e-3, 6e-3, 50))
+    time -= time[0]
+    assert np.array_equal(from_zero(time), time)
+    for start in (-3.0, 1.7e9 / 1024.0):
+        moved = from_zero(time + start)
+        assert moved[0] == 0.0
+        assert np.abs(moved - time).max() < 1e-6 * 5e-3
+    even = 0.005 * np.arange(50)
+    assert np.array_equal(from_zero(even + 0.3), np.round(even, 9))  # no digits of the subtraction
+    assert np.array_equal(from_zero(np.array([4.0])), [4.0])
 
 
 @pytest.mark.parametrize("full", [2.0 * np.pi, 360.0, 65536.0])

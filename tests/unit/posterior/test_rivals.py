@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
+from identification.campaign.derivatives import build_design
 from identification.decay.damped_oscillation import Decay, free_decay
 from identification.neural.posterior.demodulated import Demodulated, demodulate
-from identification.neural.posterior.features import OWN, record_features
+from identification.neural.posterior.features import OWN, _conditions, record_features
 from identification.neural.posterior.mixture import distribution, quantiles
 from identification.neural.posterior.rivals import fit_rivals, forward
 from identification.neural.posterior.shapes import Conditions, Windows, best_step, campaign_columns
 from identification.status import Status
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+from tests.reference.free_decays import AREA, DENSITY, LENGTH, Setting, campaign
 from tunnel_sim.vocabulary.record import Record
 
 ZETA, OMEGA, NOISE = 0.01, 12.0, 1e-3
@@ -92,6 +94,12 @@ def test_a_reading_with_a_square_shows_in_the_second_harmonic_and_not_in_the_thi
     assert np.all(after[0] > before[0] + 0.5)
     assert np.all(after[1] < before[1] + 0.5)
     assert before[:, 2] == pytest.approx(0.0, abs=0.9)  # the power of white noise is one
+    assert np.all(np.abs(before[:, :2]) < np.arcsinh(5.0))  # and of variance one are its projections
+    # 0.05 A² cos²: the second harmonic is 0.025 A of the amplitude, in its phase.
+    seen = demodulate(squared)
+    pattern = np.sqrt(seen.information) * seen.amplitude / seen.amplitude[0]
+    expected = 0.025 * seen.amplitude[0] * np.sqrt(pattern @ pattern)
+    assert np.sinh(after[0][0]) == pytest.approx(expected, abs=5.0 + 0.01 * expected)
 
 
 @pytest.mark.parametrize("power", [0.0, -0.35])
@@ -115,6 +123,59 @@ def test_an_error_of_the_wind_speed_that_is_a_power_of_it_is_a_rival(power):
     w = Windows.of(seen)
     given = Conditions(np.full(4, stiffness), *loads(speed), share, np.zeros(4, int), (cn_beta, cn_r))
     expected = w.joined([(-change[0][w.run] * w.time, change[1][w.run] * w.time)])
+    distances = np.abs(campaign_columns(w, given) / inertia - expected).max(axis=0)
+    assert distances.min() < 0.01 * np.abs(expected).max()
+
+
+def test_conditions_of_the_runs_are_shares_of_the_fastest_and_places_of_the_springs():
+    plan = ((44.84, 12.0), (16.12, 0.0), (16.12, 24.0), (21.02, 18.0))
+    data = campaign(tuple(Setting(*of) for of in plan), duration=1.0)
+    found = _conditions(data.runs, build_design(data.runs, data.rig), (0.5, -0.3))
+    assert found.speed == pytest.approx([0.5, 0.0, 1.0, 0.75])
+    assert found.spring.tolist() == [2, 0, 0, 1]
+    assert found.stiffness.tolist() == [spring for spring, _ in plan]
+    speed = np.array([speed for _, speed in plan])
+    assert found.stiffness_load == pytest.approx(0.5 * DENSITY * speed**2 * AREA * LENGTH)
+    assert found.damping_load == pytest.approx(0.5 * DENSITY * speed * AREA * LENGTH**2)
+    still = data.runs[1:2]
+    assert _conditions(still, build_design(still, data.rig), (0.0, 0.0)).speed.tolist() == [0.0]
+
+
+@pytest.mark.parametrize(("zeta", "noise"), [(0.07, 5e-3), (0.1, 1e-3), (0.1, 5e-3)])
+def test_a_decay_is_used_until_it_falls_to_half_the_noise_of_a_window(zeta, noise):
+    """A window is two unknowns of so many block means; the end is known to one window."""
+    decay = Decay.from_modal(OMEGA, zeta)
+    found = demodulate(
+        record(np.random.default_rng(0), noise=noise, change=lambda time: free_decay(time, decay, 0.3, 0.0))
+    )
+    window = found.time[1] - found.time[0]
+    least = 0.5 * found.noise * np.sqrt(2.0 / found.samples.mean())
+    end = np.log(0.3 / least) / (zeta * OMEGA)
+    assert end < TIME[-1]
+    assert end - window < found.time[-1] + 0.5 * window < end
+
+
+@pytest.mark.parametrize("lag", [-0.3, 0.2, 0.8])
+def test_a_moment_of_the_air_that_lags_is_a_rival(lag):
+    """Truth: the roots of (s²I + sC + K)(1 + sτ) = Ka less those without a lag, for a small Ka; τ is lag · l/V."""
+    speed, inertia, stiffness, damping, cn_beta = np.array([0.0, 10.0, 25.0]), 0.1, 16.0, 0.03, 1e-6
+    area, length = 0.036, 0.625
+    moment, loss = 0.6 * speed**2 * area * length, 0.6 * speed * area * length**2
+    change, decays = [], []
+    for load, v in zip(moment, speed, strict=True):
+        tau = lag * length / v if v else 0.0
+        free, ka = np.array([inertia, damping, stiffness]), cn_beta * load
+        lagging = np.polyadd(np.polymul(free, [tau, 1.0]), [-ka])
+        plain = np.polyadd(free, [-ka])
+        root = max(np.roots(plain), key=lambda s: s.imag)
+        nearest = min(np.roots(np.trim_zeros(lagging, "f")), key=lambda s: abs(s - root))
+        change.append(nearest - root)
+        decays.append(Decay(-root.real, abs(root) ** 2))
+    seen = [demodulate(Record(TIME, free_decay(TIME, decay, 0.3, 0.0))) for decay in decays]
+    w = Windows.of(seen)
+    given = Conditions(np.full(3, stiffness), moment, loss, speed / 25.0, np.zeros(3, int), (cn_beta, -0.3))
+    shift = np.array(change)[w.run] * w.time
+    expected = w.joined([(shift.real, shift.imag)])
     distances = np.abs(campaign_columns(w, given) / inertia - expected).max(axis=0)
     assert distances.min() < 0.01 * np.abs(expected).max()
 

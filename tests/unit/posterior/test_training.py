@@ -76,6 +76,33 @@ def test_rare_and_outside_forms_are_never_drawn():
     assert all(form.group is not Group.RARE and form.family != "unknown" for form in forms)
 
 
+def test_variants_of_a_campaign_lose_runs_and_ends_and_differ_in_noise(monkeypatch):
+    from tunnel_lab.training import draw, samples
+
+    monkeypatch.setattr(samples, "CAMPAIGNS", 8)
+    monkeypatch.setattr(draw, "DURATION", 2.0)
+    sizes = {draw.label(form): form.start for form in FORMS if form.group is not Group.RARE}
+    made = list(samples.readings_of(samples.ShardSpec(1, "tuning", 0, tuple(sizes.items()))))
+    fewer = shorter = 0
+    for first in range(0, len(made), samples.VARIANTS):
+        (whole, drawn, families, _), *others = made[first : first + samples.VARIANTS]
+        assert [number for *_, number in made[first : first + samples.VARIANTS]] == [0, 1, 2]
+        names = [run.id for run in whole.runs]
+        assert {run.record.time_s.size for run in whole.runs} == {500}  # 2 s at 250 Hz
+        for one, read, of, _ in others:
+            kept = [run.id for run in one.runs]
+            assert kept == [name for name in names if name in kept]  # in their order, and none of them twice
+            (size,) = {run.record.time_s.size for run in one.runs}
+            assert 200 <= size <= 500
+            assert 0.3 <= read.noise_std / drawn.noise_std <= 8.0
+            assert (samples.truth_of(read), of) == (samples.truth_of(drawn), families)
+            fewer += len(kept) < len(names)
+            shorter += size < 500
+    # One in two each, but for a draw of all runs: of 16, none or all would be 1 in 65 000.
+    assert 0 < fewer < 16
+    assert 0 < shorter < 16
+
+
 @pytest.mark.parametrize("factor", [0.1, 10.0])
 def test_a_size_of_an_effect_that_diverges_is_moved_towards_its_usual_size(factor):
     from dataclasses import replace
