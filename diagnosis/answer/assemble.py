@@ -39,7 +39,7 @@ from diagnosis.study import Study
 
 _LATE_START = (
     "The nominal model misses the motion grossly, so each record is used only from its second passage through the "
-    "middle on: a start driven by hand is not a free decay."
+    "middle, since a start driven by hand is not a free decay, until its motion ends."
 )
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
