@@ -176,7 +176,7 @@ def _weighed(found: Study, base: Fit) -> list[Weighed]:
         chance=base.chance,
         excess=base.excess,
         outside=UNKNOWN_SHARE if found.outsider is None else found.outsider.share,
-        forms={h.names: h.forms for h in found.hypotheses},
+        numbers={h.names: h.further_numbers for h in found.hypotheses},
     )
 
 

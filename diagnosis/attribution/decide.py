@@ -67,7 +67,7 @@ def weigh(
     chance: float,
     excess: float,
     outside: float = UNKNOWN_SHARE,
-    forms: Mapping[tuple[str, ...], int] | None = None,
+    numbers: Mapping[tuple[str, ...], int] | None = None,
 ) -> list[Weighed]:
     """Probabilities of the answers.
 
@@ -76,7 +76,7 @@ def weigh(
         chance: standard deviation of a share by chance alone.
         excess: of the nominal model's block means.
         outside: share that a cause outside the vocabulary leaves open; `UNKNOWN_SHARE` at most counts.
-        forms: how many forms were freed, by sorted effect names; 0 where not given.
+        numbers: how many numbers a set has beside its effects' own, by sorted effect names; 0 where not given.
 
     Returns:
         All answers, ``unknown`` among them, most probable first.
@@ -85,9 +85,10 @@ def weigh(
     for names, share in shares:
         key = tuple(sorted(names))
         answers[key] = min(max(share, 0.0), answers.get(key, np.inf))
-    freed = forms or {}
+    further = numbers or {}
     weights = {
-        names: evidence(names, share, freed.get(names, 0), excess, chance) for names, share in answers.items()
+        names: evidence(names, share, further.get(names, 0), excess, chance)
+        for names, share in answers.items()
     }
     odds = sum(
         weight / _unknown_evidence(len(names), outside, excess, chance) for names, weight in weights.items()
@@ -103,17 +104,17 @@ def weigh(
     return sorted(found, key=lambda w: -w.probability)
 
 
-def evidence(effects: Sequence[str], share: float, forms: int, excess: float, chance: float) -> float:
+def evidence(effects: Sequence[str], share: float, numbers: int, excess: float, chance: float) -> float:
     """Weight of a set of effects among all answers.
 
     Args:
         share: of the gap that they leave open, a fraction.
-        forms: how many of their forms were freed.
+        numbers: how many they have beside their own, such as freed forms; fewer than the nominal model's: below 0.
         excess: of the nominal model's block means.
         chance: standard deviation of a share by chance alone.
     """
     floor = form_floor(excess, effects) + CHANCE_STDS * chance
-    return _density(share, floor) * _prior(len(effects), forms)
+    return _density(share, floor) * _prior(len(effects), numbers)
 
 
 def _unknown_evidence(count: int, outside: float, excess: float, chance: float) -> float:
@@ -135,6 +136,6 @@ def _density(share: float, floor: float) -> float:
     return float(known * beyond**STEEPNESS_BEYOND)
 
 
-def _prior(count: int, forms: int) -> float:
-    """Prior weight: every further effect and every freed form must close so much more of what is left."""
-    return float(PAIR_SHARE ** (STEEPNESS * max(0, count - 1)) * FORM_SHARE ** (STEEPNESS * forms))
+def _prior(count: int, numbers: int) -> float:
+    """Prior weight: every further effect and every further number must close so much more of what is left."""
+    return float(PAIR_SHARE ** (STEEPNESS * max(0, count - 1)) * FORM_SHARE ** (STEEPNESS * numbers))

@@ -188,7 +188,7 @@ def _left(hypothesis: Hypothesis) -> float:
 
 def _evidence(hypothesis: Hypothesis, nominal: Fit) -> float:
     share = _left(hypothesis) / max(nominal.excess, 1e-9)
-    return evidence(hypothesis.effects, share, hypothesis.forms, nominal.excess, nominal.chance)
+    return evidence(hypothesis.effects, share, hypothesis.further_numbers, nominal.excess, nominal.chance)
 
 
 def _going_on(
@@ -206,7 +206,7 @@ def _may_gain(hypothesis: Hypothesis, nominal: Fit) -> bool:
     if not hypothesis.effects:
         return True
     larger = (*hypothesis.effects, "")
-    best = evidence(larger, 0.0, hypothesis.forms, nominal.excess, nominal.chance)
+    best = evidence(larger, 0.0, hypothesis.further_numbers, nominal.excess, nominal.chance)
     return len(hypothesis.effects) < MOST_CAUSES and best > _evidence(hypothesis, nominal)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.spectra import resonance
-from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES
+from diagnosis.fitting.spectra import linear_coefficients, resonance
+from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES, NEEDLESS_SPRING
 from tunnel_sim.effects.parameters import ParameterInfo
 
 _POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
@@ -43,6 +43,18 @@ class Hypothesis:
         """How many form parameters were freed."""
         problem = self.fit.problem
         return sum(i.form for k in problem.effects if k.name in problem.free_forms for i in k.parameters())
+
+    @property
+    def further_numbers(self) -> int:
+        """How many form parameters were freed, less one where gravity leaves the rig no need of a spring."""
+        return self.forms - _needs_no_spring(self.fit)
+
+
+def _needs_no_spring(fitted: Fit) -> bool:
+    data = fitted.problem.data
+    if not data.normalised or data.law is not None:
+        return False
+    return fitted.value("stiffness") < NEEDLESS_SPRING * linear_coefficients(fitted, 0)[2]
 
 
 def is_plausible(fitted: Fit) -> bool:

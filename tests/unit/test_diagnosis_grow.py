@@ -113,7 +113,7 @@ def test_growth_ends_where_a_further_effect_closes_nothing():
 
 def left(*effects, excess):
     """A set whose fit leaves an excess; nothing else is read of it."""
-    problem = SimpleNamespace(effects=(), free_forms=())
+    problem = SimpleNamespace(effects=(), free_forms=(), data=SimpleNamespace(normalised=False))
     return Hypothesis(effects, SimpleNamespace(problem=problem, excess=excess, chance=0.001))
 
 

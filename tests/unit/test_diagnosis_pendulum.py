@@ -14,6 +14,7 @@ from diagnosis.fitting.spectra import resonance
 from diagnosis.investigate import fit_nominal, investigate
 from diagnosis.law.bases import COMMON, SINGLE, ranges
 from diagnosis.law.paths import paths
+from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_reference import moments
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.integrator import integrate
@@ -64,6 +65,19 @@ def without_spring():
 
 def test_gravity_counts_in_the_frequency(without_spring):
     assert 2.0 * np.pi * resonance(without_spring, 0) == pytest.approx(np.sqrt(GRAVITY), rel=1e-9)
+
+
+@pytest.mark.parametrize(("share", "further"), [(0.0, -1), (0.04, -1), (0.06, 0)])
+def test_gravity_that_needs_no_spring_counts_as_a_number_less(without_spring, share, further):
+    common = without_spring.point.common.copy()
+    common[without_spring.problem.names.index("stiffness")] = share / (1.0 - share) * GRAVITY
+    found = fit_at(without_spring.problem, Point(common, without_spring.point.release))
+    assert Hypothesis(("gravity_stiffness",), found).further_numbers == further
+
+
+def test_a_stated_spring_is_needed():
+    base = nominal(campaign())
+    assert Hypothesis((), base).further_numbers == 0
 
 
 def test_a_steady_moment_moves_a_pendulum_by_what_gravity_allows(without_spring):

@@ -18,7 +18,7 @@ def weight(share, misfit, excess, chance, effects=1, forms=0):
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5])
 def test_the_probabilities_are_those_of_the_decision(share, excess):
     chance = 0.002
-    found = weigh([(TEXTBOOK, share), (EXACT, 0.3), (PAIR, 0.05)], chance, excess, forms={PAIR: 2})
+    found = weigh([(TEXTBOOK, share), (EXACT, 0.3), (PAIR, 0.05)], chance, excess, numbers={PAIR: 2})
     weights = {
         TEXTBOOK: weight(share, 0.005, excess, chance),
         EXACT: weight(0.3, 0.001, excess, chance),
