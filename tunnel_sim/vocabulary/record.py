@@ -42,7 +42,7 @@ class Record:
         """Copy, freeze and check the arrays.
 
         Raises:
-            ValueError: when shapes differ, there are fewer than two samples, or a value is not finite.
+            ValueError: when shapes differ or there are fewer than two samples.
         """
         object.__setattr__(self, "time_s", read_only(self.time_s))
         object.__setattr__(self, "yaw_rad", read_only(self.yaw_rad))
@@ -50,8 +50,6 @@ class Record:
             raise ValueError(
                 "time_s and yaw_rad must be one-dimensional, equally long and of two samples or more"
             )
-        if not (np.isfinite(self.time_s).all() and np.isfinite(self.yaw_rad).all()):
-            raise ValueError("time_s and yaw_rad must be finite")
 
     @property
     def sample_interval(self) -> float:
