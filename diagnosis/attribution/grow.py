@@ -151,8 +151,9 @@ def _of_each(parents: Sequence[Hypothesis], ranked: Sequence[Hypothesis]) -> lis
     """The best child of each parent, then the others: what fits better at first may be a dead end."""
     first: list[Hypothesis] = []
     for parent in parents:
-        own = (h for h in ranked if h not in first and set(parent.effects) < set(h.effects))
-        first += [child for child in [next(own, None)] if child is not None]
+        child = next((h for h in ranked if h not in first and set(parent.effects) < set(h.effects)), None)
+        if child is not None:
+            first.append(child)
     return first + [h for h in ranked if h not in first]
 
 
