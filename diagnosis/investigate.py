@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.attribution.decide import UNKNOWN, Weighed, weigh
-from diagnosis.attribution.grow import InStretches, exchange, grow, grow_in_stretches, prune
+from diagnosis.attribution.grow import exchange, grow, prune
+from diagnosis.attribution.grow_in_stretches import InStretches, grow_in_stretches
 from diagnosis.attribution.hypothesis import Hypothesis, polish
 from diagnosis.attribution.outsiders import weigh_outsiders
 from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.attribution.decide import evidence, form_floor
+from diagnosis.attribution.decide import evidence
 from diagnosis.attribution.hypothesis import Hypothesis, is_plausible, restricted, with_forms
 from diagnosis.fitting.least_squares import Fit, FitError, fit
-from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
-from diagnosis.fitting.stretches import Stretches, fit_longer, in_stretches, long_stretch
 from diagnosis.policy import (
     ALWAYS_FITTED,
     BEAM_WIDTH,
@@ -22,7 +20,6 @@ from diagnosis.policy import (
     GROWN_BY,
     GROWN_FROM,
     GROWTH_EVIDENCE,
-    LENGTHENED,
     MOST_CAUSES,
     PREDICTED_SHARE,
     SAME_CHANGE,
@@ -49,12 +46,12 @@ def grow(nominal: Fit, kinds: Sequence[type[Effect]], progress: Progress | None 
     found: dict[tuple[str, ...], Hypothesis] = {}
     level = [Hypothesis((), nominal)]
     while level:
-        children = _children(level, kinds, progress)
+        children = sets_with_one_more(level, kinds, progress)
         if all(_may_gain(child, nominal) for child in children):  # else freeing a form gains nothing
             count = FREED_HYPOTHESES if not level[0].effects else 1
             children = with_forms(children, FREED_FROM * level[0].fit.excess, count)
         found |= {child.names: child for child in children}
-        going = _going_on(children, level, nominal)
+        going = going_on(children, level, nominal)
         near = [h for h in going if _left(h) <= BEAM_WIDTH * _left(going[0])]
         level = _distinct(near, nominal)[:GROWN_FROM]
     return sorted(found.values(), key=lambda h: h.fit.total)
@@ -75,114 +72,6 @@ def _same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
     return apart < SAME_CHANGE * (nominal.total - max(one.total, other.total))
 
 
-@dataclass(frozen=True, eq=False)
-class InStretches:
-    """Sets of causes grown on stretches of the runs.
-
-    Args:
-        nominal: fit of the nominal model to long stretches.
-        stretches: these.
-        hypotheses: sets of causes fitted to them.
-    """
-
-    nominal: Fit
-    stretches: Stretches
-    hypotheses: tuple[Hypothesis, ...]
-
-    def whole(self, hypothesis: Hypothesis, data: Data) -> Hypothesis | None:
-        """The hypothesis fitted to whole runs, from its fit to stretches.
-
-        Args:
-            hypothesis: fitted to the stretches.
-
-        Returns:
-            The same effects; None where the fit fails.
-        """
-        with suppress(FitError, np.linalg.LinAlgError):
-            return replace(hypothesis, fit=fit_longer(hypothesis.fit, self.stretches, data)[0])
-        return None
-
-
-@dataclass(frozen=True, eq=False)
-class _Grown:
-    """A set of causes fitted to long stretches of the runs, and to short ones where it was found there."""
-
-    long: Hypothesis
-    short: Hypothesis | None = None
-
-
-def grow_in_stretches(
-    data: Data,
-    fit_nominal: Callable[[Data], Fit],
-    kinds: Sequence[type[Effect]],
-    progress: Progress | None = None,
-) -> InStretches:
-    """Grow sets of causes on stretches of the runs, where the nominal model misses the motion itself.
-
-    Args:
-        fit_nominal: fits the nominal model to any runs.
-        kinds: effects to try; those that are autonomous are.
-        progress: called with the names of each set.
-
-    Returns:
-        The best sets of each size, compared in long stretches. Effects are added in short ones, in which the phase
-        cannot be lost, and in long ones to the sets that keep it there: a slow loss hardly shows in two cycles.
-    """
-    short = in_stretches(data)
-    first = fit_nominal(short.data)
-    try:
-        nominal, long = fit_longer(first, short, data, long_stretch(short))
-    except (FitError, np.linalg.LinAlgError):  # a model without the causes may run away in long stretches
-        nominal, long = first, short
-    level, found = [_Grown(Hypothesis((), nominal), Hypothesis((), first))], []
-    able = [kind for kind in kinds if kind.autonomous]
-    while level:
-        grown = _longer_sets(level, short, data, able, progress)
-        least = min(FREED_FROM * level[0].long.fit.excess, form_floor(nominal.excess) * nominal.excess)
-        children = with_forms([child.long for child in grown.values()], least)
-        found += children
-        parents = [g.long for g in level]
-        going = _of_each(parents, _going_on(children, parents, nominal))
-        level = [replace(grown[h.names], long=h) for h in going[:GROWN_FROM]]
-    return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
-
-
-def _of_each(parents: Sequence[Hypothesis], ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The best child of each parent, then the others: what fits better at first may be a dead end."""
-    first: list[Hypothesis] = []
-    for parent in parents:
-        child = next((h for h in ranked if h not in first and set(parent.effects) < set(h.effects)), None)
-        if child is not None:
-            first.append(child)
-    return first + [h for h in ranked if h not in first]
-
-
-def _longer_sets(
-    level: Sequence[_Grown],
-    short: Stretches,
-    data: Data,
-    kinds: Sequence[type[Effect]],
-    progress: Progress | None,
-) -> dict[tuple[str, ...], _Grown]:
-    """The sets with one effect more, by their names, from the better of two starts where there are two."""
-    tried = _children([g.short for g in level if g.short is not None], kinds, progress)
-    best = sorted(tried, key=lambda h: h.fit.total)[:LENGTHENED]
-    grown = {h.names: g for h in best if (g := _lengthened(h, short, data)) is not None}
-    following = [g.long for g in level if g.long.effects and not is_gross(g.long.fit)]
-    for child in _children(following, kinds, progress):
-        other = grown.get(child.names)
-        if other is None or child.fit.total < other.long.fit.total:
-            grown[child.names] = _Grown(child, None if other is None else other.short)
-    return grown
-
-
-def _lengthened(hypothesis: Hypothesis, short: Stretches, data: Data) -> _Grown | None:
-    with suppress(FitError, np.linalg.LinAlgError):
-        found, _ = fit_longer(hypothesis.fit, short, data, long_stretch(short))
-        return _Grown(replace(hypothesis, fit=found), hypothesis)
-    return None
-
-
 def _left(hypothesis: Hypothesis) -> float:
     return max(hypothesis.fit.excess, 0.0)
 
@@ -192,10 +81,17 @@ def _evidence(hypothesis: Hypothesis, nominal: Fit) -> float:
     return evidence(hypothesis.effects, share, hypothesis.further_numbers, nominal.excess, nominal.chance)
 
 
-def _going_on(
-    children: Sequence[Hypothesis], parents: Sequence[Hypothesis], nominal: Fit
-) -> list[Hypothesis]:
-    """The sets to grow further, best first; none where the best of all could gain nothing."""
+def going_on(children: Sequence[Hypothesis], parents: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
+    """The sets to grow further.
+
+    Args:
+        children: fitted sets of one size.
+        parents: those that they grew from.
+        nominal: the fit without any effect.
+
+    Returns:
+        Best first; none where the best of all could gain nothing.
+    """
     ranked = sorted(children, key=lambda h: -_evidence(h, nominal))
     if not ranked or not _may_gain(ranked[0], nominal):
         return []
@@ -264,7 +160,7 @@ def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> li
             and _same_change(h.fit, alone[name].fit, nominal)
         ]
         if others in by_name:
-            sets += [_to_the_end(child) for child in _children([by_name[others]], alike, None)]
+            sets += [_to_the_end(child) for child in sets_with_one_more([by_name[others]], alike, None)]
     return sets
 
 
@@ -293,10 +189,19 @@ def without(whole: Fit, kind: type[Effect]) -> Fit:
     return fit(start.problem, start.point)
 
 
-def _children(
+def sets_with_one_more(
     level: Sequence[Hypothesis], kinds: Sequence[type[Effect]], progress: Progress | None
 ) -> list[Hypothesis]:
-    """The sets with one effect more, each fitted from its best starting points."""
+    """The sets with one effect more, each fitted from its best starting points.
+
+    Args:
+        level: fitted sets.
+        kinds: effects to add to each.
+        progress: called with the names of each set.
+
+    Returns:
+        One for every set of effects, the better fit where two sets lead to it.
+    """
     found: dict[tuple[str, ...], Hypothesis] = {}
     for parent in level:
         others = [kind for kind in kinds if kind.name not in parent.effects]

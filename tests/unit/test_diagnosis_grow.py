@@ -121,14 +121,14 @@ def test_a_set_goes_on_from_its_own_parent_though_the_best_set_is_a_dead_end():
     nothing = left(excess=100.0)
     parents = [left("a", excess=20.0), left("b", excess=30.0)]
     children = [left("a", "c", excess=19.0), left("b", "d", excess=20.0)]
-    assert [h.effects for h in growth._going_on(children, parents, nothing.fit)] == [("b", "d")]
-    assert growth._going_on(children[:1], parents, nothing.fit) == []
+    assert [h.effects for h in growth.going_on(children, parents, nothing.fit)] == [("b", "d")]
+    assert growth.going_on(children[:1], parents, nothing.fit) == []
 
 
 def test_growth_ends_where_the_best_set_leaves_nothing_to_gain():
     nothing, parents = left(excess=100.0), [left("a", excess=20.0)]
-    assert growth._going_on([left("a", "c", excess=0.0)], parents, nothing.fit) == []
-    assert growth._going_on([left("a", "c", excess=5.0)], parents, nothing.fit) != []
+    assert growth.going_on([left("a", "c", excess=0.0)], parents, nothing.fit) == []
+    assert growth.going_on([left("a", "c", excess=5.0)], parents, nothing.fit) != []
 
 
 def test_pruning_fits_the_smaller_sets_that_are_missing(of_three):

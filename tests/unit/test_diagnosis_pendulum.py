@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.attribution.grow import _of_each, grow_in_stretches
+from diagnosis.attribution.grow_in_stretches import _of_each, grow_in_stretches
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import fit_at
 from diagnosis.fitting.problem import Point, Problem

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.attribution.grow import grow_in_stretches
+from diagnosis.attribution.grow_in_stretches import grow_in_stretches
 from diagnosis.fitting.least_squares import FitError, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
@@ -91,7 +91,7 @@ def test_a_nominal_model_that_runs_away_on_long_stretches_stays_on_short_ones(da
     def away(*_, **__):
         raise FitError
 
-    monkeypatch.setattr("diagnosis.attribution.grow.fit_longer", away)
+    monkeypatch.setattr("diagnosis.attribution.grow_in_stretches.fit_longer", away)
     found = grow_in_stretches(data, fit_nominal, [effect_class("quadratic_damping")])
     assert found.hypotheses == ()
     assert max(run.reading.size for run in found.nominal.problem.data.runs) == in_stretches(data).length
