@@ -225,8 +225,7 @@ def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
     stated = problem.stated(fit.point.common, fit.point.release[run_index], run)
     pressure = problem.data.air_moment(run)
     stiffness = stated.spring_stiffness - pressure * stated.derivatives.cn_beta
-    for law in (effect.law() for effect in problem.effects_at(fit.point.common)):
-        stiffness += law.get("gravity_stiffness", 0.0) * np.cos(law.get("gravity_angle", 0.0))
+    stiffness += sum(effect.stiffness_at_rest for effect in problem.effects_at(fit.point.common))
     rate = pressure * problem.data.reference_length / run.wind_speed if run.wind_on else 0.0
     return stated.yaw_inertia, stated.mechanical_damping - rate * stated.derivatives.cn_r, stiffness
 

@@ -210,6 +210,11 @@ class Effect:
             remedy="draw it with EffectChain.draw, or leave the effect out",
         )
 
+    @property
+    def stiffness_at_rest(self) -> float:
+        """Stiffness that it adds to the rig at rest, N m/rad, where the rig may have no other."""
+        return 0.0
+
     def law(self) -> Law:
         """The effect's parameters in the moment law, by name, for an effect that is a term of the law."""
         return {}

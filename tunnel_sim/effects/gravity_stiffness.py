@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos
 
 from tunnel_sim.effects.base import Effect, Law
 from tunnel_sim.effects.parameters import parameter
@@ -47,3 +48,8 @@ class GravityStiffness(Effect):
     def law(self) -> Law:
         """The effect's terms of the moment law."""
         return {"gravity_stiffness": self.stiffness, "gravity_angle": self.rest_angle}
+
+    @property
+    def stiffness_at_rest(self) -> float:
+        """Stiffness that it adds to the rig at rest, N m/rad."""
+        return self.stiffness * cos(self.rest_angle)
