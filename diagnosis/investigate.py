@@ -101,11 +101,11 @@ def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: 
             cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
             noise = campaign_noise(cleaned)
             nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
-        started_late = is_gross(nominal)
-        if started_late:
+        cut = is_gross(nominal)
+        if cut:
             nominal = fit_nominal(without_rest(without_start(nominal.problem.data)))
         nominal, noise, test = judge(nominal, noise, trend, step=step, coarse_step=coarse)
-    return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, started_late)
+    return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, cut)
 
 
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:

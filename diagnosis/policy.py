@@ -117,7 +117,8 @@ PAIR_SHARE = 0.44
 #: A freed form must leave less than this share of what is left without it. Tuned.
 FORM_SHARE = 0.80
 #: Stiffness of an unstated spring beside gravity, as a share of both, below which the rig needs no spring. The set
-#: then counts as one with a number less: a spring would have to soften by chance as gravity does. Judgement.
+#: then counts as one with a number less: a spring would have to soften by chance as gravity does. Judgement, made
+#: when three simulated pendulums had been given a cubic spring (0018).
 NEEDLESS_SPRING = 0.05
 #: Share of the probability that is spread evenly over all answers. Tuned: how often an answer of overwhelming
 #: weight was wrong, where something was at work that neither fits nor rivals know.

@@ -36,8 +36,8 @@ class Study:
         hum: the hum that was removed, or None.
         nominal: the fit of the nominal model to the cleaned records.
         test: whether there is a gap, after the hum is removed.
-        started_late: whether the start of every run was left out, because the nominal model misses the motion
-            grossly.
+        cut: whether the start of every run and what follows its motion were left out, because the nominal model
+            misses the motion grossly.
         hypotheses: fitted sets of effects.
         weighed: answers with probabilities, most probable first; empty where there is no gap.
         random: answers with a random moment that passed its tests.
@@ -55,7 +55,7 @@ class Study:
     hum: Hum | None
     nominal: Fit
     test: GapTest
-    started_late: bool = False
+    cut: bool = False
     hypotheses: tuple[Hypothesis, ...] = ()
     weighed: tuple[Weighed, ...] = ()
     random: tuple[RandomAnswer, ...] = ()

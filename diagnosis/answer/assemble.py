@@ -37,9 +37,9 @@ from diagnosis.result import (
 )
 from diagnosis.study import Study
 
-_LATE_START = (
+_CUT_RECORDS = (
     "The nominal model misses the motion grossly, so each record is used only from its second passage through the "
-    "middle, since a start driven by hand is not a free decay, until its motion ends."
+    "middle until its motion ends. A start driven by hand is not a free decay, and neither is a body at rest."
 )
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
@@ -117,7 +117,7 @@ def assemble(
                 shown.confirmation,
                 named=study.named,
             ),
-            *((_LATE_START,) if study.started_late else ()),
+            *((_CUT_RECORDS,) if study.cut else ()),
             *_outside(study),
         ),
         inclusion=inclusion(weighed, study.read_off),

@@ -76,7 +76,7 @@ def weigh(
         chance: standard deviation of a share by chance alone.
         excess: of the nominal model's block means.
         outside: share that a cause outside the vocabulary leaves open; `UNKNOWN_SHARE` at most counts.
-        numbers: how many numbers a set has beside its effects' own, by sorted effect names; 0 where not given.
+        numbers: as `evidence` takes them, by sorted effect names; 0 where not given.
 
     Returns:
         All answers, ``unknown`` among them, most probable first.
@@ -109,7 +109,7 @@ def evidence(effects: Sequence[str], share: float, numbers: int, excess: float, 
 
     Args:
         share: of the gap that they leave open, a fraction.
-        numbers: how many they have beside their own, such as freed forms; fewer than the nominal model's: below 0.
+        numbers: how many they have beside their own: freed forms, less a spring that gravity replaces.
         excess: of the nominal model's block means.
         chance: standard deviation of a share by chance alone.
     """

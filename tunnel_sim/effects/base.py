@@ -212,7 +212,7 @@ class Effect:
 
     @property
     def stiffness_at_rest(self) -> float:
-        """Stiffness that it adds to the rig at rest, N m/rad, where the rig may have no other."""
+        """Stiffness that the effect adds to the rig at rest, N m/rad: 0 unless it acts as a spring."""
         return 0.0
 
     def law(self) -> Law:

@@ -51,5 +51,5 @@ class GravityStiffness(Effect):
 
     @property
     def stiffness_at_rest(self) -> float:
-        """Stiffness that it adds to the rig at rest, N m/rad."""
+        """Stiffness that gravity adds to the rig at rest, N m/rad."""
         return self.stiffness * cos(self.rest_angle)
