@@ -16,13 +16,14 @@ from diagnosis.attribution.hypothesis import Hypothesis, polish
 from diagnosis.attribution.outsiders import weigh_outsiders
 from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
 from diagnosis.detection.gap import judge
-from diagnosis.detection.mains import find_hum, refine_frequency, remove_hum
+from diagnosis.detection.mains import Hum, find_hum, refine_frequency, remove_hum
 from diagnosis.detection.refusal import refuse_indefinite
-from diagnosis.detection.sensor_noise import campaign_noise, noise_trend, reading_step
-from diagnosis.fitting.least_squares import Fit, FitError, fit
+from diagnosis.detection.sensor_noise import Noise, campaign_noise, noise_trend, reading_step
+from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.run_data import Data, prepare, without_rest, without_start
 from diagnosis.fitting.similarity import Similarity, similar_campaign
+from diagnosis.fitting.spectra import mains_interval
 from diagnosis.fitting.starting_points import is_gross, nominal_start
 from diagnosis.policy import COARSE_STEP_POWER, COARSER_STEP, HUM_LEFT, NOISE_EXPLAINS_UP_TO, UNKNOWN_SHARE
 from diagnosis.study import COARSE_STEP, HUM, Study
@@ -95,17 +96,33 @@ def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: 
     with clock.step("nominal fit"):
         nominal = fit_nominal(prepare(campaign, noise.variance, similarity))
         cleaned, hum = campaign, None
-        line = find_hum(nominal) if HUM.name in allowed else None
+        line = find_hum(_fine(nominal, campaign, noise.variance)) if HUM.name in allowed else None
         if line is not None:
             frequency = refine_frequency(campaign, line)
-            cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
-            noise = campaign_noise(cleaned)
+            cleaned, noise, hum = _without_hum(campaign, frequency, noise)
             nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
         cut = is_gross(nominal)
         if cut:
             nominal = fit_nominal(without_rest(without_start(nominal.problem.data)))
         nominal, noise, test = judge(nominal, noise, trend, step=step, coarse_step=coarse)
     return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, cut)
+
+
+def _fine(nominal: Fit, campaign: Campaign, variance: dict[str, float]) -> Fit:
+    """The nominal fit with the residuals of blocks short enough to show the mains; those of a slow rig are not."""
+    similarity, least = nominal.problem.data.similarity, mains_interval(nominal.problem.data.similarity)
+    if all(run.interval < least for run in nominal.problem.data.runs):
+        return nominal
+    problem = Problem(prepare(campaign, variance, similarity, 0.5 * least))
+    return replace(nominal, problem=problem, residuals=scaled_residuals(problem, nominal.point))
+
+
+def _without_hum(campaign: Campaign, frequency: float, noise: Noise) -> tuple[Campaign, Noise, Hum]:
+    """The campaign without a hum, its noise, and the hum; twice, as a hum may count as noise at first."""
+    for _ in range(2):
+        cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
+        noise = campaign_noise(cleaned)
+    return cleaned, noise, hum
 
 
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:

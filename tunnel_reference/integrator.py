@@ -9,6 +9,7 @@ is of third order in the step.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -47,15 +48,20 @@ def _stack(arrays: Sequence[Array]) -> Array:
 def _group_terms(
     terms: Sequence[Sequence[Term]], offsets: Sequence[int], runs: Sequence[int]
 ) -> list[_Group]:
-    """Merge equal laws of all campaigns into groups, ordered by phase, then by first appearance."""
-    found: dict[tuple[int, Law, int], list[tuple[Term, Places]]] = {}
+    """Merge equal laws of all campaigns into groups, ordered by phase, then by first appearance.
+
+    A law that a campaign has twice is in two groups: a law adds to each row of its group once.
+    """
+    found: dict[tuple[int, Law, int, int], list[tuple[Term, Places]]] = {}
     for number, campaign_terms in enumerate(terms):
         rows = np.arange(offsets[number], offsets[number] + runs[number])
+        before: Counter[tuple[int, Law, int]] = Counter()
         for term in campaign_terms:
-            states = 0 if term.memory is None else term.memory.shape[0]
-            found.setdefault((int(term.phase), term.law, states), []).append((term, rows))
+            key = (int(term.phase), term.law, 0 if term.memory is None else term.memory.shape[0])
+            found.setdefault((*key, before[key]), []).append((term, rows))
+            before[key] += 1
     groups = []
-    for (phase, law, states), members in sorted(found.items(), key=lambda item: item[0][0]):
+    for (phase, law, states, _), members in sorted(found.items(), key=lambda item: item[0][0]):
         rows = np.concatenate([r for _, r in members])
         params = {k: _stack([t.params[k] for t, _ in members]) for k in members[0][0].params}
         memory = np.concatenate(

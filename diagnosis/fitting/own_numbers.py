@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.whitening import correlate
-from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION
+from tunnel_sim.effects.base import IN_RUNS, MULTIPLES, NEAR_MOTION
 from tunnel_sim.vocabulary.record import Array
 
 _PADDING = 4  # zero padding of the spectra
@@ -41,22 +41,26 @@ def ringing(fit: Fit) -> OwnNumbers | None:
     Returns:
         Amplitude (rad), angular frequency (rad/s) and damping ratio with every run's phase; None where no
         frequency is left beside the motion's own.
+
+    Where a frequency is that of a run's own motion, or a multiple of it, that run does not count. At least half of
+    them must: springs and winds differ, and a line that is near the motion of one run is beside that of another.
     """
     runs = fit.problem.data.runs
     step = 1.0 / (_PADDING * max(run.duration for run in runs))
     grid = np.arange(step, 0.4 / max(run.interval for run in runs), step)
-    free = np.all([_beside_the_motion(run.reading, run.interval, grid) for run in runs], axis=0)
+    beside = np.array([_beside_the_motion(run.reading, run.interval, grid) for run in runs])
+    free = np.mean(beside, axis=0) >= IN_RUNS
     if not free.any():
         return None
     shortest = min(run.duration for run in runs)
     tried = [(rate, _amplitudes(fit, grid, rate)) for rate in np.array(_DECAYS) / shortest]
-    drops = [np.where(free, np.sum(drop, axis=0), 0.0) for _, (_, drop) in tried]
+    drops = [np.where(free, np.sum(drop * beside, axis=0), 0.0) for _, (_, drop) in tried]
     best = int(np.argmax([drop.max() for drop in drops]))
     at = int(np.argmax(drops[best]))
     rate, (amplitude, _) = tried[best]
     omega = float(np.hypot(2.0 * np.pi * grid[at], rate))
     found = amplitude[:, at]
-    size = float(np.sqrt(np.mean(np.abs(found) ** 2)))
+    size = float(np.sqrt(np.mean(np.abs(found[beside[:, at]]) ** 2)))
     return OwnNumbers((size, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
 
 

@@ -278,13 +278,17 @@ class Data:
 
 
 def prepare(
-    campaign: Campaign, noise_variance: dict[str, float], similarity: Similarity = AS_MEASURED
+    campaign: Campaign,
+    noise_variance: dict[str, float],
+    similarity: Similarity = AS_MEASURED,
+    interval: float = BLOCK_INTERVAL,
 ) -> Data:
     """Average a campaign's records in blocks.
 
     Args:
         noise_variance: of one sample, rad², by run id.
         similarity: how the campaign was made from the measured one.
+        interval: between the blocks, s; the nearest number of samples, at least one.
 
     Returns:
         The prepared data. Where any run states no stiffness, all are taken in normalised form.
@@ -293,7 +297,8 @@ def prepare(
     held = {} if campaign.law is None else campaign.law.held
     return Data(
         runs=tuple(
-            _prepare_run(run, noise_variance[run.id], campaign.sensor.derivative) for run in campaign.runs
+            _prepare_run(run, noise_variance[run.id], campaign.sensor.derivative, interval)
+            for run in campaign.runs
         ),
         frontal_area=rig.frontal_area or similarity.area,
         reference_length=rig.reference_length or similarity.time,
@@ -319,9 +324,9 @@ def departure(law: JointLaw) -> Expression:
     return parse(text, frozenset("br"))
 
 
-def _prepare_run(run: Run, noise_variance: float, derivative: int) -> RunData:
+def _prepare_run(run: Run, noise_variance: float, derivative: int, interval: float) -> RunData:
     record = run.record
-    block = max(1, round(BLOCK_INTERVAL * record.sample_rate))
+    block = max(1, round(interval * record.sample_rate))
     count = record.yaw_rad.size // block
     samples = None if record.uniform else Samples.of(record, block)
     if samples is None:

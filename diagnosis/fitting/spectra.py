@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import Data, RunData
-from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
+from diagnosis.fitting.similarity import REFERENCE_FREQUENCY, Similarity
 from tunnel_sim.vocabulary.record import Array
 
 _PADDING = 8  # zero padding: lines are found to a small part of a bin
@@ -84,6 +84,11 @@ class Line:
     runs: int
 
 
+def mains_interval(similarity: Similarity) -> float:
+    """Longest interval between blocks at which the mains can be seen, s."""
+    return 1.0 / (_NYQUIST * similarity.similar(_MAINS, "Hz"))
+
+
 def mains_line(fit: Fit) -> Line | None:
     """The strongest line near 50 Hz common to all runs.
 
@@ -92,7 +97,7 @@ def mains_line(fit: Fit) -> Line | None:
     """
     data = fit.problem.data
     mains, around = (data.similarity.similar(value, "Hz") for value in (_MAINS, _MAINS_WANDER))
-    fast_enough = all(_NYQUIST * mains < 1.0 / run.interval for run in data.runs)
+    fast_enough = all(run.interval < mains_interval(data.similarity) for run in data.runs)
     if not fast_enough or mains < _BEYOND_MOTION * REFERENCE_FREQUENCY:
         return None
     spectra = smooth_spectra(fit)

@@ -106,6 +106,21 @@ def test_smooth_laws_match_an_adaptive_solver(name):
         assert np.max(np.abs(motion.angle[:, run] - adaptive(c, run, make(c, run)))) < 1e-8
 
 
+def test_a_law_that_acts_twice_in_a_campaign_adds_up():
+    """As where two effects are forms of one polynomial."""
+    c = rig(duration=1.0)
+
+    def spring(**values):
+        terms = {"k2": 0.0, "k3": 0.0, "k4": 0.0, "k5": 0.0} | values
+        return Term(m.polynomial_spring, Phase.MOMENT, {k: np.full(2, v) for k, v in terms.items()})
+
+    apart, other = integrate([c, c], [[spring(k2=0.1), spring(k3=0.5)], [spring(k3=0.5)]], substeps=4)
+    together, alone = integrate([c, c], [[spring(k2=0.1, k3=0.5)], [spring(k3=0.5)]], substeps=4)
+    assert np.max(np.abs(apart.angle - together.angle)) < 1e-12
+    assert np.array_equal(other.angle, alone.angle)
+    assert np.max(np.abs(apart.angle - other.angle)) > 1e-3
+
+
 @pytest.mark.slow
 def test_dead_zone_matches_an_adaptive_solver():
     c = rig()

@@ -13,11 +13,13 @@ from diagnosis.attribution.grow import exchange, grow, prune, without
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Point
+from diagnosis.fitting.spectra import resonance
 from diagnosis.fitting.starting_points import starting_points
 from diagnosis.policy import MOST_CAUSES
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import INTERVAL, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
+from tunnel_sim.effects.base import NEAR_MOTION
 
 DURATION = 6.0
 campaign = partial(gap_campaigns.campaign, duration=DURATION)
@@ -209,6 +211,19 @@ def test_a_second_mode_is_neither_a_drift_nor_the_motion_itself() -> None:
     rates = (0.6, 6.0, 12.0, 14.0, 36.0)
     modes = [effect_from("second_mode", {"amplitude": 0.002, "frequency": rate}) for rate in rates]
     assert [mode.plausible(12.0) for mode in modes] == [False, True, False, False, True]
+
+
+def test_a_second_mode_near_the_motion_of_one_spring_is_found_beside_that_of_the_others() -> None:
+    base = nominal(campaign())
+    motions = sorted({2.0 * np.pi * resonance(base, i) for i in range(len(base.problem.data.runs))})
+    near = 1.1 * motions[-1]
+    beside = [abs(near / omega - 1.0) > NEAR_MOTION for omega in motions]
+    assert not all(beside)
+    assert np.mean(beside) >= 0.5
+    line = effect_from("second_mode", {"amplitude": 0.004, "frequency": near, "damping_ratio": 0.01})
+    (found,) = grow(nominal(campaign(line)), [effect_class("second_mode")])
+    assert within_noise(found.fit)
+    assert abs(found.fit.value("second_mode.frequency") - near) < 4.0 * found.fit.std("second_mode.frequency")
 
 
 def test_a_line_that_does_not_decay_is_no_mode() -> None:

@@ -1,14 +1,20 @@
 """The hum of the mains: found where it is, taken out whole, and not found in motions with corners."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from diagnosis.detection.mains import find_hum, refine_frequency, remove_hum
 from diagnosis.fitting.spectra import mains_line
+from diagnosis.investigate import nominal_study
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of, with_records
 from tests.unit.gap_campaigns import nominal
+from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.physics.forward import backlash
+from tunnel_sim.vocabulary.campaign import SensorProperties
+from tunnel_sim.vocabulary.record import Record
 
 NOISE = 4e-4
 SETTINGS = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
@@ -65,6 +71,21 @@ def test_the_line_s_amplitude_is_that_of_the_sine():
     assert line is not None
     assert line.parameter == pytest.approx(50.0, abs=0.02)
     assert line.amplitude == pytest.approx(1e-3, rel=0.05)
+
+
+def test_the_hum_of_a_slow_rig_is_found():
+    """Its mains lie above what block means show, and count as noise at first."""
+    rate = 250.0
+    slow = [replace(run, record=Record(run.record.time_s * 4.0, run.record.yaw_rad)) for run in decays().runs]
+    clean = replace(decays(), runs=tuple(slow), sensor=SensorProperties(rate, 1e-5))
+    found = nominal_study(humming(clean, 1e-3), ALL_EFFECTS)
+    assert found.hum is not None
+    own = found.similarity.own
+    assert own(found.hum.frequency, "Hz") == pytest.approx(50.0, abs=3e-3)
+    assert found.hum.amplitude == pytest.approx(1e-3, rel=0.02)
+    assert found.hum.excess == pytest.approx(0.5 * 1e-3**2 / NOISE**2, rel=0.1)
+    assert not found.test.detected
+    assert nominal_study(clean, ALL_EFFECTS).hum is None
 
 
 def test_white_noise_has_no_hum():
