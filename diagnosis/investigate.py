@@ -12,7 +12,7 @@ import numpy as np
 from diagnosis.attribution.decide import UNKNOWN, Weighed, weigh
 from diagnosis.attribution.grow import exchange, grow, prune
 from diagnosis.attribution.grow_in_stretches import InStretches, grow_in_stretches
-from diagnosis.attribution.hypothesis import Hypothesis, polish
+from diagnosis.attribution.hypothesis import Hypothesis, polish, with_forms
 from diagnosis.attribution.outsiders import weigh_outsiders
 from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
 from diagnosis.detection.gap import judge
@@ -25,7 +25,14 @@ from diagnosis.fitting.run_data import Data, prepare, without_rest, without_star
 from diagnosis.fitting.similarity import Similarity, similar_campaign
 from diagnosis.fitting.spectra import mains_interval
 from diagnosis.fitting.starting_points import is_gross, nominal_start
-from diagnosis.policy import COARSE_STEP_POWER, COARSER_STEP, HUM_LEFT, NOISE_EXPLAINS_UP_TO, UNKNOWN_SHARE
+from diagnosis.policy import (
+    COARSE_STEP_POWER,
+    COARSER_STEP,
+    HUM_LEFT,
+    NOISE_EXPLAINS_UP_TO,
+    RIVAL_PROBABILITY,
+    UNKNOWN_SHARE,
+)
 from diagnosis.study import COARSE_STEP, HUM, Study
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -133,7 +140,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     with clock.step("effects"):
         found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress)))
     with clock.step("random moments"):
-        random = weigh_random_moments(found.nominal, found.hypotheses, {kind.name for kind in kinds})
+        random = weigh_random_moments(found.nominal, found.hypotheses, kinds)
     found = replace(found, random=tuple(random), outsider=weigh_outsiders(found.nominal))
     found = _pruned(found, found.nominal, clock)
     weighed = _weighed(found, found.nominal)
@@ -182,7 +189,20 @@ def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
         return found
     with clock.step("pruning"):
         known = (*found.hypotheses, *prune(best, found.hypotheses))
-        return replace(found, hypotheses=(*known, *exchange(best, known, base)))
+        found = replace(found, hypotheses=(*known, *exchange(best, known, base)))
+    with clock.step("forms"):
+        return _with_forms(found, base)
+
+
+def _with_forms(found: Study, base: Fit) -> Study:
+    """The study with the forms of rival sets free where that pays: growth frees those of few sets."""
+    weighed = [w for w in _weighed(found, base) if w.effects != UNKNOWN]
+    near = [w.effects for w in weighed if w.probability > RIVAL_PROBABILITY]
+    if len(near) < 2:
+        return found
+    rivals = [h for h in found.hypotheses if h.names in near and not h.forms]
+    others = [h for h in found.hypotheses if not any(h is rival for rival in rivals)]
+    return replace(found, hypotheses=(*others, *with_forms(rivals, 0.0, len(rivals))))
 
 
 def _weighed(found: Study, base: Fit) -> list[Weighed]:

@@ -134,9 +134,13 @@ STEADY_IN_TIME = 5.5
 #: Rate at which steady turbulence is taken for a burst, all windows of a campaign together: a convention. And the
 #: factor by which real turbulence, which is not quite steady, may exceed that limit: a judgement.
 BURST_FALSE_ALARM_RATE, BURST = 0.001, 1.5
-#: Excess of the wind-off runs up to which they count as free of a gap: the greatest of a share of the fit's excess,
-#: so many noise variances, and the misfit of form that counts as none. Judgement.
-WIND_OFF_SHARE, WIND_OFF_LEAST = 0.05, 0.1
+#: Excess of the wind-off runs up to which they count as free of a gap: the greatest of so many noise variances and
+#: the misfit of form that counts as none. And the share of the whole excess up to which they do where turbulence is
+#: not part of the noise, so that its motion has misled the fit. Judgement.
+WIND_OFF_LEAST, WIND_OFF_SHARE = 0.1, 0.05
+#: Excess of the wind-off runs, in that of all runs, below which sets are grown anew with turbulence as noise.
+#: Judgement: time against coverage.
+LEFT_IN_THE_WIND = 0.5
 #: Single effects beside which a random moment is tried. Judgement: time against coverage.
 RANDOM_PARTNERS = 3
 #: −2 ln L by which every effect beside the random moment must improve it. Judgement: a parameter

@@ -6,16 +6,17 @@ instants and weak effects are missed in them. Here they are weighted by the spec
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.attribution.grow import prune
+from diagnosis.attribution.grow import evidence_of, grow, prune
 from diagnosis.attribution.hypothesis import Hypothesis, restricted
 from diagnosis.attribution.process_noise import fit_turbulence, with_response
 from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_at
-from diagnosis.fitting.problem import Point
+from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.starting_points import starting_points
 from diagnosis.policy import BESIDE_EVIDENCE
@@ -45,6 +46,33 @@ def beside_turbulence(best: Hypothesis, data: Data) -> list[Hypothesis]:
             best = _seen_in(fitted, data)
         return [_seen_in(one, data) for one in _smaller(fitted)]
     return []
+
+
+def grown_beside_turbulence(nominal: Fit, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
+    """Grow sets of effects from the nominal model on, with turbulence as noise.
+
+    Args:
+        nominal: fitted with the sensor's noise alone.
+        kinds: effects to try.
+
+    Yields:
+        Round by round the best set, with residuals that hold the response to the turbulence. The turbulence is what
+        the set of the round before leaves, the nominal model in the first: there it is so strong that the runs in
+        the wind hardly count. The rounds end where no effect is found, or a fit fails.
+    """
+    best, data = Hypothesis((), nominal), nominal.problem.data
+    with suppress(FitError, np.linalg.LinAlgError):
+        for _ in range(_ROUNDS):
+            process = fit_turbulence(best.fit)
+            noisy = None if process is None else with_response(best.fit, process.spectrum)
+            if noisy is None:
+                return
+            base = fit(Problem(noisy), nominal.point)
+            grown = max([Hypothesis((), base), *grow(base, kinds)], key=lambda h: evidence_of(h, base))
+            if not grown.effects:
+                return
+            best = _seen_in(grown, data)
+            yield best
 
 
 def _again(known: Fit, data: Data) -> Fit:

@@ -76,7 +76,12 @@ def _left(hypothesis: Hypothesis) -> float:
     return max(hypothesis.fit.excess, 0.0)
 
 
-def _evidence(hypothesis: Hypothesis, nominal: Fit) -> float:
+def evidence_of(hypothesis: Hypothesis, nominal: Fit) -> float:
+    """Weight of a fitted set among all answers, as `decide.evidence` gives it.
+
+    Args:
+        nominal: the fit without any effect, whose excess is the gap.
+    """
     share = _left(hypothesis) / max(nominal.excess, 1e-9)
     return evidence(hypothesis.effects, share, hypothesis.further_numbers, nominal.excess, nominal.chance)
 
@@ -92,7 +97,7 @@ def going_on(children: Sequence[Hypothesis], parents: Sequence[Hypothesis], nomi
     Returns:
         Best first; none where the best of all could gain nothing.
     """
-    ranked = sorted(children, key=lambda h: -_evidence(h, nominal))
+    ranked = sorted(children, key=lambda h: -evidence_of(h, nominal))
     if not ranked or not _may_gain(ranked[0], nominal):
         return []
     return [child for child in ranked if _goes_on(child, parents, nominal)]
@@ -104,7 +109,7 @@ def _may_gain(hypothesis: Hypothesis, nominal: Fit) -> bool:
         return True
     larger = (*hypothesis.effects, "")
     best = evidence(larger, 0.0, hypothesis.further_numbers, nominal.excess, nominal.chance)
-    return len(hypothesis.effects) < MOST_CAUSES and best > _evidence(hypothesis, nominal)
+    return len(hypothesis.effects) < MOST_CAUSES and best > evidence_of(hypothesis, nominal)
 
 
 def _goes_on(child: Hypothesis, level: Sequence[Hypothesis], nominal: Fit) -> bool:
@@ -112,8 +117,8 @@ def _goes_on(child: Hypothesis, level: Sequence[Hypothesis], nominal: Fit) -> bo
     parents = [h for h in level if set(h.effects) < set(child.effects)]
     if not any(parent.effects for parent in parents):
         return child.fit.excess > 0.0
-    best = max(_evidence(parent, nominal) for parent in parents)
-    return _evidence(child, nominal) > GROWTH_EVIDENCE * best
+    best = max(evidence_of(parent, nominal) for parent in parents)
+    return evidence_of(child, nominal) > GROWTH_EVIDENCE * best
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:

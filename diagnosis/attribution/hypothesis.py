@@ -117,8 +117,24 @@ def _freed_if_it_pays(hypothesis: Hypothesis, least: float) -> Hypothesis:
     freed = _free_forms(fitted) if fitted.excess > least else None
     if freed is None:
         return hypothesis
+    needed = _forms_that_matter(freed, (1.0 - FORM_SHARE) * fitted.excess * fitted.count)
+    if needed and needed != freed.problem.free_forms:
+        freed = _free_forms(fitted, only=needed) or freed
     found = Hypothesis(hypothesis.effects, freed)
     return found if freed.excess < FORM_SHARE**found.forms * fitted.excess else hypothesis
+
+
+def _forms_that_matter(freed: Fit, least: float) -> tuple[str, ...]:
+    """Effects whose forms differ from the textbook's so that χ² would rise by more than ``least`` without."""
+    needed = []
+    for kind in freed.problem.effects:
+        if kind.name in freed.problem.free_forms:
+            values = [(f"{kind.name}.{info.name}", info.default) for info in kind.parameters() if info.form]
+            # a form that the runs cannot tell has no standard deviation
+            pulls = [(freed.value(n) - v) / s for n, v in values if (s := freed.std(n)) > 0.0]
+            if max(np.square(pulls), default=0.0) > least:
+                needed.append(kind.name)
+    return tuple(needed)
 
 
 def polish(chosen: Hypothesis) -> Hypothesis:
@@ -168,10 +184,11 @@ def _textbook(freed: Fit, first: Fit) -> Fit | None:
     return None
 
 
-def _free_forms(fitted: Fit, tolerance: float = 1e-4) -> Fit | None:
-    """The same effects with the forms free; None where none has a form, or nothing is gained."""
+def _free_forms(fitted: Fit, tolerance: float = 1e-4, only: Collection[str] | None = None) -> Fit | None:
+    """The same effects with all forms, or only those of some, free; None where none is, or nothing is gained."""
     problem = fitted.problem
     kinds = [kind for kind in problem.effects if any(info.form for info in kind.parameters())]
+    kinds = kinds if only is None else [kind for kind in kinds if kind.name in only]
     if not kinds:
         return None
     freed = dataclasses.replace(problem, free_forms=tuple(kind.name for kind in kinds))

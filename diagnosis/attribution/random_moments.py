@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from diagnosis.attribution.beside_turbulence import beside_turbulence
+from diagnosis.attribution.beside_turbulence import beside_turbulence, grown_beside_turbulence
 from diagnosis.attribution.decide import form_floor
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.innovation_tests import bursts, whiteness
 from diagnosis.attribution.process_noise import (
     ProcessNoise,
+    Spectrum,
     fit_turbulence,
     fit_wandering_shedding,
+    with_response,
 )
-from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.policy import (
     BESIDE_EVIDENCE,
     BURST,
     BURST_FALSE_ALARM_RATE,
+    LEFT_IN_THE_WIND,
     RANDOM_PARTNERS,
     RIVAL_EVIDENCE,
     STEADY_IN_TIME,
@@ -57,23 +61,26 @@ class RandomAnswer:
 def weigh_random_moments(
     nominal: Fit,
     hypotheses: Sequence[Hypothesis],
-    allowed: Collection[str],
+    kinds: Sequence[type[Effect]],
 ) -> list[RandomAnswer]:
     """Try turbulence, and vortices with a wandering phase, alone and beside the best single effects.
 
     Args:
         hypotheses: fitted sets of effects, best first.
-        allowed: names of the vocabulary to answer in.
+        kinds: the vocabulary to answer in.
 
     Returns:
         The most likely answer of each kind that passes, with as few effects beside it as the evidence asks for.
         To pass, the innovations must be white by band, steady in time and without bursts, and the wind-off runs
-        free of a gap. Empty where none passes, or where deterministic effects close the gap.
+        free of a gap once the response is part of the noise. Empty where none passes, or where deterministic
+        effects close the gap.
 
         A strong random motion misleads the fit of the effects beside it. Where no answer passes, or only one with
         more effects than still air asks for, the best set is therefore fitted again with the response to turbulence
-        as noise.
+        as noise. Where none passes then, and most of what is left is in the wind, sets are grown anew with that
+        noise.
     """
+    allowed = {kind.name for kind in kinds}
     if any(
         max(hypothesis.fit.excess, 0.0) < form_floor(nominal.excess) * nominal.excess
         for hypothesis in hypotheses
@@ -84,8 +91,31 @@ def weigh_random_moments(
         again = beside_turbulence(hypotheses[0], nominal.problem.data)
         tried = sorted([*answers, *_passing(nominal, again, allowed)], key=_cost, reverse=True)
         answers = list({answer.kind: answer for answer in tried}.values())
+    fitted = [kind for kind in kinds if kind.fitted]
+    if (
+        fitted
+        and not answers
+        and _left_in_the_wind([nominal, *(hypothesis.fit for hypothesis in hypotheses)])
+    ):
+        rounds = grown_beside_turbulence(nominal, fitted)
+        passing = (_passing(nominal, [best], allowed) for best in rounds)
+        answers = next(filter(None, passing), [])
     least = min((answer.process.cost for answer in answers), default=0.0)
     return [answer for answer in answers if answer.process.cost < least + RIVAL_EVIDENCE]
+
+
+def _in_its_noise(known: Fit, spectrum: Spectrum) -> Fit:
+    """The effects of a fit fitted with the response to a random moment as noise; as it was where that cannot be."""
+    with suppress(FitError, np.linalg.LinAlgError):
+        noisy = with_response(known, spectrum)
+        return known if noisy is None else fit(replace(known.problem, data=noisy), known.point)
+    return known
+
+
+def _left_in_the_wind(fits: Sequence[Fit]) -> bool:
+    """Whether most of what the best fit leaves is in the runs in the wind."""
+    best = min(fits, key=lambda fit: fit.total)
+    return wind_off_excess(best) < LEFT_IN_THE_WIND * best.excess
 
 
 def _beside_too_many(answers: Sequence[RandomAnswer], nominal: Fit, hypotheses: Sequence[Hypothesis]) -> bool:
@@ -149,14 +179,21 @@ def _try(
         return None
     if bursts(process, BURST_FALSE_ALARM_RATE) > BURST:
         return None
+    if wind_off_excess(_in_its_noise(fit, process.spectrum)) > _no_gap(nominal):
+        return None
     share = (abs(process.excess) + max(wind_off_excess(fit), 0.0)) / max(nominal.excess, 1e-9)
     return RandomAnswer(kind, process, beside, share)
 
 
 def _still_open(fit: Fit, nominal: Fit) -> bool:
     """Whether the wind-off runs show a gap, which no random moment of the wind explains."""
-    misfit = form_floor(nominal.excess) * nominal.excess
-    return wind_off_excess(fit) > max(WIND_OFF_SHARE * fit.excess, misfit, WIND_OFF_LEAST)
+    return wind_off_excess(fit) > max(WIND_OFF_SHARE * fit.excess, _no_gap(nominal))
+
+
+def _no_gap(nominal: Fit) -> float:
+    """Excess of the wind-off runs that is no gap."""
+    still = max(wind_off_excess(nominal), 0.0)
+    return max(form_floor(nominal.excess) * still, WIND_OFF_LEAST)
 
 
 def wind_off_excess(fit: Fit) -> float:

@@ -59,8 +59,11 @@ def campaign(
     )
     effects = tuple(effect for effect in effects if effect is not None)
     kinds = tuple(type(effect) for effect in effects)
-    problem = Problem(Data(runs, 0.036, 0.625, 0.225, False, INERTIA), kinds)
-    values = [getattr(e, info.name) for e in effects for info in e.parameters() if not info.form]
+    shaped = tuple(
+        e.name for e in effects if any(i.form and getattr(e, i.name) != i.default for i in e.parameters())
+    )
+    problem = Problem(Data(runs, 0.036, 0.625, 0.225, False, INERTIA), kinds, free_forms=shaped)
+    values = [getattr(e, i.name) for e in effects for i in e.parameters() if not i.form or e.name in shaped]
     common = np.array([INERTIA, DAMPING, CN_BETA, CN_R, 0.001, *values])
     own = [np.linspace(0.2, 0.8, len(runs))] * len(
         problem.phased

@@ -10,8 +10,8 @@ import pytest
 from diagnosis.attribution import grow as growth
 from diagnosis.attribution.decide import weigh
 from diagnosis.attribution.grow import exchange, grow, prune, without
-from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.fitting.least_squares import fit
+from diagnosis.attribution.hypothesis import Hypothesis, with_forms
+from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.problem import Point
 from diagnosis.fitting.spectra import resonance
 from diagnosis.fitting.starting_points import starting_points
@@ -224,6 +224,25 @@ def test_a_second_mode_near_the_motion_of_one_spring_is_found_beside_that_of_the
     (found,) = grow(nominal(campaign(line)), [effect_class("second_mode")])
     assert within_noise(found.fit)
     assert abs(found.fit.value("second_mode.frequency") - near) < 4.0 * found.fit.std("second_mode.frequency")
+
+
+def test_of_several_forms_only_those_that_matter_are_freed() -> None:
+    """The friction is the textbook's, though it has a form too."""
+    friction = effect_from("coulomb_friction", {"friction_moment": 0.003})
+    spring = effect_from("asymmetric_stiffness", {"coefficient": -0.05, "exponent": 1.2})
+    base = nominal(campaign(friction, spring))
+    whole = grow(base, [type(friction), type(spring)])[0]
+    kept = Hypothesis(
+        whole.effects, fit(replace(whole.fit.problem, free_forms=()), textbook_point(whole.fit))
+    )
+    (freed,) = with_forms([kept], 0.0)
+    assert freed.fit.problem.free_forms == ("asymmetric_stiffness",)
+    assert within_noise(freed.fit)
+
+
+def textbook_point(found: Fit) -> Point:
+    problem = replace(found.problem, free_forms=())
+    return Point(np.array([found.value(name) for name in problem.names]), found.point.release)
 
 
 def test_a_line_that_does_not_decay_is_no_mode() -> None:

@@ -9,6 +9,8 @@ from scipy.linalg import expm
 from scipy.signal import lfilter, lsim
 from scipy.stats import binom
 
+from diagnosis.attribution import random_moments
+from diagnosis.attribution.grow import grow
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.innovation_tests import bursts, whiteness
 from diagnosis.attribution.process_noise import (
@@ -35,7 +37,8 @@ from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.record import Record
 
 AREA, LENGTH = 0.036, 0.625
-BOTH = ("buffeting", "vortex_shedding")
+BUFFETING = (effect_class("buffeting"),)
+BOTH = (*BUFFETING, effect_class("vortex_shedding"))
 
 
 def buffeted(data, intensity, bandwidth, seed=5):
@@ -131,7 +134,7 @@ def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth
     (start, *_) = starting_points(base, type(strong))
     spring = Hypothesis(("cubic_stiffness",), fit(start.problem, start.point, base=base))
     assert 0.005 < spring.fit.excess / base.excess < 0.015
-    (answer,) = weigh_random_moments(base, [spring], ("buffeting",))
+    (answer,) = weigh_random_moments(base, [spring], BUFFETING)
     assert answer.effects == ("buffeting", "cubic_stiffness")
 
 
@@ -142,12 +145,33 @@ def test_skips_beside_strong_turbulence_are_placed_where_they_are():
     white = fit(start.problem, start.point, base=base)
     planted = np.linspace(0.2, 0.8, len(CONDITIONS))  # shares of the runs
     assert np.max(np.abs(white.point.release[:, -1] - planted)) > 0.05
-    (answer,) = weigh_random_moments(base, [Hypothesis(("dropped_samples",), white)], ("buffeting",))
+    (answer,) = weigh_random_moments(base, [Hypothesis(("dropped_samples",), white)], BUFFETING)
     assert answer.effects == ("buffeting", "dropped_samples")
     found = answer.beside.fit
     assert found.point.release[:, -1] == pytest.approx(planted, abs=0.005)
     assert found.value("dropped_samples.lost_time") == pytest.approx(0.006, rel=0.01)
     assert abs(wind_off_excess(found)) < 0.1
+
+
+def test_beside_turbulence_that_misleads_all_sets_they_are_grown_anew():
+    friction = effect_from("coulomb_friction", {"friction_moment": 0.003})
+    spring = effect_from("cubic_stiffness", {"coefficient": -0.03})
+    base = nominal(buffeted(campaign(friction, spring), 0.02, 4.0))
+    names = ("buffeting", "coulomb_friction", "cubic_stiffness", "quadratic_damping", "sensor_drift")
+    kinds = [effect_class(name) for name in names]
+    misled = grow(base, kinds[1:])
+    (answer,) = weigh_random_moments(base, misled, kinds)
+    assert answer.effects == ("buffeting", "coulomb_friction", "cubic_stiffness")
+    found = answer.beside.fit
+    assert found.value("coulomb_friction.friction_moment") == pytest.approx(0.003, rel=0.05)
+    assert found.value("cubic_stiffness.coefficient") == pytest.approx(-0.03, rel=0.05)
+    assert abs(wind_off_excess(found)) < 0.1
+
+
+def test_sets_are_not_grown_anew_for_a_gap_that_is_in_still_air_too(monkeypatch):
+    monkeypatch.setattr(random_moments, "grown_beside_turbulence", None)
+    base = nominal(campaign(effect_from("cubic_stiffness", {"coefficient": -0.2})))
+    assert weigh_random_moments(base, [], (*BUFFETING, effect_class("coulomb_friction"))) == []
 
 
 def of(*effects, still_air):
@@ -240,7 +264,7 @@ def test_vortices_whose_phase_wanders_are_shedding_and_not_turbulence():
     (answer,) = weigh_random_moments(fit, [], BOTH)
     assert answer.effects == ("vortex_shedding",)
     assert answer.share < 0.1
-    assert weigh_random_moments(fit, [], ("buffeting",)) == []
+    assert weigh_random_moments(fit, [], BUFFETING) == []
 
 
 def test_turbulence_about_a_frequency_is_recovered():
