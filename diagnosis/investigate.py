@@ -246,9 +246,10 @@ def _read_off_explains(found: Study) -> bool:
 
 
 def _noise_explains(found: Study) -> bool:
-    """Whether the gap is so small that the noise, which misbehaves, is all of it."""
+    """Whether the gap is so small that the noise, which misbehaves, is all of it, or that its shares are chance."""
     block = found.nominal.problem.data.runs[0].block
-    return found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block
+    noisy = found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block
+    return noisy or found.nominal.chance > 1.0
 
 
 class _Clock:

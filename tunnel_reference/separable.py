@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from tunnel_reference.conditions import Array
-from tunnel_reference.draw import NUMBERS, CampaignDraw, redraw
+from tunnel_reference.draw import CampaignDraw, redraw
 from tunnel_reference.severity import read_and_fit, simulate_motions, size_effects
 
 OWN_EXCESS = 0.5
@@ -53,15 +53,15 @@ def _separable(draw: CampaignDraw) -> bool:
 
 
 def own_excesses(draws: Sequence[CampaignDraw]) -> list[CampaignDraw]:
-    """Set the own excess of every known effect that matters.
+    """Set the own excess of every effect that matters.
 
     Returns:
-        The campaigns; those outside the known families and without effects are unchanged.
+        The campaigns; those without effects are unchanged.
     """
     alone: list[CampaignDraw] = []
     places: list[tuple[int, int]] = []
     for number, draw in enumerate(draws):
-        slots = [i for i, e in enumerate(draw.effects) if not e.small and draw.kind in NUMBERS]
+        slots = [i for i, e in enumerate(draw.effects) if not e.small]
         for slot in [-1, *slots] if slots else []:
             alone.append(replace(draw, effects=(draw.effects[slot],) if slot >= 0 else ()))
             places.append((number, slot))

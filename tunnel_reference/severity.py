@@ -102,6 +102,16 @@ def _is_sensor(effect: EffectDraw, conditions: Conditions) -> bool:
     return isinstance(effect.form.bind(effect.value, effect.extra, with_defaults(conditions))[1], ReadingTerm)
 
 
+def _excess(alone: CampaignDraw, motion: Motion) -> float:
+    """Excess of a campaign; infinite where its motion grows without bound or is nothing like a free decay."""
+    if not np.all(np.isfinite(motion.angle)):
+        return np.inf
+    try:
+        return read_and_fit(alone, motion).excess
+    except (np.linalg.LinAlgError, ValueError):
+        return np.inf
+
+
 class _Search:
     """The search for one effect's severity parameter."""
 
@@ -115,8 +125,7 @@ class _Search:
     def try_out(self) -> None:
         """Compute the excess at the present value and choose the next; only sensor effects can reuse the motion."""
         assert self.motion is not None
-        finite = bool(np.all(np.isfinite(self.motion.angle)))
-        self.learn(read_and_fit(self.alone, self.motion).excess if finite else np.inf)
+        self.learn(_excess(self.alone, self.motion))
         if not self.sensor:
             self.motion = None
 

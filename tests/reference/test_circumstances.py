@@ -10,11 +10,11 @@ import pytest
 from tests.reference.rigs import rig
 from tunnel_reference import make
 from tunnel_reference.circumstances import draw_circumstances
-from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign, redraw
+from tunnel_reference.draw import BEYOND, CampaignDraw, EffectDraw, Mixture, draw_campaign, redraw
 from tunnel_reference.forms import forms_of
 from tunnel_reference.readings import read_motion
-from tunnel_reference.separable import own_excesses
-from tunnel_reference.severity import read_and_fit, simulate_motions, size_effects
+from tunnel_reference.separable import _separable, own_excesses
+from tunnel_reference.severity import _excess, read_and_fit, simulate_motions, size_effects
 from tunnel_reference.terms import Motion
 
 RIG = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
@@ -92,6 +92,27 @@ def test_effects_that_imitate_each_other_have_no_excess_of_their_own():
     sized = own_excesses(size_effects([alike, apart]))
     assert all(e.own < 0.1 * e.target for e in sized[0].effects)
     assert all(e.own > 0.5 * e.target for e in sized[1].effects)
+
+
+def test_an_effect_outside_the_vocabulary_must_matter_too():
+    weak, strong = (
+        CampaignDraw("outside", RIG, (replace(outside("damping_warms_up"), value=value),), 1)
+        for value in (1e-6, 1e-3)
+    )
+    assert [_separable(draw) for draw in own_excesses([weak, strong])] == [False, True]
+
+
+def outside(name):
+    form = next(form for form in BEYOND["outside"] if form.name == name)
+    return EffectDraw(form, form.draw(np.random.default_rng(0), RIG), form.signs[0], 1.0, form.start)
+
+
+def test_a_motion_that_is_no_decay_is_infinitely_severe():
+    alone = CampaignDraw("single", RIG, (effect("cubic_stiffness"),), 1)
+    n = round(RIG.duration * RIG.sample_rate)
+    away = np.full((n, RIG.runs), 1e200)
+    assert _excess(alone, Motion(away, away)) == np.inf
+    assert _excess(alone, Motion(np.full_like(away, np.nan), away)) == np.inf
 
 
 @pytest.mark.parametrize(("kind", "number"), [("none", 0), ("single", 1), ("three", 3), ("four", 4)])

@@ -96,13 +96,20 @@ def test_an_excess_is_measured_against_the_noise_of_a_perfect_model(
     assert excess_base(replace(asked, hum=None)).hum == 0.0
 
 
-def _left(excess: float, block: int, **given: object) -> Study:
+def _left(excess: float, block: int, chance: float = 0.01, **given: object) -> Study:
     """A study whose nominal fit leaves an excess in noise variances of a sample, of readings in blocks."""
     data = SimpleNamespace(runs=(SimpleNamespace(block=block),))
-    fitted = SimpleNamespace(excess=excess * block, problem=SimpleNamespace(data=data))
+    fitted = SimpleNamespace(excess=excess * block, chance=chance, problem=SimpleNamespace(data=data))
     noise = SimpleNamespace(variance={"r1": 0.5 * LEVEL, "r2": 1.5 * LEVEL})
     found = {"nominal": fitted, "noise": noise, "coarse": False, "step": 0.0, "hum": None}
     return SimpleNamespace(**(found | given))  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize(("chance", "explains"), [(0.9, False), (1.1, True)])
+def test_a_gap_below_the_scatter_of_the_noise_has_no_shares(chance: float, explains: bool) -> None:
+    """Bands may show a gap where the mean square does not; every set would close all of it."""
+    left = _left(0.002, 4, chance, test=SimpleNamespace(noisy=False))
+    assert _noise_explains(left) is explains
 
 
 @pytest.mark.parametrize("block", [1, 4])
