@@ -30,6 +30,7 @@ from diagnosis.policy import (
     COARSER_STEP,
     HUM_LEFT,
     NOISE_EXPLAINS_UP_TO,
+    NOISE_LEAVES,
     RIVAL_PROBABILITY,
     UNKNOWN_SHARE,
 )
@@ -149,9 +150,9 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     elif weighed[0].effects != UNKNOWN:
         with clock.step("polishing"):
             found = replace(found, hypotheses=_polished(found.hypotheses, weighed[0], random))
-    if weighed and _noise_explains(found) and _read_off_explains(found):
+    if weighed and _noise_explains(found, weighed) and _read_off_explains(found):
         weighed = []
-    elif weighed and _noise_explains(found):
+    elif weighed and _noise_explains(found, weighed):
         named = [replace(w, probability=0.0) for w in weighed if w.effects != UNKNOWN]
         weighed = [Weighed(UNKNOWN, 1.0, 1.0), *named]
     return replace(found, weighed=tuple(weighed))
@@ -245,11 +246,15 @@ def _read_off_explains(found: Study) -> bool:
     return found.hum is not None and left < HUM_LEFT * found.hum.excess
 
 
-def _noise_explains(found: Study) -> bool:
-    """Whether the gap is so small that the noise, which misbehaves, is all of it, or that its shares are chance."""
+def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
+    """Whether the gap is so small that the noise, which misbehaves, is all of it, or that its shares are chance.
+
+    Of noise, however it misbehaves, effects of a few numbers close little.
+    """
     block = found.nominal.problem.data.runs[0].block
-    noisy = found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block
-    return noisy or found.nominal.chance > 1.0
+    small = found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block
+    closed = any(w.effects != UNKNOWN and w.share < NOISE_LEAVES for w in weighed)
+    return found.nominal.chance > 1.0 or (small and not closed)
 
 
 class _Clock:

@@ -39,6 +39,9 @@ ROUNDED_NOISE = 1.5
 #: Gap, in noise variances of a sample, below which noise that misbehaves explains all of it. Judgement: as much
 #: again as the noise itself.
 NOISE_EXPLAINS_UP_TO = 1.0
+#: Share of the gap that effects leave at least where noise that misbehaves is all of it. Judgement, made when
+#: skipped samples that closed 98 % of a gap had been taken for noise.
+NOISE_LEAVES = 0.1
 
 # ---- What is read off the records before any fit --------------------------------------------------------------
 

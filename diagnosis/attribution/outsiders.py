@@ -20,7 +20,13 @@ from diagnosis.fitting.run_data import RunData
 from diagnosis.fitting.starting_points import project_out
 from tunnel_sim.vocabulary.record import Array
 
-_TIMES = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0)  # s: how slowly a zero follows
+_TIMES = (
+    0.25,
+    0.5,
+    1.0,
+    2.0,
+    4.0,
+)  # s: how slowly a zero follows; one that follows at once is a sensor's curve
 
 
 @dataclass(frozen=True)
@@ -73,13 +79,13 @@ def _motions(nominal: Fit) -> list[_Motion]:
 
 
 def _zero_follows_power(motions: list[_Motion]) -> list[list[Array]]:
-    """A zero that follows the squared angle, at once or with a lag, starting from zero or from a settled value."""
+    """A zero that follows the squared angle with a lag, starting from zero or from a settled value."""
     trials = []
     for time, settled in product(_TIMES, (False, True)):
         columns = []
         for motion in motions:
             square = motion.angle**2
-            keep = np.exp(-motion.run.interval / time) if time > 0.0 else 0.0
+            keep = np.exp(-motion.run.interval / time)
             # at rest before the release, or held at the release angle for long
             start = keep * square[0] if settled else 0.0
             columns.append(motion.run.scaled(lfilter([1.0 - keep], [1.0, -keep], square, zi=[start])[0]))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.decay.spectrum import highest_peak
+from identification.decay.spectrum import peak_of_swing
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.record import Record, evenly_spaced
@@ -135,8 +135,7 @@ def frequency(record: Record) -> float:
     record = evenly_spaced(record, bridged=False)
     swing = record.yaw_rad - np.mean(record.yaw_rad)
     size = _PADDING * swing.size
-    place, _ = highest_peak(swing * np.hanning(swing.size), size)
-    return place * record.sample_rate / size
+    return peak_of_swing(swing, size) * record.sample_rate / size
 
 
 def _rig(rig: RigProperties, change: Similarity) -> RigProperties:

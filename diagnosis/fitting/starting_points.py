@@ -15,7 +15,7 @@ from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData, departure
 from diagnosis.fitting.spectra import Line, mains_line, shedding_line
 from diagnosis.policy import GROSS_MISFIT
-from identification.decay.spectrum import highest_peak
+from identification.decay.spectrum import peak_of_swing
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.fitting import Circumstances, Trial
 from tunnel_sim.effects.parameters import ParameterInfo
@@ -86,8 +86,7 @@ def _frequency(run: RunData) -> float:
     """Frequency of the greatest peak of a run's spectrum, Hz."""
     values = run.reading - run.reading.mean()
     size = _PADDING * values.size
-    place, _ = highest_peak(values * np.hanning(values.size), size)
-    return float(place / (size * run.interval))
+    return float(peak_of_swing(values, size) / (size * run.interval))
 
 
 @dataclass(frozen=True)

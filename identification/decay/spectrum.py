@@ -12,6 +12,8 @@ from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
 
 _PADDING = 8  # zero padding: eight times the record, so the interpolated peak sits within 1/16 of a bin
 
+_FEWEST_CYCLES = 2.0  # in a record whose motion lasts as long as it does
+
 
 @dataclass(frozen=True)
 class SpectralPeak:
@@ -70,6 +72,25 @@ def highest_peak(values: Array, size: int, lowest: int = 1) -> tuple[float, Arra
     power = np.abs(np.fft.rfft(values, size)) ** 2
     peak = lowest + int(np.argmax(power[lowest:-1]))
     return peak + _parabola_offset(power[peak - 1 : peak + 2]), power
+
+
+def peak_of_swing(swing: Array, size: int) -> float:
+    """Where the spectrum of a decay is highest, between its bins.
+
+    Args:
+        swing: the series without its mean, shape (n,), any unit.
+        size: number of samples it is padded to with zeros, at least n.
+
+    Returns:
+        The place of the peak in bins, with a Hann window. A peak below two cycles of the series is none of the
+        motion's: a heavily damped one is over before the middle of the series. It is then sought with a window that
+        falls from the start.
+    """
+    place, _ = highest_peak(swing * _window(swing.size, falling=False), size)
+    per_cycle = size / swing.size
+    if place < _FEWEST_CYCLES * per_cycle:
+        place, _ = highest_peak(swing * _window(swing.size, falling=True), size, max(1, int(per_cycle)))
+    return place
 
 
 @lru_cache(maxsize=4)  # most runs of a campaign have the same length

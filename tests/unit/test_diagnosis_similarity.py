@@ -79,6 +79,14 @@ def test_a_similar_rig_moves_through_the_same_angles(name, change):
     assert np.max(np.abs(forward_motion(rig, still, 100.0).angle - own.angle)) > 1e-4  # the effect shows
 
 
+@pytest.mark.parametrize("damping", [0.002, 0.05, 0.2])
+def test_the_frequency_of_a_decay_is_found_however_early_it_ends(damping):
+    """A sensor that drifts has more power below one cycle in the record than a motion that is over at once."""
+    time = np.arange(0.0, 15.0, 1e-3)
+    decay = 0.2 * np.exp(-damping * 12.0 * time) * np.cos(12.0 * time) - 0.004 * np.sqrt(time / 15.0)
+    assert 2.0 * np.pi * frequency(Record(time, decay)) == pytest.approx(12.0, rel=0.05)
+
+
 def test_every_unit_goes_there_and_back():
     change = Similarity(0.03, 40.0)
     units = {info.unit for kind in ALL_EFFECTS for info in kind.parameters()}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from diagnosis.answer.reported import excess_base
-from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.decide import UNKNOWN, Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.random_moments import RandomAnswer
 from diagnosis.detection.mains import Hum
@@ -105,11 +105,14 @@ def _left(excess: float, block: int, chance: float = 0.01, **given: object) -> S
     return SimpleNamespace(**(found | given))  # type: ignore[return-value]
 
 
+OPEN = [Weighed(UNKNOWN, 0.0, 0.5), Weighed(("dropped_samples",), 0.2, 0.5)]
+
+
 @pytest.mark.parametrize(("chance", "explains"), [(0.9, False), (1.1, True)])
 def test_a_gap_below_the_scatter_of_the_noise_has_no_shares(chance: float, explains: bool) -> None:
     """Bands may show a gap where the mean square does not; every set would close all of it."""
     left = _left(0.002, 4, chance, test=SimpleNamespace(noisy=False))
-    assert _noise_explains(left) is explains
+    assert _noise_explains(left, [Weighed(("sensor_drift",), 0.0, 0.9)]) is explains
 
 
 @pytest.mark.parametrize("block", [1, 4])
@@ -119,7 +122,9 @@ def test_a_gap_below_the_scatter_of_the_noise_has_no_shares(chance: float, expla
 def test_noise_that_misbehaves_explains_a_gap_up_to_its_own_power(
     block: int, excess: float, noisy: bool, explains: bool
 ) -> None:
-    assert _noise_explains(_left(excess, block, test=SimpleNamespace(noisy=noisy))) is explains
+    left = _left(excess, block, test=SimpleNamespace(noisy=noisy))
+    assert _noise_explains(left, OPEN) is explains
+    assert not _noise_explains(left, [*OPEN, Weighed(("dropped_samples",), 0.02, 0.9)])
 
 
 @pytest.mark.parametrize("block", [1, 4])
