@@ -38,7 +38,7 @@ class SensorNonlinearity(Effect):
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.2,)
 
-    coefficient: float = parameter("s", "1/rad2", "cubic coefficient", scale=0.05, lower=-20.0, upper=20.0)
+    coefficient: float = parameter("s", "1/rad2", "cubic coefficient", scale=0.05, lower=-1.0, upper=1.0)
 
     exponent: float = exponent("p", "power of the angle in the error (unchanged at 0.2 rad)", 3.0)
 
@@ -47,8 +47,8 @@ class SensorNonlinearity(Effect):
         "1/rad",
         "coefficient of an additional quadratic error",
         scale=0.02,
-        lower=-5.0,
-        upper=5.0,
+        lower=-1.0,
+        upper=1.0,
         form=True,
     )
 
