@@ -249,7 +249,7 @@ def _read_off_explains(found: Study) -> bool:
 def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
     """Whether the gap is so small that the noise, which misbehaves, is all of it, or that its shares are chance.
 
-    Of noise, however it misbehaves, effects of a few numbers close little.
+    Effects of a few numbers close little of any noise, however it misbehaves.
     """
     block = found.nominal.problem.data.runs[0].block
     small = found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block

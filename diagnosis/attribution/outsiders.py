@@ -20,13 +20,8 @@ from diagnosis.fitting.run_data import RunData
 from diagnosis.fitting.starting_points import project_out
 from tunnel_sim.vocabulary.record import Array
 
-_TIMES = (
-    0.25,
-    0.5,
-    1.0,
-    2.0,
-    4.0,
-)  # s: how slowly a zero follows; one that follows at once is a sensor's curve
+# s: how slowly a zero follows; one that follows at once is a sensor's curve
+_TIMES = (0.25, 0.5, 1.0, 2.0, 4.0)
 
 
 @dataclass(frozen=True)

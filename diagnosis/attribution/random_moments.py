@@ -105,7 +105,10 @@ def weigh_random_moments(
 
 
 def _in_its_noise(known: Fit, spectrum: Spectrum) -> Fit:
-    """The effects of a fit fitted with the response to a random moment as noise; as it was where that cannot be."""
+    """A fit made again with the response to a random moment as noise.
+
+    Where the filter forgets too slowly or the fit fails, the fit is the one given: the limit is then hard on it.
+    """
     with suppress(FitError, np.linalg.LinAlgError):
         noisy = with_response(known, spectrum)
         return known if noisy is None else fit(replace(known.problem, data=noisy), known.point)
@@ -114,7 +117,7 @@ def _in_its_noise(known: Fit, spectrum: Spectrum) -> Fit:
 
 def _left_in_the_wind(fits: Sequence[Fit]) -> bool:
     """Whether most of what the best fit leaves is in the runs in the wind."""
-    best = min(fits, key=lambda fit: fit.total)
+    best = min(fits, key=lambda one: one.total)
     return wind_off_excess(best) < LEFT_IN_THE_WIND * best.excess
 
 
