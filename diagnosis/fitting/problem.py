@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,7 +16,7 @@ from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
-from tunnel_sim.physics.moment_law import parameter_vector
+from tunnel_sim.physics.moment_law import parameter_vector, run_dtype
 from tunnel_sim.physics.motion import Motion
 from tunnel_sim.physics.release import released_by_spring_end
 from tunnel_sim.physics.rod_modes import slow_motion
@@ -233,11 +234,17 @@ class Problem:
 
     def _jobs(self, point: Point) -> Iterator[tuple[int, _Job]]:
         """What there is to integrate at a point, by run."""
-        if np.all(np.isfinite(point.common)):
-            effects = self.effects_at(point.common)
-            for r in range(len(self.data.runs)):
-                if np.all(np.isfinite(point.release[r])):
-                    yield r, _Job(self, point, r, effects)
+        if not np.all(np.isfinite(point.common)):
+            return
+        effects = self.effects_at(point.common)
+        autonomous = all(kind.autonomous for kind in self.effects)
+        first: dict[object, _Job] = {}  # by the conditions: the stretches of a long record share a moment law
+        for r, run in enumerate(self.data.runs):
+            if np.all(np.isfinite(point.release[r])):
+                like = first.get(run.conditions) if autonomous else None
+                job = _Job(self, point, r, effects) if like is None else like.released(self, point, r)
+                first.setdefault(run.conditions, job)
+                yield r, job
 
 
 class _Job:
@@ -268,6 +275,17 @@ class _Job:
         law, step = compensated(law, run.wind_speed, stride * run.interval / substeps)
         self.row["step"], self.row["steps"], self.row["stride"] = step / stride, substeps, stride
         self.law = parameter_vector(law)
+
+    def released(self, problem: Problem, point: Point, run_index: int) -> _Job:
+        """Another run in equal conditions, where no effect knows the time or the release."""
+        job = copy.copy(self)
+        job.run = problem.data.runs[run_index]
+        job.zero = problem.zero(point.common, point.release[run_index])
+        job.row = self.row.copy()
+        job.row["angle"] = job.row["lagged"] = point.release[run_index, 0]
+        job.row["rate"] = point.release[run_index, 1]
+        job.blocks = job.run.reading.size
+        return job
 
     def reading(self, angle: Array, rate: Array) -> Array:
         """Block means of the reading from angle and rate at the blocks' ends."""
@@ -363,7 +381,9 @@ def _run_jobs(jobs: list[_Job]) -> list[Array]:
     for length in np.unique(lengths):
         at = np.flatnonzero(lengths == length)
         while at.size:
-            rows = np.concatenate([jobs[i].row for i in at])
+            rows = np.empty(at.size, dtype=run_dtype())
+            for k, i in enumerate(at):
+                rows[k] = jobs[i].row[0]
             law = np.stack([jobs[i].law for i in at])
             angle, rate, status = integrate(law, rows, int(length) + 1)
             done = at if status == 0 else at[: status - 1]

@@ -60,6 +60,12 @@ class RunData:
     whitening: Array = field(default_factory=lambda: WHITE)
 
     @property
+    def conditions(self) -> tuple[object, ...]:
+        """What the moment law and its integration depend on: spring, wind and sampling."""
+        stated = (self.spring_stiffness, self.wind_speed, self.air_density)
+        return (*stated, self.interval, self.block, self.derivative)
+
+    @property
     def wind_on(self) -> bool:
         """Whether the wind blows."""
         return self.wind_speed > 0.0

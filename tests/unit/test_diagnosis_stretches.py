@@ -10,7 +10,7 @@ from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
 from diagnosis.fitting.stretches import fit_longer, in_stretches, long_stretch
 from diagnosis.investigate import fit_nominal
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, INTERVAL, campaign, nominal
-from tunnel_sim.effects import effect_class
+from tunnel_sim.effects import ALL_EFFECTS, effect_class
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +41,26 @@ def test_longer_stretches_begin_where_shorter_ones_do(data, factor):
 def test_sets_are_compared_over_eighteen_cycles(data):
     short = in_stretches(data)
     assert long_stretch(short) * INTERVAL * REFERENCE_FREQUENCY == pytest.approx(18.0)
+
+
+@pytest.mark.parametrize(
+    "kind", [kind for kind in ALL_EFFECTS if kind.autonomous], ids=lambda kind: kind.name
+)
+def test_a_stretch_moves_as_it_does_alone(kind, data):
+    """Stretches in equal conditions share a moment law, and nothing else."""
+    stretches = in_stretches(data, 230).data.runs[::7]
+    release = np.array([[0.05 * (k + 1), 0.2 - 0.1 * k] for k in range(len(stretches))])
+    common = [0.11, 0.05, *(0.01 * (k + 1) for k in range(30))]
+
+    def predicted(runs, release):
+        problem = Problem(data.with_runs(tuple(runs)), (kind,), free_forms=(kind.name,))
+        within = np.clip(common[: len(problem.names)], *problem.bounds)
+        return problem.predict([Point(within, release)])[0]
+
+    together = predicted(stretches, release)
+    assert len({run.reading.size for run in stretches}) > 1
+    for k, run in enumerate(stretches):
+        np.testing.assert_array_equal(together[k], predicted([run], release[k : k + 1])[0])
 
 
 def test_releases_are_taken_over_from_shorter_stretches(data, monkeypatch):

@@ -11,7 +11,7 @@ of (ωh)⁵/144 and a relative frequency error of −(ωh)⁴/120. The phase ang
 
 Fits predict thousands of runs and may err up to the noise of a block mean: their steps are longer
 (`fit_substeps`) and make up for their own error (`compensated`). What is reported is predicted once more in steps
-of `REPORT_STEP` at most (`report_substeps`): half those of a fit of a body below 27 rad/s.
+of `REPORT_STEP` at most (`report_substeps`), a quarter of the longest of a fit.
 
 Steps are only divided by whole numbers, so that a sample interval remains a whole number of steps.
 """
@@ -42,7 +42,7 @@ LEAST_STEP = 0.999 / (USUAL_RATE * MOST_SUBSTEPS)
 #: Longest step of what is reported, s.
 REPORT_STEP = 2e-3
 
-_FIT_STEP = 4.001e-3  # s: no shorter than a block mean, whatever its last digit
+_FIT_STEP = 8.75e-3  # s: a body at the 2 Hz to which the fits scale time turns by `_FIT_BODY_TURN`
 _FIT_BODY_TURN = 0.11  # rad: once `compensated`, some 1e-6 rad over 10 s
 _FIT_MOST_STRIDE = 3  # block means per step
 #: Parameters of moments that a long step of a fit does not follow: kinks, and a spring that is not linear.
