@@ -10,6 +10,7 @@ from identification.policy import LEAST_NOISE, LEAST_PEAK_SHARE
 from tunnel_sim.vocabulary.record import Array, Record
 
 PEAK_HALF_WIDTH = 1.0 / 12.0  # of a period, either side of a peak, that its parabola is fitted to
+_LEAST_SAMPLES = 1.5001  # either side of a peak, whose parabola needs three
 _LEAST_PEAKS = 4
 _MOVES = 8  # of half a window each
 
@@ -71,8 +72,8 @@ def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
 def follow_peaks(record: Record, frequency: float) -> tuple[Array, Array]:
     """Peaks of both signs, each looked for half a period after the one before.
 
-    A peak is the vertex of a parabola through the samples within a twelfth of a period of it. The first is
-    looked for past the release itself.
+    A peak is the vertex of a parabola through the samples within a twelfth of a period of it, or through the three
+    samples about it where they are fewer. The first is looked for past the release itself.
 
     Args:
         record: the reading, rad against s.
@@ -84,6 +85,7 @@ def follow_peaks(record: Record, frequency: float) -> tuple[Array, Array]:
     """
     time = record.time_s - record.time_s[0]
     half = 0.5 / frequency
+    width = max(PEAK_HALF_WIDTH / frequency, _LEAST_SAMPLES * float(np.median(np.diff(time))))
     middle = 0.5 * (float(record.yaw_rad.max()) + float(record.yaw_rad.min()))
     search = np.flatnonzero((time >= 0.25 * half) & (time <= 1.25 * half))
     times: list[float] = []
@@ -91,8 +93,8 @@ def follow_peaks(record: Record, frequency: float) -> tuple[Array, Array]:
     expected = (
         float(time[search[np.argmax(np.abs(record.yaw_rad[search] - middle))]]) if search.size else np.inf
     )
-    while expected + 2.0 * half * PEAK_HALF_WIDTH <= time[-1]:
-        vertex = _vertex(time, record.yaw_rad, expected, 2.0 * half * PEAK_HALF_WIDTH)
+    while expected + width <= time[-1]:
+        vertex = _vertex(time, record.yaw_rad, expected, width)
         if vertex is None:
             break
         if len(heights) >= 2 and (vertex[1] > heights[-1]) != (heights[-2] > heights[-1]):
