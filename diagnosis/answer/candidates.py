@@ -111,7 +111,7 @@ def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
             bound = fit.bound(name)
             std = None if bound else fit.std(name) * inflate
             given = ParameterEstimate(fit.value(name), std, infos[name].unit, bound)
-            found[name] = meant_parameter(given, infos[name])
+            found[name] = meant_parameter(given, infos[name], problem.data.swing)
         for name, value in problem.fixed:
             found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
     if random is not None:

@@ -12,18 +12,20 @@ from diagnosis.result import ParameterEstimate
 from tunnel_sim.effects.parameters import ParameterInfo
 
 
-def meant_parameter(found: ParameterEstimate, info: ParameterInfo) -> ParameterEstimate:
+def meant_parameter(found: ParameterEstimate, info: ParameterInfo, swing: float) -> ParameterEstimate:
     """A fitted parameter, without its standard deviation where that says nothing.
 
     Args:
         found: the estimate.
         info: the parameter's usual size and range.
+        swing: largest angle of the motion, rad.
 
     Returns:
         The estimate; not determined where its standard deviation exceeds that of a uniform distribution over the
         range allowed, or ten times the parameter's value and usual size.
     """
-    uniform = (info.fit_upper - info.fit_lower) / math.sqrt(12.0)
+    lower, upper = info.fit_range(swing)
+    uniform = (upper - lower) / math.sqrt(12.0)
     size = UNDETERMINED_FACTOR * max(abs(found.value), info.scale)
     return _limited(found, min(uniform, size))
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from diagnosis.fitting.samples import Samples, hermite_basis, hermite_means
-from diagnosis.fitting.similarity import AS_MEASURED, Similarity
+from diagnosis.fitting.similarity import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
 from diagnosis.fitting.whitening import WHITE, colour, colouring, response, whiten
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
@@ -238,6 +238,12 @@ class Data:
         if self.law is None or not self.law.terms:
             return ()
         return departure(self.law).program({}, {"b": "angle", "r": "rate"})
+
+    @cached_property
+    def swing(self) -> float:
+        """The largest angle of the motion from its middle, rad, also where the readings are rates."""
+        turn = 2.0 * np.pi * REFERENCE_FREQUENCY
+        return max(0.5 * float(np.ptp(run.reading)) / turn**run.derivative for run in self.runs)
 
     @property
     def springs(self) -> tuple[float, ...]:

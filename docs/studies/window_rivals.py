@@ -246,7 +246,7 @@ class _Task:
         info = kind.parameters()[0]
         best, least = None, np.inf
         for unit in (sign * size for size in _SCAN for sign in (1.0, -1.0)):
-            if not info.lower <= unit * info.scale <= info.upper:
+            if not info.fit_lower <= unit * info.scale <= info.fit_upper:
                 continue
             x = self.adjusted((kind,), np.array([unit, 0.0, 0.0]))
             cost = np.inf if x is None else float(np.sum(self.residuals((kind,), x) ** 2))
@@ -273,8 +273,8 @@ class _Task:
         base = (
             np.array([[_SLOWEST * omega - omega, -_LEAST_ZETA - zeta], [omega, _MOST_ZETA - zeta]]) / _SCALES
         )
-        lower = np.array([info.lower / info.scale for info in infos] + base[0].tolist())
-        upper = np.array([info.upper / info.scale for info in infos] + base[1].tolist())
+        lower = np.array([info.fit_lower / info.scale for info in infos] + base[0].tolist())
+        upper = np.array([info.fit_upper / info.scale for info in infos] + base[1].tolist())
 
         def residuals(x: Array) -> Array:
             return self.residuals(kinds, x)

@@ -69,15 +69,16 @@ def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
     )
 
 
-def follow_peaks(record: Record, frequency: float) -> tuple[Array, Array]:
+def follow_peaks(record: Record, frequency: float, *, sparse: bool = False) -> tuple[Array, Array]:
     """Peaks of both signs, each looked for half a period after the one before.
 
-    A peak is the vertex of a parabola through the samples within a twelfth of a period of it, or through the three
-    samples about it where they are fewer. The first is looked for past the release itself.
+    A peak is the vertex of a parabola through the samples within a twelfth of a period of it. The first is
+    looked for past the release itself.
 
     Args:
         record: the reading, rad against s.
         frequency: of the oscillation, Hz.
+        sparse: whether three samples make a peak where a twelfth of a period holds fewer, as noise does too.
 
     Returns:
         Instants since the first sample in s and heights in rad, shape (n,) each; they end where peaks no
@@ -85,7 +86,9 @@ def follow_peaks(record: Record, frequency: float) -> tuple[Array, Array]:
     """
     time = record.time_s - record.time_s[0]
     half = 0.5 / frequency
-    width = max(PEAK_HALF_WIDTH / frequency, _LEAST_SAMPLES * float(np.median(np.diff(time))))
+    width = PEAK_HALF_WIDTH / frequency
+    if sparse:
+        width = max(width, _LEAST_SAMPLES * float(np.median(np.diff(time))))
     middle = 0.5 * (float(record.yaw_rad.max()) + float(record.yaw_rad.min()))
     search = np.flatnonzero((time >= 0.25 * half) & (time <= 1.25 * half))
     times: list[float] = []

@@ -80,7 +80,7 @@ def centre_of(run: Run, resolution: float) -> Centre | None:
     frequency = starting_frequency(run.record)
     if frequency is None:
         return None
-    heights = follow_peaks(run.record, frequency)[1]
+    heights = follow_peaks(run.record, frequency, sparse=True)[1]
     swings = 0.5 * np.abs(np.diff(heights))
     if swings.size < _LEAST_CENTRES + 1:
         return None

@@ -9,8 +9,9 @@ import pytest
 
 from tests.reference.effect_cases import VALUES, settings
 from tests.reference.effect_oracle import Setting
-from tunnel_sim.effects import ALL_EFFECTS, EffectChain, effect_from
+from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
 from tunnel_sim.effects.fitting import WindOnRun
+from tunnel_sim.effects.parameters import SWING
 
 TIME = np.linspace(0.0, 10.0, 1001)
 ANGLE = 0.3 * np.exp(-0.1 * TIME) * np.cos(9.0 * TIME)
@@ -112,3 +113,23 @@ def test_the_loss_may_follow_the_motion_or_the_rig_in_still_air():
     assert moment == pytest.approx(abs(stiffer.mean()) / np.sqrt(3.0))
     assert rate == pytest.approx(abs(lost.mean()) / np.sqrt(3.0))
     assert damping.unseen_form(0.5, []) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("kind", ALL_EFFECTS, ids=lambda kind: kind.name)
+def test_a_smaller_swing_never_narrows_what_a_fit_may_take(kind: type[Effect]) -> None:
+    for info in kind.parameters():
+        assert info.fit_range(SWING) == info.fit_range(4.0) == (info.fit_lower, info.fit_upper)
+        lower, upper = info.fit_range(0.1 * SWING)
+        assert lower <= info.fit_lower
+        assert upper >= info.fit_upper
+
+
+def test_a_range_per_squared_angle_follows_the_swing() -> None:
+    info = effect_class("cubic_stiffness").parameters()[0]
+    assert info.fit_range(0.1 * SWING) == pytest.approx((100.0 * info.fit_lower, 100.0 * info.fit_upper))
+    stiffness = effect_class("gravity_stiffness").parameters()[0]
+    assert stiffness.fit_range(0.1 * SWING) == (stiffness.fit_lower, stiffness.fit_upper)
+    contact = next(
+        info for info in effect_class("coulomb_friction").parameters() if info.name == "presliding"
+    )
+    assert contact.fit_range(0.1 * SWING) == pytest.approx((0.1 * contact.fit_lower, contact.fit_upper))

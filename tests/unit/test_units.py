@@ -6,7 +6,7 @@ import pytest
 
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.units import dimension, in_si
+from tunnel_sim.vocabulary.units import angle_power, dimension, in_si
 
 
 @pytest.mark.parametrize(
@@ -36,3 +36,20 @@ def test_every_unit_of_the_vocabulary_is_known_but_that_of_the_lag() -> None:
 def test_what_is_not_a_unit_is_refused(unit: str) -> None:
     with pytest.raises(TunnelError, match="write it of kg, m, s, rad, N and Hz"):
         dimension(unit)
+
+
+@pytest.mark.parametrize(
+    ("unit", "power"),
+    [
+        ("rad", 1),
+        ("N m", 1),
+        ("1/rad2", -2),
+        ("1/rad", -1),
+        ("N m/rad", 0),
+        ("N m s2/rad2", -1),
+        ("rad/(N m)", 0),
+        ("1", 0),
+    ],
+)
+def test_moments_grow_with_the_angles(unit: str, power: float) -> None:
+    assert angle_power(unit) == power

@@ -34,8 +34,10 @@ class AsymmetricStiffness(Effect):
         "1/rad",
         "relative change of stiffness per angle",
         scale=0.05,
-        lower=-2.0,
-        upper=2.0,
+        lower=-1e6,
+        upper=1e6,
+        fit_lower=-2.0,
+        fit_upper=2.0,
     )
 
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 2.0)

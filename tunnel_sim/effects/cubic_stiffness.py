@@ -31,8 +31,10 @@ class CubicStiffness(Effect):
         "1/rad2",
         "relative change of stiffness per squared angle, positive when hardening",
         scale=0.2,
-        lower=-10.0,
-        upper=50.0,
+        lower=-1e6,
+        upper=1e6,
+        fit_lower=-10.0,
+        fit_upper=50.0,
     )
 
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 3.0)

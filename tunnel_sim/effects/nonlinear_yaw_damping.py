@@ -29,7 +29,14 @@ class NonlinearYawDamping(Effect):
     example = (20.0,)
 
     coefficient: float = parameter(
-        "μa", "1/rad2", "relative change of Ca per squared angle", scale=5.0, lower=-500.0, upper=500.0
+        "μa",
+        "1/rad2",
+        "relative change of Ca per squared angle",
+        scale=5.0,
+        lower=-1e6,
+        upper=1e6,
+        fit_lower=-500.0,
+        fit_upper=500.0,
     )
 
     exponent: float = exponent("p", "power of the angle in the factor (unchanged at 0.2 rad)", 2.0)

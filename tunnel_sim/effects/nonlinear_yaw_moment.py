@@ -27,7 +27,14 @@ class NonlinearYawMoment(Effect):
     example = (3.0,)
 
     coefficient: float = parameter(
-        "κa", "1/rad2", "relative change of Ka per squared angle", scale=1.0, lower=-100.0, upper=100.0
+        "κa",
+        "1/rad2",
+        "relative change of Ka per squared angle",
+        scale=1.0,
+        lower=-1e6,
+        upper=1e6,
+        fit_lower=-100.0,
+        fit_upper=100.0,
     )
 
     exponent: float = exponent("p", "power of the angle in the factor (unchanged at 0.2 rad)", 2.0)

@@ -6,6 +6,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+from tunnel_sim.vocabulary.units import angle_power
+
+SWING = 0.3
+"""Least swing that the ranges of the parameters are meant for, rad: a release at 20 degrees keeps above it."""
+
 LEAST_EXPONENT = 0.25
 """Smallest exponent: below it a term is nearly a jump, which the integration steps do not resolve."""
 
@@ -23,8 +28,8 @@ class ParameterInfo:
         upper: greatest value allowed, in the unit.
         default: value where none is given, in the unit; zero for the severity.
         form: whether it generalises the effect's form; its default gives the textbook form.
-        fit_lower: least value a fit may take, in the unit.
-        fit_upper: greatest value a fit may take, in the unit.
+        fit_lower: least value a fit of swings from `SWING` on may take, in the unit.
+        fit_upper: greatest value a fit of such swings may take, in the unit.
         rate_exponent: name of the parameter that is the power of the rate which it multiplies; empty: none.
         beside_spring: whether only a spring of stated stiffness beside the effect makes it known; else it is held.
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
@@ -46,6 +51,23 @@ class ParameterInfo:
     beside_spring: bool
     chosen_spring: bool
     per_pressure: bool
+
+    def fit_range(self, swing: float) -> tuple[float, float]:
+        """Least and greatest value that a fit may take.
+
+        Args:
+            swing: largest angle of the motion, rad. Below `SWING` what is per angle may be as much greater, and
+                what is an angle as much smaller: the moments' shares then stay as they are.
+
+        Returns:
+            Both, in the unit.
+        """
+        if "rad" not in self.unit or not 0.0 < swing < SWING:
+            return self.fit_lower, self.fit_upper
+        wider = (SWING / swing) ** -angle_power(self.unit)
+        if wider > 1.0:
+            return max(self.lower, self.fit_lower * wider), min(self.upper, self.fit_upper * wider)
+        return (self.fit_lower * wider if self.fit_lower > 0.0 else self.fit_lower), self.fit_upper
 
 
 def parameter(

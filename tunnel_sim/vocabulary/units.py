@@ -61,6 +61,29 @@ def dimension(unit: str) -> Dimension:
     return product(found, of_below)
 
 
+@functools.cache
+def angle_power(unit: str) -> float:
+    """How a quantity changes where all angles are multiplied by a number, and moments with them.
+
+    Args:
+        unit: as for `dimension`.
+
+    Returns:
+        The power of that number: 1 for an angle or a moment, 0 for a stiffness, -2 for 1/rad2.
+
+    Raises:
+        TunnelError: as `dimension`.
+    """
+    above, _, below = unit.partition("/")
+    return dimension(unit)[0] + _radians(above) - _radians(below.strip("()"))
+
+
+def _radians(text: str) -> float:
+    """The power of the radian in a product."""
+    found = map(_FACTOR.fullmatch, text.split())
+    return sum(float(match[2] or 1.0) for match in found if match is not None and match[1] == "rad")
+
+
 def _factors(text: str, sign: float) -> Dimension | None:
     """The dimension of a product; None where a factor is unknown."""
     found = NUMBER
