@@ -197,6 +197,26 @@ def test_a_stretched_campaign_has_the_same_causes(twice_caused, quantity, time, 
     assert_same_answer(*twice_caused[quantity], time, moment)
 
 
+@pytest.mark.parametrize("factor", [0.01, 0.1, 10.0])
+def test_a_factor_on_the_angles_leaves_the_causes(twice_caused, factor):
+    """Moments grow with the angles; a coefficient per squared angle ends at no bound meant for larger swings."""
+    data, first = twice_caused["angle"]
+    sensor = dataclasses.replace(data.sensor, noise_std=data.sensor.noise_std * factor)
+    runs = tuple(
+        dataclasses.replace(run, record=Record(run.record.time_s, run.record.yaw_rad * factor))
+        for run in data.runs
+    )
+    found = investigate(dataclasses.replace(data, sensor=sensor, runs=runs), FEW)
+    assert found.causes == first.causes
+    known = {answer.effects: answer.probability for answer in first.weighed}
+    for answer in found.weighed:
+        assert answer.probability == pytest.approx(known[answer.effects], abs=0.02)
+    name = "cubic_stiffness.coefficient"
+    # beside forms, which polishing frees where that lowers χ², a coefficient is known less well
+    allowed = first.chosen.std(name) / factor**2 + found.chosen.std(name)
+    assert found.chosen.value(name) == pytest.approx(first.chosen.value(name) / factor**2, abs=allowed)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("quantity", ["angle", "rate"])
 @pytest.mark.parametrize(("time", "moment"), GRID)
