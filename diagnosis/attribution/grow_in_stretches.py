@@ -14,7 +14,7 @@ from diagnosis.attribution.hypothesis import Hypothesis, with_forms
 from diagnosis.fitting.least_squares import Fit, FitError
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.starting_points import is_gross
-from diagnosis.fitting.stretches import Stretches, fit_longer, in_stretches, long_stretch
+from diagnosis.fitting.stretches import Stretches, fit_longer, in_stretches, long_stretch, spread_out
 from diagnosis.policy import FREED_FROM, GROWN_FROM, LENGTHENED
 from tunnel_sim.effects import Effect
 
@@ -72,7 +72,7 @@ def grow_in_stretches(
         The best sets of each size, compared in long stretches. Effects are added in short ones, in which the phase
         cannot be lost, and in long ones to the sets that keep it there: a slow loss hardly shows in two cycles.
     """
-    short = in_stretches(data)
+    short = spread_out(in_stretches(data), data)
     first = fit_nominal(short.data)
     try:
         nominal, long = fit_longer(first, short, data, long_stretch(short))

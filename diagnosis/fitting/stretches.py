@@ -8,7 +8,9 @@ damping that differ from stretch to stretch (multiple shooting; Bock, Springer S
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Container
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.problem import Point
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
+from diagnosis.policy import GROWN_ON
 
 _SHORT, _LONG = 2, 18  # cycles
 _LONGER = 3  # times, from one fit to the next: the phase at the end of a stretch is known to that much
@@ -49,6 +52,14 @@ class Stretches:
     places: tuple[tuple[int, int], ...]
     length: int
 
+    def only(self, places: Container[tuple[int, int]]) -> Stretches:
+        """Those of the places given."""
+        if all(place in places for place in self.places):
+            return self
+        kept = [k for k, place in enumerate(self.places) if place in places]
+        runs = tuple(self.data.runs[k] for k in kept)
+        return Stretches(self.data.with_runs(runs), tuple(self.places[k] for k in kept), self.length)
+
 
 def in_stretches(data: Data, length: int | None = None) -> Stretches:
     """Cut runs into stretches.
@@ -71,13 +82,34 @@ def in_stretches(data: Data, length: int | None = None) -> Stretches:
     return Stretches(data.with_runs(tuple(parts)), tuple(places), length)
 
 
+def spread_out(short: Stretches, data: Data) -> Stretches:
+    """Stretches of two cycles to grow sets of causes on, spread over the runs where all would be too many.
+
+    Args:
+        short: all of them.
+
+    Returns:
+        Those that lie in every k-th stretch of eighteen cycles, the first of each run among them. k is the least
+        with which the runs divided by it have no more than `GROWN_ON` blocks.
+    """
+    each = ceil(sum(run.reading.size for run in data.runs) / GROWN_ON)
+    long = in_stretches(data, long_stretch(short))
+    kept: set[tuple[int, int]] = set()
+    for run in range(len(data.runs)):
+        begins = [begin for number, begin in long.places if number == run]
+        ends = [*begins[1:], data.runs[run].reading.size]
+        for begin, end in list(zip(begins, ends, strict=True))[::each]:
+            kept.update(place for place in short.places if place[0] == run and begin <= place[1] < end)
+    return short.only(kept)
+
+
 def fit_longer(
     found: Fit, stretches: Stretches, data: Data, length: int | None = None
 ) -> tuple[Fit, Stretches]:
     """Fit ever longer stretches, each from the fit of shorter ones.
 
     Args:
-        found: a fit of the stretches.
+        found: a fit of the stretches, the first of each run among them.
         length: to reach, in blocks; None: whole runs.
 
     Returns:
@@ -89,10 +121,10 @@ def fit_longer(
     longest = max(run.reading.size for run in data.runs)
     goal = longest if length is None else min(length, longest)
     while stretches.length < goal:
-        longer = in_stretches(data, min(stretches.length * _LONGER, goal))
+        known = dict(zip(stretches.places, found.point.release, strict=True))
+        longer = in_stretches(data, min(stretches.length * _LONGER, goal)).only(known)
         if longer.length >= longest:
             longer = Stretches(data, tuple((i, 0) for i in range(len(data.runs))), longest)
-        known = dict(zip(stretches.places, found.point.release, strict=True))
         release = np.array([known[place] for place in longer.places])
         problem = dataclasses.replace(found.problem, data=longer.data)
         start = Point(found.point.common, release)

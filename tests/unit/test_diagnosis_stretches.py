@@ -7,7 +7,7 @@ from diagnosis.attribution.grow_in_stretches import grow_in_stretches
 from diagnosis.fitting.least_squares import FitError, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
-from diagnosis.fitting.stretches import fit_longer, in_stretches, long_stretch
+from diagnosis.fitting.stretches import fit_longer, in_stretches, long_stretch, spread_out
 from diagnosis.investigate import fit_nominal
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, INTERVAL, campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
@@ -61,6 +61,29 @@ def test_a_stretch_moves_as_it_does_alone(kind, data):
     assert len({run.reading.size for run in stretches}) > 1
     for k, run in enumerate(stretches):
         np.testing.assert_array_equal(together[k], predicted([run], release[k : k + 1])[0])
+
+
+def test_of_many_stretches_every_second_long_one_is_used(data, monkeypatch):
+    monkeypatch.setattr("diagnosis.fitting.stretches._LONG", 6)  # these runs are shorter than two of eighteen
+    short = in_stretches(data)
+    assert spread_out(short, data).places == short.places
+    sizes = [run.reading.size for run in data.runs]
+    monkeypatch.setattr("diagnosis.fitting.stretches.GROWN_ON", sum(sizes) - 1)
+    found, long = spread_out(short, data), long_stretch(short)
+    assert {place[0] for place in found.places if place[1] == 0} == set(range(len(sizes)))
+    last = {number: max(1, round(size / long)) - 1 for number, size in enumerate(sizes)}
+    expected = [place for place in short.places if min(place[1] // long, last[place[0]]) % 2 == 0]
+    assert list(found.places) == expected
+    assert 0 < len(expected) < len(short.places)
+
+
+def test_whole_runs_are_fitted_from_some_of_their_stretches(data, monkeypatch):
+    monkeypatch.setattr("diagnosis.fitting.stretches._LONG", 6)
+    monkeypatch.setattr("diagnosis.fitting.stretches.GROWN_ON", 1000)
+    short = spread_out(in_stretches(data), data)
+    found, longest = fit_longer(fit_nominal(short.data), short, data)
+    assert longest.data is data
+    assert found.excess == pytest.approx(fit_nominal(data).excess, rel=1e-3, abs=1e-3)
 
 
 def test_releases_are_taken_over_from_shorter_stretches(data, monkeypatch):
