@@ -35,6 +35,7 @@ def campaign(
     seed: int = 3,
     duration: float = DURATION,
     quantity: Quantity | None = None,
+    damping: float = DAMPING,
 ) -> Campaign:
     """Six runs of two springs and three speeds, with effects, and something added to every reading."""
     count = round(duration / INTERVAL)
@@ -64,7 +65,7 @@ def campaign(
     )
     problem = Problem(Data(runs, 0.036, 0.625, 0.225, False, INERTIA), kinds, free_forms=shaped)
     values = [getattr(e, i.name) for e in effects for i in e.parameters() if not i.form or e.name in shaped]
-    common = np.array([INERTIA, DAMPING, CN_BETA, CN_R, 0.001, *values])
+    common = np.array([INERTIA, damping, CN_BETA, CN_R, 0.001, *values])
     own = [np.linspace(0.2, 0.8, len(runs))] * len(
         problem.phased
     )  # phases (rad) or instants (shares of the run)

@@ -120,8 +120,8 @@ def test_a_smaller_swing_never_narrows_what_a_fit_may_take(kind: type[Effect]) -
     for info in kind.parameters():
         assert info.fit_range(SWING) == info.fit_range(4.0) == (info.fit_lower, info.fit_upper)
         lower, upper = info.fit_range(0.1 * SWING)
-        assert lower <= info.fit_lower
-        assert upper >= info.fit_upper
+        assert info.lower <= lower <= info.fit_lower
+        assert info.fit_upper <= upper <= info.upper
 
 
 def test_a_range_per_squared_angle_follows_the_swing() -> None:

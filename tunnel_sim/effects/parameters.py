@@ -67,7 +67,8 @@ class ParameterInfo:
         wider = (SWING / swing) ** -angle_power(self.unit)
         if wider > 1.0:
             return max(self.lower, self.fit_lower * wider), min(self.upper, self.fit_upper * wider)
-        return (self.fit_lower * wider if self.fit_lower > 0.0 else self.fit_lower), self.fit_upper
+        least = self.fit_lower * wider if self.unit == "rad" and self.fit_lower > 0.0 else self.fit_lower
+        return max(self.lower, least), self.fit_upper
 
 
 def parameter(
