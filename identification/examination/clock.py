@@ -13,6 +13,7 @@ from tunnel_sim.vocabulary.record import CLOCK_TOLERANCE, Array, Record
 
 _FINEST = 9  # decimals: no logger rounds to less than a nanosecond
 _ON_LATTICE = 1e-3  # of the lattice's step: rounding errors of the decimals themselves
+_TIMER_DECIMALS = 10  # steps of the decimals that a timer's must exceed, or any stamps would lie on it
 _SWEEPS = 8
 _NO_GAP = 1.75  # usual steps: a longer one may be a gap
 _MOST_MISSING = 1e3  # ticks per sample: beyond it the stamps are not those of one clock
@@ -69,12 +70,13 @@ def find_clock(time_s: Array) -> Clock | None:
         time_s: stamps, increasing, shape (n,), s.
 
     Returns:
-        The clock whose ticks, rounded to the last decimal of the stamps, are the stamps; samples may be missing.
-        None if there is none.
+        The clock whose ticks, rounded to the last decimal of the stamps or to the ticks of a logger's timer, are
+        the stamps; samples may be missing. None if there is none.
     """
     steps = np.diff(time_s)
     usual = steps[steps < _NO_GAP * np.median(steps)]
-    allowed = _rounding(time_s)
+    decimal = _rounding(time_s)
+    allowed = max(decimal, _timer(steps, decimal))
     for interval in (float(np.mean(steps)), float(np.mean(usual))):
         found = _counted(time_s, interval)
         if found is not None and found.away <= max(allowed, CLOCK_TOLERANCE * found.interval):
@@ -108,6 +110,22 @@ def _rounding(time_s: Array) -> float:
         if np.abs(scaled - np.round(scaled)).max() < _ON_LATTICE:
             return float(10.0**-decimals)
     return 0.0
+
+
+def _timer(steps: Array, decimal: float) -> float:
+    """Step of a timer that all steps between stamps are multiples of, s; 0 if there is none.
+
+    Args:
+        steps: between stamps, s, shape (n - 1,).
+        decimal: step of the decimals of the stamps, s, as `_rounding` gives it.
+    """
+    changes = np.diff(np.sort(steps))
+    changes = changes[changes > max(_TIMER_DECIMALS * decimal, CLOCK_TOLERANCE * float(steps.max()))]
+    if not changes.size:
+        return 0.0
+    whole = np.round(steps / changes.min())
+    step = float(steps @ whole / (whole @ whole))
+    return step if np.abs(steps - step * whole).max() < decimal + _ON_LATTICE * step else 0.0
 
 
 def _matters(clock: Clock) -> bool:

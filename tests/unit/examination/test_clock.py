@@ -33,6 +33,23 @@ def test_the_clock_behind_stamps_of_whole_milliseconds(interval, cut_off):
     assert -1e-3 * cut_off < late.mean() < 1e-5  # cutting off moves all samples alike
 
 
+@pytest.mark.parametrize("decimals", [None, 7, 6])
+@pytest.mark.parametrize("tick", [0.000249226, 0.000461434, 1.0 / 4096.0])
+def test_the_clock_behind_stamps_of_a_timer(tick, decimals):
+    """A timer's ticks need be no decimals."""
+    true = 17.3 + 0.001 * np.arange(4000)
+    stamps = tick * np.round(true / tick)
+    found = find_clock(stamps if decimals is None else np.round(stamps, decimals))
+    assert found is not None
+    assert found.interval == pytest.approx(0.001, rel=1e-6)
+    assert found.missing == 0
+
+
+def test_uneven_samples_on_a_timer_have_no_clock():
+    ticks = np.random.default_rng(4).integers(2, 7, 4000)
+    assert find_clock(0.000249226 * np.cumsum(ticks)) is None
+
+
 def test_missing_samples_do_not_hide_the_clock():
     interval, place = 0.01004, np.delete(np.arange(4000), [*range(700, 760), 2000, 3001])
     found = find_clock(np.round(interval * place, 3))
