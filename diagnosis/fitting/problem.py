@@ -145,12 +145,8 @@ class Problem:
         """Least and greatest values of the common parameters."""
         low = {"yaw_inertia": 1e-9, "stiffness": 0.0, "mechanical_damping": 0.0}
         infos = {f"{kind.name}.{info.name}": info for kind in self.effects for info in kind.parameters()}
-        found = np.array(
-            [
-                infos[name].fit_range(self.data.swing) if name in infos else (low.get(name, -np.inf), np.inf)
-                for name in self.names
-            ]
-        )
+        ranges = {name: info.fit_range(self.data.swing) for name, info in infos.items()}
+        found = np.array([ranges.get(name, (low.get(name, -np.inf), np.inf)) for name in self.names])
         return found[:, 0], found[:, 1]
 
     def effects_at(self, common: Array) -> tuple[Effect, ...]:

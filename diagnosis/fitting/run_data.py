@@ -62,8 +62,7 @@ class RunData:
     @property
     def conditions(self) -> tuple[object, ...]:
         """What the moment law and its integration depend on: spring, wind and sampling."""
-        stated = (self.spring_stiffness, self.wind_speed, self.air_density)
-        return (*stated, self.interval, self.block, self.derivative)
+        return self.spring_stiffness, self.wind_speed, self.air_density, self.interval, self.derivative
 
     @property
     def wind_on(self) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 from tunnel_sim.vocabulary.units import angle_power
 
 SWING = 0.3
-"""Least swing that the ranges of the parameters are meant for, rad: a release at 20 degrees keeps above it."""
+"""Least swing that the ranges of the parameters are meant for, rad: a release at 20 degrees stays above it."""
 
 LEAST_EXPONENT = 0.25
 """Smallest exponent: below it a term is nearly a jump, which the integration steps do not resolve."""
@@ -56,8 +56,8 @@ class ParameterInfo:
         """Least and greatest value that a fit may take.
 
         Args:
-            swing: largest angle of the motion, rad. Below `SWING` what is per angle may be as much greater, and
-                what is an angle as much smaller: the moments' shares then stay as they are.
+            swing: largest angle of the motion, rad. Below `SWING` a coefficient per angle may be as much greater,
+                and a least angle is as much smaller: the shares of the moments stay as they are.
 
         Returns:
             Both, in the unit.
