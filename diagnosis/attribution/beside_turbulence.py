@@ -48,7 +48,9 @@ def beside_turbulence(best: Hypothesis, data: Data) -> list[Hypothesis]:
     return []
 
 
-def grown_beside_turbulence(nominal: Fit, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
+def grown_beside_turbulence(
+    nominal: Fit, kinds: Sequence[type[Effect]]
+) -> Iterator[tuple[Hypothesis, Hypothesis]]:
     """Grow sets of effects from the nominal model on, with turbulence as noise.
 
     Args:
@@ -56,9 +58,10 @@ def grown_beside_turbulence(nominal: Fit, kinds: Sequence[type[Effect]]) -> Iter
         kinds: effects to try.
 
     Yields:
-        Round by round the best set, with residuals that hold the response to the turbulence. The turbulence is what
-        the set of the round before leaves, the nominal model in the first: there it is so strong that the runs in
-        the wind hardly count. The rounds end where no effect is found, or a fit fails.
+        Round by round the best set, with residuals that hold the response to the turbulence: as it was fitted, and
+        fitted on to the sensor's noise alone. The turbulence is what the latter leaves in the round before, and the
+        nominal model in the first: there it is so strong that the runs in the wind hardly count. The rounds end
+        where no effect is found, or a fit fails.
     """
     best, data = Hypothesis((), nominal), nominal.problem.data
     with suppress(FitError, np.linalg.LinAlgError):
@@ -71,8 +74,9 @@ def grown_beside_turbulence(nominal: Fit, kinds: Sequence[type[Effect]]) -> Iter
             grown = max([Hypothesis((), base), *grow(base, kinds)], key=lambda h: evidence_of(h, base))
             if not grown.effects:
                 return
-            best = _seen_in(grown, data)
-            yield best
+            seen = _seen_in(grown, data)
+            best = replace(seen, fit=fit(seen.fit.problem, seen.fit.point), textbook=None)
+            yield seen, best
 
 
 def _again(known: Fit, data: Data) -> Fit:

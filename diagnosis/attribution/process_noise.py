@@ -28,8 +28,6 @@ _LEAST_STROUHAL = 0.05  # bluff bodies shed at 0.1 to 0.3
 _LINE_SPACING = 0.3  # Hz, in the search for a line
 _WIDEST_LINE = 0.5  # Hz: beyond it a wandering line is turbulence
 _HIGHEST_LINE = 30.0  # Hz
-_LONGEST_FILTER = 512  # taps of an innovations filter
-_FORGOTTEN = 1e-4  # a filter's response that is over
 _DOUBLINGS = 30  # of the Riccati equation: 2^30 steps of the filter
 _EVALUATIONS = 60  # of the likelihood beyond the starting grid
 
@@ -181,26 +179,17 @@ def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
         spectrum: of the moment.
 
     Returns:
-        The data, whose whitening filters are the steady filters' innovations; None where no run is in the wind, or
-        a filter forgets too slowly to be one of finite length.
+        The data, scaled as the innovations of the steady filter; None where no run is in the wind, or the filter
+        does not settle.
     """
     runs = list(fit.problem.data.runs)
     channels = {i: c for i in range(len(runs)) if (c := _channel(fit, i, 0.0)) is not None}
-    for (i, channel), (numerator, denominator, spread) in zip(
-        channels.items(), _filters(list(channels.values()), spectrum), strict=True
-    ):
-        impulse = np.zeros(_LONGEST_FILTER)
-        impulse[0] = 1.0
-        taps = lfilter(numerator, denominator, impulse)
-        if not np.all(np.abs(taps[_LONGEST_FILTER // 2 :]) < _FORGOTTEN):
+    filters = _filters(list(channels.values()), spectrum)
+    for (i, channel), (numerator, denominator, spread) in zip(channels.items(), filters, strict=True):
+        if not (np.isfinite(spread) and spread > 0.0):
             return None
-        taps = taps[: int(np.flatnonzero(np.abs(taps) > _FORGOTTEN * 1e-3)[-1]) + 1]
-        run = runs[i]
-        runs[i] = replace(
-            run,
-            whitening=np.convolve(run.whitening, taps),
-            noise_variance=run.noise_variance * spread / channel.variance,
-        )
+        variance = runs[i].noise_variance * spread / channel.variance
+        runs[i] = replace(runs[i], innovations=(numerator, denominator), noise_variance=variance)
     return fit.problem.data.with_runs(tuple(runs)) if channels else None
 
 

@@ -12,11 +12,11 @@ from diagnosis.detection.noise_colour import noise_colour, whitened
 from diagnosis.detection.noise_under_null import level_p_value, trend_p_values
 from diagnosis.detection.rounding import rounding_errors, with_rounding
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend
-from diagnosis.fitting.least_squares import Fit
+from diagnosis.fitting.least_squares import Fit, FitError
 from diagnosis.fitting.least_squares import fit as refit
 from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.spectra import resonance
-from diagnosis.fitting.starting_points import is_gross
+from diagnosis.fitting.starting_points import is_gross, nominal_start
 from diagnosis.policy import BEYOND_THE_MOTION, FLOOR_TOLERANCE, GAP_FALSE_ALARM_RATE, NOISE_FALSE_ALARM_SHARE
 from tunnel_sim.vocabulary.record import Array
 
@@ -104,24 +104,40 @@ def judge(
         the motion is slow and the noise small, and fit and noise are whitened where the noise is coloured. Where
         whitening does not close the gap, colour is believed only if runs with the wind off have it, and if it shows
         above the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion.
-        Nor is it believed where there would be more noise than is stated.
+        Nor is it believed where there would be more noise than is stated. Turbulence may hide the colour, which is
+        then sought in the runs with the wind off alone.
     """
     errors = rounding_errors(nominal, noise.white(step), step)
     allowed = None if errors is None else with_rounding(nominal.problem.data, errors)
     if allowed is not None:
         nominal = refit(Problem(allowed), nominal.point)
     plain = test_gap(nominal, noise, trend, coarse_step=coarse_step, errors=errors)
-    found = None if is_gross(nominal) else noise_colour(nominal)
-    if found is None:
-        return nominal, noise, plain
-    white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
-    coloured = noise.coloured(found, nominal.problem.data)
-    test = test_gap(white, coloured, trend, coarse_step=coarse_step, errors=errors)
-    still = any(not run.wind_on for run in nominal.problem.data.runs)
-    excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests)
-    if test.detected and (excessive or not (still and noise_colour(nominal, beyond=BEYOND_THE_MOTION))):
-        return nominal, noise, plain
-    return white, coloured, test
+    for source in () if is_gross(nominal) else (nominal, *_in_still_air(nominal)):
+        found = noise_colour(source, throughout=source is not nominal)
+        if found is None:
+            continue
+        white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
+        coloured = noise.coloured(found, nominal.problem.data)
+        test = test_gap(white, coloured, trend, coarse_step=coarse_step, errors=errors)
+        still = any(not run.wind_on for run in nominal.problem.data.runs)
+        excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests)
+        believed = still and not excessive and noise_colour(source, beyond=BEYOND_THE_MOTION) is not None
+        if believed or not test.detected:
+            return white, coloured, test
+    return nominal, noise, plain
+
+
+def _in_still_air(nominal: Fit) -> list[Fit]:
+    """The fit of the runs with the wind off alone; none where all are, or it fails."""
+    data = nominal.problem.data
+    still = tuple(run for run in data.runs if not run.wind_on)
+    if not 0 < len(still) < len(data.runs):
+        return []
+    only = data.with_runs(still)
+    try:
+        return [refit(Problem(only), nominal_start(only))]
+    except (FitError, np.linalg.LinAlgError):
+        return []
 
 
 def chance(total: float, freedom: float, relative: float) -> float:

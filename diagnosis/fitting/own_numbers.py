@@ -147,8 +147,8 @@ class _Skipping:
         self.rate = np.gradient(run.reading - run.unscaled(residual), run.interval)
         self.slope = run.unwhitened(self.rate)
         self.left = self._unabsorbed(residual)
-        power = _after(_squares(self.slope, run.whitening))
-        absorbed = _after(self.slope[:, None] * correlate(self.basis, run.whitening))
+        power = _after(_squares(self.slope, run.taps))
+        absorbed = _after(self.slope[:, None] * correlate(self.basis, run.taps))
         power -= np.sum(absorbed**2, axis=1)
         self.weight = np.maximum(power, 1e-9 * float(self.slope @ self.slope))
 
@@ -170,7 +170,7 @@ class _Skipping:
     def _best(self, left: Array, time: float | None) -> _Step:
         inside = slice(_EDGE, left.size - _EDGE)
         weight = self.weight[inside]
-        seen = _after(self.slope * correlate(left, self.run.whitening))[inside]
+        seen = _after(self.slope * correlate(left, self.run.taps))[inside]
         own = seen / weight
         tried = np.maximum(own, 0.0) if time is None else time
         best = int(np.argmax(tried * (2.0 * seen - tried * weight)))

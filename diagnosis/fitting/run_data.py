@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.signal import lfilter
 
 from diagnosis.fitting.samples import Samples, hermite_basis, hermite_means
 from diagnosis.fitting.similarity import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
@@ -43,6 +44,8 @@ class RunData:
             follow from it.
         samples: where they are, if they are not evenly spaced.
         whitening: filter that makes the noise of the block means white, its first tap 1, shape (order + 1,).
+        innovations: numerator and denominator of the filter that then makes the response to a random moment white,
+            which begins at rest with the run; None where there is no such moment.
     """
 
     id: str
@@ -58,6 +61,7 @@ class RunData:
     derivative: int = 0
     samples: Samples | None = None
     whitening: Array = field(default_factory=lambda: WHITE)
+    innovations: tuple[Array, Array] | None = None
 
     @property
     def conditions(self) -> tuple[object, ...]:
@@ -108,9 +112,33 @@ class RunData:
             In noise standard deviations, shape (n,); blocks of fewer samples weigh less, and empty ones are 0.
         """
         if self.samples is None:
-            return np.asarray(whiten(difference, self.whitening) / np.sqrt(self.noise_variance), np.float64)
+            return self.white(difference) / np.sqrt(self.noise_variance)
         seen = np.where(self.samples.count > 0, difference, 0.0)
-        return whiten(seen, self.whitening) * np.sqrt(self.samples.count / (self.block * self.noise_variance))
+        return self.white(seen) * np.sqrt(self.samples.count / (self.block * self.noise_variance))
+
+    def white(self, values: Array) -> Array:
+        """Block means with white noise.
+
+        Args:
+            values: of the run, or several in columns, shape (n,) or (n, k), any unit.
+
+        Returns:
+            Of the values' shape and unit.
+        """
+        found = whiten(values, self.whitening)
+        if self.innovations is None:
+            return found
+        with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
+            return np.asarray(lfilter(*self.innovations, found, axis=0), np.float64)
+
+    @property
+    def taps(self) -> Array:
+        """Response of `white` to one value well inside the run, dimensionless, shape (m,)."""
+        if self.innovations is None:
+            return self.whitening
+        impulse = np.zeros(self.reading.size)
+        impulse[: self.whitening.size] = self.whitening[: impulse.size]
+        return np.asarray(lfilter(*self.innovations, impulse), np.float64)
 
     def unwhitened(self, difference: Array) -> Array:
         """A difference of readings over the noise of its innovations, not whitened.
@@ -135,7 +163,11 @@ class RunData:
         """
         if self.samples is not None:
             residual = residual / np.sqrt(np.maximum(self.samples.count, 1) / self.block)
-        return np.asarray(colour(residual * np.sqrt(self.noise_variance), self.whitening), np.float64)
+        innovations = residual * np.sqrt(self.noise_variance)
+        if self.innovations is not None:
+            numerator, denominator = self.innovations
+            innovations = lfilter(denominator, numerator, innovations)
+        return np.asarray(colour(innovations, self.whitening), np.float64)
 
     @property
     def filled(self) -> int:
@@ -191,7 +223,7 @@ class RunData:
         return np.asarray(np.sqrt(self.noise_variance) / np.abs(self.response(frequency)))
 
     def response(self, frequency: float | Array) -> np.ndarray:
-        """What the whitening filter makes of a sinusoid.
+        """What the whitening filters make of a sinusoid.
 
         Args:
             frequency: Hz, any shape.
@@ -199,7 +231,12 @@ class RunData:
         Returns:
             Complex factor, dimensionless, of the frequency's shape; 1 where the noise is white.
         """
-        return response(self.whitening, np.asarray(frequency) * self.interval)
+        cycles = np.asarray(frequency) * self.interval
+        found = response(self.whitening, cycles)
+        if self.innovations is None:
+            return found
+        numerator, denominator = self.innovations
+        return np.asarray(found * response(numerator, cycles) / response(denominator, cycles))
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,6 @@ from scipy.signal import cont2discrete, lfilter, savgol_filter
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import RunData
 from diagnosis.fitting.spectra import linear_coefficients, resonance
-from diagnosis.fitting.whitening import whiten
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
@@ -125,7 +124,7 @@ class Path:
 
     @property
     def _white(self) -> bool:
-        return self.run.samples is None and self.run.whitening.size == 1
+        return self.run.samples is None and self.run.taps.size == 1
 
     @cached_property
     def group(self) -> int:
@@ -143,9 +142,9 @@ class Path:
         """
         run = self.run
         if run.samples is None:
-            return self.rows(whiten(reading, run.whitening) / np.sqrt(run.noise_variance))
+            return self.rows(run.white(reading) / np.sqrt(run.noise_variance))
         count = run.samples.count[:, None]
-        white = whiten(np.where(count > 0, reading, 0.0), run.whitening)
+        white = run.white(np.where(count > 0, reading, 0.0))
         return self.rows(white * np.sqrt(count / (run.block * run.noise_variance)))
 
     def rows(self, white: Array) -> Array:

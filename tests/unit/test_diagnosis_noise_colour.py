@@ -71,6 +71,31 @@ def test_an_effect_beneath_coloured_noise_is_still_a_gap(name, effect):
     assert min(found.tests, key=found.tests.__getitem__) in ("below", "f0", "offset")
 
 
+def test_a_colour_that_the_wind_hides_is_sought_in_still_air(monkeypatch):
+    def hidden(fit, *args, **kwargs):
+        windy = any(run.wind_on for run in fit.problem.data.runs)
+        return None if windy else noise_colour(fit, *args, **kwargs)
+
+    monkeypatch.setattr(gap, "noise_colour", hidden)
+    data = coloured(buffeted(campaign(damping=0.04), 0.01, 4.0), "ar1")
+    fit, noise, found = judged(data)
+    assert found.detected
+    assert noise.colour is not None
+    assert all(run.whitening.size > 1 for run in fit.problem.data.runs)
+    still = [r for run, r in zip(fit.problem.data.runs, fit.residuals, strict=True) if not run.wind_on]
+    assert np.mean(np.concatenate(still) ** 2) == pytest.approx(1.0, abs=0.3)
+
+
+@pytest.mark.parametrize(("effect", "size"), [("free_play", 0.01), ("asymmetric_stiffness", 0.3)])
+@pytest.mark.parametrize("damping", [0.02, 0.04])
+def test_a_gap_of_still_air_is_no_colour(effect, size, damping):
+    data = campaign(effect_class(effect)(size), damping=damping)
+    assert gap._in_still_air(nominal(data))[0].excess > 0.5
+    _, noise, found = judged(data)
+    assert found.detected
+    assert noise.colour is None
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_white_noise_is_left_alone(seed):
     data = campaign(seed=seed)

@@ -14,11 +14,17 @@ from diagnosis.attribution.grow import grow
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.innovation_tests import bursts, whiteness
 from diagnosis.attribution.process_noise import (
+    Spectrum,
     fit_turbulence,
     fit_wandering_shedding,
     with_response,
 )
-from diagnosis.attribution.random_moments import _beside_too_many, weigh_random_moments, wind_off_excess
+from diagnosis.attribution.random_moments import (
+    _beside_too_many,
+    _beyond_doubt,
+    weigh_random_moments,
+    wind_off_excess,
+)
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.starting_points import starting_points
 from tests.unit.gap_campaigns import (
@@ -201,9 +207,23 @@ def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy
     again = fit(replace(windy.problem, data=data), windy.point)
     for run, residual in zip(data.runs, again.residuals, strict=True):
         assert np.mean(residual**2) == pytest.approx(1.0, abs=0.2)
-        assert (run.whitening.size > 1) == run.wind_on
+        assert (run.innovations is not None) == run.wind_on
         neighbours = float(residual[1:] @ residual[:-1]) / float(residual @ residual)
         assert abs(neighbours) < 4.0 / np.sqrt(residual.size)
+        start = residual[: residual.size // 20]  # the rig is at rest there: its response begins with the run
+        assert np.mean(start**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / start.size))
+
+
+def test_turbulence_that_is_slowly_forgotten_can_be_noise(windy):
+    assert with_response(windy, Spectrum(intensity=1e-3, bandwidth=0.03)) is not None
+
+
+def test_an_excess_that_chance_or_an_uncertain_level_gives_is_no_share_of_the_gap(windy):
+    (answer,) = weigh_random_moments(windy, [], BUFFETING)
+    assert answer.process.excess != 0.0
+    assert answer.share == 0.0
+    assert _beyond_doubt(0.05, 10**9) == pytest.approx(0.02, abs=1e-3)
+    assert _beyond_doubt(0.05, 800) == 0.0
 
 
 def test_one_gust_is_no_buffeting():

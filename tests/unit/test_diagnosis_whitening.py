@@ -1,5 +1,7 @@
 """Whitening: exact for autoregressive noise from the first value on, and nothing at all for white noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
@@ -47,6 +49,26 @@ def test_a_run_scales_a_sinusoid_by_its_response():
     assert run.noise_at(3.0) == pytest.approx(1e-3 / abs(run.response(3.0)))
     assert run.unscaled(run.scaled(wave.real)) == pytest.approx(wave.real, abs=1e-9)
     assert run.noise_std == pytest.approx(1e-3 * np.sqrt(autocovariance(FILTERS[1], 1)[0]), rel=1e-9)
+
+
+def test_a_run_whitens_the_response_to_a_random_moment_from_its_start():
+    """Truth: the filter is the inverse of the one that made the response out of white noise, at rest before."""
+    innovations = (np.array([1.0, -1.9, 0.95]), np.array([1.0, -1.2, 0.4]))
+    white = np.random.default_rng(3).standard_normal(500)
+    moved = 1e-3 * lfilter(*reversed(innovations), white)
+    for whitening in (WHITE, FILTERS[1]):
+        run = RunData(
+            "r1", moved, 4, 4e-3, 1e-6, None, 0.0, 0.0, 16.0, whitening=whitening, innovations=innovations
+        )
+        assert run.unscaled(run.scaled(moved)) == pytest.approx(moved, abs=1e-12)
+        late = np.zeros(500)
+        late[200:] = moved[:300]
+        taps = np.convolve(run.taps, late)[:500]
+        assert run.white(late)[200:] == pytest.approx(taps[200:], abs=1e-12)
+        wave = np.exp(2j * np.pi * 3.0 * run.interval * np.arange(500))
+        seen = run.white(wave.real) + 1j * run.white(wave.imag)
+        assert np.max(np.abs(seen[200:] / wave[200:] - run.response(3.0))) < 1e-6
+    assert replace(run, whitening=WHITE).scaled(moved) == pytest.approx(white, abs=1e-9)
 
 
 @pytest.mark.parametrize("whitening", [WHITE, *FILTERS])
