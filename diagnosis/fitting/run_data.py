@@ -112,7 +112,7 @@ class RunData:
             In noise standard deviations, shape (n,); blocks of fewer samples weigh less, and empty ones are 0.
         """
         if self.samples is None:
-            return self.white(difference) / np.sqrt(self.noise_variance)
+            return np.asarray(self.white(difference) / np.sqrt(self.noise_variance), np.float64)
         seen = np.where(self.samples.count > 0, difference, 0.0)
         return self.white(seen) * np.sqrt(self.samples.count / (self.block * self.noise_variance))
 
