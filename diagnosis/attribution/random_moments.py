@@ -46,8 +46,8 @@ class RandomAnswer:
         kind: of the random moment.
         process: its fit.
         beside: the fitted effects beside it, or None.
-        share: of the gap left open: the excess of the innovations and of the wind-off runs, each beyond chance and
-            an uncertain level of the noise, over the nominal one.
+        share: of the gap left open, a fraction: the excess of the innovations and of the wind-off runs, each beyond
+            chance and an uncertain level of the noise, over the nominal one.
     """
 
     kind: type[Effect]
