@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis.blind.files import KEY, SCHEMA_VERSION, SEAL, folder_hash, write_document
-from tunnel_reference.draw import DEFAULT_SHARES, Mixture
+from tunnel_reference.draw import DEFAULT_SHARES, Mixture, redraw
 from tunnel_reference.make import as_campaign, draw_set, simulate_set, truth_of
+from tunnel_reference.separable import ATTEMPTS
+from tunnel_reference.severity import Simulated
 from tunnel_sim.files.campaign_io import write_campaign
 from tunnel_sim.files.leftovers import clear_leftovers
 from tunnel_sim.files.writing import whole_folder
@@ -103,8 +105,20 @@ def _write_campaigns(
     for start in range(0, count, CHUNK):
         for simulated in simulate_set(draws[start : start + CHUNK], progress=show_steps):
             name = f"c{len(truths) + 1:0{width}d}"
-            write_campaign(as_campaign(simulated, name), folder / name)
-            truths[name] = truth_of(simulated)
+            truths[name] = truth_of(_written(simulated, folder / name, show_steps))
             if progress is not None:
                 progress(len(truths), count)
     return truths
+
+
+def _written(simulated: Simulated, folder: Path, show_steps: bool) -> Simulated:
+    """The campaign that was written: one that the reader refuses, as for too few cycles, is drawn again."""
+    for attempt in range(ATTEMPTS):
+        try:
+            write_campaign(as_campaign(simulated, folder.name), folder)
+            break
+        except TunnelError:
+            if attempt == ATTEMPTS - 1:
+                raise
+            (simulated,) = simulate_set([redraw(simulated.draw)], progress=show_steps)
+    return simulated

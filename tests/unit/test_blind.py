@@ -18,7 +18,7 @@ from tests.unit.test_blind_score import document
 from tunnel_lab.cli import main
 from tunnel_reference import draw
 from tunnel_reference.draw import Mixture
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_io import read_campaign, write_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -117,6 +117,27 @@ def test_an_interrupted_making_leaves_nothing(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         make_blind(tmp_path / "set", count=1, seed=1)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_campaign_that_the_reader_refuses_is_drawn_again(tmp_path, monkeypatch):
+    written = []
+
+    def refuses_the_first(campaign, folder):
+        written.append(campaign)
+        if len(written) == 1:
+            raise TunnelError("about 1.3 cycles of oscillation, fewer than three")
+        return write_campaign(campaign, folder)
+
+    monkeypatch.setattr("diagnosis.blind.make.write_campaign", refuses_the_first)
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
+    key = make_blind(
+        tmp_path / "set", count=1, seed=5, shares={"single": 1.0}, mixture=Mixture(variety=0.0, small=0.0)
+    )
+    first, second = (campaign.runs[0].record.yaw_rad for campaign in written)
+    assert not np.array_equal(first, second)
+    assert np.array_equal(read_campaign(tmp_path / "set" / "c0001").runs[0].record.yaw_rad, second)
+    assert list(json.loads(key.read_text())["truths"]) == ["c0001"]
 
 
 def test_a_set_is_not_made_over_another(blind):
