@@ -25,8 +25,6 @@ from diagnosis.policy import (
     BESIDE_EVIDENCE,
     BURST,
     BURST_FALSE_ALARM_RATE,
-    CHANCE_STDS,
-    FLOOR_TOLERANCE,
     LEFT_IN_THE_WIND,
     RANDOM_PARTNERS,
     RIVAL_EVIDENCE,
@@ -46,8 +44,7 @@ class RandomAnswer:
         kind: of the random moment.
         process: its fit.
         beside: the fitted effects beside it, or None.
-        share: of the gap left open, a fraction: the excess of the innovations and of the wind-off runs, each beyond
-            chance and an uncertain level of the noise, over the nominal one.
+        share: of the gap left open: the innovations' and the wind-off runs' excess over the nominal one.
     """
 
     kind: type[Effect]
@@ -185,19 +182,10 @@ def _try(
         return None
     if bursts(process, BURST_FALSE_ALARM_RATE) > BURST:
         return None
-    still = wind_off_excess(_in_its_noise(fit, process.spectrum))
-    if still > _no_gap(nominal):
+    if wind_off_excess(_in_its_noise(fit, process.spectrum)) > _no_gap(nominal):
         return None
-    in_the_wind = sum(innovations.size for innovations in process.innovations)
-    in_still_air = sum(run.filled for run in fit.problem.data.runs if not run.wind_on)
-    left = _beyond_doubt(abs(process.excess), in_the_wind) + _beyond_doubt(still, in_still_air)
-    share = left / max(nominal.excess, 1e-9)
+    share = (abs(process.excess) + max(wind_off_excess(fit), 0.0)) / max(nominal.excess, 1e-9)
     return RandomAnswer(kind, process, beside, share)
-
-
-def _beyond_doubt(excess: float, count: int) -> float:
-    """Excess of so many values beyond what chance and an uncertain level of the noise give."""
-    return max(excess - FLOOR_TOLERANCE - CHANCE_STDS * float(np.sqrt(2.0 / max(count, 1))), 0.0)
 
 
 def _still_open(fit: Fit, nominal: Fit) -> bool:

@@ -21,7 +21,6 @@ from diagnosis.attribution.process_noise import (
 )
 from diagnosis.attribution.random_moments import (
     _beside_too_many,
-    _beyond_doubt,
     weigh_random_moments,
     wind_off_excess,
 )
@@ -216,14 +215,6 @@ def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy
 
 def test_turbulence_that_is_slowly_forgotten_can_be_noise(windy):
     assert with_response(windy, Spectrum(intensity=1e-3, bandwidth=0.03)) is not None
-
-
-def test_an_excess_that_chance_or_an_uncertain_level_gives_is_no_share_of_the_gap(windy):
-    (answer,) = weigh_random_moments(windy, [], BUFFETING)
-    assert answer.process.excess != 0.0
-    assert answer.share == 0.0
-    assert _beyond_doubt(0.05, 10**9) == pytest.approx(0.02, abs=1e-3)
-    assert _beyond_doubt(0.05, 800) == 0.0
 
 
 def test_one_gust_is_no_buffeting():
