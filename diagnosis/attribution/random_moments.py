@@ -44,7 +44,8 @@ class RandomAnswer:
         kind: of the random moment.
         process: its fit.
         beside: the fitted effects beside it, or None.
-        share: of the gap left open: the innovations' and the wind-off runs' excess over the nominal one.
+        share: of the gap left open, a fraction: the innovations' and the wind-off runs' excess over the nominal
+            one's.
     """
 
     kind: type[Effect]
