@@ -24,8 +24,8 @@ from rich.table import Table
 from diagnosis import diagnose
 from diagnosis.detection.sensor_noise import campaign_noise
 from diagnosis.fitting.least_squares import Fit, fit
+from diagnosis.fitting.prepare import prepare
 from diagnosis.fitting.problem import Problem, campaign_rig
-from diagnosis.fitting.run_data import prepare
 from diagnosis.fitting.starting_points import StartingPoint, nominal_start, starting_points
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.engine.model import Model, build_model

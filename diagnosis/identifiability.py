@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
-from diagnosis.fitting.run_data import prepare
+from diagnosis.fitting.prepare import prepare
 from diagnosis.fitting.starting_points import unabsorbed
 from diagnosis.investigate import fit_nominal
 from tunnel_sim.effects import Effect, known_effects

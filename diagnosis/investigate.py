@@ -20,8 +20,9 @@ from diagnosis.detection.mains import Hum, find_hum, refine_frequency, remove_hu
 from diagnosis.detection.refusal import refuse_indefinite
 from diagnosis.detection.sensor_noise import Noise, campaign_noise, noise_trend, reading_step
 from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
+from diagnosis.fitting.prepare import prepare, without_rest, without_start
 from diagnosis.fitting.problem import Problem
-from diagnosis.fitting.run_data import Data, prepare, without_rest, without_start
+from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.similarity import Similarity, similar_campaign
 from diagnosis.fitting.spectra import mains_interval
 from diagnosis.fitting.starting_points import is_gross, nominal_start

@@ -28,6 +28,9 @@ COLOUR_FALSE_ALARM_RATE = 1e-3
 #: Rate at which steady noise is said to differ between parts of the records in one band, which is then left out of
 #: its spectrum. Convention: one in a hundred, since the spectrum is interpolated there.
 COLOUR_STEADY_RATE = 0.01
+#: Share of the bands that must be steady where the colour is sought in still air alone. Judgement, made on a set
+#: where turbulence had hidden it: few parts are compared there, so that an unsteady band is easily overlooked.
+COLOUR_THROUGHOUT = 0.75
 #: Ratio of the greatest to the smallest motion among the parts of the records from which noise is seen not to
 #: follow the motion. Judgement: power that does would then differ by a factor of four.
 COLOUR_AMPLITUDES = 2.0

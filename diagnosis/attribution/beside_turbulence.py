@@ -59,9 +59,9 @@ def grown_beside_turbulence(
 
     Yields:
         Round by round the best set, with residuals that hold the response to the turbulence: as it was fitted, and
-        fitted on to the sensor's noise alone. The turbulence is what the latter leaves in the round before, and the
-        nominal model in the first: there it is so strong that the runs in the wind hardly count. The rounds end
-        where no effect is found, or a fit fails.
+        fitted again with the sensor's noise alone. The latter's residuals give the turbulence of the next round.
+        In the first round the nominal model's do: they overstate it so much that the runs in the wind hardly count.
+        The rounds end where no effect is found, or a fit fails.
     """
     best, data = Hypothesis((), nominal), nominal.problem.data
     with suppress(FitError, np.linalg.LinAlgError):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -112,7 +113,7 @@ def judge(
     if allowed is not None:
         nominal = refit(Problem(allowed), nominal.point)
     plain = test_gap(nominal, noise, trend, coarse_step=coarse_step, errors=errors)
-    for source in () if is_gross(nominal) else (nominal, *_in_still_air(nominal)):
+    for source in () if is_gross(nominal) else _colour_sources(nominal):
         found = noise_colour(source, throughout=source is not nominal)
         if found is None:
             continue
@@ -127,17 +128,15 @@ def judge(
     return nominal, noise, plain
 
 
-def _in_still_air(nominal: Fit) -> list[Fit]:
-    """The fit of the runs with the wind off alone; none where all are, or it fails."""
+def _colour_sources(nominal: Fit) -> Iterator[Fit]:
+    """The fits that may show the noise's colour: the nominal one, and that of the runs with the wind off alone."""
+    yield nominal
     data = nominal.problem.data
     still = tuple(run for run in data.runs if not run.wind_on)
-    if not 0 < len(still) < len(data.runs):
-        return []
-    only = data.with_runs(still)
-    try:
-        return [refit(Problem(only), nominal_start(only))]
-    except (FitError, np.linalg.LinAlgError):
-        return []
+    if 0 < len(still) < len(data.runs):
+        only = data.with_runs(still)
+        with suppress(FitError, np.linalg.LinAlgError):
+            yield refit(Problem(only), nominal_start(only))
 
 
 def chance(total: float, freedom: float, relative: float) -> float:

@@ -21,6 +21,7 @@ from diagnosis.policy import (
     COLOUR_AMPLITUDES,
     COLOUR_FALSE_ALARM_RATE,
     COLOUR_STEADY_RATE,
+    COLOUR_THROUGHOUT,
     FLOOR_TOLERANCE,
 )
 from tunnel_sim.vocabulary.record import Array
@@ -30,7 +31,6 @@ _CYCLES = 8.0  # of the motion in a part, at least: its windowed line then stays
 _BESIDE = 0.25  # of the motion's frequency, on either side of its harmonics, left out
 _LOWEST = 2.5  # cycles in a part: the window's lobe about zero frequency ends there
 _OCTAVE_PARTS = 2  # bands in an octave
-_THROUGHOUT = 0.75  # of the bands must be steady where few parts are compared
 _SLOPE_BANDS = 4  # lowest bands that give the slope below them
 #: Neighbouring ordinates under a Hann window: as many carry the information of one independent ordinate.
 _HANN = 1.94
@@ -106,7 +106,7 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     Args:
         nominal: any fit whose residuals were scaled as white.
         beyond: multiple of the motion's frequency, from which on the spectrum is regarded.
-        throughout: whether the lowest band and three quarters of all must be steady, or any two.
+        throughout: whether the lowest band and `COLOUR_THROUGHOUT` of all must be steady; otherwise any two do.
 
     Returns:
         The spectrum; None where it is flat within `FLOOR_TOLERANCE` and chance, or no bands are the same in all
@@ -127,7 +127,7 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     cells = [part.by_band(edges) for part in parts]
     power, count = (np.array(column) for column in zip(*cells, strict=True))
     steady = _steady(power, count)
-    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= _THROUGHOUT)):
+    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= COLOUR_THROUGHOUT)):
         return None
     total = count.sum(axis=0)
     level = np.log(np.sum(power * count, axis=0)[steady] / total[steady])

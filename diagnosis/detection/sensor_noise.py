@@ -9,7 +9,8 @@ import numpy as np
 
 from diagnosis.detection.noise_colour import Colour
 from diagnosis.detection.scattered_noise import scattered_variance
-from diagnosis.fitting.run_data import BLOCK_INTERVAL, Data
+from diagnosis.fitting.prepare import BLOCK_INTERVAL
+from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.similarity import frequency
 from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties

@@ -1,4 +1,4 @@
-"""Runs prepared for fitting: block means of the reading and the stated physics they belong to."""
+"""Runs as the fits see them: block means of the reading and the stated physics they belong to."""
 
 from __future__ import annotations
 
@@ -15,14 +15,8 @@ from diagnosis.fitting.whitening import WHITE, colour, colouring, response, whit
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.aero import aerodynamic_stiffness
-from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.record import Array
-
-#: Interval of the block means, s: the motion stays below 10 Hz and the mains at 50 Hz.
-BLOCK_INTERVAL = 4e-3
-_END = 50  # a run ends where its last fiftieth stands
-_STILL = 0.02  # of the largest swing, within which a body counts as at rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +125,7 @@ class RunData:
         with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
             return np.asarray(lfilter(*self.innovations, found, axis=0), np.float64)
 
-    @property
+    @cached_property
     def taps(self) -> Array:
         """Response of `white` to one value well inside the run, dimensionless, shape (m,)."""
         if self.innovations is None:
@@ -325,40 +319,6 @@ class Data:
         return self.with_runs(tuple(run for run in self.runs if run.id in keep))
 
 
-def prepare(
-    campaign: Campaign,
-    noise_variance: dict[str, float],
-    similarity: Similarity = AS_MEASURED,
-    interval: float = BLOCK_INTERVAL,
-) -> Data:
-    """Average a campaign's records in blocks.
-
-    Args:
-        noise_variance: of one sample, rad², by run id.
-        similarity: how the campaign was made from the measured one.
-        interval: between the blocks, s; the nearest number of samples, at least one.
-
-    Returns:
-        The prepared data. Where any run states no stiffness, all are taken in normalised form.
-    """
-    rig = campaign.rig
-    held = {} if campaign.law is None else campaign.law.held
-    return Data(
-        runs=tuple(
-            _prepare_run(run, noise_variance[run.id], campaign.sensor.derivative, interval)
-            for run in campaign.runs
-        ),
-        frontal_area=rig.frontal_area or similarity.area,
-        reference_length=rig.reference_length or similarity.time,
-        width=rig.width or 0.0,
-        normalised=any(run.spring_stiffness is None for run in campaign.runs),
-        yaw_inertia=rig.yaw_inertia,
-        own_zeros=campaign.sensor.zero == "per_run" and "zero" not in held,
-        similarity=similarity,
-        law=campaign.law,
-    )
-
-
 def departure(law: JointLaw) -> Expression:
     """The moment that a joint's law has beside its linear spring, damper and friction.
 
@@ -370,69 +330,3 @@ def departure(law: JointLaw) -> Expression:
     """
     text = "".join(f"-({term.coefficient!r})*({term.expression})" for term in law.terms)
     return parse(text, frozenset("br"))
-
-
-def _prepare_run(run: Run, noise_variance: float, derivative: int, interval: float) -> RunData:
-    record = run.record
-    block = max(1, round(interval * record.sample_rate))
-    count = record.yaw_rad.size // block
-    samples = None if record.uniform else Samples.of(record, block)
-    if samples is None:
-        reading = record.yaw_rad[: count * block].reshape(count, block).mean(axis=1)
-    else:
-        since = record.time_s - record.time_s[0] + 0.5 * record.sample_interval
-        reading = samples.means(np.interp(samples.time, since, record.yaw_rad))
-    return RunData(
-        id=run.id,
-        reading=reading,
-        block=block,
-        interval=block * record.sample_interval,
-        noise_variance=noise_variance / block,
-        spring_stiffness=run.spring_stiffness,
-        wind_speed=run.wind_speed,
-        air_density=run.air_density or 0.0,
-        duration=record.duration + record.sample_interval,
-        derivative=derivative,
-        samples=samples,
-    )
-
-
-def without_start(data: Data) -> Data:
-    """The runs from their second passage through the middle on.
-
-    Where a hand lets go late, the start of the record is driven, which no free decay explains.
-
-    Returns:
-        The data with every run cut at the first passage through its mean after its first turning point; a run
-        that would lose more than a quarter stays as it is.
-    """
-    return dataclasses.replace(data, runs=tuple(_without_start(run) for run in data.runs))
-
-
-def _without_start(run: RunData) -> RunData:
-    values = run.reading - np.mean(run.reading)
-    passages = np.flatnonzero(np.diff(np.signbit(values)))
-    turn = int(np.argmax(np.abs(values[: passages[0] + 1]))) if passages.size else 0
-    later = passages[passages > turn]
-    if later.size == 0 or later[0] > values.size // 4:
-        return run
-    return run.part(int(later[0]) + 1)
-
-
-def without_rest(data: Data) -> Data:
-    """The runs up to where their motion ends.
-
-    Where dry friction stops a body depends on its last swing discontinuously, so that χ² has many minima.
-
-    Returns:
-        The data with every run cut after its last reading that differs from its end by more than a fiftieth of its
-        largest swing.
-    """
-    return dataclasses.replace(data, runs=tuple(_without_rest(run) for run in data.runs))
-
-
-def _without_rest(run: RunData) -> RunData:
-    at_end = np.median(run.reading[-max(1, run.reading.size // _END) :])
-    away = np.abs(run.reading - at_end)
-    moving = np.flatnonzero(away > _STILL * away.max())
-    return run.part(last=int(moving[-1]) + 1) if moving.size else run

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
-from diagnosis.fitting.run_data import prepare
+from diagnosis.fitting.prepare import prepare
 from diagnosis.localisation.excess import RunExcess, bands_beyond_chance, run_excesses
 from diagnosis.localisation.inference import Finding, blow_interval, infer_channel, infer_condition
 from diagnosis.localisation.mapping import Survey, survey

@@ -12,8 +12,9 @@ from diagnosis.detection.gap import GapTest, judge
 from diagnosis.detection.mains import Hum
 from diagnosis.detection.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.fitting.least_squares import Fit, fit
+from diagnosis.fitting.prepare import prepare
 from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.run_data import Data, RunData, prepare
+from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.similarity import Similarity
 from diagnosis.fitting.starting_points import nominal_start
 from diagnosis.investigate import fit_nominal

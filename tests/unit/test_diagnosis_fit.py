@@ -15,8 +15,8 @@ from diagnosis.fitting.least_squares import (
     sensitivities,
 )
 from diagnosis.fitting.normal_equations import bounded_step, normal_equations, project_release
+from diagnosis.fitting.prepare import prepare
 from diagnosis.fitting.problem import Point, Problem, condensed
-from diagnosis.fitting.run_data import prepare
 from diagnosis.fitting.starting_points import nominal_start
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth

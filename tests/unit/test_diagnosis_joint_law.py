@@ -12,8 +12,8 @@ from diagnosis.answer.joint_law import found_law
 from diagnosis.answer.native_closure import _left
 from diagnosis.detection.own_model import with_law
 from diagnosis.fitting.least_squares import scaled_residuals
+from diagnosis.fitting.prepare import prepare
 from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.run_data import prepare
 from diagnosis.fitting.similarity import similar_campaign
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, read_model, vocabulary
 from diagnosis.detection.own_model import reach, with_law
-from diagnosis.fitting.run_data import prepare
+from diagnosis.fitting.prepare import prepare
 from diagnosis.fitting.similarity import similar_campaign
 from diagnosis.investigate import fit_nominal, investigate
 from diagnosis.patch import NativeClosure

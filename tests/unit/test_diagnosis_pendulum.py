@@ -8,8 +8,8 @@ import pytest
 from diagnosis.attribution.grow_in_stretches import _of_each, grow_in_stretches
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import fit_at
+from diagnosis.fitting.prepare import prepare, without_rest, without_start
 from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.run_data import prepare, without_rest, without_start
 from diagnosis.fitting.spectra import resonance
 from diagnosis.investigate import fit_nominal, investigate
 from diagnosis.law.bases import COMMON, SINGLE, ranges

@@ -5,7 +5,7 @@ import pytest
 
 from diagnosis.detection.rounding import rounding_errors, with_rounding
 from diagnosis.detection.sensor_noise import campaign_noise, lattice_step, reading_step
-from diagnosis.fitting.run_data import prepare
+from diagnosis.fitting.prepare import prepare
 from diagnosis.investigate import fit_nominal
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records

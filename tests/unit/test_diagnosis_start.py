@@ -7,8 +7,8 @@ import pytest
 
 from diagnosis.attribution.hypothesis import _within
 from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.prepare import prepare
 from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.run_data import prepare
 from diagnosis.fitting.spectra import residual_spectra, resonance, shedding_line
 from diagnosis.fitting.starting_points import is_gross, nominal_start, project_out, starting_points
 from tests.reference import free_decays

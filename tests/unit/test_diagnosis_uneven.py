@@ -12,8 +12,9 @@ from diagnosis.detection.mains import refine_frequency, remove_hum
 from diagnosis.detection.scattered_noise import scattered_variance
 from diagnosis.detection.sensor_noise import campaign_noise
 from diagnosis.fitting.least_squares import fit, scaled_residuals
+from diagnosis.fitting.prepare import prepare
 from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.run_data import hermite_basis, prepare
+from diagnosis.fitting.run_data import hermite_basis
 from diagnosis.fitting.starting_points import nominal_start
 from tests.reference.free_decays import AREA, LENGTH, Setting, Truth, angle_of
 from tunnel_sim.effects.dropped_samples import DroppedSamples

@@ -10,8 +10,8 @@ import pytest
 from scipy.stats import binom
 
 from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.prepare import without_start
 from diagnosis.fitting.problem import Problem
-from diagnosis.fitting.run_data import without_start
 from diagnosis.fitting.spectra import linear_coefficients
 from diagnosis.fitting.starting_points import nominal_start, starting_points
 from diagnosis.localisation.backbone import backbones, drift

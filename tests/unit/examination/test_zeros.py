@@ -10,8 +10,8 @@ from decays import CN_BETA, INERTIA, campaign, reading, run
 
 from diagnosis.detection.sensor_noise import campaign_noise
 from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.prepare import prepare
 from diagnosis.fitting.problem import Problem
-from diagnosis.fitting.run_data import prepare
 from diagnosis.fitting.starting_points import nominal_start
 from identification import identify
 from identification.examination.examine import examine
