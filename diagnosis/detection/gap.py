@@ -13,6 +13,7 @@ from diagnosis.detection.noise_colour import noise_colour, whitened
 from diagnosis.detection.noise_under_null import level_p_value, trend_p_values
 from diagnosis.detection.rounding import rounding_errors, with_rounding
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend
+from diagnosis.detection.wandering_zero import zero_wanders
 from diagnosis.fitting.least_squares import Fit, FitError
 from diagnosis.fitting.least_squares import fit as refit
 from diagnosis.fitting.problem import Problem
@@ -105,8 +106,8 @@ def judge(
         the motion is slow and the noise small, and fit and noise are whitened where the noise is coloured. Where
         whitening does not close the gap, colour is believed only if runs with the wind off have it, and if it shows
         above the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion.
-        Nor is it believed where there would be more noise than is stated. Turbulence may hide the colour, which is
-        then sought in the runs with the wind off alone.
+        Nor is it believed where there would be more noise than is stated, or where it alone would close the gap of
+        a wandering zero. Turbulence may hide the colour, which is then sought in the runs with the wind off alone.
     """
     errors = rounding_errors(nominal, noise.white(step), step)
     allowed = None if errors is None else with_rounding(nominal.problem.data, errors)
@@ -123,7 +124,7 @@ def judge(
         still = any(not run.wind_on for run in nominal.problem.data.runs)
         excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests)
         believed = still and not excessive and noise_colour(source, beyond=BEYOND_THE_MOTION) is not None
-        if believed or not test.detected:
+        if believed if test.detected else not zero_wanders(nominal, found):
             return white, coloured, test
     return nominal, noise, plain
 

@@ -33,7 +33,7 @@ _LOWEST = 2.5  # cycles in a part: the window's lobe about zero frequency ends t
 _OCTAVE_PARTS = 2  # bands in an octave
 _SLOPE_BANDS = 4  # lowest bands that give the slope below them
 #: Neighbouring ordinates under a Hann window: as many carry the information of one independent ordinate.
-_HANN = 1.94
+HANN = 1.94
 _LONGEST = 512  # taps of the whitening filter
 
 
@@ -141,6 +141,22 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     return Colour(centres, level, std, _red(slope), slope_std, _red(steep))
 
 
+def between_harmonics(fit: Fit, index: int) -> tuple[Array, Array]:
+    """The periodogram of a run's residuals between the harmonics of its motion.
+
+    Args:
+        fit: its residuals are scaled as white.
+        index: of the run.
+
+    Returns:
+        Frequency (Hz) and power (in units of white noise), shape (n,) each.
+    """
+    run = fit.problem.data.runs[index]
+    values = run.unscaled(fit.residuals[index])
+    whole = _part(values, run.reading - values, run, resonance(fit, index))
+    return whole.frequency[whole.between], whole.power[whole.between]
+
+
 @dataclass(frozen=True, eq=False)
 class _Part:
     """A part of a record: its periodogram, in units of white noise, and the size of the motion (rad)."""
@@ -156,7 +172,7 @@ class _Part:
         inside = (band >= 0) & (band < edges.size - 1)
         count = np.bincount(band[inside], minlength=edges.size - 1)
         power = np.bincount(band[inside], self.power[self.between][inside], edges.size - 1)
-        return power / np.maximum(count, 1), count / _HANN
+        return power / np.maximum(count, 1), count / HANN
 
 
 def _parts(fit: Fit, index: int) -> list[_Part]:

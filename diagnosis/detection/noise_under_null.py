@@ -57,11 +57,7 @@ def _p_values(trend: NoiseTrend, chance: Array) -> Array:
 def _repetitions(fit: Fit, white: Mapping[str, float], step: float) -> Array:
     """Statistics of the campaign repeated, shape (repetitions, 3)."""
     count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
-    readings = (
-        (reading, run.block / run.interval)
-        for run, _, reading in repeated(fit, white, step, count)
-        if run.samples is None  # the others have no part in the trend
-    )
+    readings = ((reading, run.sample_times) for run, _, reading in repeated(fit, white, step, count))
     found = trend_statistics(readings)
     assert found is not None  # the campaign was judged
     return found

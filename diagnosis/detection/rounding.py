@@ -49,7 +49,7 @@ def repeated(
     """
     rng = seeded(fit)
     for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
-        motion = _motion(run.reading - run.unscaled(residual), run.block)
+        motion = _motion(run.reading - run.unscaled(residual), run)
         reading = motion + white[run.id] * rng.standard_normal((count, motion.size))
         if step > 0.0:
             shift = step * rng.uniform(size=(count, 1))
@@ -58,12 +58,12 @@ def repeated(
         yield run, motion, reading
 
 
-def _motion(blocks: Array, block: int) -> Array:
+def _motion(blocks: Array, run: RunData) -> Array:
     """Samples of a motion from its block means."""
-    if block == 1:
+    if run.block == 1 and run.samples is None:
         return blocks
-    centres = np.arange(blocks.size) * block + 0.5 * (block - 1)
-    return np.asarray(CubicSpline(centres, blocks)(np.arange(blocks.size * block)), np.float64)
+    seen = slice(None) if run.samples is None else run.samples.count > 0
+    return np.asarray(CubicSpline(run.times[seen], blocks[seen])(run.sample_times), np.float64)
 
 
 def rounding_errors(fit: Fit, white: Mapping[str, float], step: float) -> list[Array] | None:
@@ -81,10 +81,7 @@ def rounding_errors(fit: Fit, white: Mapping[str, float], step: float) -> list[A
     if min(white.values()) > _BLURS * step:
         return None
     count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
-    return [
-        (reading - motion).reshape(count, run.reading.size, run.block).mean(axis=2)
-        for run, motion, reading in repeated(fit, white, step, count)
-    ]
+    return [run.means(reading - motion) for run, motion, reading in repeated(fit, white, step, count)]
 
 
 def with_rounding(data: Data, errors: Sequence[Array]) -> Data | None:

@@ -282,7 +282,7 @@ class NoiseTrend:
         spread: natural logarithm of the ratio of the local variances' standard deviation to that of a normal
             distribution with their quartiles: positive for heavy tails. Skewness alone makes it about 0.1.
         step: of the lattice of the readings, rad.
-        judged: whether any run is sampled evenly and fast enough for the test.
+        judged: whether any run is sampled fast enough for the test.
     """
 
     amplitude_z: float
@@ -301,29 +301,36 @@ def noise_trend(campaign: Campaign) -> NoiseTrend:
     """Measure whether the noise is as strong in motion as at rest, and the same at all times.
 
     Returns:
-        Trends of the variance of fourth differences of the reading in windows of 20 ms, pooled over the runs with
-        evenly spaced samples that are not shorter than five windows. Their null distribution is simulated
+        Trends of the variance of fourth divided differences of the reading in windows of 20 ms, pooled over the
+        runs that are not shorter than five windows. Their null distribution is simulated
         (`diagnosis.detection.noise_under_null`).
     """
-    even = [r.record for r in campaign.runs if r.record.uniform and r.record.duration > _SHORTEST]
-    values = trend_statistics([(record.yaw_rad[None], record.sample_rate) for record in even])
+    long = [run.record for run in campaign.runs if run.record.duration > _SHORTEST]
+    values = trend_statistics([(record.yaw_rad[None], _sample_times(record)) for record in long])
     if values is None:
         return NoiseTrend(0.0, 0.0, 0.0, judged=False)
     amplitude, rate, spread = values[0].tolist()
     return NoiseTrend(amplitude, rate, spread, step=reading_step(campaign))
 
 
-def trend_statistics(readings: Iterable[tuple[Array, float]]) -> Array | None:
+def _sample_times(record: Record) -> Array:
+    """Time of the samples, shape (n,), s; on a uniform clock where the stamps are only rounded."""
+    if not record.uniform:
+        return record.time_s
+    return np.asarray(np.arange(record.time_s.size) * record.sample_interval, np.float64)
+
+
+def trend_statistics(readings: Iterable[tuple[Array, Array]]) -> Array | None:
     """The statistics of `NoiseTrend`.
 
     Args:
-        readings: by run, readings of any number of repetitions, shape (repetitions, n), rad, and their rate, Hz;
-            taken one after another, so that a generator holds those of one run at a time.
+        readings: by run, readings of any number of repetitions, shape (repetitions, n), rad, and their times, shape
+            (n,), s; taken one after another, so that a generator holds those of one run at a time.
 
     Returns:
         Shape (repetitions, 3): ``amplitude_z``, ``rate_z`` and ``spread``; None where none is fast enough.
     """
-    parts = [_local_levels(reading, rate) for reading, rate in readings if round(_WINDOW * rate) >= _FEWEST]
+    parts = [_local_levels(reading, time) for reading, time in readings if _in_window(time) >= _FEWEST]
     if not parts:
         return None
     level, square, rate = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
@@ -344,12 +351,17 @@ def _standardised(values: Array) -> Array:
     return result
 
 
-def _local_levels(reading: Array, rate: float) -> tuple[Array, Array, Array]:
+def _in_window(time: Array) -> int:
+    """Samples in a window, on average."""
+    return round(_WINDOW * (time.size - 1) / float(time[-1] - time[0]))
+
+
+def _local_levels(reading: Array, time: Array) -> tuple[Array, Array, Array]:
     """Mean squared fourth difference by window over its mean, less one; squared angle and rate, standardised."""
-    width = round(_WINDOW * rate)
+    width = _in_window(time)
     reading = reading - reading.mean(axis=-1, keepdims=True)
     # leaves (ω dt)⁴ of the motion: far below any noise
-    fourth = np.diff(reading, n=4, axis=-1)
+    fourth = _fourth_differences(reading, time)
     count = fourth.shape[-1] // width
 
     def windows(values: Array) -> Array:
@@ -359,3 +371,15 @@ def _local_levels(reading: Array, rate: float) -> tuple[Array, Array, Array]:
     level = level / np.maximum(level.mean(axis=-1, keepdims=True), 1e-300) - 1.0
     angle = windows(reading[..., 2:]).mean(axis=-1)
     return level, _standardised(angle**2), _standardised(np.gradient(angle, axis=-1) ** 2)
+
+
+def _fourth_differences(reading: Array, time: Array) -> Array:
+    """Fourth divided differences, shape (..., n − 4), rad: white noise has the same variance in all of them."""
+    count = time.size - 4
+    total, gain = np.zeros((*reading.shape[:-1], count)), np.zeros(count)
+    for k in range(5):
+        others = [time[k : count + k] - time[j : count + j] for j in range(5) if j != k]
+        weight = 1.0 / np.prod(others, axis=0)
+        total += weight * reading[..., k : count + k]
+        gain += weight**2
+    return np.asarray(total / np.sqrt(gain))

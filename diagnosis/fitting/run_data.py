@@ -172,14 +172,15 @@ class RunData:
         """Block means of one value per sample.
 
         Args:
-            values: shape (m,).
+            values: shape (m,) or (k, m).
 
         Returns:
-            Shape (n,).
+            Shape (n,) or (k, n).
         """
         if self.samples is not None:
             return self.samples.means(values)
-        return np.asarray(values.reshape(self.reading.size, self.block).mean(axis=1), np.float64)
+        blocks = values.reshape(*values.shape[:-1], self.reading.size, self.block)
+        return np.asarray(blocks.mean(axis=-1), np.float64)
 
     def part(self, first: int = 0, last: int | None = None) -> RunData:
         """The run from one block up to another.

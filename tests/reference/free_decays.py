@@ -66,12 +66,18 @@ def campaign(
     rng=None,
     nominal_inertia=None,
     has_size=True,
+    jitter=0.0,
 ):
-    """Records of the nominal model; noise is white and Gaussian, resolution quantises."""
+    """Records of the nominal model; noise is white and Gaussian, resolution quantises, jitter delays samples.
+
+    Args:
+        jitter: greatest delay of a sample, a share of the interval.
+    """
     truth = truth or Truth()
-    time = np.arange(round(duration * rate)) / rate
+    even = np.arange(round(duration * rate)) / rate
     runs = []
     for number, setting in enumerate(settings, 1):
+        time = even + jitter / rate * rng.uniform(size=even.size) if jitter else even
         yaw = angle_of(setting, truth, time) + zero
         if noise:
             yaw = yaw + noise * rng.standard_normal(time.size)

@@ -16,19 +16,24 @@ from tests.reference.free_decays import Setting, with_records
 
 NOISE = 4e-4
 SETTINGS = (Setting(16.12, 0.0), Setting(44.84, 0.0), Setting(16.12, 20.0), Setting(44.84, 20.0))
-STEPS = {"continuous": None, "the rig's": 5.1e-4, "coarse": 1.5e-3, "hides the noise": 3e-3}
+SENSORS = {
+    "continuous": {},
+    "jittered": {"jitter": 0.5},
+    "the rig's": {"resolution": 5.1e-4},
+    "jittered and the rig's": {"jitter": 0.5, "resolution": 5.1e-4},
+    "coarse": {"resolution": 1.5e-3},
+    "hides the noise": {"resolution": 3e-3},
+}
 RATES = (0.1, 0.01, 1e-3)
 """Rates at which alarms are counted."""
 CHANCE = 1e-4
 """Of each bound being exceeded by a test that keeps its rate."""
 
 
-def decays(seed, step=None, *, noise=NOISE, **options):
-    """Four runs of the nominal model in closed form, read at 1 kHz off a lattice."""
+def decays(seed, *, noise=NOISE, **options):
+    """Four runs of the nominal model in closed form, read at 1 kHz."""
     rng = np.random.default_rng(seed)
-    return free_decays.campaign(
-        SETTINGS, noise=noise, resolution=step, rate=1000.0, duration=3.0, rng=rng, **options
-    )
+    return free_decays.campaign(SETTINGS, noise=noise, rate=1000.0, duration=3.0, rng=rng, **options)
 
 
 def judged(data):
@@ -39,11 +44,11 @@ def judged(data):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", STEPS)
+@pytest.mark.parametrize("name", SENSORS)
 def test_no_test_sounds_more_often_than_it_says(name):
     """The bound: as many alarms as a test of exactly its rate exceeds with a chance of 1e-4, by test and in all."""
     trials = 150
-    found = [judged(decays(seed, STEPS[name])) for seed in range(trials)]
+    found = [judged(decays(seed, **SENSORS[name])) for seed in range(trials)]
     values = {test: np.array([one.tests[test] for one in found]) for test in found[0].tests}
     values["all"] = np.array([one.p_value for one in found])
     assert {"noise against amplitude", "noise against rate", "noise in bursts", "noise level"} < set(values)
@@ -90,7 +95,7 @@ def test_bursts_are_distinguished_from_noise_that_is_nearly_steady(share, size, 
 
 
 def test_the_same_campaign_has_the_same_p_values():
-    data = decays(3, 5.1e-4)
+    data = decays(3, resolution=5.1e-4)
     assert judged(data).tests == judged(data).tests
 
 

@@ -161,24 +161,30 @@ def test_continuous_readings_have_a_step_far_below_any_sensor():
     assert reading_step(decays()) < 0.1 * NOISE
 
 
-def trends(count, change=None):
-    """Trends of campaigns of white noise, the reading passed through ``change``."""
+def trends(count, change=None, jitter=0.0):
+    """Trends of campaigns of white noise, the reading passed through ``change``.
+
+    Args:
+        jitter: greatest delay of a sample, a share of the interval.
+    """
     found = []
     for seed in range(count):
-        data = decays(seed + 100, rate=1000.0, duration=4.0)
+        data = decays(seed + 100, rate=1000.0, duration=4.0, jitter=jitter)
         trend = noise_trend(data if change is None else with_records(data, change(seed)))
         found.append((trend.amplitude_z, trend.rate_z, trend.spread))
     return np.array(found)
 
 
-def test_trends_of_white_noise_are_standard_normal():
-    found = trends(200)[:, :2]
+@pytest.mark.parametrize("jitter", [0.0, 0.5])
+def test_trends_of_white_noise_are_standard_normal(jitter):
+    found = trends(200, jitter=jitter)[:, :2]
     assert np.all(np.abs(found.mean(axis=0)) < 4.0 / np.sqrt(200))
     low, high = chi2.ppf([1e-5, 1.0 - 1e-5], 199) / 199
     assert np.all((low < found.var(axis=0)) & (found.var(axis=0) < high))
 
 
-def test_noise_that_follows_the_motion_is_loud():
+@pytest.mark.parametrize("jitter", [0.0, 0.5])
+def test_noise_that_follows_the_motion_is_loud(jitter):
     def by_rate(seed):
         rng = np.random.default_rng(seed)
         return lambda t, y: y + rng.normal(0.0, 1.0, y.size) * 2e-4 * np.abs(np.gradient(y, t))
@@ -187,28 +193,29 @@ def test_noise_that_follows_the_motion_is_loud():
         rng = np.random.default_rng(seed)
         return lambda _t, y: y + rng.normal(0.0, 1.0, y.size) * 3e-3 * np.abs(y)
 
-    assert np.all(trends(3, by_rate)[:, 1] > 8.0)
-    assert np.all(trends(3, by_amplitude)[:, 0] > 8.0)
+    assert np.all(trends(3, by_rate, jitter)[:, 1] > 8.0)
+    assert np.all(trends(3, by_amplitude, jitter)[:, 0] > 8.0)
 
 
-def test_bursts_are_louder_than_any_steady_noise():
+@pytest.mark.parametrize("jitter", [0.0, 0.5])
+def test_bursts_are_louder_than_any_steady_noise(jitter):
     def bursts(seed):
         rng = np.random.default_rng(seed)
         return lambda t, y: y + rng.normal(0.0, 5.0 * NOISE, y.size) * (np.sin(2.0 * t) > 0.95)
 
-    assert np.min(trends(3, bursts)[:, 2]) > 2.0 * np.max(trends(30)[:, 2])
+    assert np.min(trends(3, bursts, jitter)[:, 2]) > 2.0 * np.max(trends(30, jitter=jitter)[:, 2])
 
 
 def test_repetitions_are_judged_each_by_itself():
     data = decays(rate=1000.0)
-    readings = [(run.record.yaw_rad, 1000.0) for run in data.runs]
-    noisier = [(y + np.random.default_rng(3).normal(0.0, 1e-3 * np.abs(y)), rate) for y, rate in readings]
+    readings = [(run.record.yaw_rad, run.record.time_s) for run in data.runs]
+    noisier = [(y + np.random.default_rng(3).normal(0.0, 1e-3 * np.abs(y)), time) for y, time in readings]
     both = trend_statistics(
-        [(np.stack([a, b]), rate) for (a, rate), (b, _) in zip(readings, noisier, strict=True)]
+        [(np.stack([a, b]), time) for (a, time), (b, _) in zip(readings, noisier, strict=True)]
     )
     for i, one in enumerate((readings, noisier)):
         np.testing.assert_allclose(
-            both[i], trend_statistics([(y[None], rate) for y, rate in one])[0], rtol=1e-9
+            both[i], trend_statistics([(y[None], time) for y, time in one])[0], rtol=1e-9
         )
 
 

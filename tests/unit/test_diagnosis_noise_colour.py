@@ -5,11 +5,16 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.stats import binom
 
 from diagnosis.detection import gap
 from diagnosis.detection.noise_colour import _steady, noise_colour
 from diagnosis.detection.noise_remarks import noise_remarks
 from diagnosis.detection.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
+from diagnosis.detection.wandering_zero import zero_wanders
+from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.problem import Problem
+from diagnosis.policy import COLOUR_FALSE_ALARM_RATE
 from tests.unit.gap_campaigns import NOISE, campaign, nominal, with_blow
 from tests.unit.test_diagnosis_process_noise import buffeted
 from tunnel_sim.effects import effect_class
@@ -31,10 +36,15 @@ def colour(name, count, rng):
 
 def coloured(data, name, size=2.0, seed=1):
     """The campaign with coloured noise added, its size in standard deviations of the white noise, none stated."""
+    return with_zero(data, lambda count, rng: size * NOISE * colour(name, count, rng), seed)
+
+
+def with_zero(data, zero, seed=1):
+    """The campaign with something added to every reading, of its number of samples; no noise is stated."""
     rng = np.random.default_rng(seed)
     runs = []
     for run in data.runs:
-        yaw = run.record.yaw_rad + size * NOISE * colour(name, run.record.yaw_rad.size, rng)
+        yaw = run.record.yaw_rad + zero(run.record.yaw_rad.size, rng)
         runs.append(dataclasses.replace(run, record=Record(run.record.time_s, yaw)))
     sensor = dataclasses.replace(data.sensor, noise_std=None)
     return dataclasses.replace(data, runs=tuple(runs), sensor=sensor)
@@ -57,6 +67,36 @@ def test_coloured_noise_alone_is_not_a_gap(name):
     assert abs(fit.excess) < 0.06
     # were it taken for white noise, it would be one
     assert min(gap.band_p_values(nominal(coloured(campaign(), name)))) < 1e-6
+
+
+def random_walk(count, rng):
+    return 3.0 * NOISE * np.cumsum(rng.standard_normal(count)) / np.sqrt(count)
+
+
+def late_step(count, rng):
+    return 3.0 * NOISE * (np.arange(count) > rng.uniform(0.3, 0.7) * count)
+
+
+@pytest.mark.parametrize("zero", [random_walk, late_step])
+def test_a_zero_that_wanders_is_a_gap_and_no_colour(zero):
+    """Even where noise of its spectrum would close the gap."""
+    data = with_zero(campaign(duration=20.0), zero)
+    before = nominal(data)
+    colour = noise_colour(before)
+    whitened = fit(Problem(gap.whitened(before.problem.data, colour)), before.point)
+    assert abs(whitened.excess) < 0.1
+    _, noise, found = judged(data)
+    assert found.detected
+    assert noise.colour is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COLOURS)
+def test_coloured_noise_is_taken_for_a_wandering_zero_no_oftener_than_stated(name):
+    trials = 60
+    fits = [nominal(coloured(campaign(seed=seed), name, seed=seed)) for seed in range(trials)]
+    alarms = sum(zero_wanders(before, noise_colour(before)) for before in fits)
+    assert alarms <= binom.ppf(1.0 - 1e-4, trials, COLOUR_FALSE_ALARM_RATE)
 
 
 @pytest.mark.parametrize("name", COLOURS)
