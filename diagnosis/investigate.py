@@ -20,7 +20,7 @@ from diagnosis.detection.mains import Hum, find_hum, refine_frequency, remove_hu
 from diagnosis.detection.refusal import refuse_indefinite
 from diagnosis.detection.sensor_noise import Noise, campaign_noise, noise_trend, reading_step
 from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
-from diagnosis.fitting.prepare import prepare, without_rest, without_start
+from diagnosis.fitting.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.similarity import Similarity, similar_campaign
@@ -139,6 +139,9 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     fitted = [kind for kind in kinds if kind.fitted]
     if fitted and is_gross(found.nominal):
         return _weigh_in_stretches(found, fitted, clock)
+    data = without_long_rest(found.nominal.problem.data)
+    if data is not found.nominal.problem.data:  # where dry friction stops a body, χ² has many minima
+        found = replace(found, nominal=fit(Problem(data), found.nominal.point))
     with clock.step("effects"):
         found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress)))
     with clock.step("random moments"):

@@ -15,6 +15,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 BLOCK_INTERVAL = 4e-3
 _END = 50  # a run ends where its last fiftieth stands
 _STILL = 0.02  # of the largest swing, within which a body counts as at rest
+_QUIET = 5.0  # noise standard deviations of a block mean, within which it does too
 
 
 def prepare(
@@ -107,11 +108,32 @@ def without_rest(data: Data) -> Data:
         The data with every run cut after its last reading that differs from its end by more than a fiftieth of its
         largest swing.
     """
-    return dataclasses.replace(data, runs=tuple(_without_rest(run) for run in data.runs))
+    return dataclasses.replace(data, runs=tuple(run.part(last=_moves_until(run)) for run in data.runs))
 
 
-def _without_rest(run: RunData) -> RunData:
+def without_long_rest(data: Data) -> Data:
+    """The runs up to where their motion ends, where a rest follows that is longer.
+
+    Returns:
+        The data with such runs cut after their last reading that differs from their end by more than the noise, or
+        the same data where there are none.
+    """
+    ends = [_moves_until(run, _QUIET * float(np.sqrt(run.noise_variance))) for run in data.runs]
+    cut = [2 * end < run.reading.size for run, end in zip(data.runs, ends, strict=True)]
+    if not any(cut):
+        return data
+    runs = [
+        run.part(last=end if rests else None) for run, end, rests in zip(data.runs, ends, cut, strict=True)
+    ]
+    return data.with_runs(tuple(runs))
+
+
+def _moves_until(run: RunData, still: float | None = None) -> int:
+    """Number of blocks up to the last that is away from the end by more than ``still``, rad; all where none is.
+
+    Without it, by more than a fiftieth of the largest swing.
+    """
     at_end = np.median(run.reading[-max(1, run.reading.size // _END) :])
     away = np.abs(run.reading - at_end)
-    moving = np.flatnonzero(away > _STILL * away.max())
-    return run.part(last=int(moving[-1]) + 1) if moving.size else run
+    moving = np.flatnonzero(away > (_STILL * away.max() if still is None else still))
+    return int(moving[-1]) + 1 if moving.size else run.reading.size

@@ -193,7 +193,9 @@ def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint 
     infos = _own_parameters(problem, kind)
     scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)
     values = np.array([trial.values.get(info.name, info.default) for info in infos])
-    change = _moderate_change(base, problem, values, scaled)
+    names = base.problem.names
+    replaced = names.index(trial.replaces) if trial.replaces in names else None
+    change = _moderate_change(base, problem, values, scaled, replaced)
     if change is None:
         return None
     left = project_out(base, change)
@@ -207,21 +209,33 @@ def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint 
         start[scaled] = np.clip(moderate, infos[scaled].lower, infos[scaled].upper)
         if start[scaled] == 0.0:
             start[scaled], drop = 0.01 * values[scaled], 0.0
-    point = Point(np.concatenate([base.point.common, start]), base.point.release)
+        if replaced is not None:
+            start[scaled] = min(start[scaled], base.point.common[replaced])
+    point = Point(_with_effect(base, start, scaled, replaced), base.point.release)
     place = None if scaled is None else base.point.common.size + scaled
     return StartingPoint(problem, point, drop, place)
 
 
-def _moderate_change(base: Fit, problem: Problem, values: Array, scaled: int | None) -> list[Array] | None:
+def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | None) -> Array:
+    """Common parameters with those of an effect; ``replaced`` is the place of the one that it replaces."""
+    common = base.point.common.copy()
+    if scaled is not None and replaced is not None:
+        common[replaced] -= values[scaled]
+    return np.concatenate([common, values])
+
+
+def _moderate_change(
+    base: Fit, problem: Problem, values: Array, scaled: int | None, replaced: int | None = None
+) -> list[Array] | None:
     """Change of the scaled prediction by an effect, one value lowered until the change is moderate.
 
     ``values`` holds the effect's parameters and is changed in place to those that were used; ``scaled`` is the
-    place of the one that is lowered, None where none may be.
+    place of the one that is lowered, None where none may be, and ``replaced`` that of the one that it replaces.
     """
     data = base.problem.data
     limit = 3.0 * np.sqrt(base.total)
     for _ in range(12):
-        moved = problem.predict([Point(np.concatenate([base.point.common, values]), base.point.release)])[0]
+        moved = problem.predict([Point(_with_effect(base, values, scaled, replaced), base.point.release)])[0]
         change = [
             run.scaled(m - run.reading) + r
             for m, run, r in zip(moved, data.runs, base.residuals, strict=True)

@@ -8,9 +8,10 @@ import pytest
 from diagnosis.attribution.grow_in_stretches import _of_each, grow_in_stretches
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import fit_at
-from diagnosis.fitting.prepare import prepare, without_rest, without_start
+from diagnosis.fitting.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.spectra import resonance
+from diagnosis.fitting.starting_points import is_gross, starting_points
 from diagnosis.investigate import fit_nominal, investigate
 from diagnosis.law.bases import COMMON, SINGLE, ranges
 from diagnosis.law.paths import paths
@@ -146,3 +147,26 @@ def test_what_acts_on_a_pendulum_of_large_amplitude_is_found(amplitude, friction
     for name, (value, unit) in truth.items():
         found = study.similarity.own(study.chosen.value(name), unit)
         assert found == pytest.approx(value, rel=0.03)
+
+
+def test_gravity_is_found_where_the_nominal_model_does_not_miss_the_motion():
+    """Linear theory sees gravity's curvature only if it takes the place of the spring."""
+    found = fit_nominal(without_start(prepared(pendulum(0.5, 10.0))))
+    assert not is_gross(found)
+    (gravity,) = starting_points(found, effect_class("gravity_stiffness"))
+    (cubic,) = starting_points(found, effect_class("cubic_stiffness"))
+    assert gravity.predicted_drop == pytest.approx(cubic.predicted_drop, rel=0.1)
+    stiffness = found.point.common[found.problem.names.index("stiffness")]
+    assert sum(
+        gravity.point.common[gravity.problem.names.index(name)]
+        for name in ("stiffness", "gravity_stiffness.stiffness")
+    ) == pytest.approx(stiffness, rel=1e-9)
+
+
+def test_a_rest_that_is_longer_than_the_motion_is_left_out():
+    data = prepared(pendulum(0.3, 60.0))
+    (run,) = without_long_rest(data).runs
+    moving = np.flatnonzero(np.abs(run.reading) > 0.01)
+    assert 0.9 * run.reading.size < moving[-1] < run.reading.size < 0.5 * data.runs[0].reading.size
+    short = prepared(pendulum(0.3, 10.0))
+    assert without_long_rest(short) is short

@@ -34,11 +34,13 @@ class Trial:
         values: by parameter name; the others start at their defaults.
         scaled: name of the parameter that linear theory rescales; None where the values are used as they are.
         at_most: greatest absolute value that linear theory may give it, in its unit.
+        replaces: name of the nominal parameter that is lowered by as much, down to zero; None for none.
     """
 
     values: Mapping[str, float]
     scaled: str | None
     at_most: float = inf
+    replaces: str | None = None
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import cos
 
 from tunnel_sim.effects.base import Effect, Law
+from tunnel_sim.effects.fitting import Circumstances, Trial
 from tunnel_sim.effects.parameters import parameter
 
 
@@ -44,6 +46,16 @@ class GravityStiffness(Effect):
         fit_upper=1.6,
         beside_spring=True,  # without a spring it is one with the sensor's zero
     )
+
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """Gravity beside stated springs, or in place of an unstated one.
+
+        An unstated spring absorbs all of a small gravity but its curvature. In place of the spring it leaves the
+        frequency of small swings as it is, so that the curvature shows.
+        """
+        (trial,) = super().trials(campaign)
+        return (replace(trial, replaces="stiffness") if campaign.normalised else trial,)
 
     def law(self) -> Law:
         """The effect's terms of the moment law."""
