@@ -110,9 +110,9 @@ STEEPNESS_BEYOND = 6.0
 FORM_MISFIT = 0.005
 #: The same of effects that have no form to miss. Tuned.
 EXACT_MISFIT = 0.001
-#: Excess of block means beyond which the noise that counts as such no longer grows with the gap. Tuned: a motion
-#: missed grossly is no reason to overlook a second effect. With 1000, simulated pendulums lacked a quadratic damping
-#: of 2 to 6 noise powers; 33 blind campaigns of large gaps and eight real records were hardly changed.
+#: Excess of block means beyond which that share no longer grows with the gap. Tuned: a motion missed grossly is no
+#: reason to overlook a second effect. With 1000, simulated pendulums lacked a quadratic damping of 2 to 6 noise
+#: powers; 33 blind campaigns of large gaps and eight real records were hardly changed.
 FORM_MISFIT_UP_TO = 300.0
 #: Standard deviations by which chance may change a share or a slope. Convention.
 CHANCE_STDS = 2.0

@@ -69,7 +69,7 @@ def _surely_free(record: Record) -> int:
     return min(int(np.flatnonzero(away >= _NEAR_LARGEST * away.max())[-1]), yaw.size // 2)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Swings:
     """The swings of a record, smoothed.
 

@@ -9,7 +9,7 @@ PAIR = ("free_play", "quadratic_damping")
 
 
 def weight(share, misfit, excess, chance, effects=1, forms=0):
-    delta = misfit * min(1.0, 1000.0 / excess) + 2.0 * chance
+    delta = misfit * min(1.0, 300.0 / excess) + 2.0 * chance
     beyond = ((0.2 + delta) / (max(share, 0.2) + delta)) ** 6
     return delta**2 * (share + delta) ** -3 * beyond * 0.44 ** (3 * (effects - 1)) * 0.8 ** (3 * forms)
 
