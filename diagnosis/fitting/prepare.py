@@ -15,6 +15,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 BLOCK_INTERVAL = 4e-3
 _END = 50  # a run ends where its last fiftieth stands
 _STILL = 0.02  # of the largest swing, within which a body counts as at rest
+_LONG_REST = 0.1  # of a run
 _QUIET = 5.0  # noise standard deviations of a block mean, within which it does too
 
 
@@ -112,14 +113,14 @@ def without_rest(data: Data) -> Data:
 
 
 def without_long_rest(data: Data) -> Data:
-    """The runs up to where their motion ends, where a rest follows that is longer.
+    """The runs up to where their motion ends, where a long rest follows.
 
     Returns:
         The data with such runs cut after their last reading that differs from their end by more than the noise, or
         the same data where there are none.
     """
     ends = [_moves_until(run, _QUIET * float(np.sqrt(run.noise_variance))) for run in data.runs]
-    cut = [2 * end < run.reading.size for run, end in zip(data.runs, ends, strict=True)]
+    cut = [end < (1.0 - _LONG_REST) * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
     if not any(cut):
         return data
     runs = [

@@ -163,7 +163,7 @@ def test_gravity_is_found_where_the_nominal_model_does_not_miss_the_motion():
     ) == pytest.approx(stiffness, rel=1e-9)
 
 
-def test_a_rest_that_is_longer_than_the_motion_is_left_out():
+def test_a_long_rest_is_left_out():
     data = prepared(pendulum(0.3, 60.0))
     (run,) = without_long_rest(data).runs
     moving = np.flatnonzero(np.abs(run.reading) > 0.01)
