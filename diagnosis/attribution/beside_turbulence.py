@@ -119,4 +119,4 @@ def _smaller(whole: Hypothesis) -> list[Hypothesis]:
 def _seen_in(hypothesis: Hypothesis, data: Data) -> Hypothesis:
     """The hypothesis as it stands, with residuals in the noise of other data."""
     problem = replace(hypothesis.fit.problem, data=data)
-    return replace(hypothesis, fit=fit_at(problem, hypothesis.fit.point))
+    return replace(hypothesis, fit=fit_at(problem, hypothesis.fit.point), textbook=None)

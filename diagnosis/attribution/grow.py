@@ -208,7 +208,7 @@ def sets_with_one_more(
         One for every set of effects, the better fit where two sets lead to it.
     """
     found: dict[tuple[str, ...], Hypothesis] = {}
-    for parent in level:
+    for parent in (*level, *_in_textbook_form(level)):
         others = [kind for kind in kinds if kind.name not in parent.effects]
         for kind, starts in _worth_fitting(parent, others):
             if progress is not None:
@@ -220,6 +220,12 @@ def sets_with_one_more(
             if child.names not in found or best.total < found[child.names].fit.total:
                 found[child.names] = child
     return list(found.values())
+
+
+def _in_textbook_form(level: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The single effects whose form was freed, without it: alone, a form also follows what other causes do."""
+    single = [h for h in level if len(h.effects) == 1]
+    return [Hypothesis(h.effects, h.textbook) for h in single if h.textbook is not None]
 
 
 def _worth_fitting(

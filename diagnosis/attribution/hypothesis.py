@@ -27,7 +27,7 @@ class Hypothesis:
     Args:
         effects: names, in the order they were added.
         fit: the fit.
-        textbook: the fit with the textbook form, where the forms were freed in the end; None otherwise.
+        textbook: the fit with the textbook form, where the forms were freed; None otherwise.
     """
 
     effects: tuple[str, ...]
@@ -120,7 +120,7 @@ def _freed_if_it_pays(hypothesis: Hypothesis, least: float) -> Hypothesis:
     needed = _forms_that_matter(freed, (1.0 - FORM_SHARE) * fitted.excess * fitted.count)
     if needed and needed != freed.problem.free_forms:
         freed = _free_forms(fitted, only=needed) or freed
-    found = Hypothesis(hypothesis.effects, freed)
+    found = Hypothesis(hypothesis.effects, freed, fitted)
     return found if freed.excess < FORM_SHARE**found.forms * fitted.excess else hypothesis
 
 

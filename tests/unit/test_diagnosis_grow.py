@@ -254,3 +254,10 @@ def test_a_line_that_does_not_decay_is_no_mode() -> None:
         for r in ratios
     ]
     assert [mode.plausible(12.0) for mode in modes] == [False, True, True]
+
+
+def test_a_second_effect_is_added_to_the_textbook_form_as_well(monkeypatch):
+    tried = []
+    monkeypatch.setattr(growth, "_worth_fitting", lambda parent, _kinds: tried.append(parent) or [])
+    growth.sets_with_one_more([Hypothesis(("a",), 1, 2), Hypothesis(("a", "b"), 3, 4)], [], None)
+    assert [(h.effects, h.fit) for h in tried] == [(("a",), 1), (("a", "b"), 3), (("a",), 2)]
