@@ -237,6 +237,7 @@ def test_of_several_forms_only_those_that_matter_are_freed() -> None:
     )
     (freed,) = with_forms([kept], 0.0)
     assert freed.fit.problem.free_forms == ("asymmetric_stiffness",)
+    assert freed.textbook is kept.fit
     assert within_noise(freed.fit)
 
 
