@@ -378,8 +378,9 @@ def _fourth_differences(reading: Array, time: Array) -> Array:
     count = time.size - 4
     total, gain = np.zeros((*reading.shape[:-1], count)), np.zeros(count)
     for k in range(5):
-        others = [time[k : count + k] - time[j : count + j] for j in range(5) if j != k]
-        weight = 1.0 / np.prod(others, axis=0)
+        weight = np.ones(count)
+        for j in {0, 1, 2, 3, 4} - {k}:
+            weight /= time[k : count + k] - time[j : count + j]
         total += weight * reading[..., k : count + k]
         gain += weight**2
     return np.asarray(total / np.sqrt(gain))

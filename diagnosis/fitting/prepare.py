@@ -15,8 +15,8 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 BLOCK_INTERVAL = 4e-3
 _END = 50  # a run ends where its last fiftieth stands
 _STILL = 0.02  # of the largest swing, within which a body counts as at rest
-_LONG_REST = 0.1  # of a run
 _QUIET = 5.0  # noise standard deviations of a block mean, within which it does too
+_LONG_REST = 0.1  # of a run: a rest that is cut off
 
 
 def prepare(
