@@ -26,7 +26,8 @@ from diagnosis.policy import (
 )
 from tunnel_sim.vocabulary.record import Array
 
-_PARTS = 8  # parts of records to compare, at least
+_PARTS = 8  # parts of records to compare, where they are long enough
+_FEWEST_PARTS = 4  # fewer agree by chance
 _CYCLES = 8.0  # of the motion in a part, at least: its windowed line then stays within the share left out
 _BESIDE = 0.25  # of the motion's frequency, on either side of its harmonics, left out
 _LOWEST = 2.5  # cycles in a part: the window's lobe about zero frequency ends there
@@ -110,11 +111,11 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
 
     Returns:
         The spectrum; None where it is flat within `FLOOR_TOLERANCE` and chance, or no bands are the same in all
-        parts of the records.
+        parts of the records, of which there must be four.
     """
     parts = [part for i in range(len(nominal.residuals)) for part in _parts(nominal, i)]
     sizes = [part.motion for part in parts]
-    if not sizes or max(sizes) < COLOUR_AMPLITUDES * min(sizes):
+    if len(sizes) < _FEWEST_PARTS or max(sizes) < COLOUR_AMPLITUDES * min(sizes):
         return None
     lowest = max(
         _LOWEST * max(part.frequency[1] for part in parts),

@@ -4,14 +4,10 @@ Free motion crosses its centre every half cycle, whatever its initial phase. In 
 crossings (or between the start of the record and the first one) the body was held, moved by hand, or at rest. The
 release is then the turning point of the motion that follows, extrapolated backwards. A hold in mid-record that is
 shorter than about three quarters of a cycle leaves no such interval and is not detected. At the start of a record a
-hand that pulls the body aside is also known by its slowness: a free swing takes no longer out than back. One that
-holds it aside is known by the time the body stays there: a free swing stays no longer than the next one.
+hand that pulls the body aside is also known by its slowness: a free swing takes no longer out than back.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -55,11 +51,16 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
     frequency = starting_frequency(later)
     if frequency is None:
         return 0
-    swings = _swings(record, sensor, float(np.median(later.yaw_rad)), frequency)
-    held = _last_long_stretch(swings.crossings, swings.largest)
-    if held is None and swings.largest == 1 and swings.crossings.size > 2 and (swings.pulled or swings.stays):
+    crossings, largest, out = _crossings(record, sensor, float(np.median(later.yaw_rad)), frequency)
+    held = _last_long_stretch(crossings, largest)
+    if (
+        held is None
+        and largest == 1
+        and crossings.size > 2
+        and out[0] > _SLOWER * (crossings[1] - out[1]) + 0.5
+    ):
         held = 0
-    return 0 if held is None else _standstill(record, swings.crossings, held)
+    return 0 if held is None else _standstill(record, crossings, held)
 
 
 def _surely_free(record: Record) -> int:
@@ -69,24 +70,14 @@ def _surely_free(record: Record) -> int:
     return min(int(np.flatnonzero(away >= _NEAR_LARGEST * away.max())[-1]), yaw.size // 2)
 
 
-@dataclass(frozen=True, eq=False)
-class _Swings:
-    """The swings of a record, smoothed.
+def _crossings(
+    record: Record, sensor: SensorProperties, centre: float, frequency: float
+) -> tuple[Array, int, tuple[float, float]]:
+    """Where the smoothed reading crosses its centre, in samples; the start of the record counts as the first.
 
-    Args:
-        crossings: where they cross the centre, in samples; the start of the record counts as the first.
-        largest: place of the first crossing after the largest excursion.
-        pulled: whether the largest excursion takes longer to get to than to come back from.
-        stays: whether the body stays near its first turning point for longer than near the second.
+    The second value is the place of the first crossing after the largest excursion; the third are the samples that
+    the smoothed reading takes to get there, and its place in samples.
     """
-
-    crossings: Array
-    largest: int
-    pulled: bool
-    stays: bool
-
-
-def _swings(record: Record, sensor: SensorProperties, centre: float, frequency: float) -> _Swings:
     yaw = record.yaw_rad
     width = max(1, min(round(_SMOOTHED * record.sample_rate / frequency), yaw.size // 4))
     total = np.concatenate([[0.0], np.cumsum(yaw - centre)])
@@ -100,19 +91,7 @@ def _swings(record: Record, sensor: SensorProperties, centre: float, frequency: 
     crossings = np.concatenate([[0.0], middles])
     steps = float(np.argmax(away))
     turn = steps + 0.5 * width
-    back = float(crossings[1] - turn) if crossings.size > 1 else np.inf
-    return _Swings(
-        crossings,
-        int(np.searchsorted(crossings, turn)),
-        pulled=steps > _SLOWER * back + 0.5,
-        stays=_stays(np.split(away, outside[change + 1])),
-    )
-
-
-def _stays(swings: Sequence[Array]) -> bool:
-    """Whether the first excursion stays near its peak for longer than the second one."""
-    near = [int(np.sum(swing > _NEAR_LARGEST * swing.max())) for swing in swings[:2]]
-    return len(near) == 2 and near[0] > _LONGER * near[1]
+    return crossings, int(np.searchsorted(crossings, turn)), (steps, turn)
 
 
 def _last_long_stretch(crossings: Array, largest: int) -> int | None:

@@ -137,6 +137,13 @@ def test_a_gap_of_still_air_is_no_colour(effect, size, damping):
     assert noise.colour is None
 
 
+def test_two_parts_of_records_show_no_colour():
+    data = coloured(campaign(duration=6.0), "ar1")
+    assert noise_colour(nominal(data)) is not None
+    two = dataclasses.replace(data, runs=(data.runs[0], data.runs[-1]))
+    assert noise_colour(nominal(two)) is None
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_white_noise_is_left_alone(seed):
     data = campaign(seed=seed)

@@ -60,18 +60,6 @@ def test_a_hand_that_pulls_the_body_aside_is_known_by_its_slowness(cycles, angle
     assert abs(found - pull.size) <= 0.02 * RATE
 
 
-@pytest.mark.parametrize("cycles", [0.3, 0.45, 0.7])
-@pytest.mark.parametrize("angle", [ANGLE, -ANGLE])
-def test_a_hand_that_holds_the_body_aside_is_known_by_the_time_it_stays(cycles, angle):
-    free = run("r", 16.0, 0.0, angle=angle)
-    held = round(cycles * 2.0 * np.pi / np.sqrt(160.0) * RATE)
-    before = np.full(held, free.record.yaw_rad[0])
-    found = find_release(
-        reading(free, np.concatenate([before, free.record.yaw_rad])).record, SensorProperties()
-    )
-    assert abs(found - held) <= 0.02 * RATE
-
-
 def test_the_release_is_found_at_uneven_times():
     free = run("r", 16.0, 0.0)
     held = reading(free, np.concatenate([np.full(HELD, free.record.yaw_rad[0]), free.record.yaw_rad])).record
