@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 
 import numpy as np
@@ -141,7 +141,8 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
         return _weigh_in_stretches(found, fitted, clock)
     data = without_long_rest(found.nominal.problem.data)
     if data is not found.nominal.problem.data:  # where dry friction stops a body, χ² has many minima
-        found = replace(found, nominal=fit(Problem(data), found.nominal.point))
+        with suppress(FitError, np.linalg.LinAlgError):  # what is left may be too short: whole runs then
+            found = replace(found, nominal=fit(Problem(data), found.nominal.point))
     with clock.step("effects"):
         found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress)))
     with clock.step("random moments"):

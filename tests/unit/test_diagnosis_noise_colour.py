@@ -92,7 +92,7 @@ def test_a_zero_that_wanders_is_a_gap_and_no_colour(zero):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", COLOURS)
-def test_coloured_noise_is_taken_for_a_wandering_zero_no_oftener_than_stated(name):
+def test_coloured_noise_is_taken_for_a_wandering_zero_no_more_often_than_stated(name):
     trials = 60
     fits = [nominal(coloured(campaign(seed=seed), name, seed=seed)) for seed in range(trials)]
     alarms = sum(zero_wanders(before, noise_colour(before)) for before in fits)
