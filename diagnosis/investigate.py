@@ -139,10 +139,10 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     fitted = [kind for kind in kinds if kind.fitted]
     if fitted and is_gross(found.nominal):
         return _weigh_in_stretches(found, fitted, clock)
-    data = without_long_rest(found.nominal.problem.data)
-    if data is not found.nominal.problem.data:  # where dry friction stops a body, χ² has many minima
+    moving, rested = without_long_rest(found.nominal.problem.data)
+    if rested:  # where dry friction stops a body, χ² has many minima
         with suppress(FitError, np.linalg.LinAlgError):  # what is left may be too short: whole runs then
-            found = replace(found, nominal=fit(Problem(data), found.nominal.point))
+            found = replace(found, nominal=fit(Problem(moving), found.nominal.point), rested=rested)
     with clock.step("effects"):
         found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress)))
     with clock.step("random moments"):

@@ -38,6 +38,7 @@ class Study:
         test: whether there is a gap, after the hum is removed.
         cut: whether the start of every run and what follows its motion were left out, because the nominal model
             misses the motion grossly.
+        rested: runs that end with a long rest, which the fits of effects leave out.
         hypotheses: fitted sets of effects.
         weighed: answers with probabilities, most probable first; empty where there is no gap.
         random: answers with a random moment that passed its tests.
@@ -56,6 +57,7 @@ class Study:
     nominal: Fit
     test: GapTest
     cut: bool = False
+    rested: tuple[str, ...] = ()
     hypotheses: tuple[Hypothesis, ...] = ()
     weighed: tuple[Weighed, ...] = ()
     random: tuple[RandomAnswer, ...] = ()

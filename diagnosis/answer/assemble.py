@@ -41,6 +41,10 @@ _CUT_RECORDS = (
     "The nominal model misses the motion grossly, so each record is used only from its second passage through the "
     "middle until its motion ends. A start driven by hand is not a free decay, and neither is a body at rest."
 )
+_RESTED = (
+    "The body is at rest at the end of {}. The fits leave the rest out: the place where friction stops a body says "
+    "little about its motion."
+)
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
 
@@ -118,6 +122,7 @@ def assemble(
                 named=study.named,
             ),
             *((_CUT_RECORDS,) if study.cut else ()),
+            *((_RESTED.format(", ".join(study.rested)),) if study.rested else ()),
             *_outside(study),
         ),
         inclusion=inclusion(weighed, study.read_off),

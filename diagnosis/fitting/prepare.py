@@ -112,21 +112,18 @@ def without_rest(data: Data) -> Data:
     return dataclasses.replace(data, runs=tuple(run.part(last=_moves_until(run)) for run in data.runs))
 
 
-def without_long_rest(data: Data) -> Data:
+def without_long_rest(data: Data) -> tuple[Data, tuple[str, ...]]:
     """The runs up to where their motion ends, where a long rest follows.
 
     Returns:
-        The data with such runs cut after their last reading that differs from their end by more than the noise, or
-        the same data where there are none.
+        The data with such runs cut after their last reading that differs from their end by more than the noise, and
+        the ids of these runs.
     """
     ends = [_moves_until(run, _QUIET * float(np.sqrt(run.noise_variance))) for run in data.runs]
-    cut = [end < (1.0 - _LONG_REST) * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
-    if not any(cut):
-        return data
-    runs = [
-        run.part(last=end if rests else None) for run, end, rests in zip(data.runs, ends, cut, strict=True)
-    ]
-    return data.with_runs(tuple(runs))
+    rests = [end < (1.0 - _LONG_REST) * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
+    each = list(zip(data.runs, ends, rests, strict=True))
+    runs = tuple(run.part(last=end) if rest else run for run, end, rest in each)
+    return data.with_runs(runs), tuple(run.id for run, _, rest in each if rest)
 
 
 def _moves_until(run: RunData, still: float | None = None) -> int:

@@ -165,8 +165,11 @@ def test_gravity_is_found_where_the_nominal_model_does_not_miss_the_motion():
 
 def test_a_long_rest_is_left_out():
     data = prepared(pendulum(0.3, 60.0))
-    (run,) = without_long_rest(data).runs
+    cut, rested = without_long_rest(data)
+    (run,) = cut.runs
+    assert rested == (run.id,)
     moving = np.flatnonzero(np.abs(run.reading) > 0.01)
     assert 0.9 * run.reading.size < moving[-1] < run.reading.size < 0.5 * data.runs[0].reading.size
     short = prepared(pendulum(0.3, 10.0))
-    assert without_long_rest(short) is short
+    whole, none = without_long_rest(short)
+    assert (whole.runs, none) == (short.runs, ())
