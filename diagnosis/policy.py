@@ -136,14 +136,15 @@ EVEN_SHARE = 0.03
 
 # ---- Random moments (0009) ------------------------------------------------------------------------------------
 
-#: Largest departure of the innovations' power by band from white, in standard deviations. Judgement: among 64 to
-#: 100 bands the greatest is below 3.5 by chance; a real spectrum is not first-order, which adds some.
-WHITE_BY_BAND = 7.0
-#: The same for quarters of the record in time. Judgement.
-STEADY_IN_TIME = 5.5
+#: Largest departure of the innovations' power from white, by band and by quarter of a record, in standard
+#: deviations. Judgement: among 100 to 150 the greatest is below 3.5 by chance; a real spectrum is not first-order,
+#: which adds some.
+WHITE_INNOVATIONS = 7.0
 #: Rate at which steady turbulence is taken for a burst, all windows of a campaign together: a convention. And the
 #: factor by which real turbulence, which is not quite steady, may exceed that limit: a judgement.
 BURST_FALSE_ALARM_RATE, BURST = 0.001, 1.5
+#: Rate at which a random moment of all runs is taken for one of a single run. Convention.
+ONE_RUN_FALSE_ALARM_RATE = 1e-3
 #: Excess of the wind-off runs up to which they count as free of a gap: the greatest of so many noise variances and
 #: the misfit of form that counts as none. And the share of the whole excess up to which they do where turbulence is
 #: not part of the noise, so that its motion has misled the fit. Judgement.
@@ -153,9 +154,11 @@ WIND_OFF_LEAST, WIND_OFF_SHARE = 0.1, 0.05
 LEFT_IN_THE_WIND = 0.5
 #: Single effects beside which a random moment is tried. Judgement: time against coverage.
 RANDOM_PARTNERS = 3
-#: −2 ln L by which every effect beside the random moment must improve it. Judgement: a parameter
-#: fitted by least squares to a random motion gains about ten for nothing.
-BESIDE_EVIDENCE = 60.0
+#: −2 ln L by which every effect beside the random moment must improve it. Judgement: a parameter fitted by least
+#: squares to a random motion gains about ten for nothing, and a few effects are tried.
+BESIDE_EVIDENCE = 30.0
+#: The same of every instant or phase of a run's own. Judgement: it is the best of many that were tried.
+OWN_EVIDENCE = 10.0
 #: −2 ln L beyond which a likelier kind of random moment rules another out. Convention: odds of e^10.
 RIVAL_EVIDENCE = 20.0
 

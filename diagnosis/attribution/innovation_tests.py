@@ -1,4 +1,4 @@
-"""Whether the innovations of a random moment are those of steady noise: white, steady in time, without bursts."""
+"""Whether a random moment is steady noise: white innovations, steady in time, without bursts, alike in all runs."""
 
 from __future__ import annotations
 
@@ -6,27 +6,44 @@ import numpy as np
 from scipy.stats import chi2
 
 from diagnosis.attribution.process_noise import ProcessNoise
+from diagnosis.policy import BURST, BURST_FALSE_ALARM_RATE, ONE_RUN_FALSE_ALARM_RATE, WHITE_INNOVATIONS
 from tunnel_sim.vocabulary.record import Array
 
 
-def whiteness(result: ProcessNoise) -> tuple[float, float]:
+def is_steady_noise(result: ProcessNoise) -> bool:
+    """Whether a random moment passes all tests.
+
+    Args:
+        result: a fit of process noise.
+
+    Returns:
+        False where its innovations are not white and steady, come in bursts, or are those of one run.
+    """
+    return (
+        departure_from_white(result) <= WHITE_INNOVATIONS
+        and bursts(result, BURST_FALSE_ALARM_RATE) <= BURST
+        and of_all_runs(result) >= ONE_RUN_FALSE_ALARM_RATE
+    )
+
+
+def departure_from_white(result: ProcessNoise) -> float:
     """How far innovations are from white and steady.
 
     Args:
         result: a fit of process noise.
 
     Returns:
-        Largest departure of a frequency band's mean power from 1, in its standard deviations; and the same of a
-        quarter of the record in time.
+        Largest departure from 1 of the mean power in a frequency band, or in a quarter of the record in time, in
+        its standard deviations.
     """
-    bands, quarters = [], []
+    departures = []
     for innovations in result.innovations:
         power = np.abs(np.fft.rfft(innovations - innovations.mean())) ** 2 / innovations.size
         for part in np.array_split(power[1:], 8):
-            bands.append((float(part.mean()) - 1.0) * np.sqrt(part.size))
+            departures.append((float(part.mean()) - 1.0) * np.sqrt(part.size))
         for part in np.array_split(innovations, 4):
-            quarters.append((float(np.mean(part**2)) - 1.0) * np.sqrt(part.size / 2.0))
-    return float(np.max(np.abs(bands))), float(np.max(np.abs(quarters)))
+            departures.append((float(np.mean(part**2)) - 1.0) * np.sqrt(part.size / 2.0))
+    return float(np.max(np.abs(departures)))
 
 
 def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
@@ -52,3 +69,21 @@ def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
 def _moving_power(innovations: Array, length: int) -> Array:
     total = np.concatenate(([0.0], np.cumsum(innovations**2)))
     return np.asarray(total[length:] - total[:-length])
+
+
+def of_all_runs(result: ProcessNoise) -> float:
+    """Probability that a random moment that acts in all runs shows in one of them as much as this one does.
+
+    A gust in one run is not turbulence. The power of the response to the narrowest random moment, which has two
+    quadratures, is an exponential variable, and that of a broader one varies less. Fisher's test of the greatest of
+    n such variables: Proc. R. Soc. A 125 (1929) 54, doi 10.1098/rspa.1929.0151.
+
+    Args:
+        result: a fit of process noise.
+
+    Returns:
+        The first term of Fisher's series, which is at least the probability; a fraction.
+    """
+    total = float(result.by_run.sum())
+    share = float(result.by_run.max()) / total if total > 0.0 else 0.0
+    return min(1.0, result.by_run.size * (1.0 - share) ** (result.by_run.size - 1))

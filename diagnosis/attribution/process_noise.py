@@ -56,6 +56,8 @@ class ProcessNoise:
     Args:
         spectrum: as fitted.
         drop: of −2 ln L against white measurement noise alone, wind-on runs, dimensionless.
+        by_run: the drop of each wind-on run over the power that the spectrum predicts of its response, in units of
+            the noise's, shape (runs,), dimensionless; at least 0.
         cost: −2 ln L without constants, wind-on runs, dimensionless.
         excess: mean squared scaled innovation minus one, dimensionless.
         innovations: scaled, by wind-on run.
@@ -64,6 +66,7 @@ class ProcessNoise:
 
     spectrum: Spectrum
     drop: float
+    by_run: Array
     cost: float
     excess: float
     innovations: list[Array]
@@ -149,18 +152,31 @@ def _fit(
         },
     )
     best = spectrum(np.exp(found.x).tolist())
-    innovations = [scaled for _, scaled in _filtered(channels, best)]
+    costs, innovations = zip(*_filtered(channels, best), strict=True)
     kept = [c.residual[_skip(c) :] / np.sqrt(c.variance) for c in channels]
     count = sum(i.size for i in innovations)
-    white = sum(float(k.size * np.log(c.variance) + k @ k) for c, k in zip(channels, kept, strict=True))
+    white = [float(k.size * np.log(c.variance) + k @ k) for c, k in zip(channels, kept, strict=True)]
+    drops = np.array(white) - np.array(costs)
     return ProcessNoise(
         best,
-        white - float(found.fun),
+        float(drops.sum()),
+        np.maximum(drops, 0.0) / _predicted(channels, Spectrum(1.0, LONGEST_BANDWIDTH)),
         float(found.fun),
         sum(float(i @ i) for i in innovations) / count - 1.0,
-        innovations,
+        list(innovations),
         channels[0].interval,
     )
+
+
+def _predicted(channels: Sequence[_Channel], spectrum: Spectrum) -> Array:
+    """Power of the response at the end of each run that began at rest, in units of the noise's, shape (runs,)."""
+    transition, disturbance = _discrete(channels, spectrum)
+    power = []
+    for channel, a, q in zip(channels, transition, disturbance, strict=True):
+        for _ in range(int(np.log2(channel.residual.size))):
+            a, q = a @ a, q + a @ q @ a.T
+        power.append(q[0, 0] / channel.variance)
+    return np.array(power)
 
 
 def _simplex(start: Array, bounds: Array) -> Array:

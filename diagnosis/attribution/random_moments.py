@@ -9,10 +9,10 @@ from functools import partial
 
 import numpy as np
 
-from diagnosis.attribution.beside_turbulence import beside_turbulence, grown_beside_turbulence
 from diagnosis.attribution.decide import form_floor
+from diagnosis.attribution.grow_beside_random import grow_beside_random
 from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.attribution.innovation_tests import bursts, whiteness
+from diagnosis.attribution.innovation_tests import is_steady_noise
 from diagnosis.attribution.process_noise import (
     ProcessNoise,
     Spectrum,
@@ -23,13 +23,10 @@ from diagnosis.attribution.process_noise import (
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.policy import (
     BESIDE_EVIDENCE,
-    BURST,
-    BURST_FALSE_ALARM_RATE,
     LEFT_IN_THE_WIND,
+    OWN_EVIDENCE,
     RANDOM_PARTNERS,
     RIVAL_EVIDENCE,
-    STEADY_IN_TIME,
-    WHITE_BY_BAND,
     WIND_OFF_LEAST,
     WIND_OFF_SHARE,
 )
@@ -64,7 +61,7 @@ def weigh_random_moments(
     hypotheses: Sequence[Hypothesis],
     kinds: Sequence[type[Effect]],
 ) -> list[RandomAnswer]:
-    """Try turbulence, and vortices with a wandering phase, alone and beside the best single effects.
+    """Try turbulence, and vortices with a wandering phase, alone and beside effects.
 
     Args:
         hypotheses: fitted sets of effects, best first.
@@ -72,14 +69,12 @@ def weigh_random_moments(
 
     Returns:
         The most likely answer of each kind that passes, with as few effects beside it as the evidence asks for.
-        To pass, the innovations must be white by band, steady in time and without bursts, and the wind-off runs
-        free of a gap once the response is part of the noise. Empty where none passes, or where deterministic
+        To pass, the random moment must be steady noise, alike in all runs in the wind, and the wind-off runs must
+        be free of a gap once the response is part of the noise. Empty where none passes, or where deterministic
         effects close the gap.
 
-        A strong random motion misleads the fit of the effects beside it. Where no answer passes, or only one with
-        more effects than still air asks for, the best set is therefore fitted again with the response to turbulence
-        as noise. Where none passes then, and most of what is left is in the wind, sets are grown anew with that
-        noise.
+        A strong random motion misleads the fit of the effects beside it. Where most of what is left is in the wind,
+        sets are therefore grown once more, with the response to the random moment as noise.
     """
     allowed = {kind.name for kind in kinds}
     if any(
@@ -87,20 +82,11 @@ def weigh_random_moments(
         for hypothesis in hypotheses
     ):
         return []
-    answers = _passing(nominal, hypotheses, allowed)
-    if hypotheses and _beside_too_many(answers, nominal, hypotheses):
-        again = beside_turbulence(hypotheses[0], nominal.problem.data)
-        tried = sorted([*answers, *_passing(nominal, again, allowed)], key=_cost, reverse=True)
-        answers = list({answer.kind: answer for answer in tried}.values())
+    sets = list(hypotheses)
     fitted = [kind for kind in kinds if kind.fitted]
-    if (
-        fitted
-        and not answers
-        and _left_in_the_wind([nominal, *(hypothesis.fit for hypothesis in hypotheses)])
-    ):
-        rounds = grown_beside_turbulence(nominal, fitted)
-        passing = (_passing(nominal, found, allowed) for found in rounds)
-        answers = next(filter(None, passing), [])
+    if fitted and _left_in_the_wind([nominal, *(hypothesis.fit for hypothesis in hypotheses)]):
+        sets = grow_beside_random(nominal, fitted)
+    answers = _passing(nominal, sets, allowed)
     least = min((answer.process.cost for answer in answers), default=0.0)
     return [answer for answer in answers if answer.process.cost < least + RIVAL_EVIDENCE]
 
@@ -122,18 +108,18 @@ def _left_in_the_wind(fits: Sequence[Fit]) -> bool:
     return wind_off_excess(best) < LEFT_IN_THE_WIND * best.excess
 
 
-def _beside_too_many(answers: Sequence[RandomAnswer], nominal: Fit, hypotheses: Sequence[Hypothesis]) -> bool:
-    """Whether no answer passes, or only beside more effects than still air asks for, though its gap can close."""
-    sets = [Hypothesis((), nominal), *hypotheses]
-    enough = [len(one.effects) for one in sets if not _still_open(one.fit, nominal)]
-    if not enough:
-        return False
-    beside = [0 if a.beside is None else len(a.beside.effects) for a in answers]
-    return not beside or min(beside) > min(enough) + 1
-
-
 def _cost(answer: RandomAnswer) -> float:
-    return answer.process.cost + BESIDE_EVIDENCE * len(answer.effects)
+    """−2 ln L, with what further freedom gains by chance."""
+    found = answer.process.cost + BESIDE_EVIDENCE * len(answer.effects)
+    if answer.process.spectrum.centre > 0.0:
+        found += RIVAL_EVIDENCE
+    if answer.beside is not None:
+        fit = answer.beside.fit
+        own = sum(
+            place.stop - place.start for place in fit.problem.own_places(fit.point.release.shape[1]).values()
+        )
+        found += OWN_EVIDENCE * own * len(answer.process.innovations)
+    return found
 
 
 def _passing(nominal: Fit, hypotheses: Sequence[Hypothesis], allowed: Collection[str]) -> list[RandomAnswer]:
@@ -153,13 +139,9 @@ _Kind = Callable[[Fit], ProcessNoise | None]
 def _likeliest(
     kind: type[Effect], fits: Sequence[_Kind], nominal: Fit, hypotheses: Sequence[Hypothesis]
 ) -> RandomAnswer | None:
-    for explain in fits:  # a spectrum with more freedom only where the simpler one does not pass
-        tried = [_try(kind, explain, nominal, None, nominal)]
-        tried += [_try(kind, explain, s.fit, s, nominal) for s in _partners(kind, hypotheses)]
-        passed = [answer for answer in tried if answer is not None]
-        if passed:
-            return min(passed, key=_cost)
-    return None
+    sets = [(nominal, None), *((h.fit, h) for h in _partners(kind, hypotheses))]
+    tried = [_try(kind, explain, one, beside, nominal) for one, beside in sets for explain in fits]
+    return min((answer for answer in tried if answer is not None), key=_cost, default=None)
 
 
 def _partners(kind: type[Effect], hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -176,12 +158,7 @@ def _try(
     if _still_open(fit, nominal):
         return None
     process = explain(fit)
-    if process is None or process.drop <= 0.0:
-        return None
-    band, quarter = whiteness(process)
-    if band > WHITE_BY_BAND or quarter > STEADY_IN_TIME:
-        return None
-    if bursts(process, BURST_FALSE_ALARM_RATE) > BURST:
+    if process is None or process.drop <= 0.0 or not is_steady_noise(process):
         return None
     if wind_off_excess(_in_its_noise(fit, process.spectrum)) > _no_gap(nominal):
         return None

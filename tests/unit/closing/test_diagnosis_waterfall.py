@@ -147,7 +147,7 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
     """Where the wind is off the runs' own residuals are left, and nothing beside the moment is taken out."""
     kind = effect_class("buffeting")
     best = added(base, IDLE)
-    process = ProcessNoise(Spectrum(0.01, 5.0), 10.0, 5.0, 0.25, [np.ones(9)] * 4, 0.012)
+    process = ProcessNoise(Spectrum(0.01, 5.0), 10.0, np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012)
     random = RandomAnswer(kind, process, Hypothesis((IDLE,), best), 0.01)
     study = studied(data, base, (kind.name, IDLE, HUM))
     study = replace(study, random=(random,), weighed=(Weighed((kind.name, IDLE), 0.01, 0.9),))
