@@ -28,7 +28,7 @@ from diagnosis.fitting.starting_points import starting_points
 from diagnosis.policy import BESIDE_EVIDENCE
 from tunnel_sim.effects import Effect
 
-_ROUNDS = 3  # of estimating the random moment from the residuals, and the effects beside it
+_ROUNDS = 2  # of estimating the random moment from the residuals, and the effects beside it
 
 
 def grow_beside_random(nominal: Fit, kinds: Sequence[type[Effect]]) -> list[Hypothesis]:
@@ -40,10 +40,10 @@ def grow_beside_random(nominal: Fit, kinds: Sequence[type[Effect]]) -> list[Hypo
 
     Returns:
         The sets, best first, as they were fitted, with residuals in the sensor's noise alone. They are grown in up
-        to three rounds. The random moment of the first is what the nominal model leaves, which overstates it so
-        much that the runs in the wind hardly count. That of a later round is what the best set of the round before
-        leaves when it is fitted with the sensor's noise alone. The rounds end where the best set no longer changes,
-        no random moment is found, or a fit fails; the last one counts.
+        to two rounds. The random moment of the first is what the nominal model leaves, which overstates it so much
+        that the runs in the wind hardly count. That of the second is what the best set of the first leaves when it
+        is fitted with the sensor's noise alone. There is no second round where that set is empty, and the first
+        counts where a fit of the second fails.
     """
     best, data = Hypothesis((), nominal), nominal.problem.data
     found: list[Hypothesis] = []
