@@ -74,7 +74,7 @@ def weigh_random_moments(
         effects close the gap.
 
         A strong random motion misleads the fit of the effects beside it. Where most of what is left is in the wind,
-        sets are therefore grown once more, with the response to the random moment as noise.
+        sets are therefore grown once more, with the response to the random moment as noise, and only these count.
     """
     allowed = {kind.name for kind in kinds}
     if any(
@@ -82,11 +82,11 @@ def weigh_random_moments(
         for hypothesis in hypotheses
     ):
         return []
-    sets = list(hypotheses)
     fitted = [kind for kind in kinds if kind.fitted]
+    grown: list[Hypothesis] = []
     if fitted and _left_in_the_wind([nominal, *(hypothesis.fit for hypothesis in hypotheses)]):
-        sets = grow_beside_random(nominal, fitted)
-    answers = _passing(nominal, sets, allowed)
+        grown = grow_beside_random(nominal, fitted)
+    answers = _passing(nominal, grown or hypotheses, allowed)
     least = min((answer.process.cost for answer in answers), default=0.0)
     return [answer for answer in answers if answer.process.cost < least + RIVAL_EVIDENCE]
 
@@ -115,9 +115,7 @@ def _cost(answer: RandomAnswer) -> float:
         found += RIVAL_EVIDENCE
     if answer.beside is not None:
         fit = answer.beside.fit
-        own = sum(
-            place.stop - place.start for place in fit.problem.own_places(fit.point.release.shape[1]).values()
-        )
+        own = fit.point.release.shape[1] - fit.problem.first_phase
         found += OWN_EVIDENCE * own * len(answer.process.innovations)
     return found
 
