@@ -138,7 +138,7 @@ EVEN_SHARE = 0.03
 
 #: Largest departure of the innovations' power from white, by band and by quarter of a record, in standard
 #: deviations. Judgement: among 100 to 150 the greatest is below 3.5 by chance; a real spectrum is not first-order,
-#: which adds some.
+#: which adds some. The limit by quarter was 5.5 until it had refused two true answers of tuning campaigns.
 WHITE_INNOVATIONS = 7.0
 #: Rate at which steady turbulence is taken for a burst, all windows of a campaign together: a convention. And the
 #: factor by which real turbulence, which is not quite steady, may exceed that limit: a judgement.

@@ -42,8 +42,8 @@ _CUT_RECORDS = (
     "middle until its motion ends. A start driven by hand is not a free decay, and neither is a body at rest."
 )
 _RESTED = (
-    "The body is at rest at the end of {}. The fits leave the rest out: the place where friction stops a body says "
-    "little about its motion."
+    "The body is at rest at the end of {}. The fits leave that part out: the place where friction stops a body "
+    "says little about its motion."
 )
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 

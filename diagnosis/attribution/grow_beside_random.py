@@ -49,8 +49,9 @@ def grow_beside_random(nominal: Fit, kinds: Sequence[type[Effect]]) -> list[Hypo
     found: list[Hypothesis] = []
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):
-            random = _random_moment(best.fit)
-            noisy = None if random is None else with_response(best.fit, random.spectrum)
+            known = fit(best.fit.problem, best.fit.point) if best.effects else nominal
+            random = _random_moment(known)
+            noisy = None if random is None else with_response(known, random.spectrum)
             if noisy is None:
                 break
             base = fit(Problem(noisy), nominal.point)
@@ -58,10 +59,9 @@ def grow_beside_random(nominal: Fit, kinds: Sequence[type[Effect]]) -> list[Hypo
             top = _sought_again(max([Hypothesis((), base), *grown], key=lambda h: evidence_of(h, base)))
             sets = [*grown, *_with_more_of_the_wind(top, kinds)]
             found = [_seen_in(h, data) for h in sorted(sets, key=lambda h: h.fit.total) if h.effects]
-            before, seen = best.names, _seen_in(sets[-1], data)
-            if seen.names == before:
+            best = _seen_in(sets[-1], data)
+            if not best.effects:
                 break
-            best = replace(seen, fit=fit(seen.fit.problem, seen.fit.point), textbook=None)
     return found
 
 
@@ -93,6 +93,7 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
 
 
 def _better_in_each_run(known: Fit, kind: type[Effect]) -> Fit:
+    """The fit with the instants or phases of one effect sought once more."""
     others = restricted(known, {other.name for other in known.problem.effects} - {kind.name})
     starts = starting_points(fit_at(others.problem, others.point), kind)
     if not starts:

@@ -122,7 +122,10 @@ def test_a_random_moment_of_all_runs_is_taken_for_one_of_a_single_run_at_the_sta
 
 
 def test_turbulence_in_one_run_is_not_that_of_the_stream(windy):
-    assert of_all_runs(fit_turbulence(windy)) > 0.1
+    found = fit_turbulence(windy)
+    assert of_all_runs(found) > 0.1
+    assert is_steady_noise(found)
+    assert not is_steady_noise(replace(found, by_run=np.array([1.0, *np.full(7, 0.01)])))
     blown, still = buffeted(campaign(), 0.01, 4.0), campaign()
     last = max(i for i, (_, speed) in enumerate(CONDITIONS) if speed > 0.0)
     runs = tuple(blown.runs[i] if i == last else run for i, run in enumerate(still.runs))
