@@ -213,12 +213,12 @@ def _with_forms(found: Study, base: Fit) -> Study:
 
 def _weighed(found: Study, base: Fit) -> list[Weighed]:
     """The answers with their probabilities, most probable first; shares of the gap that ``base`` leaves."""
-    shares = [(h.effects, _share(h.fit, base)) for h in found.hypotheses]
+    shares = [(h.effects, h.share_left(base)) for h in found.hypotheses]
     shares += [(answer.effects, answer.share) for answer in found.random]
     return weigh(
         shares,
         chance=base.chance,
-        excess=base.excess,
+        excess=base.gap,
         outside=UNKNOWN_SHARE if found.outsider is None else found.outsider.share,
         numbers={h.names: h.further_numbers for h in found.hypotheses},
     )
@@ -231,11 +231,6 @@ def _polished(
     if any(moment.effects == answer.effects for moment in random):
         return tuple(hypotheses)
     return tuple(polish(h) if h.names == answer.effects else h for h in hypotheses)
-
-
-def _share(fitted: Fit, nominal: Fit) -> float:
-    """Share of the nominal gap that a fit leaves open."""
-    return max(fitted.excess, 0.0) / max(nominal.excess, 1e-9)
 
 
 def _read_off_explains(found: Study) -> bool:

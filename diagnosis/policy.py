@@ -116,6 +116,9 @@ EXACT_MISFIT = 0.001
 FORM_MISFIT_UP_TO = 300.0
 #: Standard deviations by which chance may change a share or a slope. Convention.
 CHANCE_STDS = 2.0
+#: χ² by which a set with a needless effect may be better than one without. By chance alone two numbers lower it by
+#: more than 20 once in 22,000 effects tried, so that of 25 effects one does in one campaign of 900.
+NEEDLESS_CHI2 = 20.0
 #: Share at which a cause is as likely as an unknown one. Tuned.
 UNKNOWN_SHARE = 0.2
 #: Factor on that share for every further effect of the set that is compared with ``unknown``. Tuned (0018): on 15

@@ -24,6 +24,7 @@ from diagnosis.policy import (
     FORM_MISFIT,
     FORM_MISFIT_UP_TO,
     FORM_SHARE,
+    NEEDLESS_CHI2,
     PAIR_SHARE,
     STEEPNESS,
     STEEPNESS_BEYOND,
@@ -54,12 +55,12 @@ def form_floor(excess: float, effects: Sequence[str] = ()) -> float:
     """Share of the gap that a misfit of form may leave.
 
     Args:
-        excess: of the nominal model's block means.
+        excess: of the nominal model's block means, above 0.
         effects: that were fitted.
     """
     exact = {kind.name for kind in known_effects() if kind.exact}
     misfit = EXACT_MISFIT if effects and exact.issuperset(effects) else FORM_MISFIT
-    return misfit * min(1.0, FORM_MISFIT_UP_TO / max(excess, 1e-9))
+    return misfit * min(1.0, FORM_MISFIT_UP_TO / excess)
 
 
 def weigh(
@@ -72,7 +73,7 @@ def weigh(
     """Probabilities of the answers.
 
     Args:
-        shares: effect names and share of the gap they leave open, for sets of any size.
+        shares: effect names and share of the gap they leave open, for sets of any size; below 0 by chance.
         chance: standard deviation of a share by chance alone.
         excess: of the nominal model's block means.
         outside: share that a cause outside the vocabulary leaves open; `UNKNOWN_SHARE` at most counts.
@@ -84,17 +85,17 @@ def weigh(
     answers: dict[tuple[str, ...], float] = {}
     for names, share in shares:
         key = tuple(sorted(names))
-        answers[key] = min(max(share, 0.0), answers.get(key, np.inf))
-    further = numbers or {}
-    weights = {
-        names: evidence(names, share, further.get(names, 0), excess, chance)
-        for names, share in answers.items()
-    }
-    odds = sum(
-        weight / _unknown_evidence(len(names), outside, excess, chance) for names, weight in weights.items()
-    )
+        answers[key] = min(share, answers.get(key, np.inf))
+    least = min((0.0, *answers.values()))
+    weights: dict[tuple[str, ...], float] = {}
+    odds = 0.0
+    for names, share in answers.items():
+        further = (numbers or {}).get(names, 0)
+        weights[names] = evidence(names, share - least, further, excess, chance)
+        odds += _odds_against_unknown(names, share, further, outside, excess, chance)
     known = odds / (1.0 + odds) / (sum(weights.values()) or 1.0)
     probabilities = {names: known * weight for names, weight in weights.items()}
+    answers = {names: max(share, 0.0) for names, share in answers.items()}
     answers[UNKNOWN], probabilities[UNKNOWN] = min(UNKNOWN_SHARE, max(outside, 0.0)), 1.0 / (1.0 + odds)
     even = EVEN_SHARE / len(answers)
     found = [
@@ -105,24 +106,32 @@ def weigh(
 
 
 def evidence(effects: Sequence[str], share: float, numbers: int, excess: float, chance: float) -> float:
-    """Weight of a set of effects among all answers.
+    """Weight of a set of effects among all sets.
+
+    The sets are fitted to the same noise. What chance adds to the shares is common to them, however much it is, and
+    only their differences count: an effect that does not act lowers χ² by `NEEDLESS_CHI2` at most.
 
     Args:
-        share: of the gap that they leave open, a fraction.
+        share: of the gap that they leave open, a fraction; above that of the best set where that is below 0.
         numbers: how many they have beside their own: freed forms, less a spring that gravity replaces.
         excess: of the nominal model's block means.
         chance: standard deviation of a share by chance alone.
     """
-    floor = form_floor(excess, effects) + CHANCE_STDS * chance
-    return _density(share, floor) * _prior(len(effects), numbers)
+    needless = NEEDLESS_CHI2 * chance**2 * excess / 2.0  # χ² as a share of the gap
+    return _density(share, form_floor(excess, effects) + needless) * _prior(len(effects), numbers)
 
 
-def _unknown_evidence(count: int, outside: float, excess: float, chance: float) -> float:
-    """Weight of ``unknown`` against sets of so many effects; an outsider that closes more weighs as one effect."""
+def _odds_against_unknown(
+    effects: Sequence[str], share: float, numbers: int, outside: float, excess: float, chance: float
+) -> float:
+    """Weight of a set of effects over that of ``unknown``; an outsider that closes more weighs as one effect."""
+    by_chance = CHANCE_STDS * chance
+    known = _density(max(share, 0.0), form_floor(excess, effects) + by_chance) * _prior(len(effects), numbers)
+    floor = form_floor(excess) + by_chance
     if outside < UNKNOWN_SHARE:
-        return evidence((), max(outside, 0.0), 0, excess, chance)
-    floor = form_floor(excess) + CHANCE_STDS * chance
-    return _density(UNKNOWN_SHARE * UNKNOWN_FURTHER ** (count - 1), floor) * _prior(count, 0)
+        return known / _density(max(outside, 0.0), floor)
+    further = len(effects) - 1
+    return known / (_density(UNKNOWN_SHARE * UNKNOWN_FURTHER**further, floor) * _prior(len(effects), 0))
 
 
 def _density(share: float, floor: float) -> float:

@@ -9,18 +9,20 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.attribution.decide import evidence
-from diagnosis.attribution.hypothesis import Hypothesis, is_plausible, restricted, with_forms
+from diagnosis.attribution.hypothesis import Hypothesis, is_plausible, own_gain, restricted, with_forms
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
 from diagnosis.policy import (
     ALWAYS_FITTED,
     BEAM_WIDTH,
+    CHANCE_STDS,
     FREED_FROM,
     FREED_HYPOTHESES,
     GROWN_BY,
     GROWN_FROM,
     GROWTH_EVIDENCE,
     MOST_CAUSES,
+    NEEDLESS_CHI2,
     PREDICTED_SHARE,
     SAME_CHANGE,
 )
@@ -76,14 +78,20 @@ def _left(hypothesis: Hypothesis) -> float:
     return max(hypothesis.fit.excess, 0.0)
 
 
-def evidence_of(hypothesis: Hypothesis, nominal: Fit) -> float:
-    """Weight of a fitted set among all answers, as `decide.evidence` gives it.
+def evidence_of(hypothesis: Hypothesis, nominal: Fit, least: float) -> float:
+    """Weight of a fitted set among all sets, as `decide.evidence` gives it.
 
     Args:
         nominal: the fit without any effect, whose excess is the gap.
+        least: `least_share` of the sets that it is compared with.
     """
-    share = _left(hypothesis) / max(nominal.excess, 1e-9)
-    return evidence(hypothesis.effects, share, hypothesis.further_numbers, nominal.excess, nominal.chance)
+    share = hypothesis.share_left(nominal) - least
+    return evidence(hypothesis.effects, share, hypothesis.further_numbers, nominal.gap, nominal.chance)
+
+
+def least_share(hypotheses: Sequence[Hypothesis], nominal: Fit) -> float:
+    """What the best set leaves of the gap, a fraction, where chance makes that less than nothing; else 0."""
+    return min(0.0, *(h.share_left(nominal) for h in hypotheses))
 
 
 def going_on(children: Sequence[Hypothesis], parents: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
@@ -97,28 +105,31 @@ def going_on(children: Sequence[Hypothesis], parents: Sequence[Hypothesis], nomi
     Returns:
         Best first; none where the best of all could gain nothing.
     """
-    ranked = sorted(children, key=lambda h: -evidence_of(h, nominal))
+    least = least_share((*children, *parents), nominal)
+    ranked = sorted(children, key=lambda h: -evidence_of(h, nominal, least))
     if not ranked or not _may_gain(ranked[0], nominal):
         return []
     return [child for child in ranked if _goes_on(child, parents, nominal)]
 
 
 def _may_gain(hypothesis: Hypothesis, nominal: Fit) -> bool:
-    """Whether the evidence could rise if one more effect closed all that is left."""
+    """Whether the evidence could rise if one more effect left no more than chance allows at the least."""
     if not hypothesis.effects:
         return True
     larger = (*hypothesis.effects, "")
-    best = evidence(larger, 0.0, hypothesis.further_numbers, nominal.excess, nominal.chance)
-    return len(hypothesis.effects) < MOST_CAUSES and best > evidence_of(hypothesis, nominal)
+    best = evidence(larger, 0.0, hypothesis.further_numbers, nominal.gap, nominal.chance)
+    least = -CHANCE_STDS * nominal.chance
+    return len(hypothesis.effects) < MOST_CAUSES and best > evidence_of(hypothesis, nominal, least)
 
 
 def _goes_on(child: Hypothesis, level: Sequence[Hypothesis], nominal: Fit) -> bool:
     """Whether a set may still lead on from the best it grew from: one of two equal causes closes only half."""
     parents = [h for h in level if set(h.effects) < set(child.effects)]
     if not any(parent.effects for parent in parents):
-        return child.fit.excess > 0.0
-    best = max(evidence_of(parent, nominal) for parent in parents)
-    return evidence_of(child, nominal) > GROWTH_EVIDENCE * best
+        return True
+    least = least_share((child, *parents), nominal)
+    best = max(evidence_of(parent, nominal, least) for parent in parents)
+    return evidence_of(child, nominal, least) > GROWTH_EVIDENCE * best
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -231,13 +242,22 @@ def _in_textbook_form(level: Sequence[Hypothesis]) -> list[Hypothesis]:
 def _worth_fitting(
     parent: Hypothesis, kinds: Sequence[type[Effect]]
 ) -> list[tuple[type[Effect], list[StartingPoint]]]:
-    """The effects that linear theory predicts to close most; after the nominal model generously many."""
+    """The effects that linear theory predicts to close most; after the nominal model generously many.
+
+    Beside other effects, those that are predicted to do no more than a needless one are left out.
+    """
     scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
     scored.sort(key=lambda item: -item[1][0].predicted_drop)
     if parent.effects:
-        return scored[:GROWN_BY]
+        return [(kind, starts) for kind, starts in scored[:GROWN_BY] if _is_needed(starts[0], parent.fit)]
     limit = PREDICTED_SHARE * parent.fit.total
     return [item for i, item in enumerate(scored) if i < ALWAYS_FITTED or item[1][0].predicted_drop > limit]
+
+
+def _is_needed(start: StartingPoint, base: Fit) -> bool:
+    """Whether linear theory predicts that an effect lowers χ² by more than a needless one."""
+    own = own_gain(start.problem, start.point) - own_gain(base.problem, base.point)
+    return start.predicted_drop > NEEDLESS_CHI2 + own
 
 
 def _best_fit(starts: Sequence[StartingPoint], base: Fit) -> Fit | None:

@@ -82,7 +82,7 @@ def grow_in_stretches(
     able = [kind for kind in kinds if kind.autonomous]
     while level:
         grown = _longer_sets(level, short, data, able, progress)
-        least = min(FREED_FROM * level[0].long.fit.excess, form_floor(nominal.excess) * nominal.excess)
+        least = min(FREED_FROM * level[0].long.fit.excess, form_floor(nominal.gap) * nominal.gap)
         children = with_forms([child.long for child in grown.values()], least)
         found += children
         parents = [g.long for g in level]

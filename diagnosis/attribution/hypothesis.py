@@ -12,7 +12,7 @@ import numpy as np
 from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.spectra import linear_coefficients, resonance
-from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES, NEEDLESS_SPRING
+from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES, NEEDLESS_SPRING, OWN_EVIDENCE
 from tunnel_sim.effects.base import IN_RUNS
 from tunnel_sim.effects.parameters import ParameterInfo
 
@@ -49,6 +49,19 @@ class Hypothesis:
     def further_numbers(self) -> int:
         """How many form parameters were freed, less one where gravity leaves the rig no need of a spring."""
         return self.forms - _needs_no_spring(self.fit)
+
+    def share_left(self, nominal: Fit) -> float:
+        """Share of the nominal gap that the set leaves open; below 0 by chance.
+
+        What instants and phases of the runs gain by chance counts as left.
+        """
+        by_chance = own_gain(self.fit.problem, self.fit.point) / self.fit.count
+        return (self.fit.excess + by_chance) / nominal.gap
+
+
+def own_gain(problem: Problem, point: Point) -> float:
+    """χ² by which the instants and phases of the runs' own may lower it by chance."""
+    return OWN_EVIDENCE * (point.release.shape[1] - problem.first_phase) * len(problem.data.runs)
 
 
 def _needs_no_spring(fitted: Fit) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 
 from diagnosis.attribution.decide import form_floor
 from diagnosis.attribution.grow_beside_random import grow_beside_random
-from diagnosis.attribution.hypothesis import Hypothesis
+from diagnosis.attribution.hypothesis import Hypothesis, own_gain
 from diagnosis.attribution.innovation_tests import is_steady_noise
 from diagnosis.attribution.process_noise import (
     ProcessNoise,
@@ -24,7 +24,6 @@ from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.policy import (
     BESIDE_EVIDENCE,
     LEFT_IN_THE_WIND,
-    OWN_EVIDENCE,
     RANDOM_PARTNERS,
     RIVAL_EVIDENCE,
     WIND_OFF_LEAST,
@@ -78,7 +77,7 @@ def weigh_random_moments(
     """
     allowed = {kind.name for kind in kinds}
     if any(
-        max(hypothesis.fit.excess, 0.0) < form_floor(nominal.excess) * nominal.excess
+        max(hypothesis.fit.excess, 0.0) < form_floor(nominal.gap) * nominal.gap
         for hypothesis in hypotheses
     ):
         return []
@@ -114,9 +113,7 @@ def _cost(answer: RandomAnswer) -> float:
     if answer.process.spectrum.centre > 0.0:
         found += RIVAL_EVIDENCE
     if answer.beside is not None:
-        fit = answer.beside.fit
-        own = fit.point.release.shape[1] - fit.problem.first_phase
-        found += OWN_EVIDENCE * own * len(answer.process.innovations)
+        found += own_gain(answer.beside.fit.problem, answer.beside.fit.point)
     return found
 
 
@@ -160,7 +157,7 @@ def _try(
         return None
     if wind_off_excess(_in_its_noise(fit, process.spectrum)) > _no_gap(nominal):
         return None
-    share = (abs(process.excess) + max(wind_off_excess(fit), 0.0)) / max(nominal.excess, 1e-9)
+    share = (abs(process.excess) + max(wind_off_excess(fit), 0.0)) / nominal.gap
     return RandomAnswer(kind, process, beside, share)
 
 
@@ -172,7 +169,7 @@ def _still_open(fit: Fit, nominal: Fit) -> bool:
 def _no_gap(nominal: Fit) -> float:
     """Excess of the wind-off runs that is no gap."""
     still = max(wind_off_excess(nominal), 0.0)
-    return max(form_floor(nominal.excess) * still, WIND_OFF_LEAST)
+    return max(form_floor(nominal.gap) * still, WIND_OFF_LEAST)
 
 
 def wind_off_excess(fit: Fit) -> float:

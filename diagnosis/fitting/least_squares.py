@@ -59,9 +59,14 @@ class Fit:
         return self.total / self.count - 1.0
 
     @property
+    def gap(self) -> float:
+        """What shares are of: the excess, at least 0.001."""
+        return max(self.excess, 1e-3)
+
+    @property
     def chance(self) -> float:
-        """Standard deviation, by chance, of a share of the excess."""
-        return float(np.sqrt(2.0 / self.count)) / max(self.excess, 1e-3)
+        """Standard deviation, by chance, of a share of the gap."""
+        return float(np.sqrt(2.0 / self.count)) / self.gap
 
     def value(self, name: str) -> float:
         """A common parameter by name."""

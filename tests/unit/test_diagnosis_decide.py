@@ -8,6 +8,7 @@ from diagnosis.attribution.decide import form_floor, weigh
 from diagnosis.policy import (
     FORM_MISFIT,
     FORM_MISFIT_UP_TO,
+    NEEDLESS_CHI2,
     PAIR_SHARE,
     RIVAL_PROBABILITY,
     UNKNOWN_FURTHER,
@@ -48,7 +49,7 @@ def test_closing_more_never_makes_an_answer_less_likely(answers, chance, excess,
 
 @given(st.floats(0.0, UNKNOWN_SHARE), st.floats(0.0, UNKNOWN_SHARE), CHANCE, EXCESS)
 def test_two_names_must_leave_less_than_the_stated_part_of_what_one_leaves(single, pair, chance, excess):
-    floor = form_floor(excess) + 2.0 * chance
+    floor = form_floor(excess) + NEEDLESS_CHI2 * chance**2 * excess / 2.0
     found = {w.effects: w.probability for w in weigh([(("a",), single), (("a", "b"), pair)], chance, excess)}
     margin = (pair + floor) / (PAIR_SHARE * (single + floor))
     if abs(margin - 1.0) > 1e-9:
@@ -92,6 +93,25 @@ def test_of_two_fits_of_the_same_effects_the_better_counts():
 def test_shares_below_zero_count_as_nothing_left():
     one, other = (weigh([(("a",), share)], 0.0, 5.0)[0] for share in (-0.2, 0.0))
     assert (one.share, one.probability) == (0.0, pytest.approx(other.probability))
+
+
+def test_what_chance_adds_to_the_shares_is_common_to_all_sets():
+    shares = {("a",): 0.02, ("a", "b"): -0.005, ("c",): 0.4}
+    high, low = (
+        weigh([(names, share - by) for names, share in shares.items()], 0.004, 5.0) for by in (0.0, 0.01)
+    )
+    assert high[0].effects == low[0].effects == ("a", "b")
+    odds = [found[0].probability / found[1].probability for found in (high, low)]
+    assert odds[0] == pytest.approx(odds[1], rel=0.01)
+
+
+def test_a_difference_within_the_chance_of_a_share_counts():
+    """A second effect may lower χ² by 280, though it lowers the share by 1.4 standard deviations only."""
+    excess, count = 1.0, 20_000
+    chance = (2.0 / count) ** 0.5 / excess
+    single, pair = 0.7 * chance, -0.7 * chance
+    assert (single - pair) * excess * count == pytest.approx(280.0)
+    assert weigh([(("a",), single), (("a", "b"), pair)], chance, excess)[0].effects == ("a", "b")
 
 
 def test_rivals_that_close_alike_are_as_likely():

@@ -115,8 +115,13 @@ def test_growth_ends_where_a_further_effect_closes_nothing():
 
 def left(*effects, excess):
     """A set whose fit leaves an excess; nothing else is read of it."""
-    problem = SimpleNamespace(effects=(), free_forms=(), data=SimpleNamespace(normalised=False))
-    return Hypothesis(effects, SimpleNamespace(problem=problem, excess=excess, chance=0.001))
+    data = SimpleNamespace(normalised=False, runs=())
+    problem = SimpleNamespace(effects=(), free_forms=(), first_phase=2, data=data)
+    point = Point(np.zeros(0), np.zeros((0, 2)))
+    return Hypothesis(
+        effects,
+        SimpleNamespace(problem=problem, point=point, excess=excess, gap=excess, count=1, chance=0.001),
+    )
 
 
 def test_a_set_goes_on_from_its_own_parent_though_the_best_set_is_a_dead_end():
