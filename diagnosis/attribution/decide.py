@@ -109,7 +109,7 @@ def evidence(effects: Sequence[str], share: float, numbers: int, excess: float, 
     """Weight of a set of effects among all sets.
 
     The sets are fitted to the same noise. What chance adds to the shares is common to them, however much it is, and
-    only their differences count: an effect that does not act lowers χ² by `NEEDLESS_CHI2` at most.
+    only their differences count: an effect that does not act seldom lowers χ² by more than `NEEDLESS_CHI2`.
 
     Args:
         share: of the gap that they leave open, a fraction; above that of the best set where that is below 0.

@@ -77,8 +77,7 @@ def weigh_random_moments(
     """
     allowed = {kind.name for kind in kinds}
     if any(
-        max(hypothesis.fit.excess, 0.0) < form_floor(nominal.gap) * nominal.gap
-        for hypothesis in hypotheses
+        max(hypothesis.fit.excess, 0.0) < form_floor(nominal.gap) * nominal.gap for hypothesis in hypotheses
     ):
         return []
     fitted = [kind for kind in kinds if kind.fitted]
