@@ -83,7 +83,7 @@ def evidence_of(hypothesis: Hypothesis, nominal: Fit, least: float) -> float:
 
     Args:
         nominal: the fit without any effect, whose excess is the gap.
-        least: `least_share` of the sets that it is compared with.
+        least: `least_share` of the sets that it is compared with, a fraction.
     """
     share = hypothesis.share_left(nominal) - least
     return evidence(hypothesis.effects, share, hypothesis.further_numbers, nominal.gap, nominal.chance)

@@ -61,7 +61,7 @@ class Hypothesis:
 
 def own_gain(problem: Problem, point: Point) -> float:
     """χ² by which the instants and phases of the runs' own may lower it by chance."""
-    return OWN_EVIDENCE * (point.release.shape[1] - problem.first_phase) * len(problem.data.runs)
+    return float(OWN_EVIDENCE * (point.release.shape[1] - problem.first_phase) * len(problem.data.runs))
 
 
 def _needs_no_spring(fitted: Fit) -> bool:
