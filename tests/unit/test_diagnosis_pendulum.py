@@ -173,3 +173,13 @@ def test_a_long_rest_is_left_out():
     short = prepared(pendulum(0.3, 10.0))
     whole, none = without_long_rest(short)
     assert (whole.runs, none) == (short.runs, ())
+
+
+def test_the_zero_lies_where_the_body_swings():
+    """Half a turn away gravity of the other sign swings a body alike, but no body hangs there."""
+    data = prepared(pendulum(2.4, 10.0))
+    problem = Problem(data, (effect_class("gravity_stiffness"),))
+    place = problem.names.index("zero")
+    lower, upper = (limits[place] for limits in problem.bounds)
+    assert (lower, upper) == (data.runs[0].reading.min(), data.runs[0].reading.max())
+    assert -np.pi < lower < -2.0 < 2.0 < upper < np.pi
