@@ -9,7 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.attribution.decide import evidence
-from diagnosis.attribution.hypothesis import Hypothesis, is_plausible, own_gain, restricted, with_forms
+from diagnosis.attribution.hypothesis import (
+    Hypothesis,
+    is_plausible,
+    own_gain,
+    restricted,
+    turned_back,
+    with_forms,
+)
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
 from diagnosis.policy import (
@@ -265,7 +272,8 @@ def _best_fit(starts: Sequence[StartingPoint], base: Fit) -> Fit | None:
     if all(fitted.total > base.total for fitted in found):  # linear theory led too far
         near = [point for start in starts if (point := start.nearer()) is not None]
         found += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
-    return min((f for f in found if is_plausible(f)), key=lambda f: f.total, default=None)
+    best = min((f for f in found if is_plausible(f)), key=lambda f: f.total, default=None)
+    return None if best is None else turned_back(best)
 
 
 def _fitted(start: StartingPoint, base: Fit) -> Fit | None:

@@ -17,6 +17,7 @@ from tunnel_sim.effects.base import IN_RUNS
 from tunnel_sim.effects.parameters import ParameterInfo
 
 _POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
+_AS_WELL = 1.01  # of χ², up to which a fit explains the readings as well as another
 _SAME_READING = 0.2  # noise standard deviations of a block mean
 
 
@@ -76,6 +77,30 @@ def is_plausible(fitted: Fit) -> bool:
     effects = fitted.problem.effects_at(fitted.point.common)
     motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]
     return all(np.mean([effect.plausible(omega) for omega in motions]) >= IN_RUNS for effect in effects)
+
+
+def turned_back(fitted: Fit) -> Fit:
+    """The fit with the sensor's zero where the body swings.
+
+    Half a turn away, gravity of the other sign swings the body alike, and fits of large swings may end there.
+
+    Returns:
+        Where the zero is beyond the readings, the fit from half a turn nearer if it explains them as well; else the
+        fit that was given.
+    """
+    problem, (least, greatest) = fitted.problem, fitted.problem.data.extremes
+    signs = [f"{kind.name}.{kind.turns}" for kind in problem.effects if kind.turns]
+    if not signs or "zero" not in problem.names or least <= fitted.value("zero") <= greatest:
+        return fitted
+    turn = np.pi if fitted.value("zero") < least else -np.pi
+    common, release = fitted.point.common.copy(), fitted.point.release.copy()
+    common[problem.names.index("zero")] += turn
+    common[[problem.names.index(name) for name in signs]] *= -1.0
+    release[:, 0] -= turn
+    with suppress(FitError, np.linalg.LinAlgError):
+        turned = fit(problem, Point(common, release))
+        return turned if turned.total < _AS_WELL * fitted.total else fitted
+    return fitted
 
 
 def restricted(whole: Fit, names: Collection[str]) -> Fit:

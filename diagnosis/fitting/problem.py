@@ -142,21 +142,11 @@ class Problem:
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """Least and greatest values of the common parameters.
-
-        The sensor's zero lies where the body swings: half a turn away a pendulum has another one, with the other
-        sign.
-        """
-        readings = [run.reading for run in self.data.runs]
-        ranges = {
-            **{name: (-np.inf, np.inf) for name in self.names},
-            "yaw_inertia": (1e-9, np.inf),
-            **dict.fromkeys(("stiffness", "mechanical_damping"), (0.0, np.inf)),
-            "zero": (min(float(np.min(r)) for r in readings), max(float(np.max(r)) for r in readings)),
-        }
+        """Least and greatest values of the common parameters."""
+        low = {"yaw_inertia": 1e-9, "stiffness": 0.0, "mechanical_damping": 0.0}
         infos = {f"{kind.name}.{info.name}": info for kind in self.effects for info in kind.parameters()}
-        ranges |= {name: info.fit_range(self.data.swing) for name, info in infos.items()}
-        found = np.array([ranges[name] for name in self.names])
+        ranges = {name: info.fit_range(self.data.swing) for name, info in infos.items()}
+        found = np.array([ranges.get(name, (low.get(name, -np.inf), np.inf)) for name in self.names])
         return found[:, 0], found[:, 1]
 
     def effects_at(self, common: Array) -> tuple[Effect, ...]:

@@ -277,6 +277,12 @@ class Data:
         return max(0.5 * float(np.ptp(run.reading)) / turn**run.derivative for run in self.runs)
 
     @property
+    def extremes(self) -> tuple[float, float]:
+        """The least and the greatest reading of all runs, rad."""
+        readings = [run.reading for run in self.runs]
+        return min(float(r.min()) for r in readings), max(float(r.max()) for r in readings)
+
+    @property
     def springs(self) -> tuple[float, ...]:
         """Stated stiffnesses, ascending, N m/rad."""
         return tuple(sorted({run.spring_stiffness for run in self.runs if run.spring_stiffness is not None}))

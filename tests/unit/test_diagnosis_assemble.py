@@ -16,7 +16,6 @@ from diagnosis.answer.candidates import candidates
 from diagnosis.answer.reported import excess_base
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.fitting.least_squares import FitError
 from diagnosis.investigate import investigate
 from diagnosis.localisation.localise import localise
 from tests.unit import gap_campaigns
@@ -374,29 +373,3 @@ def test_vocabularies():
         vocabulary(["free_play"], ["free_play"])
     with pytest.raises(TunnelError, match="did you mean 'free_play'"):
         vocabulary(["free_pley"])
-
-
-@cache
-def stopped():
-    """Dry friction stops two of the runs long before their records end."""
-    friction = effect_class("coulomb_friction")(friction_moment=0.02)
-    return gap_campaigns.campaign(friction, duration=12.0)
-
-
-def test_the_answer_says_which_runs_rest_for_long():
-    found = diagnose(stopped(), kinds=[effect_class("coulomb_friction")])
-    assert found.causes == ("coulomb_friction",)
-    assert any("at rest at the end of r3, r6" in caution for caution in found.cautions)
-
-
-def test_rests_stay_where_the_rest_of_the_runs_cannot_be_fitted(monkeypatch):
-    def refuse(*_args):
-        raise FitError("too short")
-
-    monkeypatch.setattr("diagnosis.investigate.fit", refuse)
-    nominal = gap_campaigns.nominal(stopped())
-    monkeypatch.setattr("diagnosis.investigate.fit_nominal", lambda _data: nominal)
-    found = investigate(stopped(), [effect_class("coulomb_friction")])
-    assert found.rested == ()
-    assert [run.reading.size for run in found.nominal.problem.data.runs] == [3000] * 6
-    assert found.causes == ("coulomb_friction",)

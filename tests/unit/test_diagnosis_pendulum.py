@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
+from diagnosis import diagnose
 from diagnosis.attribution.grow_in_stretches import _of_each, grow_in_stretches
 from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.fitting.least_squares import fit_at
+from diagnosis.fitting.least_squares import FitError, fit_at
 from diagnosis.fitting.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.spectra import resonance
@@ -175,11 +178,39 @@ def test_a_long_rest_is_left_out():
     assert (whole.runs, none) == (short.runs, ())
 
 
-def test_the_zero_lies_where_the_body_swings():
-    """Half a turn away gravity of the other sign swings a body alike, but no body hangs there."""
-    data = prepared(pendulum(2.4, 10.0))
-    problem = Problem(data, (effect_class("gravity_stiffness"),))
-    place = problem.names.index("zero")
-    lower, upper = (limits[place] for limits in problem.bounds)
-    assert (lower, upper) == (data.runs[0].reading.min(), data.runs[0].reading.max())
-    assert -np.pi < lower < -2.0 < 2.0 < upper < np.pi
+def test_gravity_keeps_its_sign():
+    """Half a turn away gravity of the other sign swings a body alike; the fits of this record end there first."""
+    data = pendulum(2.2, 19.0, quadratic=0.0)
+    found = investigate(data, [effect_class(name) for name in ("gravity_stiffness", "coulomb_friction")])
+    best = found.hypotheses[0].fit
+    assert found.causes == ("coulomb_friction", "gravity_stiffness")
+    assert abs(best.excess) < 0.2
+    similar = found.similarity.moment * GRAVITY
+    assert best.value("gravity_stiffness.stiffness") == pytest.approx(similar, rel=1e-3)
+    assert best.value("zero") + found.similarity.rest == pytest.approx(0.0, abs=1e-3)
+
+
+@cache
+def stopped():
+    """Dry friction stops two of the runs long before their records end."""
+    friction = effect_class("coulomb_friction")(friction_moment=0.02)
+    return campaign(friction, duration=12.0)
+
+
+def test_the_answer_says_which_runs_rest_for_long():
+    found = diagnose(stopped(), kinds=[effect_class("coulomb_friction")])
+    assert found.causes == ("coulomb_friction",)
+    assert any("at rest at the end of r3, r6" in caution for caution in found.cautions)
+
+
+def test_rests_stay_where_the_rest_of_the_runs_cannot_be_fitted(monkeypatch):
+    def refuse(*_args):
+        raise FitError("too short")
+
+    monkeypatch.setattr("diagnosis.investigate.fit", refuse)
+    fitted = nominal(stopped())
+    monkeypatch.setattr("diagnosis.investigate.fit_nominal", lambda _data: fitted)
+    found = investigate(stopped(), [effect_class("coulomb_friction")])
+    assert found.rested == ()
+    assert [run.reading.size for run in found.nominal.problem.data.runs] == [3000] * 6
+    assert found.causes == ("coulomb_friction",)

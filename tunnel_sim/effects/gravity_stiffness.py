@@ -31,6 +31,7 @@ class GravityStiffness(Effect):
     )
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
     example = (0.4, 0.2)
+    turns = "stiffness"
 
     stiffness: float = parameter(
         "Kg", "N m/rad", "greatest restoring moment", scale=0.3, lower=-1e5, upper=1e5
