@@ -148,7 +148,8 @@ class Candidate:
     Args:
         effect: name, ``none`` or ``unknown``; several names are joined by a plus sign.
         probability: that it is the answer, a fraction.
-        excess_after: with it added, in the fitted runs, in units of the noise variance.
+        excess_after: with it added, in the fitted runs, in units of the noise variance. Instants and phases of the
+            runs' own count as 10 of χ² each.
         closed: share of the gap it closes there.
         parameters: its fitted parameters by name (``effect.parameter`` where it has several effects).
     """
