@@ -121,11 +121,15 @@ def _diagnose(
 
 
 def _with_closable(answer: Diagnosis, study: Study) -> Diagnosis:
-    """The answer with what could be closed of what remains, or a caution that it was not found."""
-    significant = answer.rest is not None and answer.rest.significant
+    """The answer with what could be closed of what remains, or a caution that it was not found.
+
+    Of an undecided diagnosis the whole gap remains.
+    """
+    decided = answer.decision.decided
+    significant = not decided or (answer.rest is not None and answer.rest.significant)
     try:
         with np.errstate(over="raise"):  # a fitted model that runs away
-            return replace(answer, closable=closable(study, significant=significant))
+            return replace(answer, closable=closable(study, significant=significant, decided=decided))
     except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
         said = "How much of what remains could be closed was not found: its equations cannot be solved."
         return replace(answer, cautions=(*answer.cautions, said))

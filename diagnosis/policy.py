@@ -202,6 +202,12 @@ LINE_CONTRAST = 8.0
 
 # ---- What is reported -----------------------------------------------------------------------------------------
 
+#: Probability from which the most probable answer is the answer; below, the diagnosis is undecided. Convention:
+#: more probable than all others together.
+DECIDED_FROM = 0.5
+#: Probability of the smallest set of answers that is stated, and of what the likely answers have in common.
+#: Convention.
+CREDIBLE = 0.9
 #: Answers less probable than this are not called rivals. Tuned.
 RIVAL_PROBABILITY = 0.05
 #: Candidates less probable than this are counted, not listed. Judgement.

@@ -87,7 +87,8 @@ def parameters_table(document: Document) -> TextTable:
         mark = "" if given["unit"] == "1" else unit_mark(given["unit"])
         rows.append((owner if owner != effect else "", name, estimated(given, mark)))
         effect = owner
-    return TextTable("Parameters ± one standard deviation", ("effect", "parameter", "estimate"), tuple(rows))
+    whose = "Parameters" if document.get("decided", True) else "Parameters of the most probable answer"
+    return TextTable(f"{whose} ± one standard deviation", ("effect", "parameter", "estimate"), tuple(rows))
 
 
 def gap_table(document: Document) -> TextTable:
@@ -207,7 +208,7 @@ def rival_lines(document: Document) -> list[str]:
     """
     rivals, run = document["ambiguous_with"], document["next_run"]
     lines = []
-    if rivals:
+    if rivals and document.get("decided", True):
         lines.append(f"These runs cannot distinguish it from: {', '.join(rivals)}")
     if run is not None:
         lines.append(f"A run that could: {run_words(run)}")

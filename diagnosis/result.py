@@ -10,6 +10,7 @@ import polars as pl
 
 from diagnosis.closable import Closable
 from diagnosis.closure import Rest, Waterfall
+from diagnosis.decision import Decision, decision
 from diagnosis.patch import PatchedModel
 from diagnosis.printing import diagnosis_parts
 from identification.printing.frames import wide_frame
@@ -279,12 +280,18 @@ class Diagnosis:
     model: PatchedModel | None = None
     closable: Closable | None = None
 
+    @property
+    def decision(self) -> Decision:
+        """Whether the answer is decided, and what the likely answers have in common."""
+        return decision([(candidate.effect, candidate.probability) for candidate in self.candidates])
+
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""
         return {
             "schema_version": SCHEMA_VERSION,
             "campaign": self.campaign,
             "causes": list(self.causes),
+            **self.decision.to_json_dict(),
             "verdict": self.verdict,
             "gap": as_json(self.gap),
             "where": as_json(self.where),

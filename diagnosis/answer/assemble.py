@@ -24,6 +24,7 @@ from diagnosis.answer.small_swings import coefficient_names
 from diagnosis.answer.verdict import blind_spots, cnr_note, verdict
 from diagnosis.answer.waterfall import waterfall
 from diagnosis.attribution.decide import UNKNOWN, Weighed
+from diagnosis.decision import decision
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.localisation.maps import Maps
 from diagnosis.patch import PatchedModel
@@ -87,10 +88,10 @@ def assemble(
         causes=study.causes,
         verdict=verdict(
             study.causes,
+            decision([(candidate.effect, candidate.probability) for candidate in weighed]),
             before=gap.excess_before,
             closed=gap.closed,
-            rest=left.words,
-            probability=weighed[0].probability,
+            rest=left,
             closed_on=gap.closed_on,
             both_winds=data.wind_on and any(not run.wind_on for run in data.runs),
         ),

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnosis.attribution.decide import UNKNOWN
+from diagnosis.closure import Rest
+from diagnosis.decision import Decision, undecided_words
 from diagnosis.names import plain
+from diagnosis.printing import share
 from identification.printing.numbers import significant
 from tunnel_sim.effects import effect_class
 
@@ -20,11 +23,11 @@ _CHANNEL_WORDS = {
 
 def verdict(
     causes: Sequence[str],
+    found: Decision,
     *,
     before: float,
     closed: float,
-    rest: str,
-    probability: float,
+    rest: Rest,
     closed_on: str,
     both_winds: bool,
 ) -> str:
@@ -32,10 +35,10 @@ def verdict(
 
     Args:
         causes: names; empty for no gap.
+        found: whether the answer is decided.
         before: excess of the nominal model, in units of the noise variance.
         closed: share of the gap closed, 0 to 1.
-        rest: what remains, in sentences (`diagnosis.closure.Rest`).
-        probability: of the answer, a fraction.
+        rest: what remains.
         closed_on: the runs that ``closed`` was measured on, in words (`GapSummary.closed_on`).
         both_winds: whether the campaign has runs with the wind off and runs with the wind on.
     """
@@ -44,20 +47,24 @@ def verdict(
             f"No gap: the nominal model explains the runs down to their noise "
             f"(mean squared residual over noise variance, minus one: {before:+.3f})."
         )
+    if not found.decided:
+        said = f"There is a gap ({_times(before)} the noise power), and its cause is undecided."
+        with_first = f"With the first of them added, {share(closed)} of the gap closes {closed_on}."
+        return " ".join((said, undecided_words(found), *(() if tuple(causes) == UNKNOWN else (with_first,))))
     if tuple(causes) == UNKNOWN:
         return (
             f"There is a gap ({_times(before)} the noise power), and no effect of the vocabulary explains it. "
-            f"{rest}"
+            f"{rest.words}"
         )
     several = len(causes) > 1
     sources = "; ".join(
         _source(name, both_winds=both_winds) + (f" ({plain(name)})" if several else "") for name in causes
     )
     return (
-        f"The gap ({_times(before)} the noise power) comes from {plain(*causes)} "
-        f"(probability {probability:.2f}): "
-        f"{sources}. With {'them' if several else 'it'} added, {100.0 * closed:.1f} % of the gap "
-        f"closes {closed_on}. {rest}"
+        f"The gap ({_times(before)} the noise power) comes {'only in part ' if rest.material else ''}"
+        f"from {plain(*causes)} (probability {found.credible[0][1]:.2f}): "
+        f"{sources}. With {'them' if several else 'it'} added, {share(closed)} of the gap "
+        f"closes {closed_on}. {rest.words}"
     )
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from diagnosis.attribution.decide import UNKNOWN
+from diagnosis.decision import Decision, decision
 
 _KINDS = ("none", "single", "pair", "three", "four")
 NAMES = ("cn_beta", "cn_r")
@@ -157,6 +158,27 @@ class Case:
             if candidate["effect"] == wanted:
                 return float(candidate["probability"])
         return None
+
+    @property
+    def decision(self) -> Decision | None:
+        """Whether the answer is decided, and the smallest set of likely ones; None where there is no answer."""
+        answers = [(c["effect"], float(c["probability"])) for c in self.answer.get("candidates", ())]
+        return decision(answers) if answers else None
+
+    @property
+    def stated_wrongly(self) -> bool:
+        """Whether a set of effects is stated that is not the true one; an undecided answer states none."""
+        found = self.decision
+        return bool(self.named) and not self.right and (found is None or found.decided)
+
+    @property
+    def covered(self) -> bool | None:
+        """Whether the true causes are in the smallest set of likely answers; None where there is no answer."""
+        found = self.decision
+        if found is None:
+            return None
+        likely = [set(effect.split(" + ")) - {"none"} for effect, _ in found.credible]
+        return any(names - set(self.small) == set(self.truth) for names in likely)
 
     @property
     def rival(self) -> bool:

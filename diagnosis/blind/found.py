@@ -43,16 +43,24 @@ class Found:
         exact: campaigns whose causes are exactly right.
         found: of the true causes that matter, those named.
         false: of the causes named, those that do not act. Small ones that act are not counted at all.
+        stated_wrongly: campaigns with a decided answer that names a wrong set.
+        covered: campaigns whose true causes are in the smallest set of answers that together have 0.9.
+        credible_size: mean number of answers in these sets; 0 where there are none.
     """
 
     group: str
     exact: Proportion
     found: Proportion
     false: Proportion
+    stated_wrongly: Proportion
+    covered: Proportion
+    credible_size: float
 
     def to_json_dict(self) -> dict[str, Any]:
-        """The three shares."""
-        return {name: getattr(self, name).to_json_dict() for name in ("exact", "found", "false")}
+        """The shares by name, and ``credible_size``."""
+        shares = ("exact", "found", "false", "stated_wrongly", "covered")
+        found: dict[str, Any] = {name: getattr(self, name).to_json_dict() for name in shares}
+        return found | {"credible_size": self.credible_size}
 
 
 def found_by_group(cases: Sequence[Case]) -> list[Found]:
@@ -68,7 +76,11 @@ def found_by_group(cases: Sequence[Case]) -> list[Found]:
             hits = [name in c.named for c in inside for name in c.truth if c.truth != UNKNOWN]
             wrong = [name not in c.truth for c in inside for name in c.named if name not in c.small]
             exact = [c.right for c in inside]
-            result.append(Found(group, *map(Proportion.of, (exact, hits, wrong))))
+            stated = [c.stated_wrongly for c in inside]
+            covered = [c.covered for c in inside if c.covered is not None]
+            sizes = [len(c.decision.credible) for c in inside if c.decision is not None]
+            shares = map(Proportion.of, (exact, hits, wrong, stated, covered))
+            result.append(Found(group, *shares, sum(sizes) / len(sizes) if sizes else 0.0))
     return result
 
 

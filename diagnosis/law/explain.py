@@ -26,10 +26,11 @@ from identification.printing.numbers import unit_mark, with_std
 _BESIDE = 2.0  # standard deviations
 
 
-def closable(study: Study, *, significant: bool) -> Closable | None:
+def closable(study: Study, *, significant: bool, decided: bool = True) -> Closable | None:
     """Say how much of what the answer leaves could be closed, and by what.
 
     Args:
+        decided: whether the answer is; of an undecided one the whole gap of the nominal model is left.
         significant: whether what remains is beyond chance.
 
     Returns:
@@ -39,12 +40,12 @@ def closable(study: Study, *, significant: bool) -> Closable | None:
     Raises:
         LinAlgError: when the equations of a kind cannot be solved.
     """
-    left = study.chosen
+    left = study.chosen if decided else study.nominal
     if not study.causes or not significant or study.random_answer(study.fitted) is not None:
         return None
     if left.excess <= 0.0:
         return None
-    return explain(left, study.similarity, named=study.named)
+    return explain(left, study.similarity, named=study.named and decided)
 
 
 def explain(left: Fit, similarity: Similarity, *, named: bool) -> Closable:

@@ -50,6 +50,25 @@ def test_causes_found_and_false_are_those_counted_by_hand():
     assert "two causes" not in found
 
 
+def test_an_undecided_answer_states_no_set_and_may_cover_the_true_one():
+    wrong, truth = "mains_hum", ["free_play"]
+
+    def answered(*answers):
+        stated = [{"effect": effect, "probability": value} for effect, value in answers]
+        return case(
+            "c", {"effects": truth, "small": ["sensor_drift"]}, document([wrong]) | {"candidates": stated}
+        )
+
+    decided = answered((wrong, 0.6), ("free_play + sensor_drift", 0.35), ("unknown", 0.05))
+    undecided = answered((wrong, 0.45), ("free_play", 0.3), ("unknown", 0.25))
+    missed = answered((wrong, 0.95), ("free_play", 0.05))
+    assert [c.stated_wrongly for c in (decided, undecided, missed)] == [True, False, True]
+    assert [c.covered for c in (decided, undecided, missed)] == [True, True, False]
+    everything = next(found for found in found_by_group((decided, undecided, missed)) if found.group == "all")
+    assert everything.stated_wrongly == everything.covered == Proportion(2, 3)
+    assert everything.credible_size == pytest.approx(2.0)
+
+
 def test_kinds_go_up_to_four():
     exact = Score(CASES, (), "", "", {}, False).exact()
     assert (exact["three"], exact["four"]) == (Proportion(1, 3), Proportion(0, 1))

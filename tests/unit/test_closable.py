@@ -11,8 +11,12 @@ import tomli_w
 from scipy.signal import lfilter
 
 from diagnosis import _diagnose, diagnose
+from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.closable import KINDS, Ceiling, closable_table, closable_words
+from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.spectra import linear_coefficients
+from diagnosis.fitting.starting_points import starting_points
 from diagnosis.investigate import investigate
 from diagnosis.law.ceiling import Evidence, Rest
 from diagnosis.law.explain import chosen_kind, closable
@@ -233,8 +237,6 @@ def test_the_table_names_every_kind(detent):
 
 def test_a_steady_moment_turns_the_rig_as_the_closed_form_says(detent):
     path = paths(detent[0].nominal)[0]
-    from diagnosis.fitting.spectra import linear_coefficients
-
     inertia, damping, stiffness = linear_coefficients(path.fit, 0)
     sigma = damping / (2.0 * inertia)
     omega = np.sqrt(stiffness / inertia - sigma**2)
@@ -360,3 +362,15 @@ def test_a_proposed_file_is_plain_toml(detent, tmp_path: Path):
     text = tomli_w.dumps({"effects": [dict(found.law.effect)]})
     (tmp_path / "law.toml").write_text(text)
     assert [kind.name for kind in read_effects(tmp_path / "law.toml")] == ["proposed_angle"]
+
+
+def test_the_formula_for_an_undecided_answer_starts_from_the_nominal_model(detent):
+    study, found = detent
+    nominal, name = study.nominal, "cubic_stiffness"
+    (point, *_) = starting_points(nominal, effect_class(name))
+    hypothesis = Hypothesis((name,), fit(point.problem, point.point, base=nominal, max_iterations=2))
+    likely = replace(study, hypotheses=(hypothesis,), weighed=(Weighed((name,), 0.5, 0.4),))
+    assert likely.chosen is hypothesis.fit
+    undecided = closable(likely, significant=True, decided=False)
+    assert undecided.to_json_dict() == found.to_json_dict()
+    assert closable(likely, significant=True).excess < found.excess

@@ -7,8 +7,9 @@ from diagnosis_document import campaign, document
 
 from diagnosis.answer.reported import on_stretches
 from diagnosis.answer.verdict import verdict
-from diagnosis.closure import Step, Waterfall
-from diagnosis.printing import gap_table
+from diagnosis.closure import Rest, Step, Waterfall
+from diagnosis.decision import decision
+from diagnosis.printing import gap_table, parameters_table
 from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
 from tunnel_lab.diagnosis_view import view
 from tunnel_lab.diagnosis_view.page import render_report
@@ -19,13 +20,19 @@ def gap(*held_out: bool) -> GapSummary:
     return GapSummary(True, 2.0, 0.1, 0.9, HELD_OUT if any(held_out) else FITTED, runs, 0.01, 1e-9)
 
 
-def said(*causes: str, closed_on: str = "somewhere", both_winds: bool = True) -> str:
+def said(
+    *causes: str,
+    closed_on: str = "somewhere",
+    both_winds: bool = True,
+    material: bool = False,
+    answers: tuple[tuple[str, float], ...] = (),
+) -> str:
     return verdict(
         causes,
+        decision(answers or ((" + ".join(causes), 0.9), ("unknown", 0.1))),
         before=2.0,
         closed=0.95,
-        rest="What remains is small.",
-        probability=0.9,
+        rest=Rest(material, 0.1, 0.0, material, {}, "What remains is small."),
         closed_on=closed_on,
         both_winds=both_winds,
     )
@@ -92,3 +99,67 @@ def test_the_wind_is_mentioned_only_where_runs_have_it_on_and_off(cause):
     assert "wind" not in said(cause, both_winds=False)
     assert "with the wind on" in said(cause)
     assert ("with the wind on and off" in said(cause)) == (cause == "coulomb_friction")
+
+
+def test_what_remains_and_is_material_is_said_in_the_first_sentence():
+    first = said("coulomb_friction", material=True).partition(". ")[0]
+    assert "only in part from coulomb friction" in first
+    assert "in part" not in said("coulomb_friction")
+    given = document()
+    given["ambiguous_with"] = []
+    assert view.headline(given) == ("quadratic damping", "found")
+    given["rest"]["material"] = True
+    assert view.headline(given) == ("quadratic damping, in part", "open")
+
+
+UNDECIDED = (
+    ("coulomb_friction + gravity_stiffness", 0.35),
+    ("coulomb_friction + cubic_stiffness", 0.33),
+    ("coulomb_friction + quadratic_damping", 0.25),
+    ("unknown", 0.07),
+)
+
+
+def test_below_one_half_no_set_is_named_as_the_cause():
+    causes = ("coulomb_friction", "gravity_stiffness")
+    text = said(*causes, answers=UNDECIDED)
+    assert "its cause is undecided" in text
+    assert "comes from" not in text
+    assert "The likely answers contain coulomb friction (0.93)." in text
+    assert "coulomb friction and gravity stiffness (0.35), " in text
+    assert "with probability 0.93 together" in text
+    assert "comes from" in said(*causes, answers=((" + ".join(causes), 0.5), ("unknown", 0.5)))
+
+
+def test_where_no_effect_is_common_the_channel_may_be():
+    answers = (("coulomb_friction", 0.45), ("quadratic_damping", 0.46), ("unknown", 0.09))
+    found = decision(answers)
+    assert not found.effects
+    assert found.channels == pytest.approx({"damping": 0.91})
+    assert "act on the damping (0.91)" in said("coulomb_friction", answers=answers)
+    apart = said(
+        "coulomb_friction", answers=(("coulomb_friction", 0.4), ("free_play", 0.4), ("unknown", 0.2))
+    )
+    assert "no effect and no channel in common" in apart
+
+
+def test_the_credible_set_is_the_smallest_with_nine_tenths():
+    assert [name for name, _ in decision(UNDECIDED).credible] == [name for name, _ in UNDECIDED[:3]]
+    assert decision((("none", 0.999), ("unknown", 0.001))).credible == (("none", 0.999),)
+
+
+def test_an_undecided_answer_is_undecided_on_every_page():
+    given = document()
+    given["candidates"][0]["probability"] = 0.41
+    answers = [(one["effect"], one["probability"]) for one in given["candidates"]]
+    given |= decision(answers).to_json_dict()
+    assert view.headline(given) == ("Undecided", "open")
+    given["common"]["channels"] = {"damping": 0.95}
+    assert view.headline(given)[0] == "Undecided: the damping, and more"
+    given["common"]["effects"] = {"quadratic_damping": 0.93}
+    assert view.headline(given)[0] == "Undecided: quadratic damping, and more"
+    labels = [fact.label for fact in view.facts(given)]
+    assert "With the most probable answer added" in labels
+    assert "Probability of the most probable answer" in labels
+    assert any("Do not repair" in step for step in view.next_steps(given))
+    assert parameters_table(given).title.startswith("Parameters of the most probable answer")

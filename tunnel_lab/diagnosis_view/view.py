@@ -42,20 +42,32 @@ def headline(document: Document) -> tuple[str, str]:
     causes = document["causes"]
     if not causes:
         return "No gap", "none"
+    if not document.get("decided", True):
+        common = document["common"]
+        known = (
+            [plain(*common["effects"])]
+            if common["effects"]
+            else [f"the {name}" for name in common["channels"]]
+        )
+        return f"Undecided: {' and '.join(known)}, and more" if known else "Undecided", "open"
     if causes == ["unknown"]:
         return "Unexplained gap", "unknown"
     names = plain(*causes)
     if document["ambiguous_with"]:
         return f"{names}, or {' or '.join(plain(n) for n in document['ambiguous_with'])}", "open"
+    if (document.get("rest") or {}).get("material"):
+        return f"{names}, in part", "open"
     return names, "found"
 
 
 def facts(document: Document) -> list[Fact]:
     """The figures at the head of the page."""
     gap, where = document["gap"], document["where"]
+    decided = document.get("decided", True)
+    added = "the causes" if decided else "the most probable answer"
     found = [Fact("Gap of the nominal model", excess(gap["excess_before"]), "noise variances")]
     if document["causes"] and document["causes"] != ["unknown"]:
-        left = Fact("With the causes added", excess(gap["excess_after"]), gap["after_on"])
+        left = Fact(f"With {added} added", excess(gap["excess_after"]), gap["after_on"])
         found += [left, Fact("Share closed", percent(gap["closed"]), gap["closed_on"])]
     if document["causes"]:
         found += [
@@ -64,7 +76,8 @@ def facts(document: Document) -> list[Fact]:
         ]
     if document["candidates"]:
         first = document["candidates"][0]
-        found.append(Fact("Probability of the answer", percent(first["probability"])))
+        whose = "answer" if decided else "most probable answer"
+        found.append(Fact(f"Probability of the {whose}", percent(first["probability"])))
     return found
 
 
@@ -225,7 +238,15 @@ def next_steps(document: Document) -> list[str]:
         )
     if not causes:
         return [*steps, "Use the coefficients of the nominal model, within their intervals."]
-    if causes == ["unknown"]:
+    if not document.get("decided", True):
+        steps.append(
+            "Add runs with other springs, wind speeds and release angles, and diagnose again: no answer has a "
+            "probability of one half."
+        )
+        steps.append(
+            "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause."
+        )
+    elif causes == ["unknown"]:
         steps.append("Read where the model departs from the runs, and examine the rig there.")
         steps.append("State the effect that you suspect in a file, and diagnose again with --effects-file.")
     else:

@@ -41,6 +41,7 @@ def _answer_rows(documents: Sequence[Document]) -> Rows:
         ("left [noise powers]", *(_left(d) for d in documents)),
         ("share closed", *(share(d["gap"]["closed"]) if _explained(d) else _NONE for d in documents)),
         ("causes", *(",\n".join(d["causes"]) or "none" for d in documents)),
+        ("decided", *("yes" if d["decided"] else "no" for d in documents)),
         ("or", *(",\n".join(d["ambiguous_with"]) or _NONE for d in documents)),
         ("probability", *(probability(d["candidates"][0]["probability"]) for d in documents)),
     )

@@ -60,6 +60,9 @@ class Document(Part):
     schema_version: int = Field(description="1")
     campaign: OneLine = Field(description="the campaign's name")
     causes: list[OneLine] = Field(description="effect names; empty: no gap; unknown: no effect explains it")
+    decided: bool = Field(
+        default=True, description="whether the answer has at least one half of the probability"
+    )
     ambiguous_with: list[OneLine] = Field(
         description="effects that the runs cannot distinguish from the causes"
     )

@@ -15,6 +15,14 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 class DiagnosisDocument(Document):
     """What ``tunnel diagnose --json`` writes; excesses are in noise variances of a sample."""
 
+    credible: Annotated[
+        list[dict[str, Any]],
+        Field(description="effect and probability of the fewest answers that have 0.9 together"),
+    ]
+    common: Annotated[
+        dict[str, dict[str, float]],
+        Field(description="effects and channels that answers of 0.9 together have in common"),
+    ]
     verdict: Annotated[str, Field(description="the answer in plain words")]
     where: Annotated[
         dict[str, Any],
