@@ -75,12 +75,18 @@ def found_by_group(cases: Sequence[Case]) -> list[Found]:
         if inside:
             hits = [name in c.named for c in inside for name in c.truth if c.truth != UNKNOWN]
             wrong = [name not in c.truth for c in inside for name in c.named if name not in c.small]
-            exact = [c.right for c in inside]
-            stated = [c.stated_wrongly for c in inside]
             covered = [c.covered for c in inside if c.covered is not None]
             sizes = [len(c.decision.credible) for c in inside if c.decision is not None]
-            shares = map(Proportion.of, (exact, hits, wrong, stated, covered))
-            result.append(Found(group, *shares, sum(sizes) / len(sizes) if sizes else 0.0))
+            found = Found(
+                group,
+                exact=Proportion.of([c.right for c in inside]),
+                found=Proportion.of(hits),
+                false=Proportion.of(wrong),
+                stated_wrongly=Proportion.of([c.stated_wrongly for c in inside]),
+                covered=Proportion.of(covered),
+                credible_size=sum(sizes) / len(sizes) if sizes else 0.0,
+            )
+            result.append(found)
     return result
 
 
