@@ -92,9 +92,12 @@ def _diagnose(
         refuse_hopeless(found.campaign)
     campaign, left_out = comparable_runs(found.campaign)
     if campaign.sensor.derivative:
-        # Their sizes are those of angles, and their ranges too.
-        kinds = [kind for kind in kinds if kind.channel != "sensor"]
-        left_out = (*left_out, f"Effects of the sensor are not tried on {campaign.sensor.quantity}s.")
+        # Their sizes are those of angles, and their ranges too; a mode moves the body.
+        kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
+        said = (
+            f"Of the effects of the sensor, none but a second mode is tried on {campaign.sensor.quantity}s."
+        )
+        left_out = (*left_out, said)
     if campaign.law is not None and campaign.law.slide:
         left_out = (*left_out, SLIDE)
     try:
@@ -115,9 +118,8 @@ def _diagnose(
     if progress is not None:
         progress("what no effect explains")
     answer = _with_closable(answer, study)
-    if answer.causes == UNKNOWN:
-        return replace(answer, cautions=(*answer.cautions, *second_modes(campaign)))
-    return answer
+    modes = second_modes(campaign) if answer.causes == UNKNOWN else ()
+    return replace(answer, verdict=" ".join((*modes, answer.verdict)))
 
 
 def _with_closable(answer: Diagnosis, study: Study) -> Diagnosis:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.attribution.decide import UNKNOWN, Weighed, weigh
-from diagnosis.attribution.grow import exchange, grow, prune
+from diagnosis.attribution.grow import exchange, grow, prune, second_mode_alone
 from diagnosis.attribution.grow_in_stretches import InStretches, grow_in_stretches
 from diagnosis.attribution.hypothesis import Hypothesis, polish, with_forms
 from diagnosis.attribution.outsiders import weigh_outsiders
@@ -58,7 +58,7 @@ def investigate(
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
     clock = _Clock(progress)
-    found = _test(*similar_campaign(campaign), {kind.name for kind in kinds}, clock)
+    found = _test(*similar_campaign(campaign), kinds, clock)
     if found.test.detected:
         found = _weigh_effects(found, kinds, clock)
     return replace(found, seconds=clock.seconds)
@@ -76,7 +76,7 @@ def nominal_study(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Study:
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    return _test(*similar_campaign(campaign), {kind.name for kind in kinds}, _Clock(None))
+    return _test(*similar_campaign(campaign), kinds, _Clock(None))
 
 
 def fit_nominal(data: Data) -> Fit:
@@ -96,8 +96,9 @@ def fit_nominal(data: Data) -> Fit:
     return found
 
 
-def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: _Clock) -> Study:
+def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
     """The study up to the test of the gap: noise, hum and nominal fit."""
+    allowed = {kind.name for kind in kinds}
     with clock.step("noise"):
         noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
@@ -110,7 +111,8 @@ def _test(campaign: Campaign, similarity: Similarity, allowed: set[str], clock: 
             frequency = refine_frequency(campaign, line)
             cleaned, noise, hum = _without_hum(campaign, frequency, noise)
             nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
-        cut = is_gross(nominal)
+        # a second mode is missed from the start on, and its decay is counted from there
+        cut = is_gross(nominal) and second_mode_alone(nominal, kinds) is None
         if cut:
             nominal = fit_nominal(without_rest(without_start(nominal.problem.data)))
         nominal, noise, test = judge(nominal, noise, trend, step=step, coarse_step=coarse)
@@ -137,14 +139,15 @@ def _without_hum(campaign: Campaign, frequency: float, noise: Noise) -> tuple[Ca
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
     """The study with sets of effects, random moments and outsiders fitted and weighed."""
     fitted = [kind for kind in kinds if kind.fitted]
-    if fitted and is_gross(found.nominal):
+    first = second_mode_alone(found.nominal, fitted) if is_gross(found.nominal) else None
+    if fitted and first is None and is_gross(found.nominal):
         return _weigh_in_stretches(found, fitted, clock)
     moving, rested = without_long_rest(found.nominal.problem.data)
     if rested:  # where dry friction stops a body, χ² has many minima
         with suppress(FitError, np.linalg.LinAlgError):  # what is left may be too short: whole runs then
             found = replace(found, nominal=fit(Problem(moving), found.nominal.point), rested=rested)
     with clock.step("effects"):
-        found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress)))
+        found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress, first)))
     with clock.step("random moments"):
         random = weigh_random_moments(found.nominal, found.hypotheses, kinds)
     found = replace(found, random=tuple(random), outsider=weigh_outsiders(found.nominal))

@@ -40,20 +40,26 @@ _ITERATIONS = 12  # of a fit on the way; the answer's own is polished
 Progress = Callable[[str], None]
 
 
-def grow(nominal: Fit, kinds: Sequence[type[Effect]], progress: Progress | None = None) -> list[Hypothesis]:
+def grow(
+    nominal: Fit,
+    kinds: Sequence[type[Effect]],
+    progress: Progress | None = None,
+    first: Hypothesis | None = None,
+) -> list[Hypothesis]:
     """Add effects one after another, to the best few sets of each size.
 
     Args:
         nominal: the fit without any effect.
         kinds: effects to try.
         progress: called with the names of each set.
+        first: the set that all others contain; None: none.
 
     Returns:
         Fitted hypotheses of all sizes, best first. The growth ends where the evidence for a larger set falls or
         could not rise, and at `MOST_CAUSES`.
     """
-    found: dict[tuple[str, ...], Hypothesis] = {}
-    level = [Hypothesis((), nominal)]
+    found: dict[tuple[str, ...], Hypothesis] = {} if first is None else {first.names: first}
+    level = [Hypothesis((), nominal) if first is None else first]
     while level:
         children = sets_with_one_more(level, kinds, progress)
         if all(_may_gain(child, nominal) for child in children):  # else freeing a form gains nothing
@@ -64,6 +70,21 @@ def grow(nominal: Fit, kinds: Sequence[type[Effect]], progress: Progress | None 
         near = [h for h in going if _left(h) <= BEAM_WIDTH * _left(going[0])]
         level = _distinct(near, nominal)[:GROWN_FROM]
     return sorted(found.values(), key=lambda h: h.fit.total)
+
+
+def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis | None:
+    """The second mode, where the nominal model misses the motion because it has one mode only.
+
+    Args:
+        nominal: a fit that misses the motion.
+        kinds: effects that may be tried.
+
+    Returns:
+        The fit with the mode added; None where it misses the motion too, or may not be tried.
+    """
+    modes = [kind for kind in kinds if kind.line == "ringing"]
+    found = sets_with_one_more([Hypothesis((), nominal)], modes, None)
+    return found[0] if found and not is_gross(found[0].fit) else None
 
 
 def _distinct(ranked: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:

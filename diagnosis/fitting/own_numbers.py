@@ -58,8 +58,9 @@ def ringing(fit: Fit) -> OwnNumbers | None:
     best = int(np.argmax([drop.max() for drop in drops]))
     at = int(np.argmax(drops[best]))
     rate, (amplitude, _) = tried[best]
-    omega = float(np.hypot(2.0 * np.pi * grid[at], rate))
-    found = amplitude[:, at]
+    exponent = complex(-rate, 2.0 * np.pi * grid[at])
+    omega = abs(exponent)
+    found = amplitude[:, at] / exponent ** runs[0].derivative
     size = float(np.sqrt(np.mean(np.abs(found[beside[:, at]]) ** 2)))
     return OwnNumbers((size, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
 

@@ -301,7 +301,7 @@ class _Job:
             + weights[1] * angle[1:]
             + h * (weights[2] * rate[:-1] + weights[3] * rate[1:])
         )
-        return self.chain.reading(self.chain.angle(mean, self.run.times) + self.zero)
+        return self.chain.reading(self.chain.angle(mean, self.run.times, self.run.derivative) + self.zero)
 
 
 def blocks_beyond(physics: RunSettings, run: RunData) -> int:

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.other_modes import second_modes
+from diagnosis.fitting.starting_points import is_gross
+from diagnosis.investigate import investigate
+from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
@@ -34,3 +37,37 @@ def test_a_second_mode_is_named_even_where_it_decays_in_a_quarter_of_the_run(rat
 @pytest.mark.parametrize("others", [(), ((0.02, 6.6, 0.3),), ((0.02, 2.21, 0.1),)])
 def test_one_mode_its_harmonic_and_a_mode_that_is_not_resolved_are_not_named(others):
     assert second_modes(campaign(MOTION, *others)) == ()
+
+
+def two_modes(derivative, share):
+    """Two runs of two uncoupled modes in closed form, with noise of a thousandth."""
+    rng, time, runs = np.random.default_rng(1), np.arange(1500) / 100.0, []
+    for name in ("r0", "r1"):
+        reading = np.zeros(time.size)
+        for size, hertz, rate, phase in (
+            (0.2, 1.1, 0.05, 0.3),
+            (0.2 * share, 1.75, 0.12, rng.uniform(0.0, 6.28)),
+        ):
+            exponent = complex(-rate, 2.0 * np.pi * hertz)
+            reading += (size * exponent**derivative * np.exp(exponent * time + 1j * phase)).real
+        runs.append(
+            Run(name, Record(time, reading + 1e-3 * np.std(reading) * rng.standard_normal(time.size)), 0.0)
+        )
+    quantity = ("angle", "rate", "acceleration")[derivative]
+    return Campaign("two modes", RigProperties(), SensorProperties(100.0, quantity=quantity), tuple(runs))
+
+
+@pytest.mark.parametrize("derivative", [0, 1, 2])
+@pytest.mark.parametrize(
+    "share", [0.05, 0.5]
+)  # with the larger one the nominal model misses the motion itself
+def test_a_second_mode_is_an_answer_however_large_and_whatever_the_sensor_measures(derivative, share):
+    kinds = [effect_class(name) for name in ("second_mode", "cubic_stiffness", "coulomb_friction")]
+    study = investigate(two_modes(derivative, share), kinds)
+    assert is_gross(study.nominal) == (share > 0.1)
+    assert study.fitted == ("second_mode",)
+    assert study.weighed[0].probability > 0.9
+    found = study.chosen
+    assert found.value("second_mode.amplitude") == pytest.approx(0.2 * share, rel=2e-3)
+    frequency = study.similarity.own(found.value("second_mode.frequency"), "rad/s")
+    assert frequency == pytest.approx(2.0 * np.pi * 1.75, rel=1e-3)

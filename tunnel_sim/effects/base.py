@@ -269,6 +269,21 @@ class Effect:
         del time_s, stated, drawn
         return angle
 
+    def oscillation(
+        self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
+    ) -> Array | None:
+        """An oscillation that the sensor sees beside the body's.
+
+        Args:
+            time_s: true times since the release, s, shape (n,).
+            derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
+
+        Returns:
+            rad, rad/s or rad/s², shape (n,), which is added to the angle or its derivative; None: none.
+        """
+        del time_s, stated, drawn, derivative
+        return None
+
     def on_sensor(self, sensor: SensorModel) -> SensorModel:
         """Change the sensor itself."""
         return sensor

@@ -38,7 +38,7 @@ class EffectChain:
         """
         motion, sensor = rng.spawn(len(effects)), rng.spawn(len(effects))
         drawn = tuple(
-            effect.draw(stated, of_sensor if _overrides(effect, "on_angle") else of_motion)
+            effect.draw(stated, of_sensor if _overrides(effect, *_SEEN) else of_motion)
             for effect, of_motion, of_sensor in zip(effects, motion, sensor, strict=True)
         )
         return cls(stated, tuple(effects), drawn)
@@ -84,20 +84,23 @@ class EffectChain:
 
         true = self.true_times(time_s)
         path = CubicHermiteSpline(motion.time_s, motion.angle, motion.rate)
-        return self.angle(np.asarray(path(true, derivative), np.float64), true)
+        return self.angle(np.asarray(path(true, derivative), np.float64), true, derivative)
 
-    def angle(self, angle: Array, time_s: Array) -> Array:
+    def angle(self, angle: Array, time_s: Array, derivative: int = 0) -> Array:
         """The angle that the sensor measures, before zero and noise are added.
 
         Args:
-            angle: of the rod's upper end, rad, shape (n,).
+            angle: of the rod's upper end, or its derivative, rad, rad/s or rad/s², shape (n,).
             time_s: true times since the release, s, shape (n,).
+            derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
 
         Returns:
-            The measured angle, rad, shape (n,).
+            The measured angle or its derivative, in the same unit, shape (n,).
         """
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
-            angle = effect.on_angle(angle, time_s, self.stated, drawn)
+            beside = effect.oscillation(time_s, self.stated, drawn, derivative)
+            seen = angle if beside is None else angle + beside
+            angle = effect.on_angle(seen, time_s, self.stated, drawn)
         return angle
 
     def sensor(self, sensor: SensorModel) -> SensorModel:
@@ -122,12 +125,11 @@ class EffectChain:
     @property
     def reads_plainly(self) -> bool:
         """Whether no effect changes the measured angle or the reading."""
-        return not any(
-            _overrides(effect, hook)
-            for effect in self.effects
-            for hook in ("on_time", "on_angle", "on_reading")
-        )
+        return not any(_overrides(effect, "on_time", *_SEEN, "on_reading") for effect in self.effects)
 
 
-def _overrides(effect: Effect, hook: str) -> bool:
-    return getattr(type(effect), hook) is not getattr(Effect, hook)
+_SEEN = ("oscillation", "on_angle")
+
+
+def _overrides(effect: Effect, *hooks: str) -> bool:
+    return any(getattr(type(effect), hook) is not getattr(Effect, hook) for hook in hooks)

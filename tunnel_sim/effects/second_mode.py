@@ -71,13 +71,25 @@ class SecondMode(Effect):
             decays and self.frequency > _SLOWEST * omega and abs(self.frequency / omega - 1.0) > NEAR_MOTION
         )
 
-    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """Add the oscillation at a phase of the run's own."""
+    def oscillation(
+        self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
+    ) -> Array | None:
+        """The second oscillation, at a phase of the run's own."""
         if self.is_null:
-            return angle
+            return None
         phase = self.drawn_number(drawn)
         size = self.amplitude * (abs(stated.release_angle) / _REFERENCE_RELEASE) ** self.exponent
         since = np.maximum(time_s, 0.0)  # the body is held before the release
         turn = self.frequency * since
-        wave = size * np.exp(-self.damping_ratio * turn) * np.cos(turn + phase)
-        return np.asarray(angle + wave, np.float64)
+        # a derivative multiplies exp(s t) by s, s = ω2 (i − ζ2)
+        factor, lead = (
+            self.frequency * np.hypot(1.0, self.damping_ratio),
+            np.arctan2(1.0, -self.damping_ratio),
+        )
+        wave = (
+            size
+            * factor**derivative
+            * np.exp(-self.damping_ratio * turn)
+            * np.cos(turn + phase + derivative * lead)
+        )
+        return np.asarray(wave if derivative == 0 else np.where(time_s >= 0.0, wave, 0.0), np.float64)
