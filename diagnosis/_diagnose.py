@@ -13,6 +13,7 @@ from diagnosis.answer.assemble import assemble
 from diagnosis.answer.limit_cycles import limit_cycle_answer, refused_limit_cycles
 from diagnosis.answer.other_modes import second_modes
 from diagnosis.answer.own_units import in_own_units
+from diagnosis.answer.where import localise
 from diagnosis.attribution.decide import UNKNOWN
 from diagnosis.detection.comparable import comparable_runs
 from diagnosis.detection.limit_cycles import diagnosable
@@ -21,7 +22,6 @@ from diagnosis.detection.own_model import SLIDE, reach, with_law
 from diagnosis.detection.refusal import refuse_hopeless
 from diagnosis.investigate import Progress, investigate
 from diagnosis.law.explain import closable
-from diagnosis.localisation.localise import localise
 from diagnosis.patch import UNPATCHED
 from diagnosis.result import Diagnosis
 from tunnel_sim.effects import Effect, effect_class, known_effects

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from diagnosis.attribution.decide import UNKNOWN, Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.outsiders import Outsider
@@ -14,6 +16,7 @@ from diagnosis.detection.mains import Hum
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.similarity import Similarity
+from diagnosis.localisation.place import Place, locate
 from tunnel_sim.effects import the_effect
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -39,6 +42,7 @@ class Study:
         cut: whether the start of every run and what follows its motion were left out, because the nominal model
             misses the motion grossly.
         rested: runs that end with a long rest, which the fits of effects leave out.
+        place: where the gap is, from the residuals alone; None where it is not located yet.
         hypotheses: fitted sets of effects.
         weighed: answers with probabilities, most probable first; empty where there is no gap.
         random: answers with a random moment that passed its tests.
@@ -58,6 +62,7 @@ class Study:
     test: GapTest
     cut: bool = False
     rested: tuple[str, ...] = ()
+    place: Place | None = None
     hypotheses: tuple[Hypothesis, ...] = ()
     weighed: tuple[Weighed, ...] = ()
     random: tuple[RandomAnswer, ...] = ()
@@ -111,3 +116,21 @@ class Study:
             return found
         share = max(steady.fit.excess, 0.0) / max(self.nominal.excess, 1e-9)
         return found if found.share < share else None
+
+
+def located(study: Study) -> Place:
+    """Where the gap of a study is, found now where it was not found before.
+
+    Args:
+        study: up to the test of the gap.
+    """
+    if study.place is not None:
+        return study.place
+    stated = study.noise.stated_variance if study.coarse else None
+    level = float(np.mean([run.noise_variance * run.block for run in study.nominal.problem.data.runs]))
+    return locate(
+        study.campaign,
+        study.nominal,
+        hum_removed=study.hum is not None,
+        noise_ratio=level / stated if stated else 1.0,
+    )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
-from diagnosis.fitting.run_data import RunData
 from diagnosis.fitting.similarity import Similarity
 from diagnosis.localisation.backbone import backbones
 from diagnosis.localisation.excess import (
@@ -21,9 +20,9 @@ from diagnosis.localisation.excess import (
 )
 from diagnosis.localisation.lines import residual_lines
 from diagnosis.localisation.maps import GroupExcess, Maps, RunMap, Trace
-from diagnosis.localisation.own_units import maps_in_own_units
+from diagnosis.localisation.own_units import maps_in_own_units, trace_in_own_units
 from diagnosis.localisation.phase_plane import apparent_moment, motion, phase_plane
-from diagnosis.study import Study
+from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
 _TIME_BINS = 60
@@ -53,51 +52,61 @@ class Survey:
     moment_z: float
 
 
-def survey(study: Study, scaled: Fit, excesses: list[RunExcess], chosen: tuple[str, ...]) -> Survey:
-    """Draw up all maps.
+def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[str, ...]) -> Survey:
+    """Draw up all maps of the nominal model's residuals.
 
     Args:
-        study: gives the records and the fits.
-        scaled: the nominal fit with residuals in units of the noise that counts.
+        nominal: fit of the nominal model.
+        scaled: the same with residuals in units of the noise that counts.
         excesses: its squared residuals, by run.
         chosen: ids of the runs the phase plane is taken over; all where empty.
     """
-    campaign, nominal = study.campaign, study.nominal
-    best = None if study.chosen is nominal else study.chosen
+    similarity = nominal.problem.data.similarity
     bands = band_excesses(excesses)
     inside = [
         within_bands(r, run, bands_beyond_chance(bands))
         for r, run in zip(scaled.residuals, excesses, strict=True)
     ]
-    starts = [run.start for run in nominal.problem.data.runs]
-    times = [s + _mid_times(run) for s, run in zip(starts, nominal.problem.data.runs, strict=True)]
+    times = _times(nominal)
     time = _time_profile(scaled, inside, times)
     energy, z = _moment_energy(nominal, times, time.edges)
     edges = _log_edges(excesses)
-    after = None if best is None else _spectrum(run_excesses(campaign, best), edges).mean
     resonances = [run.resonance for run in excesses]
     maps = Maps(
         runs=_run_maps(scaled, excesses),
-        groups=_groups(scaled, excesses, study.similarity),
+        groups=_groups(scaled, excesses, similarity),
         time=time,
         time_by_run=_time_by_run(scaled, times, time.edges),
         moment_time=np.maximum(energy, 0.0) / max(float(np.maximum(energy, 0.0).sum()), 1e-300),
         amplitude=_amplitude_profile(scaled, inside),
         frequency=_spectrum(excesses, edges),
         frequency_by_run=np.stack([_spectrum([run], edges).mean for run in excesses]),
-        frequency_after=after,
+        frequency_after=None,
         resonance=(min(resonances), max(resonances)),
         bands=bands,
         lines=residual_lines(excesses, nominal.problem.data.runs),
-        backbones=tuple(backbones(nominal, starts)),
+        backbones=tuple(backbones(nominal, [run.start for run in nominal.problem.data.runs])),
         phase_plane=phase_plane(nominal, chosen),
-        traces=_traces(nominal, best, excesses, times),
+        traces=_traces(nominal, None, excesses),
     )
     interval = _frequency_interval(excesses)
-    similarity = study.similarity
     if interval is not None:
         interval = similarity.own(interval[0], "Hz"), similarity.own(interval[1], "Hz")
     return Survey(maps_in_own_units(maps, similarity), excesses, interval, energy, z)
+
+
+def with_answer(found: Survey, campaign: Campaign, nominal: Fit, answer: Fit) -> Maps:
+    """The maps with what the answer leaves beside the nominal model's residuals.
+
+    Args:
+        campaign: as measured, of the units of the fits.
+        nominal: fit of the nominal model, from which the maps were drawn up.
+        answer: fit with the causes.
+    """
+    after = _spectrum(run_excesses(campaign, answer), _log_edges(found.excesses)).mean
+    traces = _traces(nominal, answer, found.excesses)
+    own = tuple(trace_in_own_units(trace, nominal.problem.data.similarity) for trace in traces)
+    return replace(found.maps, frequency_after=after, traces=own)
 
 
 def _shares(excesses: list[RunExcess]) -> list[float]:
@@ -169,9 +178,12 @@ def _first_number(label: str) -> tuple[float, str]:
     return (float(head) if head.replace(".", "", 1).isdigit() else 0.0, label)
 
 
-def _mid_times(run: RunData) -> Array:
-    result: Array = (np.arange(run.reading.size, dtype=np.float64) + 0.5) * run.interval
-    return result
+def _times(fit: Fit) -> list[Array]:
+    """Times of the residuals since the start of every record, s."""
+    return [
+        run.start + (np.arange(run.reading.size, dtype=np.float64) + 0.5) * run.interval
+        for run in fit.problem.data.runs
+    ]
 
 
 def _time_profile(fit: Fit, inside: list[tuple[Array, float]], times: list[Array]) -> Profile:
@@ -251,9 +263,8 @@ def _frequency_interval(excesses: list[RunExcess]) -> tuple[float, float] | None
     return profile(edges, places, kept, ones, [2.0] * len(kept)).interval()
 
 
-def _traces(
-    nominal: Fit, best: Fit | None, excesses: list[RunExcess], times: list[Array]
-) -> tuple[Trace, ...]:
+def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[Trace, ...]:
+    times = _times(nominal)
     order = sorted(range(len(excesses)), key=lambda i: -excesses[i].excess)[:_TRACES]
     return tuple(_trace(nominal, best, i, times[i]) for i in order)
 

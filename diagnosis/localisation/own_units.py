@@ -43,7 +43,7 @@ def maps_in_own_units(maps: Maps, similarity: Similarity) -> Maps:
         lines=tuple(replace(line, frequency=hertz(line.frequency)) for line in maps.lines),
         backbones=tuple(_backbone(curve, similarity) for curve in maps.backbones),
         phase_plane=None if plane is None else _plane(plane, similarity.own(1.0, plane.unit)),
-        traces=tuple(_trace(trace, similarity) for trace in maps.traces),
+        traces=tuple(trace_in_own_units(trace, similarity) for trace in maps.traces),
     )
 
 
@@ -51,7 +51,13 @@ def _times(values: Array, similarity: Similarity) -> Array:
     return values * similarity.own(1.0, "s")
 
 
-def _trace(trace: Trace, similarity: Similarity) -> Trace:
+def trace_in_own_units(trace: Trace, similarity: Similarity) -> Trace:
+    """A trace with the times and readings of the measured rig.
+
+    Args:
+        trace: of the similar campaign.
+        similarity: how that was made.
+    """
     factor = similarity.own(1.0, similarity.reading)
     return replace(
         trace,

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from diagnosis.localisation.inference import Finding
 from diagnosis.localisation.mapping import Survey
+from diagnosis.names import plain
 from diagnosis.policy import LISTED_BAND_SHARE, LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
 from diagnosis.result import Where
 from identification.printing.numbers import p_text
+from tunnel_sim.effects import Effect
 
 _LISTED = 12  # ids listed in a sentence at most
 _BAND_WORDS = {
@@ -51,6 +55,25 @@ def describe(
     both = any(group.by == "wind" for group in found.maps.groups)
     parts.append(_nature(channel, condition, both))
     return " ".join(part for part in parts if part)
+
+
+def acts_otherwise(where: Where, kinds: Sequence[type[Effect]]) -> str:
+    """Whether the named causes act where the residuals say that the gap is.
+
+    Args:
+        where: from the residuals.
+        kinds: of the causes; none where none is named.
+
+    Returns:
+        A sentence; empty where there is nothing to compare.
+    """
+    if not kinds or where.channel is None:
+        return ""
+    names = plain(*(kind.name for kind in kinds))
+    if where.channel in {kind.channel for kind in kinds}:
+        return f"That agrees with {names}."
+    acts = " and ".join(dict.fromkeys(_CHANNEL_WORDS[kind.channel] for kind in kinds))
+    return f"That does not agree with {names}: {'they act' if len(kinds) > 1 else 'it acts'} on {acts}."
 
 
 def _runs(where: Where, found: Survey) -> str:

@@ -14,10 +14,10 @@ from diagnosis._diagnose import diagnose, vocabulary
 from diagnosis.answer.assemble import assemble
 from diagnosis.answer.candidates import candidates
 from diagnosis.answer.reported import excess_base
+from diagnosis.answer.where import localise
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.investigate import investigate
-from diagnosis.localisation.localise import localise
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import INTERVAL, with_blow
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from

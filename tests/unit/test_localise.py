@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from diagnosis.answer.where import localise
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.prepare import without_start
 from diagnosis.fitting.problem import Problem
@@ -17,8 +18,8 @@ from diagnosis.fitting.starting_points import nominal_start, starting_points
 from diagnosis.localisation.backbone import backbones, drift
 from diagnosis.localisation.excess import RunExcess, run_excesses, shortest_interval
 from diagnosis.localisation.inference import _between_runs, _by_band, _by_drift, _lone_run
-from diagnosis.localisation.localise import localise, runs_beyond_chance
 from diagnosis.localisation.phase_plane import apparent_moment
+from diagnosis.localisation.place import runs_beyond_chance
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import INTERVAL, nominal, studied, with_blow
 from tunnel_sim.effects import effect_class, effect_from
