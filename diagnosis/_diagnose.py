@@ -107,7 +107,7 @@ def _diagnose(
             raise
         raise refused_limit_cycles(found.remarks) from error
     if progress is not None:
-        progress("where, and how far it closes")
+        progress("how far it closes")
     where, maps = localise(study)
     remarks = (*found.remarks, *noise_remarks(study.noise, study.trend))
     patched, unpatched = (None, ()) if model is None else _patched(study, model)

@@ -35,8 +35,8 @@ from diagnosis.policy import (
     RIVAL_PROBABILITY,
     UNKNOWN_SHARE,
 )
-from diagnosis.study import COARSE_STEP, HUM, Study
-from tunnel_sim.effects import ALL_EFFECTS, Effect
+from diagnosis.study import COARSE_STEP, HUM, Study, located
+from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -60,6 +60,8 @@ def investigate(
     clock = _Clock(progress)
     found = _test(*similar_campaign(campaign), kinds, clock)
     if found.test.detected:
+        with clock.step("where"):
+            found = replace(found, place=located(found))
         found = _weigh_effects(found, kinds, clock)
     return replace(found, seconds=clock.seconds)
 
@@ -224,7 +226,14 @@ def _weighed(found: Study, base: Fit) -> list[Weighed]:
         excess=base.gap,
         outside=UNKNOWN_SHARE if found.outsider is None else found.outsider.share,
         numbers={h.names: h.further_numbers for h in found.hypotheses},
+        place=_open_place(found),
     )
+
+
+def _open_place(found: Study) -> str | None:
+    """The channel that the residuals show, unless a cause read off the records acts there."""
+    channel = None if found.place is None else found.place.channel.value
+    return None if channel in {effect_class(name).channel for name in found.read_off} else channel
 
 
 def _polished(

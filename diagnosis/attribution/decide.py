@@ -26,6 +26,7 @@ from diagnosis.policy import (
     FORM_SHARE,
     NEEDLESS_CHI2,
     PAIR_SHARE,
+    PLACE_WRONG,
     STEEPNESS,
     STEEPNESS_BEYOND,
     UNKNOWN_FURTHER,
@@ -69,6 +70,7 @@ def weigh(
     excess: float,
     outside: float = UNKNOWN_SHARE,
     numbers: Mapping[tuple[str, ...], int] | None = None,
+    place: str | None = None,
 ) -> list[Weighed]:
     """Probabilities of the answers.
 
@@ -78,6 +80,7 @@ def weigh(
         excess: of the nominal model's block means.
         outside: share that a cause outside the vocabulary leaves open; `UNKNOWN_SHARE` at most counts.
         numbers: as `evidence` takes them, by sorted effect names; 0 where not given.
+        place: the channel that the residuals alone show; None: none.
 
     Returns:
         All answers, ``unknown`` among them, most probable first.
@@ -91,8 +94,9 @@ def weigh(
     odds = 0.0
     for names, share in answers.items():
         further = (numbers or {}).get(names, 0)
-        weights[names] = evidence(names, share - least, further, excess, chance)
-        odds += _odds_against_unknown(names, share, further, outside, excess, chance)
+        agrees = _agreement(names, place)
+        weights[names] = agrees * evidence(names, share - least, further, excess, chance)
+        odds += agrees * _odds_against_unknown(names, share, further, outside, excess, chance)
     known = odds / (1.0 + odds) / (sum(weights.values()) or 1.0)
     probabilities = {names: known * weight for names, weight in weights.items()}
     answers = {names: max(share, 0.0) for names, share in answers.items()}
@@ -103,6 +107,12 @@ def weigh(
         for names, share in answers.items()
     ]
     return sorted(found, key=lambda w: -w.probability)
+
+
+def _agreement(effects: Sequence[str], place: str | None) -> float:
+    """Weight of a set by whether one of its effects acts in the channel that the residuals show."""
+    channels = {kind.channel for kind in known_effects() if kind.name in effects}
+    return 1.0 if place is None or not channels or place in channels else PLACE_WRONG / (1.0 - PLACE_WRONG)
 
 
 def evidence(effects: Sequence[str], share: float, numbers: int, excess: float, chance: float) -> float:

@@ -156,9 +156,11 @@ def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
         return None
     shifts = np.array([_shift(curve) for curve in curves])
     frequency, damping = np.sum(shifts**2, axis=0)
-    if frequency >= damping:
+    if frequency >= damping:  # as with a wrong spring, but also with gravity or a flexible rod beside several
         return Finding(
-            "calibration", "each run alone is linear, but the runs' frequencies do not agree with one model"
+            None,
+            "each run alone is linear, but the runs' frequencies do not agree with one model: a stated value is "
+            "wrong, or a stiffness is missing",
         )
     return Finding("damping", "each run alone is linear, but the runs' damping does not agree with one model")
 

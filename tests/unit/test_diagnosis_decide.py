@@ -4,12 +4,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diagnosis.attribution.decide import form_floor, weigh
+from diagnosis.attribution.decide import UNKNOWN, form_floor, weigh
 from diagnosis.policy import (
+    EVEN_SHARE,
     FORM_MISFIT,
     FORM_MISFIT_UP_TO,
     NEEDLESS_CHI2,
     PAIR_SHARE,
+    PLACE_WRONG,
     RIVAL_PROBABILITY,
     UNKNOWN_FURTHER,
     UNKNOWN_SHARE,
@@ -138,3 +140,21 @@ def test_many_that_close_little_do_not_outweigh_unknown():
     found = weigh([((f"effect {i}",), 0.95) for i in range(23)], 0.001, 20.0)
     assert found[0].effects == ("unknown",)
     assert found[0].probability > 0.95
+
+
+def test_names_that_act_elsewhere_than_the_residuals_show_lose_weight():
+    shares = [(("coulomb_friction",), 0.01), (("cubic_stiffness",), 0.01)]
+    even, damping = (
+        {w.effects: w.probability for w in weigh(shares, 0.0, 5.0, place=place)}
+        for place in (None, "damping")
+    )
+    assert even[("coulomb_friction",)] == pytest.approx(even[("cubic_stiffness",)])
+    odds = (damping[("coulomb_friction",)] - EVEN_SHARE / 3) / (
+        damping[("cubic_stiffness",)] - EVEN_SHARE / 3
+    )
+    assert odds == pytest.approx((1.0 - PLACE_WRONG) / PLACE_WRONG)
+    alone = [
+        {w.effects: w.probability for w in weigh(shares[1:], 0.0, 5.0, place=p)}[UNKNOWN]
+        for p in (None, "damping")
+    ]
+    assert alone[1] > 5.0 * (alone[0] - EVEN_SHARE / 2)

@@ -24,11 +24,12 @@ NAME = "diagnose"
 STEPS = {
     "noise": "estimating the noise",
     "nominal fit": "fitting the nominal model",
+    "where": "locating the gap",
     "effects": "fitting sets of effects",
     "random moments": "fitting random moments",
     "pruning": "fitting the answer without each effect",
     "polishing": "fitting the answer to convergence",
-    "where, and how far it closes": "locating the gap, predicting held-out runs",
+    "how far it closes": "predicting held-out runs",
     "what no effect explains": "estimating what no effect explains",
 }
 """Steps of the study in words; any other progress message is a set of effects."""
