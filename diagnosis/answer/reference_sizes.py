@@ -40,14 +40,14 @@ def parameter_unit(name: str, campaign: Campaign) -> str:
         sized = _AREA[rig.frontal_area is not None, rig.reference_length is not None]
         return _PER_INERTIA_AREA[sized] if normalised else sized
     if info.unit == "l/V" and rig.reference_length is None:
-        return "m/V"
+        return "m"  # a·l, which over V is the time
     return _per_inertia(info.unit) if normalised else info.unit
 
 
 def _per_inertia(unit: str) -> str:
     """The unit of a quantity whose mass is divided by Izz."""
-    if unit in _PER_INERTIA or unit == "l/V":
-        return _PER_INERTIA.get(unit, unit)
+    if unit in _PER_INERTIA:
+        return _PER_INERTIA[unit]
     of = dimension(unit)
     return in_si(product(of, dimension("kg m2"), -of[0])) if of[0] else unit
 
