@@ -10,6 +10,7 @@ from diagnosis.answer.own_units import own_parameters
 from diagnosis.answer.reference_sizes import parameter_unit, size_note, sized_coefficients
 from diagnosis.fitting.similarity import similar_campaign
 from diagnosis.result import ParameterEstimate
+from identification import identify
 from tests.reference import free_decays
 from tests.reference.free_decays import AREA, LENGTH, Setting
 from tests.unit import gap_campaigns
@@ -79,6 +80,8 @@ def test_units_without_springs_and_sizes(data):
         assert tuple(parameter_unit(name, d) for d in (data, bare, small)) == units
     nothing = replace(bare, rig=RigProperties())
     assert parameter_unit("buffeting.intensity", nothing) == "m/kg"
+    thin = replace(nothing, runs=tuple(replace(run, air_density=None) for run in nothing.runs))
+    assert parameter_unit("buffeting.intensity", thin) == "1/m2"  # the density is within it
 
 
 @pytest.mark.parametrize("quantity", ["angle", "rate", "acceleration"])
@@ -104,6 +107,22 @@ def test_every_parameter_is_given_in_a_unit_that_can_be_read_and_in_own_units(da
                 assert factor == pytest.approx(change.own(1.0, own.unit))
             else:
                 assert own.unit == infos[key].unit
+
+
+def test_without_springs_and_sizes_no_density_is_needed():
+    def bare(density):
+        runs = (Setting(None, 12.0), Setting(None, 24.0), Setting(None, 12.0, 0.14))
+        found = free_decays.campaign(runs, noise=4e-4, duration=5.0, has_size=False, rng=np.random.default_rng(1))
+        return replace(found, runs=tuple(replace(run, air_density=density) for run in found.runs))
+
+    kinds = vocabulary(["nonlinear_yaw_damping"])
+    answer, told = (diagnose(bare(density), kinds=kinds) for density in (None, 1.2))
+    assert answer.causes == told.causes == ()
+    for name in ("omega_n", "zeta"):
+        same = pytest.approx(told.coefficients.after[name].value, rel=1e-3)
+        assert answer.coefficients.after[name].value == same
+    found = identify(bare(None))
+    assert [run.omega_n.value for run in found.runs] == [r.omega_n.value for r in identify(bare(1.2)).runs]
 
 
 def test_a_lag_is_found_where_no_sizes_are_stated():
