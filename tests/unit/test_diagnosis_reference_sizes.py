@@ -112,7 +112,9 @@ def test_every_parameter_is_given_in_a_unit_that_can_be_read_and_in_own_units(da
 def test_without_springs_and_sizes_no_density_is_needed():
     def bare(density):
         runs = (Setting(None, 12.0), Setting(None, 24.0), Setting(None, 12.0, 0.14))
-        found = free_decays.campaign(runs, noise=4e-4, duration=5.0, has_size=False, rng=np.random.default_rng(1))
+        found = free_decays.campaign(
+            runs, noise=4e-4, duration=5.0, has_size=False, rng=np.random.default_rng(1)
+        )
         return replace(found, runs=tuple(replace(run, air_density=density) for run in found.runs))
 
     kinds = vocabulary(["nonlinear_yaw_damping"])
