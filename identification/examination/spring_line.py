@@ -92,8 +92,9 @@ def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
         return ()
     place = _the_one(springs) if springs.stiffness.size >= _LEAST else None
     remark = _several(springs) if place is None else _one(springs, place)
-    inertias, moments = zip(*other_fits(swings), strict=True)
-    return (replace(remark, figures={"inertias_kg_m2": list(inertias), "air_stiffnesses_m3": list(moments)}),)
+    fits = other_fits(swings)
+    figures = {"inertias_kg_m2": [one for one, _ in fits], "air_stiffnesses_m3": [air for _, air in fits]}
+    return (replace(remark, figures=figures),)
 
 
 def inertia_off_the_springs(swings: Sequence[Swing], campaign: Campaign) -> tuple[Remark, ...]:

@@ -128,9 +128,9 @@ def _reaching(
         return None
     away = [abs(factor - 1.0) * abs(found.value) for factor in factors]
     away += [abs(other - found.value) for other in others]
-    wider = max(1.0, max(away) / sqrt(3.0) / found.std)
+    std = max(found.std, max(away) / sqrt(3.0))
     interval = found.interval
-    if interval is not None:
-        low, high = (found.value + wider * (end - found.value) for end in interval)
-        interval = low, high
-    return replace(found, std=found.std * wider, interval=interval)
+    if interval is not None and std > found.std:
+        half = float(norm.ppf(0.975)) * std
+        interval = min(interval[0], found.value - half), max(interval[1], found.value + half)
+    return replace(found, std=std, interval=interval)
