@@ -67,9 +67,8 @@ def own_parameters(
         own = own_estimate(value, similarity)
         factor = similarity.time**-beyond
         std = None if own.std is None else own.std * factor
-        unit = parameter_unit(
-            name, campaign
-        )  # the sizes and the inertia that it leaves out are 1 in own units
+        # A size, density or inertia that is not stated is 1 in own units: only the name of the unit changes.
+        unit = parameter_unit(name, campaign)
         found[name] = replace(own, value=own.value * factor, std=std, unit=unit)
     return found
 

@@ -234,6 +234,8 @@ def _speeds_exchanged(labels: Labels) -> Iterator[tuple[tuple[int, ...], Labels]
     rises = np.diff(labels.pressure[order]) > SAME_PRESSURE * labels.pressure[order][1:]
     settings = np.split(order, np.flatnonzero(rises) + 1)
     for one, two in itertools.combinations(settings, 2):
+        if one.size + two.size == 2:
+            continue  # that is an exchange between two runs
         other = labels.pressure.copy()
         other[one], other[two] = other[two].mean(), other[one].mean()
         yield tuple(np.sort(np.concatenate([one, two])).tolist()), replace(labels, pressure=other)
