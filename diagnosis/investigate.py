@@ -25,7 +25,7 @@ from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.similarity import Similarity, similar_campaign
 from diagnosis.fitting.spectra import mains_interval
-from diagnosis.fitting.starting_points import is_gross, nominal_start
+from diagnosis.fitting.starting_points import decays_start, is_gross, nominal_start
 from diagnosis.policy import (
     COARSE_STEP_POWER,
     COARSER_STEP,
@@ -82,13 +82,16 @@ def nominal_study(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Study:
 
 
 def fit_nominal(data: Data) -> Fit:
-    """Fit the nominal model.
+    """Fit the nominal model; where it misses the motion, from the runs' own decays as well.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted.
     """
     try:
         found = fit(Problem(data), nominal_start(data))
+        nearer = decays_start(data) if is_gross(found) else None
+        if nearer is not None:
+            found = min(found, fit(Problem(data), nearer), key=lambda one: one.total)
     except (FitError, np.linalg.LinAlgError) as error:
         raise TunnelError(
             "the nominal model cannot be fitted",

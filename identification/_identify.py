@@ -10,6 +10,7 @@ from identification.examination.examine import examine
 from identification.examination.rates import as_angles
 from identification.examination.self_excited import in_limit_cycle
 from identification.remark import Examined
+from identification.statistics.widening import widened_by_contradictions
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -41,6 +42,7 @@ def identify(
     examined = examine(campaign).accepted()
     left = examined.campaign
     found = chosen.estimate(left) if left.runs else Estimate(campaign.name, chosen.name, ())
+    found = widened_by_contradictions(found, left, examined.remarks)
     estimate = _of_all_runs(campaign, examined, as_angles(found, campaign.sensor))
     if throw and estimate.status.failed:
         what, _, remedy = estimate.status.value.partition(": ")

@@ -36,6 +36,10 @@ of the paper in view, whose p-value is 0.06: springs 4 and 7 are flagged at this
 SPRING_TOLERANCE = 0.01
 """Relative standard uncertainty of a stated stiffness: weights and arm of a static calibration."""
 
+INERTIA_FACTOR = 1.5
+"""Factor by which a nominal inertia may be off: it comes from a drawing, without the support and the air that moves
+with the body. Confusing one spring with two makes 2. Judgement."""
+
 SAME_PRESSURE = 0.1
 """Dynamic pressures that differ by a smaller share are of one setting: speeds are read to a few per cent."""
 

@@ -40,7 +40,8 @@ from diagnosis.study import Study
 
 _CUT_RECORDS = (
     "The nominal model misses the motion grossly, so each record is used only from its second passage through the "
-    "middle until its motion ends. A start driven by hand is not a free decay, and neither is a body at rest."
+    "middle until its motion ends. A start driven by hand is not a free decay, and neither is a body at rest. The "
+    "coefficients before the causes may therefore differ from those of identify, which uses the whole record."
 )
 _RESTED = (
     "The body is at rest at the end of {}. The fits leave that part out: the place where friction stops a body "

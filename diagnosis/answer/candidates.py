@@ -9,7 +9,6 @@ import numpy as np
 
 from diagnosis.answer.determined import meant_parameter
 from diagnosis.answer.own_units import own_parameters
-from diagnosis.answer.reference_sizes import parameter_unit
 from diagnosis.answer.reported import Base
 from diagnosis.attribution.decide import UNKNOWN, Weighed
 from diagnosis.attribution.process_noise import LONGEST_BANDWIDTH
@@ -116,8 +115,7 @@ def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
             found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
     if random is not None:
         found |= _random_parameters(random)
-    named = {name: replace(value, unit=parameter_unit(name, study.campaign)) for name, value in found.items()}
-    return own_parameters(named, study.similarity)
+    return own_parameters(found, study.campaign, study.similarity)
 
 
 def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
@@ -161,7 +159,7 @@ def _read_parameters(study: Study) -> dict[str, ParameterEstimate]:
         found[f"{COARSE_STEP.name}.{COARSE_STEP.parameters()[0].name}"] = ParameterEstimate(
             study.step, None, "rad"
         )
-    return own_parameters(found, study.similarity)
+    return own_parameters(found, study.campaign, study.similarity)
 
 
 def _short(parameters: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:

@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from diagnosis.answer.reference_sizes import parameter_unit
 from diagnosis.fitting.similarity import Similarity
 from diagnosis.result import Confirmation, Diagnosis, NoiseSummary, ParameterEstimate
 from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.campaign import Campaign
 
 _NEXT_RUN = {"spring_stiffness": "N m/rad", "duration": "s"}
 
@@ -42,17 +44,18 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
 
 
 def own_parameters(
-    given: Mapping[str, ParameterEstimate], similarity: Similarity
+    given: Mapping[str, ParameterEstimate], campaign: Campaign, similarity: Similarity
 ) -> dict[str, ParameterEstimate]:
     """Parameters of effects in the measured campaign's units.
 
     Args:
-        given: by ``effect.parameter``, for the similar campaign.
-        similarity: how that was made.
+        given: by ``effect.parameter``, in the effects' own units, for the similar campaign.
+        campaign: says which sizes and springs are stated.
+        similarity: how the similar campaign was made.
 
     Returns:
-        The same quantities. The coefficient of another power of the rate than the textbook's changes with that
-        power of time.
+        The same quantities, in the units of `parameter_unit`. The coefficient of another power of the rate than the
+        textbook's changes with that power of time.
     """
     found = {}
     for name, value in given.items():
@@ -64,7 +67,9 @@ def own_parameters(
         own = own_estimate(value, similarity)
         factor = similarity.time**-beyond
         std = None if own.std is None else own.std * factor
-        found[name] = replace(own, value=own.value * factor, std=std)
+        # A size, density or inertia that is not stated is 1 in own units: only the name of the unit changes.
+        unit = parameter_unit(name, campaign)
+        found[name] = replace(own, value=own.value * factor, std=std, unit=unit)
     return found
 
 

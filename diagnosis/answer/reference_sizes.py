@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import replace
 
 from diagnosis.result import ParameterEstimate
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
-from tunnel_sim.vocabulary.units import dimension, in_si, product
+from tunnel_sim.vocabulary.units import NUMBER, dimension, in_si, product
 
 #: Units of what acts on the yaw axis, and of the same per unit inertia.
 _PER_INERTIA = {
@@ -18,8 +19,6 @@ _PER_INERTIA = {
     "N m s2/rad2": "1/rad",
     "rad/(N m)": "s2",
 }
-_AREA = {(True, True): "1", (False, True): "m2", (True, False): "m", (False, False): "m3"}
-_PER_INERTIA_AREA = {"1": "1/(kg m2)", "m2": "1/kg", "m": "1/(kg m)", "m3": "m/kg"}
 
 
 def parameter_unit(name: str, campaign: Campaign) -> str:
@@ -29,25 +28,32 @@ def parameter_unit(name: str, campaign: Campaign) -> str:
         name: ``effect.parameter``.
 
     Returns:
-        The parameter's own unit; over that of Izz where any run states no spring, and times the frontal area
-        and the reference length where these are not stated.
+        The parameter's own unit; over that of Izz where any run states no spring, and times those of the frontal
+        area, the reference length and the air density where these are not stated.
     """
     effect, _, parameter = name.partition(".")
     info = next(info for info in effect_class(effect).parameters() if info.name == parameter)
     normalised = any(run.spring_stiffness is None for run in campaign.runs)
     rig = campaign.rig
     if info.per_pressure:
-        sized = _AREA[rig.frontal_area is not None, rig.reference_length is not None]
-        return _PER_INERTIA_AREA[sized] if normalised else sized
+        dense = all(run.air_density is not None for run in campaign.runs if run.wind_on)
+        factors = {
+            "kg/m3": not dense,
+            "m2": rig.frontal_area is None,
+            "m": rig.reference_length is None,
+            "1/(kg m2)": normalised,
+        }
+        within = [dimension(unit) for unit, missing in factors.items() if missing]
+        return in_si(functools.reduce(product, within, NUMBER))
     if info.unit == "l/V" and rig.reference_length is None:
-        return "m/V"
+        return "m"  # a·l, which over V is the time
     return _per_inertia(info.unit) if normalised else info.unit
 
 
 def _per_inertia(unit: str) -> str:
     """The unit of a quantity whose mass is divided by Izz."""
-    if unit in _PER_INERTIA or unit == "l/V":
-        return _PER_INERTIA.get(unit, unit)
+    if unit in _PER_INERTIA:
+        return _PER_INERTIA[unit]
     of = dimension(unit)
     return in_si(product(of, dimension("kg m2"), -of[0])) if of[0] else unit
 

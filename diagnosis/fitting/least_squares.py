@@ -13,6 +13,10 @@ from tunnel_sim.vocabulary.record import Array
 _MAX_ITERATIONS = 25
 _HOPELESS = 5  # steps after which a fit must be better than the one it adds an effect to
 _AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
+_AIR_STIFFNESS = (
+    4.0  # N m/rad in the strongest wind: a coefficient is judged by what it does, whatever the air
+)
+_AIR_DAMPING = 0.02  # N m s/rad in the same way
 _TRIES = 9  # dampings tried in a step, each ten times the last
 
 
@@ -247,13 +251,19 @@ def difference_steps(problem: Problem, common: Array) -> Array:
     Returns:
         Steps, shape (common,), each in its parameter's unit.
     """
+    data = problem.data
+    windy = [run for run in data.runs if run.wind_on]
+    stiffness_load = max((data.air_moment(run) for run in windy), default=1.0)
+    damping_load = max(
+        (data.air_moment(run) * data.reference_length / run.wind_speed for run in windy), default=1.0
+    )
     scales = {
         "yaw_inertia": 0.1,
         "stiffness": 10.0,
         "added_stiffness": 1.0,
         "mechanical_damping": 0.02,
-        "cn_beta": 0.4,
-        "cn_r": 0.1,
+        "cn_beta": _AIR_STIFFNESS / stiffness_load,
+        "cn_r": _AIR_DAMPING / damping_load,
         "zero": 1.0,
     }
     for kind in problem.effects:

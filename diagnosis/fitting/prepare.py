@@ -33,13 +33,15 @@ def prepare(
         interval: between the blocks, s; the nearest number of samples, at least one.
 
     Returns:
-        The prepared data. Where any run states no stiffness, all are taken in normalised form.
+        The prepared data. Where any run states no stiffness, all are taken in normalised form; where a wind-on run
+        states no air density, all have the density 1 kg/m³.
     """
     rig = campaign.rig
     held = {} if campaign.law is None else campaign.law.held
+    dense = all(run.air_density is not None for run in campaign.runs if run.wind_on)
     return Data(
         runs=tuple(
-            _prepare_run(run, noise_variance[run.id], campaign.sensor.derivative, interval)
+            _prepare_run(run, noise_variance[run.id], campaign.sensor.derivative, interval, dense=dense)
             for run in campaign.runs
         ),
         frontal_area=rig.frontal_area or similarity.area,
@@ -53,7 +55,9 @@ def prepare(
     )
 
 
-def _prepare_run(run: Run, noise_variance: float, derivative: int, interval: float) -> RunData:
+def _prepare_run(
+    run: Run, noise_variance: float, derivative: int, interval: float, *, dense: bool
+) -> RunData:
     record = run.record
     block = max(1, round(interval * record.sample_rate))
     count = record.yaw_rad.size // block
@@ -71,7 +75,7 @@ def _prepare_run(run: Run, noise_variance: float, derivative: int, interval: flo
         noise_variance=noise_variance / block,
         spring_stiffness=run.spring_stiffness,
         wind_speed=run.wind_speed,
-        air_density=run.air_density or 0.0,
+        air_density=(run.air_density or 0.0) if dense else 1.0,
         duration=record.duration + record.sample_interval,
         derivative=derivative,
         samples=samples,

@@ -32,9 +32,9 @@ def _powers(unit: str) -> tuple[float, float]:
     """How a quantity changes, by its unit: powers of m and s.
 
     Speeds stay as they are, so a length changes as a time does; a mass then changes as a moment does. The rig's
-    sizes and a time over l/V have rules of their own (`_rig`).
+    sizes have rules of their own (`_rig`).
     """
-    kg, metres, seconds = (0.0, 0.0, 0.0) if unit == "l/V" else dimension(unit)
+    kg, metres, seconds = dimension(unit)
     return (0.0, 0.0) if kg == seconds == 0.0 else (kg, metres + seconds)
 
 

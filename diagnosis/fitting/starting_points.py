@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +15,14 @@ from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData, departure
 from diagnosis.fitting.spectra import Line, mains_line, shedding_line
 from diagnosis.policy import GROSS_MISFIT
+from identification.decay.damped_oscillation import Decay
+from identification.decay.decay_fit import Reading, fit_run
+from identification.decay.first_guess import starting_decay
 from identification.decay.spectrum import peak_of_swing
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.fitting import Circumstances, Trial
 from tunnel_sim.effects.parameters import ParameterInfo
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, Record
 
 _STILL = 0.02  # of the largest swing, below which a run or a stretch of it counts as at rest
 _PHASES = 64  # of a cycle, for its mean
@@ -27,14 +30,41 @@ _NEARER = 0.02  # of the size that linear theory gives an effect
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
-def nominal_start(data: Data) -> Point:
+def decays_start(data: Data) -> Point | None:
+    """A starting point for the nominal model from the runs' own decays, which `identify` gives.
+
+    A frequency that depends on the amplitude spreads the peak of a spectrum, and χ² has a minimum for every cycle
+    more or less that fits the record.
+
+    Returns:
+        As `nominal_start`; None where a run has no decay of its own.
+    """
+    decays = []
+    for run in data.runs:
+        record = Record(run.times, run.reading)
+        start = starting_decay(record)
+        found = None if start is None else fit_run(Reading.from_record(record), start)
+        if found is None or not found.runs or found.runs[0].decay.stiffness <= 0.0:
+            return None
+        decays.append(found.runs[0].decay)
+    return nominal_start(data, decays)
+
+
+def nominal_start(data: Data, decays: Sequence[Decay] | None = None) -> Point:
     """A starting point for the nominal model.
+
+    Args:
+        decays: of the runs, where they are known; else their frequencies are those of their spectra.
 
     Returns:
         Inertia and aerodynamic stiffness by linear regression of the runs' frequencies, a small damping, and
         the releases from the first samples.
     """
-    omega2 = np.array([(2.0 * np.pi * _frequency(run)) ** 2 for run in data.runs])
+    omega2 = np.array(
+        [(2.0 * np.pi * _frequency(run)) ** 2 for run in data.runs]
+        if decays is None
+        else [decay.stiffness for decay in decays]
+    )
     swing = np.array([float(np.std(run.reading)) for run in data.runs])
     moving = (swing > _STILL * swing.max()).astype(np.float64)  # a body at rest has no frequency
     typical = float(np.median(omega2[moving > 0.0]))

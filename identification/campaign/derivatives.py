@@ -19,7 +19,7 @@ from identification.estimate import PARAMETERS
 from identification.policy import LEAST_SPRING_SPREAD
 from identification.statistics.information import determined, inverse, scaled_solve
 from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
-from tunnel_sim.vocabulary.campaign import RigProperties, Run
+from tunnel_sim.vocabulary.campaign import RigProperties, Run, needs_density
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -75,23 +75,23 @@ class Derivatives:
 
 
 def loads(run: Run, rig: RigProperties) -> tuple[float, float]:
-    """The factors of Cnβ and Cnr in a run: ½ρV²·A·l [N m] and ½ρV·A·l² [N m s]; A and l as 1 where unknown.
+    """The factors of Cnβ and Cnr in a run: ½ρV²·A·l [N m] and ½ρV·A·l² [N m s]; ρ, A and l as 1 where unknown.
 
     Raises:
-        TunnelError: when a wind-on run states no air density, or a stated value is too large or too small for
-        double
-            precision.
+        TunnelError: when a run does not state the air density it needs, or a stated value is too large or too small
+            for double precision.
     """
     _within_range("spring_stiffness", run.spring_stiffness or 1.0, "N m/rad", run)
     if not run.wind_on:
         return 0.0, 0.0
-    if run.air_density is None:
+    scales = run.spring_stiffness, rig.frontal_area, rig.reference_length
+    if run.air_density is None and needs_density(run.wind_speed, *scales):
         raise TunnelError(
             "wind-on run without air_density", where=f"run {run.id}", remedy="state it in kg/m3"
         )
     known = has_size(rig)
     conditions = {
-        "air_density": run.air_density,
+        "air_density": 1.0 if run.air_density is None else run.air_density,
         "wind_speed": run.wind_speed,
         "frontal_area": rig.frontal_area if known and rig.frontal_area is not None else 1.0,
         "reference_length": rig.reference_length if known and rig.reference_length is not None else 1.0,

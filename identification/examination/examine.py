@@ -13,7 +13,7 @@ from identification.examination.release import find_release
 from identification.examination.repeated import without_repeats
 from identification.examination.rest import without_rest
 from identification.examination.self_excited import self_excited_runs
-from identification.examination.spring_line import springs_off_the_line
+from identification.examination.spring_line import inertia_off_the_springs, springs_off_the_line
 from identification.examination.swings import swing_of
 from identification.examination.turns import wide_swings
 from identification.examination.zeros import with_zeros
@@ -28,8 +28,8 @@ def examine(campaign: Campaign) -> Examined:
     Repeated records are counted once. Rounded time stamps are replaced by the clock behind them. Samples before
     the release, and most of a long rest beside the centre, are cut off. Wind-on runs in a limit cycle are cut to
     their linear growth, or left out. Runs whose zeros differ get one each. Motion that grows with the wind off,
-    and springs or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies are
-    noted.
+    and springs or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies,
+    and an inertia that does not fit the springs, are noted.
 
     Returns:
         The campaign to identify and the remarks; the given campaign itself if nothing is wrong.
@@ -49,7 +49,8 @@ def examine(campaign: Campaign) -> Examined:
     kept, excited = self_excited_runs(kept)
     kept, zeros = with_zeros(kept)
     swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
-    faults = growing_runs(swings) or exchanged_labels(swings) or springs_off_the_line(swings)
+    faults = growing_runs(swings) or exchanged_labels(swings)
+    faults = faults or (*springs_off_the_line(swings), *inertia_off_the_springs(swings, kept))
     return Examined(kept, (*repeats, *noted, *clocks, *releases, *rests, *excited, *zeros, *faults))
 
 

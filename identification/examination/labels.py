@@ -17,6 +17,7 @@ from scipy.stats import chi2, f
 
 from identification.examination.swings import Swing
 from identification.policy import (
+    LEAST_SPRING_SPREAD,
     LEAST_STIFFNESS_STD,
     MISFIT_RATE,
     REFUSAL_RATE,
@@ -72,9 +73,14 @@ class _Misfit:
         """Whether the residuals are beyond chance."""
         return self.freedom > 0 and self.squares > float(chi2.isf(REFUSAL_RATE, self.freedom))
 
+    @property
+    def agrees(self) -> bool:
+        """Whether the residuals are within chance."""
+        return self.squares <= float(chi2.isf(MISFIT_RATE, self.freedom))
+
     def mends(self, before: _Misfit, trials: int) -> bool:
         """Whether the statements now agree, or agree better than before by more than chance."""
-        if self.squares <= float(chi2.isf(MISFIT_RATE, self.freedom)):
+        if self.agrees:
             return True
         ratio = before.squares / max(self.squares, 1e-300)
         return ratio > float(f.isf(REFUSAL_RATE / max(trials, 1), self.freedom, self.freedom))
@@ -101,6 +107,44 @@ def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
         if found:
             return (_remark(what, [tuple(known[i].run.id for i in places) for places in found]),)
     return ()
+
+
+def other_fits(swings: Sequence[Swing]) -> list[tuple[float, float | None]]:
+    """What the springs of the runs may be worth, where their statements contradict the frequencies.
+
+    Args:
+        swings: of the runs; those without a stated spring are ignored.
+
+    Returns:
+        Izz in kg m² and Ka over ½ρV² in m³/rad (None where it is not determined): without each spring in turn, with
+        a stiffness common to all runs, as a tilted axis has, and with the wind speeds of two settings exchanged
+        where the statements then agree.
+    """
+    labels = Labels.of([swing for swing in swings if swing.run.spring_stiffness is not None])
+    found = [_fitted(labels, labels.spring != spring) for spring in np.unique(labels.spring)]
+    found.append(_fitted(labels, labels.spring > 0.0, common=True))
+    for _, exchanged in _speeds_exchanged(labels):
+        if _of_springs(exchanged)[0].agrees:
+            found.append(_fitted(exchanged, labels.spring > 0.0))
+    return [one for one in found if one is not None and one[0] > 0.0]
+
+
+def _fitted(
+    labels: Labels, used: NDArray[np.bool_], *, common: bool = False
+) -> tuple[float, float | None] | None:
+    """Izz and C of Kr = Izz k + C ½ρV², or beside a common stiffness; None where they cannot be separated."""
+    spring, seen, pressure = labels.spring[used], labels.seen[used], labels.pressure[used]
+    windy = bool(np.any(pressure > 0.0))
+    columns = [seen, *([pressure] * windy), *([np.ones_like(seen)] * common)]
+    scaled = np.column_stack(columns) / spring[:, None]  # errors of springs are relative
+    lengths = np.linalg.norm(scaled, axis=0)
+    if (
+        spring.size < lengths.size
+        or np.linalg.svd(scaled / lengths, compute_uv=False)[-1] < LEAST_SPRING_SPREAD
+    ):
+        return None
+    solution = np.linalg.lstsq(scaled / lengths, np.ones_like(spring), rcond=None)[0] / lengths
+    return float(solution[0]), float(solution[1]) if windy else None
 
 
 def _remark(what: str, places: Sequence[tuple[str, ...]]) -> Remark:
@@ -181,6 +225,20 @@ def _winds_exchanged(labels: Labels, away: Array) -> Iterator[tuple[tuple[int, .
         low, high = sorted((labels.pressure[i], labels.pressure[j]))
         if high - low > SAME_PRESSURE * high:
             yield (i, j), replace(labels, pressure=_swapped(labels.pressure, i, j))
+    yield from _speeds_exchanged(labels)
+
+
+def _speeds_exchanged(labels: Labels) -> Iterator[tuple[tuple[int, ...], Labels]]:
+    """The wind speeds of all runs of two settings."""
+    order = np.argsort(labels.pressure)
+    rises = np.diff(labels.pressure[order]) > SAME_PRESSURE * labels.pressure[order][1:]
+    settings = np.split(order, np.flatnonzero(rises) + 1)
+    for one, two in itertools.combinations(settings, 2):
+        if one.size + two.size == 2:
+            continue  # that is an exchange between two runs
+        other = labels.pressure.copy()
+        other[one], other[two] = other[two].mean(), other[one].mean()
+        yield tuple(np.sort(np.concatenate([one, two])).tolist()), replace(labels, pressure=other)
 
 
 def _pairs(away: Array) -> list[tuple[int, int]]:

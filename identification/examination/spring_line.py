@@ -1,19 +1,36 @@
-"""Whether the stated springs agree: with the wind off, Kr/ωn² is the same inertia for all of them."""
+"""Whether the stated springs agree: with the wind off, Kr/ωn² is the same inertia for all, and the stated one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2, norm
 
+from identification.examination.labels import other_fits
 from identification.examination.swings import Swing
-from identification.policy import MISFIT_RATE, SPRING_TOLERANCE
+from identification.policy import INERTIA_FACTOR, MISFIT_RATE, SPRING_TOLERANCE
 from identification.remark import Outcome, Remark
+from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
 _LEAST = 3  # springs needed to say which one is wrong
+
+#: What Kr/ωn² over the stated inertia is where a value is in another unit.
+_SLIPS = {
+    1e3: "spring_stiffness in N mm/rad",
+    1e2: "spring_stiffness in N cm/rad",
+    np.pi / 180.0: "spring_stiffness in N m/deg",
+    1.0 / 9.81: "spring_stiffness in kgf m/rad",
+    8.85: "spring_stiffness in lbf in/rad",
+    1e6: "time_s in milliseconds",
+    1.0 / 3600.0: "time_s in minutes",
+    1e-3: "yaw_inertia in g m2",
+    1e-4: "yaw_inertia in kg cm2",
+    1e-6: "yaw_inertia in kg mm2",
+    1e-7: "yaw_inertia in g cm2",
+}
 
 _REMEDY = "calibrate that spring again; a tilted axis or a flexible rod looks similar, run the diagnosis"
 
@@ -74,7 +91,43 @@ def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
     if not springs.disagree():
         return ()
     place = _the_one(springs) if springs.stiffness.size >= _LEAST else None
-    return (_several(springs) if place is None else _one(springs, place),)
+    remark = _several(springs) if place is None else _one(springs, place)
+    fits = other_fits(swings)
+    figures = {"inertias_kg_m2": [one for one, _ in fits], "air_stiffnesses_m3": [air for _, air in fits]}
+    return (replace(remark, figures=figures),)
+
+
+def inertia_off_the_springs(swings: Sequence[Swing], campaign: Campaign) -> tuple[Remark, ...]:
+    """Note a stated inertia that the springs contradict by more than a nominal inertia is off.
+
+    Args:
+        swings: of the runs; only those with the wind off and a stated spring count.
+        campaign: states the inertia.
+
+    Returns:
+        One remark, which names the slip of units that it looks like; none where the campaign states no inertia, or
+        ``plausible = false``.
+    """
+    still = [s for s in swings if not s.run.wind_on and s.run.spring_stiffness is not None]
+    stated = campaign.rig.yaw_inertia
+    if stated is None or not still or campaign.sensor.plausible is False:
+        return ()
+    found = float(np.exp(_Springs.of(still).mean()[0]))
+    off = {ratio: abs(np.log(found / stated / ratio)) for ratio in (1.0, *_SLIPS)}
+    if off[1.0] <= np.log(INERTIA_FACTOR):
+        return ()
+    nearest = min(_SLIPS, key=off.__getitem__)
+    slip = f": it looks like {_SLIPS[nearest]}" if off[nearest] <= np.log(INERTIA_FACTOR) else ""
+    return (
+        Remark(
+            Outcome.NOTED,
+            tuple(s.run.id for s in still),
+            f"with the wind off Kr/omega_n^2 is {found:.4g} kg m2, {found / stated:.4g} times the stated "
+            f"yaw_inertia of {stated:.4g} kg m2{slip}",
+            "correct the stiffness, the inertia or the times, or state plausible = false under [sensor]",
+            {"inertias_kg_m2": [stated], "air_stiffnesses_m3": [None]},
+        ),
+    )
 
 
 def _relative_std(group: Sequence[Swing]) -> float:

@@ -204,6 +204,58 @@ def test_sensor_zero_and_sign_do_not_matter(name, of_noisy, mirrored):
         assert getattr(other, quantity).value == pytest.approx(getattr(plain, quantity).value, rel=1e-6)
 
 
+TWO_SPRINGS = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 24.0))
+CONTRADICTIONS = {
+    "one spring of two 10 % low": (
+        TWO_SPRINGS,
+        lambda run: {"spring_stiffness": SOFTER[run.spring_stiffness]},
+    ),
+    "one spring of three 10 % low": (
+        TWELVE[:9],
+        lambda run: {"spring_stiffness": SOFTER[run.spring_stiffness]},
+    ),
+    "wind on and off exchanged": (TWO_SPRINGS, lambda run: {"wind_speed": 24.0 - run.wind_speed}),
+}
+SOFTER = {16.12: 16.12, 21.02: 21.02, 44.84: 40.36}
+
+
+@cache
+def contradictory(case):
+    settings, change = CONTRADICTIONS[case]
+    data = campaign(settings, noise=5e-4, rng=np.random.default_rng(5), duration=6.0, rate=500.0)
+    return replace(data, runs=tuple(replace(run, **change(run)) for run in data.runs))
+
+
+@each_estimator
+@pytest.mark.parametrize("case", CONTRADICTIONS)
+def test_a_contradiction_that_is_said_widens_the_intervals(name, case):
+    estimate = checked(identify(contradictory(case), name, throw=False), contradictory(case))
+    assert len(estimate.remarks) == 1
+    if estimate.status.failed:  # a method may refuse instead
+        assert estimate.parameters == ()
+        return
+    for quantity in NAMES:
+        found, truth = getattr(estimate, quantity), getattr(Truth(), quantity)
+        assert abs(found.value - truth) < 2.58 * found.std + accuracy(name) * abs(truth)  # 99 %
+        if found.interval is not None:
+            assert found.interval[0] < truth < found.interval[1]
+    for run in estimate.runs:
+        if run.aerodynamic_stiffness is not None:
+            assert run.aerodynamic_stiffness.std > 0.02 * abs(run.aerodynamic_stiffness.value)
+
+
+@each_estimator
+@pytest.mark.parametrize("slip", [1e3, 1.0 / 3600.0])
+def test_an_inertia_that_the_springs_contradict_widens_the_intervals(name, slip):
+    settings = TWO_SPRINGS[::2]
+    data = campaign(settings, noise=5e-4, rng=np.random.default_rng(5), duration=6.0, rate=500.0)
+    stated = replace(data, rig=replace(data.rig, yaw_inertia=Truth().yaw_inertia / slip))
+    found = identify(stated, name)
+    assert abs(found.yaw_inertia.value - stated.rig.yaw_inertia) < 1.96 * found.yaw_inertia.std
+    kept = replace(stated, sensor=replace(stated.sensor, plausible=False))
+    assert identify(kept, name) == identify(data, name)
+
+
 PARTIAL = {
     "wind-off only": (
         (Setting(16.12, 0.0), Setting(44.84, 0.0)),

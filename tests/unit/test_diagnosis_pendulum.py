@@ -18,6 +18,7 @@ from diagnosis.fitting.starting_points import is_gross, starting_points
 from diagnosis.investigate import fit_nominal, investigate
 from diagnosis.law.bases import COMMON, SINGLE, ranges
 from diagnosis.law.paths import paths
+from identification import identify
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_reference import moments
 from tunnel_reference.conditions import Conditions
@@ -164,6 +165,16 @@ def test_gravity_is_found_where_the_nominal_model_does_not_miss_the_motion():
         gravity.point.common[gravity.problem.names.index(name)]
         for name in ("stiffness", "gravity_stiffness.stiffness")
     ) == pytest.approx(stiffness, rel=1e-9)
+
+
+def test_the_nominal_fit_is_the_one_that_identify_finds():
+    """The frequency rises by a third as the swing dies away; by the peak of the spectrum the fit ends 15 % off."""
+    data = pendulum(2.5, 30.0)
+    found, run = fit_nominal(prepared(data)), identify(data).runs[0]
+    omega = float(np.sqrt(found.value("stiffness")))
+    assert is_gross(found)
+    assert abs(omega - run.omega_n.value) < run.omega_n.std
+    assert abs(found.value("mechanical_damping") / (2.0 * omega) - run.zeta.value) < run.zeta.std
 
 
 def test_a_long_rest_is_left_out():

@@ -6,12 +6,17 @@ import numpy as np
 import pytest
 
 from diagnosis._diagnose import diagnose, vocabulary
+from diagnosis.answer.own_units import own_parameters
 from diagnosis.answer.reference_sizes import parameter_unit, size_note, sized_coefficients
+from diagnosis.fitting.similarity import similar_campaign
 from diagnosis.result import ParameterEstimate
+from identification import identify
 from tests.reference import free_decays
 from tests.reference.free_decays import AREA, LENGTH, Setting
-from tunnel_sim.effects import ALL_EFFECTS
+from tests.unit import gap_campaigns
+from tunnel_sim.effects import ALL_EFFECTS, effect_from
 from tunnel_sim.vocabulary.campaign import RigProperties
+from tunnel_sim.vocabulary.units import dimension
 
 SETTINGS = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0))
 RIGS = {
@@ -68,13 +73,68 @@ def test_units_without_springs_and_sizes(data):
         "rod_flexibility.compliance": ("rad/(N m)", "s2", "rad/(N m)"),
         "buffeting.intensity": ("1", "1/(kg m2)", "m3"),
         "vortex_shedding.amplitude": ("1", "1/(kg m2)", "m3"),
-        "unsteady_aero_lag.lag": ("l/V", "l/V", "m/V"),
+        "unsteady_aero_lag.lag": ("l/V", "l/V", "m"),
         "sensor_drift.drift": ("rad", "rad", "rad"),
     }
     for name, units in cases.items():
         assert tuple(parameter_unit(name, d) for d in (data, bare, small)) == units
     nothing = replace(bare, rig=RigProperties())
     assert parameter_unit("buffeting.intensity", nothing) == "m/kg"
+    thin = replace(nothing, runs=tuple(replace(run, air_density=None) for run in nothing.runs))
+    assert parameter_unit("buffeting.intensity", thin) == "1/m2"  # the density is within it
+
+
+@pytest.mark.parametrize("quantity", ["angle", "rate", "acceleration"])
+@pytest.mark.parametrize("sprung", [True, False], ids=["springs", "no springs"])
+@pytest.mark.parametrize("name", RIGS)
+def test_every_parameter_is_given_in_a_unit_that_can_be_read_and_in_own_units(data, name, sprung, quantity):
+    """A rig of another time scale and another moment: lengths go with time, so products of sizes stay."""
+    sensor = replace(data.sensor, quantity=quantity)
+    runs = data.runs if sprung else tuple(replace(run, spring_stiffness=None) for run in data.runs)
+    stated = replace(data, rig=RIGS[name][0], sensor=sensor, runs=runs)
+    _, change = similar_campaign(stated)
+    for kind in ALL_EFFECTS:
+        infos = {f"{kind.name}.{info.name}": info for info in kind.parameters()}
+        given = {key: ParameterEstimate(info.default + 0.7, 0.1, info.unit) for key, info in infos.items()}
+        found = own_parameters({k: v for k, v in given.items() if not infos[k].form}, stated, change)
+        for key, own in found.items():
+            factor = own.value / given[key].value
+            dimension(own.unit)
+            assert own.std == pytest.approx(0.1 * factor)
+            if infos[key].per_pressure or infos[key].unit == "l/V":
+                assert factor == 1.0
+            elif not sprung:
+                assert factor == pytest.approx(change.own(1.0, own.unit))
+            else:
+                assert own.unit == infos[key].unit
+
+
+def test_without_springs_and_sizes_no_density_is_needed():
+    def bare(density):
+        runs = (Setting(None, 12.0), Setting(None, 24.0), Setting(None, 12.0, 0.14))
+        found = free_decays.campaign(
+            runs, noise=4e-4, duration=5.0, has_size=False, rng=np.random.default_rng(1)
+        )
+        return replace(found, runs=tuple(replace(run, air_density=density) for run in found.runs))
+
+    kinds = vocabulary(["nonlinear_yaw_damping"])
+    answer, told = (diagnose(bare(density), kinds=kinds) for density in (None, 1.2))
+    assert answer.causes == told.causes == ()
+    for name in ("omega_n", "zeta"):
+        same = pytest.approx(told.coefficients.after[name].value, rel=1e-3)
+        assert answer.coefficients.after[name].value == same
+    found = identify(bare(None))
+    assert [run.omega_n.value for run in found.runs] == [r.omega_n.value for r in identify(bare(1.2)).runs]
+
+
+def test_a_lag_is_found_where_no_sizes_are_stated():
+    lag = effect_from("unsteady_aero_lag", {"lag": 2.0})
+    sized = gap_campaigns.campaign(lag, duration=6.0)
+    answer = diagnose(replace(sized, rig=RigProperties()), kinds=vocabulary(["unsteady_aero_lag"]))
+    assert answer.causes == ("unsteady_aero_lag",)
+    found = answer.candidates[0].parameters["lag"]
+    assert found.unit == "m"
+    assert abs(found.value - 2.0 * sized.rig.reference_length) < 4.0 * found.std < 0.5
 
 
 def test_no_unit_of_a_moment_is_left_in_normalised_form(data):

@@ -217,6 +217,30 @@ def test_a_factor_on_the_angles_leaves_the_causes(twice_caused, factor):
     assert found.chosen.value(name) == pytest.approx(first.chosen.value(name) / factor**2, abs=allowed)
 
 
+@pytest.mark.parametrize("key", ["air_density", "frontal_area"])
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_a_factor_on_the_air_or_the_sizes_only_divides_the_coefficients(key, factor):
+    """As stated with plausible = false: what the air does stays, and so does every fit."""
+    kinds = vocabulary(["nonlinear_yaw_moment"])
+
+    def stated(scale):
+        data = campaign(duration=4.0)
+        if key == "frontal_area":
+            return dataclasses.replace(data, rig=dataclasses.replace(data.rig, frontal_area=0.036 * scale))
+        runs = (
+            dataclasses.replace(run, air_density=1.2 * scale if run.wind_on else None) for run in data.runs
+        )
+        return dataclasses.replace(data, runs=tuple(runs))
+
+    one, other = (investigate(stated(scale), kinds) for scale in (1.0, factor))
+    assert one.causes == other.causes == ()
+    assert other.nominal.total == pytest.approx(one.nominal.total, rel=1e-6)
+    for name in ("cn_beta", "cn_r"):
+        allowed = 0.01 * one.nominal.std(name)
+        assert factor * other.nominal.value(name) == pytest.approx(one.nominal.value(name), abs=allowed)
+        assert factor * other.nominal.std(name) == pytest.approx(one.nominal.std(name), rel=1e-3)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("quantity", ["angle", "rate"])
 @pytest.mark.parametrize(("time", "moment"), GRID)

@@ -22,6 +22,18 @@ def test_the_loads_are_the_products() -> None:
     assert loads(replace(RUN, wind_speed=0.0, air_density=None), RIG) == (0.0, 0.0)
 
 
+def test_a_density_is_needed_where_a_stiffness_or_a_size_is_stated() -> None:
+    bare = replace(RUN, air_density=None, spring_stiffness=None)
+    assert loads(bare, RigProperties()) == pytest.approx((50.0, 5.0))
+    for run, rig in (
+        (bare, RIG),
+        (bare, RigProperties(reference_length=0.5)),
+        (replace(RUN, air_density=None), RigProperties()),
+    ):
+        with pytest.raises(TunnelError, match="run r1: wind-on run without air_density"):
+            loads(run, rig)
+
+
 @pytest.mark.parametrize(
     "changes",
     [

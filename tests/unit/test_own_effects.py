@@ -23,6 +23,7 @@ from tunnel_sim.effects import (
     registry,
 )
 from tunnel_sim.effects.effects_file import read_effects
+from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.engine.effect_laws import WIND_ON
 from tunnel_sim.engine.model import build_model
@@ -69,6 +70,12 @@ def changed(**traits: object) -> type:
     return dataclasses.dataclass(frozen=True)(type("Changed", (OwnCubic,), traits))
 
 
+OF_VOLTS = {
+    "__annotations__": {"hardening": float},
+    "hardening": parameter("κ", "V", "of the spring", scale=1.0),
+}
+
+
 @pytest.mark.usefixtures("clean_registry")
 @pytest.mark.parametrize(
     ("kind", "part"),
@@ -77,6 +84,7 @@ def changed(**traits: object) -> type:
         (changed(name="unknown"), "is not a name"),
         (changed(channel="gear"), "unknown channel 'gear'"),
         (changed(line="mains"), "for built-in effects"),
+        (changed(**OF_VOLTS), "parameter hardening: unknown unit 'V'"),
         (int, "is not a class derived from Effect"),
     ],
 )

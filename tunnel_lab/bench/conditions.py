@@ -14,6 +14,7 @@ from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.toml_input import load_toml, one_line, validate
 from tunnel_sim.files.writing import write_json, write_whole
+from tunnel_sim.vocabulary.campaign import needs_density
 from tunnel_sim.vocabulary.errors import TunnelError
 
 Cells = dict[str, dict[str, str]]
@@ -99,7 +100,9 @@ def faults(cells: Cells, *, plausible: bool = True) -> dict[tuple[str, str], str
                 found[row, key] = str(error)
         if not row or texts["air_density"].strip() or (row, "wind_speed") in found:
             continue
-        if (number(texts["wind_speed"], where) or 0.0) > 0.0:
+        scales = (texts["spring_stiffness"], cells[RIG]["frontal_area"], cells[RIG]["reference_length"])
+        speed = number(texts["wind_speed"], where) or 0.0
+        if needs_density(speed, *(1.0 if text.strip() else None for text in scales)):
             remedy = "give it in kg/m3 (about 1.2 for air)"
             found[row, "air_density"] = str(
                 TunnelError("wind-on without air_density", where=where, remedy=remedy)

@@ -15,6 +15,7 @@ from typing import TypeVar, get_args
 import tunnel_sim.effects as package
 from tunnel_sim.effects.base import Channel, Condition, Effect
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
+from tunnel_sim.vocabulary.units import dimension
 
 ENTRY_POINTS = "tunnel.effects"
 """Group of the entry points by which an installed package adds effects."""
@@ -98,12 +99,23 @@ def check_kind(kind: object) -> None:
             where=where,
             remedy="declare its parameters with tunnel_sim.effects.parameters.parameter",
         )
+    _readable_units(kind, where)
     if kind.line or kind.skips or kind.random or kind.lattice:
         raise TunnelError(
             "line, skips, random and lattice are for built-in effects, which are found by methods of their own",
             where=where,
             remedy="leave these traits at their defaults",
         )
+
+
+def _readable_units(kind: type[Effect], where: str) -> None:
+    """Refuse a unit that the answer could not be converted from, before any work is done."""
+    for info in kind.parameters():
+        try:
+            dimension(info.unit)
+        except TunnelError as error:
+            place = f"{where}, parameter {info.name}"
+            raise TunnelError(error.what, where=place, remedy=error.remedy) from None
 
 
 def _has_null(kind: type[Effect]) -> bool:

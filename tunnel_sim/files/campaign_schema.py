@@ -20,7 +20,14 @@ from tunnel_sim.files.toml_input import (
     validate,
 )
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, SensorProperties, Zero
+from tunnel_sim.vocabulary.campaign import (
+    Campaign,
+    Quantity,
+    RigProperties,
+    SensorProperties,
+    Zero,
+    needs_density,
+)
 from tunnel_sim.vocabulary.errors import TunnelError
 
 CAMPAIGN_FILE = "campaign.toml"
@@ -112,7 +119,7 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
                 f"the id '{run.id}' is used twice", where=where, remedy="give every run its own id"
             )
         seen.add(run.id)
-        _check_run(run, where)
+        _check_run(run, parsed.rig, where)
     if parsed.sensor.plausible is not False:
         _check_sizes(parsed, path)
     return parsed
@@ -133,8 +140,9 @@ def _check_sizes(document: CampaignDocument, path: Path) -> None:
         plausible_values(run.model_dump(), run_place(path, run.id))
 
 
-def _check_run(run: RunTable, where: str) -> None:
-    if run.wind_speed > 0.0 and run.air_density is None:
+def _check_run(run: RunTable, rig: RigTable, where: str) -> None:
+    scales = run.spring_stiffness, rig.frontal_area, rig.reference_length
+    if run.air_density is None and needs_density(run.wind_speed, *scales):
         raise TunnelError(
             f"wind-on (wind_speed = {run.wind_speed:g} m/s) without air_density",
             where=where,

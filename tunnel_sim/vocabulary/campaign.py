@@ -85,7 +85,7 @@ class Run:
         record: the sensor's reading.
         wind_speed: V, m/s; 0 is wind-off.
         spring_stiffness: Kr, N m/rad; None: the run is identified in normalised form.
-        air_density: ρ, kg/m³; required where wind_speed > 0.
+        air_density: ρ, kg/m³; required where `needs_density`.
         release_angle: nominal, rad.
     """
 
@@ -100,6 +100,16 @@ class Run:
     def wind_on(self) -> bool:
         """Whether the wind is on."""
         return self.wind_speed > 0.0
+
+
+def needs_density(wind_speed: float, *scales: float | None) -> bool:
+    """Whether a run must state its air density: without a stiffness and sizes only ωn and ζ can be identified.
+
+    Args:
+        wind_speed: V, m/s.
+        scales: the run's spring stiffness (N m/rad), and the rig's frontal area (m²) and reference length (m).
+    """
+    return wind_speed > 0.0 and any(scale is not None for scale in scales)
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,8 @@ def dimension(unit: str) -> Dimension:
     """The dimension of a unit.
 
     Args:
-        unit: factors with spaces between them and digits for powers, the denominator after one slash.
+        unit: factors with spaces between them and digits for powers, the denominator after one slash; or ``l/V``,
+            of a time as a multiple of the reference length over the wind speed, which is a number.
 
     Returns:
         Powers of kg, m and s.
@@ -51,6 +52,8 @@ def dimension(unit: str) -> Dimension:
     Raises:
         TunnelError: when the unit has another form or an unknown factor.
     """
+    if unit == "l/V":
+        return NUMBER
     above, slash, below = unit.partition("/")
     if below.startswith("(") and below.endswith(")"):
         below = below[1:-1]

@@ -190,10 +190,11 @@ def test_conditions_are_typed_pasted_checked_and_saved(browser: Any, served: Ben
     with tab(browser, served) as one:
         page = one.page
         one.open("/two/conditions")
-        page.dblclick("[row-id=a] [col-id=wind_speed]")
-        page.keyboard.press("Control+a")
-        page.keyboard.type("12")
-        page.keyboard.press("Enter")
+        for key, text in (("wind_speed", "12"), ("spring_stiffness", "16")):
+            page.dblclick(f"[row-id=a] [col-id={key}]")
+            page.keyboard.press("Control+a")
+            page.keyboard.type(text)
+            page.keyboard.press("Enter")
         page.wait_for_selector("[row-id=a] [col-id=air_density].wrong")
         page.wait_for_selector("text=tunnel: run 'a': wind-on without air_density")
         assert page.get_by_text("3 Identify").get_attribute("aria-disabled") == "true"

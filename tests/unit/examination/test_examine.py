@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from decays import campaign, grid, reading, run, stated
 
-from diagnosis import diagnose
+from diagnosis import diagnose, vocabulary
 from identification import identify
 from identification.estimate import Estimate, Status
 from identification.examination.examine import examine
 from identification.remark import Outcome, Remark
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
 
 
 def refused(data) -> Remark:
@@ -68,6 +69,18 @@ def test_winds_exchanged_between_two_runs():
     assert "wind_speed" in remark.what
 
 
+@pytest.mark.parametrize("exchanged", [(0.0, 20.0), (20.0, 25.0)])
+def test_two_speeds_exchanged_in_all_runs(exchanged):
+    data = grid((16.0, 35.0), (0.0, 20.0, 25.0))
+    swapped = dict(zip(exchanged, exchanged[::-1], strict=True))
+    for one in data.runs:
+        speed = swapped.get(one.wind_speed, one.wind_speed)
+        data = stated(data, one.id, wind_speed=speed, air_density=1.2)
+    remark = refused(data)
+    assert "wind_speed" in remark.what
+    assert set(remark.runs) == {one.id for one in data.runs if one.wind_speed in exchanged}
+
+
 def test_exchanges_that_cannot_be_distinguished_are_all_named():
     data = stated(grid((16.0, 35.0), (0.0, 20.0)), "k16-v0", wind_speed=20.0, air_density=1.2)
     data = stated(data, "k16-v20", wind_speed=0.0)
@@ -96,6 +109,44 @@ def test_of_two_springs_none_is_blamed():
     (remark,) = examine(data).remarks
     assert remark.runs == ("a", "b")
     assert "cannot be determined" in remark.what
+
+
+@pytest.mark.parametrize(
+    ("spring", "time", "said"),
+    [
+        (1e3, 1.0, "times the stated yaw_inertia of 0.1 kg m2: it looks like spring_stiffness in N mm/rad"),
+        (np.pi / 180.0, 1.0, "spring_stiffness in N m/deg"),
+        (1.0, 1.0 / 60.0, "time_s in minutes"),
+        (1.0, 1e3, "time_s in milliseconds"),
+        (30.0, 1.0, "times the stated yaw_inertia of 0.1 kg m2; correct"),
+        (1.45, 1.0, None),
+        (1.0 / 1.45, 1.0, None),
+    ],
+)
+def test_a_stated_inertia_is_compared_with_the_springs(spring, time, said):
+    data = grid((16.0, 35.0), (0.0, 20.0))
+    rig = replace(data.rig, yaw_inertia=0.1)
+    runs = tuple(
+        replace(
+            r,
+            spring_stiffness=spring * r.spring_stiffness,
+            record=Record(time * r.record.time_s, r.record.yaw_rad),
+        )
+        for r in data.runs
+    )
+    data = replace(data, rig=rig, runs=runs)
+    remarks = examine(data).remarks
+    assert [said in str(remark) for remark in remarks] == ([] if said is None else [True])
+    assert examine(replace(data, sensor=replace(data.sensor, plausible=False))).remarks == ()
+
+
+def test_the_diagnosis_says_that_the_inertia_is_off():
+    data = grid((16.0,), (0.0, 20.0))
+    answer = diagnose(
+        replace(data, rig=replace(data.rig, yaw_inertia=1e-4)), kinds=vocabulary(["sensor_drift"])
+    )
+    assert answer.causes == ()
+    assert "looks like spring_stiffness in N mm/rad" in str(answer)
 
 
 def test_time_that_runs_backwards():

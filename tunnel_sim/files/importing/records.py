@@ -21,7 +21,14 @@ from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.toml_input import one_line, shown, validate
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import (
+    Campaign,
+    Quantity,
+    RigProperties,
+    Run,
+    SensorProperties,
+    needs_density,
+)
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -195,7 +202,9 @@ def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: Cond
                 remedy="give --set wind_speed=SPEED (m/s), --conditions or --name",
             )
         said.append("wind_speed is not stated: wind-off is assumed")
-    if stated.get("wind_speed", 0.0) > 0.0 and "air_density" not in stated:
+    rig = choices.conditions
+    scales = stated.get("spring_stiffness"), rig.frontal_area, rig.reference_length
+    if "air_density" not in stated and needs_density(stated.get("wind_speed", 0.0), *scales):
         raise TunnelError(
             f"wind-on ({stated['wind_speed']:g} m/s) without air_density",
             where=where,

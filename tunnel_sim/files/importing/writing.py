@@ -22,7 +22,7 @@ _RIG = {
 }
 _RUN = {
     "spring_stiffness": "N m/rad: needed for Izz, Cr, Cnβ and Cnr; without it a run gives ωn and ζ",
-    "air_density": "kg/m3: needed where wind_speed > 0",
+    "air_density": "kg/m3: needed for Cnβ and Cnr",
     "release_angle": "rad, nominal; optional",
 }
 ORIGINAL = "# Original: "
