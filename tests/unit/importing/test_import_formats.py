@@ -11,6 +11,7 @@ import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from types import ModuleType
 
 import h5py
 import nptdms
@@ -22,6 +23,8 @@ import xlsxwriter
 
 from tests.unit.importing.import_files import RATE, decay, written
 from tunnel_sim import TunnelError
+from tunnel_sim.files.importing import matlab, workbook
+from tunnel_sim.files.importing import tdms as tdms_reader
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.matlab import _unpacked
 from tunnel_sim.files.importing.records import Imported, read_records
@@ -115,17 +118,22 @@ def test_a_format_is_read(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "module"), [("excel.xlsx", "fastexcel"), ("seven.mat", "h5py"), ("labview.tdms", "nptdms")]
+    ("name", "reader", "module"),
+    [
+        ("excel.xlsx", workbook, "fastexcel"),
+        ("seven.mat", matlab, "h5py"),
+        ("labview.tdms", tdms_reader, "nptdms"),
+    ],
 )
 def test_a_missing_library_is_said(
-    name: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, reader: ModuleType, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     FILES[name](tmp_path / name)
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(
         TunnelError, match=rf"needs the package {module}.*pip install 'virtual-wind-tunnel\[import\]'"
     ):
-        read_records([tmp_path / name])
+        reader.read((tmp_path / name).read_bytes(), name)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -168,12 +176,10 @@ def archive(*names: str, size: int = 10) -> bytes:
     ],
     ids=["macros", "links", "bomb", "other"],
 )
-def test_dangerous_workbooks_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes, what: str
-) -> None:
+def test_dangerous_workbooks_are_refused(monkeypatch: pytest.MonkeyPatch, content: bytes, what: str) -> None:
     monkeypatch.setattr(limits, "DATA_BYTES", 2**20)
     with pytest.raises(TunnelError, match=what):
-        read_records([written(tmp_path, "book.xlsx", content)])
+        workbook.read(content, "book.xlsx")
 
 
 def test_sizes_are_counted_before_anything_is_unpacked(
@@ -186,7 +192,7 @@ def test_sizes_are_counted_before_anything_is_unpacked(
     scipy.io.savemat(tmp_path / "zeros.mat", {"a": np.zeros(2**18)}, do_compression=True)
     monkeypatch.setattr(limits, "DATA_BYTES", 2**20)
     with pytest.raises(TunnelError, match="numbers, more than"):
-        read_records([tmp_path / "zeros.mat"])
+        matlab.read((tmp_path / "zeros.mat").read_bytes(), "zeros.mat")
 
 
 @pytest.mark.parametrize("compressed", [False, True])

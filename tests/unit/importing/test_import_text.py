@@ -16,7 +16,7 @@ from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.columns import _blocks
 from tunnel_sim.files.importing.records import _with_unique_ids, read_records
-from tunnel_sim.files.importing.source import Channel
+from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.text import find_dialect
 from tunnel_sim.files.importing.units import known_unit, split_unit
 
