@@ -41,12 +41,13 @@ def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
     """The condition or size that a column or a number states, a key of `Conditions`.
 
     Args:
-        name: without its unit.
-        unit: as `split_unit` gives it.
+        name: as `split_unit` gives it.
+        unit: of it.
         alone: whether it is a single number, for which "speed" is the wind's.
     """
     if name in RIG_KEYS and unit == "":
         return name
+    name = re.sub(r"\s*[(\[{<].*", "", name)  # a unit that is not known stays in the name
     plain = re.sub(r"[\s_.-]+", " ", name).strip()
     found = next((key for key, pattern in _KEYS.items() if pattern.fullmatch(plain)), None)
     # No unit of time measures what is named so.
@@ -99,7 +100,7 @@ def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[s
         return None
     factor = in_si(key, column.unit)
     if factor is None:
-        said.append(_no_unit(f"{column.name} ({column.unit})", key))
+        said.append(_no_unit(column.name, key))
         return None
     low, middle, high = np.quantile(values, (0.05, 0.5, 0.95)).tolist()
     if high - low <= _EVEN * abs(middle):
@@ -115,7 +116,7 @@ def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[s
 
 def _no_unit(heading: str, key: str) -> str:
     kind = ", ".join(UNITS[_KINDS[key]])
-    return f"'{one_line(heading, 60)}' is left out: its unit is none of {kind}; state it with --set {key}=NUMBER"
+    return f"'{one_line(heading, 60)}' is left out: its unit is not one of {kind}; --set {key}=NUMBER states it"
 
 
 def name_pattern(text: str) -> re.Pattern[str]:

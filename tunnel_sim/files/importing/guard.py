@@ -116,6 +116,8 @@ class _Server:
             ) from None
         finally:
             watch.cancel()
+        if "last" in answer:
+            self._process.wait()
         if "error" in answer:
             raise TunnelError(answer["error"], where=where, remedy=answer["remedy"])
         return _unpacked(answer["tables"], arrays)
@@ -138,7 +140,7 @@ def serve() -> None:
             except MemoryError:
                 what = f"needs more than {limits.READER_MEMORY / 2**30:g} GiB of memory to be read"
                 remedy = f"split it; if it is damaged, {_DAMAGED}"
-                _send(answers, {"error": what, "remedy": remedy, "sizes": []}, [])
+                _send(answers, {"error": what, "remedy": remedy, "sizes": [], "last": True}, [])
                 return  # the next file gets a process that holds nothing
 
 
