@@ -91,10 +91,10 @@ def test_a_measured_wind_speed_is_its_median_and_one_about_zero_is_none(tmp_path
     noise = 0.1 * np.random.default_rng(1).standard_normal(TIME.size)
     found = imported(tmp_path, ["V [m/s]", "rho"], [12.0 + noise, 1.2])
     assert found.campaign.runs[0].wind_speed == pytest.approx(12.0, abs=0.02)
-    assert any("which varies from" in line and "its median" in line for line in found.remarks())
+    assert any("the column 'V' varies from 11.8" in line and "wind_speed is its median" in line for line in found.remarks())
     found = imported(tmp_path, ["V [m/s]"], [noise + 0.02])
     assert found.campaign.runs[0].wind_speed == 0.0
-    assert any("it passes zero, so the wind is off" in line for line in found.remarks())
+    assert any("wind_speed is zero, which it passes" in line for line in found.remarks())
 
 
 def test_a_condition_that_changes_between_releases_belongs_to_each_run(tmp_path: Path) -> None:

@@ -202,6 +202,33 @@ def test_the_size_of_a_mat_file_is_that_of_all_its_arrays(tmp_path: Path, compre
     assert 3 * 8000 <= _unpacked((tmp_path / "three.mat").read_bytes()) < 3 * 8100
 
 
+@pytest.mark.parametrize("name", ["log.h5", "log.mat"])
+def test_a_damaged_heap_in_which_hdf5_goes_round_for_ever_is_one_line(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stream = io.BytesIO()
+    with h5py.File(stream, "w") as file:
+        file.attrs["id"] = "run 1"
+        file["yaw_rad"] = ANGLE
+    content = bytearray(stream.getvalue())
+    size = content.index(b"GCOL") + 24  # of the text in the heap: the next object is then this one
+    content[size : size + 8] = (2**64 - 16).to_bytes(8, "little")
+    monkeypatch.setattr(limits, "READER_SECONDS", 1.0)
+    with pytest.raises(TunnelError, match="takes longer than 1 s to read; it may be damaged"):
+        read_records([written(tmp_path, name, bytes(content))])
+
+
+@pytest.mark.parametrize("value", [np.int8(3), np.float32(3.0), np.array([3]), np.array([[3.0]]), 3])
+def test_numbers_of_any_kind_are_attributes(value: object, tmp_path: Path) -> None:
+    hdf5(tmp_path / "log.h5")
+    with h5py.File(tmp_path / "log.h5", "a") as file:
+        file.attrs["wind_speed"], file.attrs["air_density"] = value, 1.2
+        file.attrs["rho"] = "text"
+        file.attrs["empty"] = h5py.Empty("f8")
+    (run,) = read_records([tmp_path / "log.h5"]).campaign.runs
+    assert (run.wind_speed, run.air_density) == (3.0, 1.2)
+
+
 def test_a_link_out_of_an_hdf5_file_is_not_followed(tmp_path: Path) -> None:
     hdf5(tmp_path / "secret.h5")
     with h5py.File(tmp_path / "link.h5", "w") as file:

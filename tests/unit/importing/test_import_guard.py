@@ -39,7 +39,7 @@ def test_tables_come_back_as_they_were() -> None:
     ("content", "what"),
     [
         (b"spin", "log.h5: takes longer than 1 s to read; it may be damaged"),
-        (b"die", "log.h5: ends the program that reads it; it may be damaged"),
+        (b"die", "log.h5: ends the program that reads it (exit status 1); it may be damaged"),
         pytest.param(
             b"fill",
             "log.h5: needs more than 4 GiB of memory to be read; split it",

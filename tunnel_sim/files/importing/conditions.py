@@ -89,7 +89,7 @@ def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[s
     Args:
         key: of `Conditions`.
         rows: those of the run, shape (n,).
-        said: a remark is added.
+        said: a remark is added where it varies, or its unit is not known.
 
     Returns:
         The median; zero for a wind speed that passes zero; None where the column says nothing.
@@ -104,12 +104,11 @@ def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[s
         return None
     low, middle, high = np.quantile(values, (0.05, 0.5, 0.95)).tolist()
     if high - low <= _EVEN * abs(middle):
-        said.append(f"{key} from the column '{column.name}'")
         return middle * factor
     off = key == "wind_speed" and low <= 0.0
     said.append(
-        f"{key} from the column '{column.name}', which varies from {low:.4g} to {high:.4g}: "
-        + ("it passes zero, so the wind is off" if off else f"its median, {middle * factor:.6g}")
+        f"the column '{column.name}' varies from {low:.4g} to {high:.4g}: {key} is "
+        + ("zero, which it passes" if off else f"its median, {middle * factor:.6g}")
     )
     return 0.0 if off else middle * factor
 

@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import fields
@@ -30,6 +31,7 @@ _SERVE = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
     "from tunnel_sim.files.importing.guard import serve; serve()"
 )
+_LATEST = 3.0  # times the allowed time
 _DAMAGED = "export it again, or as text"
 _lock = threading.Lock()
 _kept: list[_Server] = []
@@ -105,12 +107,14 @@ class _Server:
         watch.daemon = True
         watch.start()
         try:
-            _send(self._asked, {"module": module, "where": where, "sizes": [len(content)]}, [content])
+            request = {"module": module, "where": where, "seconds": allowed, "sizes": [len(content)]}
+            _send(self._asked, request, [content])
             answer, arrays = _received(self._answers)
         except (EOFError, OSError):
-            self._process.wait()
+            status = self._process.wait()
+            ended = f"ends the program that reads it (exit status {status})"
             raise TunnelError(
-                f"takes longer than {allowed:.0f} s to read" if late.is_set() else "ends the program that reads it",
+                f"takes longer than {allowed:.0f} s to read" if late.is_set() else ended,
                 where=where,
                 remedy=f"it may be damaged: {_DAMAGED}",
             ) from None
@@ -128,10 +132,12 @@ def serve() -> None:
     asked, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # whatever a library prints is not an answer
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the asking process ends this one
-    _limit_memory()
+    _limit("RLIMIT_AS", limits.READER_MEMORY)
     with suppress(EOFError):
         while True:
             request, content = _received(asked)
+            # The asking process ends this one earlier, unless it has been killed itself.
+            _limit("RLIMIT_CPU", int(time.process_time() + _LATEST * request["seconds"]))
             try:
                 tables = import_module(request["module"]).read(content.pop(), request["where"])
                 _send(answers, *_packed(tables))
@@ -144,14 +150,14 @@ def serve() -> None:
                 return  # the next file gets a process that holds nothing
 
 
-def _limit_memory() -> None:
-    """Bound the memory of this process where the system can; elsewhere the counts of the readers must do."""
+def _limit(name: str, most: int) -> None:
+    """Bound a resource of this process where the system can: Linux all, macOS the processor's time."""
     with suppress(ImportError, ValueError, OSError):
         import resource
 
-        _, most = resource.getrlimit(resource.RLIMIT_AS)
-        bound = limits.READER_MEMORY if most == resource.RLIM_INFINITY else min(most, limits.READER_MEMORY)
-        resource.setrlimit(resource.RLIMIT_AS, (bound, most))
+        kind = getattr(resource, name)
+        _, hard = resource.getrlimit(kind)
+        resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
 
 
 def _send(stream: BinaryIO, head: dict[str, Any], parts: Sequence[bytes | memoryview]) -> None:

@@ -38,12 +38,14 @@ def read(content: bytes, where: str) -> list[Table]:
             )
             if isinstance(item, h5py.Dataset) and not path.startswith("#refs#") and not _is_text(item):
                 datasets[path] = item
-            for name, value in item.attrs.items():
-                if np.size(value) == 1 and np.asarray(value).dtype.kind in "iuf":
-                    folder = path if isinstance(item, h5py.Group) else path.rpartition("/")[0]
-                    attributes[f"{folder}/{name}".lstrip("/")] = np.asarray(value)
-                elif name in RUN_IDS and isinstance(value, str) and isinstance(item, h5py.Group):
-                    runs[path] = value
+            group = isinstance(item, h5py.Group)
+            for name in item.attrs:
+                held = item.attrs.get_id(name)  # others are not read: a text may lie in a damaged heap
+                if held.dtype.kind in "iuf" and held.get_space().get_simple_extent_npoints() == 1:
+                    folder = path if group else path.rpartition("/")[0]
+                    attributes[f"{folder}/{name}".lstrip("/")] = np.asarray(item.attrs[name])
+                elif group and name in RUN_IDS and isinstance(text := item.attrs[name], str):
+                    runs[path] = text
 
         visit("", file)
         file.visititems(visit)  # does not follow links, so nothing outside the file is opened

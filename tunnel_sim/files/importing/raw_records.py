@@ -68,8 +68,16 @@ class Raw:
         """
         # The clock of the cleaned samples may have been evened out: a run's ends are inside all the same.
         rows = (self.clock >= first) & (self.clock <= last) if not self.whole else np.isfinite(self.clock)
-        found = {key: from_column(key, column, rows, said) for key, column in self.columns.items()}
-        return {key: value for key, value in found.items() if value is not None}
+        found = {
+            key: value
+            for key, column in self.columns.items()
+            if (value := from_column(key, column, rows, said)) is not None
+        }
+        names = [(key, self.columns[key].name) for key in found]
+        if names:
+            listed = ", ".join(key if key == name else f"{key} ('{one_line(name, 40)}')" for key, name in names)
+            said.append(f"from columns: {listed}")
+        return found
 
 
 def raw_records(

@@ -86,7 +86,7 @@ class Imported:
         found = [(text, s.path.name) for s in sources for table in s.tables for text in table.said]
         found += [(text, part.id) for part in parts for text in (*part.raw.said, *part.said)]
         places: dict[str, list[str]] = {}
-        for text, place in found:
+        for text, place in dict.fromkeys(found):
             places.setdefault(text, []).append(place)
         everywhere = len(self.parts)
         lines = [
