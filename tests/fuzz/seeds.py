@@ -198,9 +198,9 @@ def run_file(name: str) -> bytes:
 
 
 CHOICES: tuple[dict[str, Any], ...] = (
-    {}, {}, {}, {"time": "1"}, {"time": "2"}, {"angle": ("1",)}, {"angle": ("2",)}, {"angle": ("4",), "unit": "deg"},
-    {"rate": 50.0}, {"counts_per_turn": 1024.0}, {"calibration": "0.1 + 2*V"}, {"start": 0.5, "end": 3.0}, {"rest": 0.01},
-    {"time_unit": "ms"}, {"cut": False},
+    {}, {}, {}, {"time": "1"}, {"time": "2"}, {"angle": ("1",)}, {"angle": ("2",)},
+    {"angle": ("4",), "unit": "deg"}, {"rate": 50.0}, {"counts_per_turn": 1024.0}, {"calibration": "0.1 + 2*V"},
+    {"start": 0.5, "end": 3.0}, {"rest": 0.01}, {"time_unit": "ms"}, {"cut": False},
 )  # fmt: skip
 """What a user may state about a log."""
 
@@ -220,16 +220,20 @@ time [s];yaw (rad);V [m/s];run;Kr
 """
 
 
-def logger_rows(named: bool) -> bytes:
+def logger_rows(*, named: bool, timed: bool) -> bytes:
     """The rows of a log under `logger_head`: two runs.
 
     Args:
         named: whether the runs have names, not numbers.
+        timed: whether there is a column of times.
     """
-    rows = [(t, y) for t, y in run_frame().iter_rows()]
+    rows = list(run_frame().iter_rows())
     half = len(rows) // 2
     names = ("a", "b") if named else (1, 2)
-    return "".join(f"{t};{y};{15.0 * (i < half)};{names[i >= half]};16.12\n" for i, (t, y) in enumerate(rows)).encode()
+    head = [f"{t};" if timed else "" for t, _ in rows]
+    return "".join(
+        f"{head[i]}{y};{15.0 * (i < half)};{names[i >= half]};16.12\n" for i, (_, y) in enumerate(rows)
+    ).encode()
 
 
 @cache
@@ -248,8 +252,12 @@ def nested_hdf5(name: str) -> bytes:
         with h5py.File(path, "w", userblock_size=block) as file:
             for number in (1, 2):
                 group = file.create_group(f"run-{number}")
-                group.attrs.update({"id": f"r{number}", "wind_speed": 0.0, "text": "long" * 20, "many": np.arange(40)})
-                group.create_dataset("time_s", data=frame["time_s"].to_numpy(), compression="gzip", chunks=(64,))
+                group.attrs.update(
+                    {"id": f"r{number}", "wind_speed": 0.0, "text": "long" * 20, "many": np.arange(40)}
+                )
+                group.create_dataset(
+                    "time_s", data=frame["time_s"].to_numpy(), compression="gzip", chunks=(64,)
+                )
                 group["yaw_rad"] = frame["yaw_rad"].to_numpy()[None]
                 group["yaw_rad"].attrs["MATLAB_class"] = np.bytes_("double")
                 group["yaw_rad"].attrs["unit"] = "rad"

@@ -92,7 +92,7 @@ def changed_bytes(content: bytes, rng: Rng, start: int = 0, end: int | None = No
 
 
 def damaged(content: bytes, rng: Rng) -> bytes:
-    """Bytes changed without being moved, so that the addresses in a file of blocks stay right, or become wrong ones.
+    """Bytes changed without being moved: the addresses in a file of blocks stay right, or become wrong.
 
     Args:
         content: any.
@@ -101,10 +101,14 @@ def damaged(content: bytes, rng: Rng) -> bytes:
     data = bytearray(content)
     last = len(data) - 8
     # Few blocks describe a file; most of it is numbers.
-    known = [i for i in range(0, last, 8) if data[i : i + 8].count(0) in (4, 5, 6, 7)] or list(range(0, last, 8))
+    known = [i for i in range(0, last, 8) if data[i : i + 8].count(0) in (4, 5, 6, 7)] or list(
+        range(0, last, 8)
+    )
     for _ in range(int(rng.integers(1, 9))):
         near = rng.random() < 0.8
-        place = known[rng.integers(len(known))] + int(rng.integers(-8, 16)) if near else int(rng.integers(last))
+        place = (
+            known[rng.integers(len(known))] + int(rng.integers(-8, 16)) if near else int(rng.integers(last))
+        )
         place = min(max(place, 0), last)
         kind = rng.integers(5)
         if kind == 0:
@@ -149,8 +153,9 @@ def changed_head(text: str, rng: Rng) -> str:
 
 _HEADINGS = (
     "time", "t", "Zeit", "yaw", "angle", "run", "Lauf", "fs", "dt", "Ts", "wind_speed", "V", "Kr", "rho", "width",
-    "frontal_area", "release_angle", "s", "ms", "h", "rad", "deg", "m/s", "km/h", "counts", "Inkr.", "V", "mV", "rad/s",
-    "N m/rad", "kg/m3", "Hz", "kHz", "#1", "Run #2", "(rad)", "[m/s]", "1e999", "-1e999", "1e-320", "0", "-0.0", "1e18",
+    "frontal_area", "release_angle", "s", "ms", "h", "rad", "deg", "m/s", "km/h", "counts", "Inkr.", "V", "mV",
+    "rad/s", "N m/rad", "kg/m3", "Hz", "kHz", "#1", "Run #2", "(rad)", "[m/s]", "1e999", "-1e999", "1e-320", "0",
+    "-0.0", "1e18",
 )  # fmt: skip
 
 

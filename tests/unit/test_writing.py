@@ -95,11 +95,14 @@ def test_of_two_writers_of_a_new_folder_one_is_refused(before: str, tmp_path: Pa
     target = tmp_path / "rig"
     if before == "empty":
         target.mkdir()
+
+    def slow() -> None:
+        with whole_folder(target, replace=False) as mine, whole_folder(target, replace=False) as quick:
+            (mine / "slow").write_text("")
+            (quick / "quick").write_text("")
+
     with pytest.raises(TunnelError, match="rig: the folder exists; another command has written it meanwhile"):
-        with whole_folder(target, replace=False) as slow:
-            (slow / "slow").write_text("")
-            with whole_folder(target, replace=False) as quick:
-                (quick / "quick").write_text("")
+        slow()
     assert [path.name for path in target.iterdir()] == ["quick"]
     assert list(tmp_path.iterdir()) == [target]
 

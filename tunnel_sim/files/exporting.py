@@ -85,7 +85,7 @@ def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
 
 
 def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
-    """A group for each run, with its id and conditions as attributes; numbered, since ids may hold any character."""
+    """A group for each run, with its id and conditions as attributes; an id may hold any character."""
     h5py = library("h5py", "HDF5", "import", where)
     with h5py.File(stream, "w") as file:
         file.attrs.update({"name": campaign.name, **_stated(campaign.rig, _RIG)})

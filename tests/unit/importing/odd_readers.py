@@ -33,5 +33,5 @@ def read(content: bytes, where: str) -> list[Table]:
         return [Table((Channel("much", np.ones(2**30)),))]
     if content == b"refuse":
         raise TunnelError("is odd", where=where, remedy="mend it")
-    print("a library that talks", flush=True)  # noqa: T201 - on purpose
+    print("a library that talks", flush=True)
     return TABLES

@@ -18,11 +18,15 @@ from tunnel_sim.files.importing.units import split_unit
 TIME, ANGLE = decay()
 
 
-def table(folder: Path, heads: list[str], columns: list[object], head: str = "", name: str = "log.csv") -> Path:
+def table(
+    folder: Path, heads: list[str], columns: list[object], head: str = "", name: str = "log.csv"
+) -> Path:
     """A file with times, angles and further columns of numbers or texts, each constant or of shape (n,)."""
     full = [np.broadcast_to(np.asarray(column), TIME.shape).tolist() for column in columns]
     rows = (";".join(map(str, row)) for row in zip(TIME.tolist(), ANGLE.tolist(), *full, strict=True))
-    return written(folder, name, "\n".join([*([head] if head else []), ";".join(["time_s", "yaw_rad", *heads]), *rows]))
+    return written(
+        folder, name, "\n".join([*([head] if head else []), ";".join(["time_s", "yaw_rad", *heads]), *rows])
+    )
 
 
 def imported(folder: Path, heads: list[str], columns: list[object], **options: str) -> Imported:
@@ -62,7 +66,21 @@ def test_the_spellings_of_a_condition(heading: str, key: str, factor: float) -> 
 
 
 @pytest.mark.parametrize(
-    "heading", ["V", "V [V]", "U [V]", "speed", "wind", "speed [rpm]", "Velocity (m/s)", "yaw", "angle", "time_s", "width_mm", "width [mm]"]
+    "heading",
+    [
+        "V",
+        "V [V]",
+        "U [V]",
+        "speed",
+        "wind",
+        "speed [rpm]",
+        "Velocity (m/s)",
+        "yaw",
+        "angle",
+        "time_s",
+        "width_mm",
+        "width [mm]",
+    ],
 )
 def test_other_names_are_not_conditions(heading: str) -> None:
     assert condition_of(*split_unit(heading)) is None
@@ -73,7 +91,9 @@ def test_a_column_of_the_wind_speed_is_not_the_clock(units: bool, tmp_path: Path
     path = table(tmp_path, ["V [m/s]", "Kr", "Luftdichte"], [54.0, 16.12, 1.2])
     text = path.read_text(encoding="utf-8").replace("V [m/s]", "Windgeschwindigkeit")
     first, rest = text.split("\n", 1)
-    path.write_text(f"{first}\n{'s;rad;km/h;Nm/rad;kg/m3' if units else '[s];[rad];[km/h];[Nm/rad];[kg/m^3]'}\n{rest}")
+    path.write_text(
+        f"{first}\n{'s;rad;km/h;Nm/rad;kg/m3' if units else '[s];[rad];[km/h];[Nm/rad];[kg/m^3]'}\n{rest}"
+    )
     (run,) = read_records([path]).campaign.runs
     assert (run.wind_speed, run.spring_stiffness, run.air_density) == (pytest.approx(15.0), 16.12, 1.2)
     np.testing.assert_array_equal(run.record.time_s, TIME)
@@ -91,7 +111,10 @@ def test_a_measured_wind_speed_is_its_median_and_one_about_zero_is_none(tmp_path
     noise = 0.1 * np.random.default_rng(1).standard_normal(TIME.size)
     found = imported(tmp_path, ["V [m/s]", "rho"], [12.0 + noise, 1.2])
     assert found.campaign.runs[0].wind_speed == pytest.approx(12.0, abs=0.02)
-    assert any("the column 'V' varies from 11.8" in line and "wind_speed is its median" in line for line in found.remarks())
+    assert any(
+        "the column 'V' varies from 11.8" in line and "wind_speed is its median" in line
+        for line in found.remarks()
+    )
     found = imported(tmp_path, ["V [m/s]"], [noise + 0.02])
     assert found.campaign.runs[0].wind_speed == 0.0
     assert any("wind_speed is zero, which it passes" in line for line in found.remarks())
@@ -102,7 +125,9 @@ def test_a_condition_that_changes_between_releases_belongs_to_each_run(tmp_path:
     time = np.arange(angle.size) / 200.0
     speed = np.where(np.arange(angle.size) < TIME.size + 100, 0.0, 15.0)
     rows = "".join(f"{t},{a},{v},1.2\n" for t, a, v in zip(time.tolist(), angle.tolist(), speed, strict=True))
-    runs = read_records([written(tmp_path, "day.csv", f"time_s,yaw_rad,wind_speed,rho\n{rows}")]).campaign.runs
+    runs = read_records(
+        [written(tmp_path, "day.csv", f"time_s,yaw_rad,wind_speed,rho\n{rows}")]
+    ).campaign.runs
     assert [run.wind_speed for run in runs] == [0.0, 15.0]
 
 
@@ -131,7 +156,9 @@ def test_a_column_that_names_the_runs_keeps_their_names(
     found = imported(tmp_path, [heading], [np.repeat(names, [half, TIME.size - half])])
     assert [run.id for run in found.campaign.runs] == list(names)
     assert [run.record.time_s.size for run in found.campaign.runs] == [half, TIME.size - half]
-    frame = pl.DataFrame({"time_s": TIME, "yaw_rad": ANGLE, heading: np.repeat(names, [half, TIME.size - half])})
+    frame = pl.DataFrame(
+        {"time_s": TIME, "yaw_rad": ANGLE, heading: np.repeat(names, [half, TIME.size - half])}
+    )
     frame.write_parquet(tmp_path / "log.parquet")
     assert [run.id for run in read_records([tmp_path / "log.parquet"]).campaign.runs] == list(names)
 
@@ -152,7 +179,9 @@ def test_numbers_above_the_table_have_their_units(tmp_path: Path) -> None:
 
 def test_files_that_state_different_rigs_are_refused(tmp_path: Path) -> None:
     paths = [table(tmp_path, ["frontal_area"], [area], name=f"{area}.csv") for area in (0.036, 0.04)]
-    with pytest.raises(TunnelError, match=r"frontal_area = 0.04, and 0.036 in another run; give --set frontal_area"):
+    with pytest.raises(
+        TunnelError, match=r"frontal_area = 0.04, and 0.036 in another run; give --set frontal_area"
+    ):
         read_records(paths)
     sizes = ImportChoices(conditions=Conditions(frontal_area=0.05))
     assert read_records(paths, sizes).campaign.rig.frontal_area == 0.05

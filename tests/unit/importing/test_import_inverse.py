@@ -44,7 +44,9 @@ def test_an_import_of_an_export_is_the_campaign(kind: str, count: int, tmp_path:
     campaign = replace(campaign, runs=campaign.runs[-count:])
     found = read_records([export_campaign(campaign, tmp_path / f"rig.{kind}", kind)]).campaign
     assert found.rig == campaign.rig
-    assert [replace(run, record=None) for run in found.runs] == [replace(run, record=None) for run in campaign.runs]
+    assert [replace(run, record=None) for run in found.runs] == [
+        replace(run, record=None) for run in campaign.runs
+    ]
     for run, truth in zip(found.runs, campaign.runs, strict=True):
         # Workbooks hold sixteen digits.
         tolerance = 1e-15 if kind == "xlsx" else 0.0

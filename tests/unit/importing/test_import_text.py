@@ -230,7 +230,9 @@ def test_counts_of_an_encoder_are_not_degrees(word: str, tmp_path: Path) -> None
 
 def test_a_unit_that_is_not_known_is_asked_about(tmp_path: Path) -> None:
     path = log(tmp_path, "Winkel [Schr.]", 551.0)
-    with pytest.raises(TunnelError, match=r"is in 'Schr.', which is not a known unit of an angle; give --unit"):
+    with pytest.raises(
+        TunnelError, match=r"is in 'Schr.', which is not a known unit of an angle; give --unit"
+    ):
         read_records([path], ImportChoices(angle=("2",)))
     (run,) = read_records([path], ImportChoices(angle=("2",), counts_per_turn=3462.0)).campaign.runs
     np.testing.assert_allclose(run.record.yaw_rad, decay()[1] * 551.0 * 2.0 * np.pi / 3462.0)
@@ -239,23 +241,25 @@ def test_a_unit_that_is_not_known_is_asked_about(tmp_path: Path) -> None:
 @pytest.mark.parametrize("heading", ["Winkel", "yaw [deg]", "yaw (rad)"])
 def test_a_swing_of_more_than_half_a_turn_is_asked_about(heading: str, tmp_path: Path) -> None:
     path = log(tmp_path, heading, 551.0)
-    with pytest.raises(TunnelError, match=r"would swing by ±189\.3 (deg|rad), more than half a turn; give --unit"):
+    with pytest.raises(
+        TunnelError, match=r"would swing by ±189\.3 (deg|rad), more than half a turn; give --unit"
+    ):
         read_records([path])
     (run,) = read_records([path], ImportChoices(unit="deg")).campaign.runs
     np.testing.assert_allclose(run.record.yaw_rad, np.deg2rad(551.0 * decay()[1]))
 
 
 @pytest.mark.parametrize(("unit", "column"), [("rad", "clock"), ("V", "1")])
-def test_a_column_of_times_in_another_unit_is_refused(
-    unit: str, column: str, tmp_path: Path
-) -> None:
+def test_a_column_of_times_in_another_unit_is_refused(unit: str, column: str, tmp_path: Path) -> None:
     path = log(tmp_path, "yaw (rad)", 1.0)
     path.write_text(path.read_text().replace("time_s", f"clock ({unit})"))
     with pytest.raises(TunnelError, match="which is not a unit of time"):
         read_records([path], ImportChoices(time=column))
 
 
-@pytest.mark.parametrize("stated", ["fs=1e999", "fs = 1e-320", "dt = 1e999", "Ts: 1e-320", "fs = -1", "sample rate;0;Hz"])
+@pytest.mark.parametrize(
+    "stated", ["fs=1e999", "fs = 1e-320", "dt = 1e999", "Ts: 1e-320", "fs = -1", "sample rate;0;Hz"]
+)
 def test_a_rate_that_is_not_one_is_not_believed(stated: str, tmp_path: Path) -> None:
     rows = "".join(f"{a}\n" for a in decay()[1].tolist())
     with pytest.raises(TunnelError, match="no column of times"):

@@ -25,15 +25,20 @@ _ALIASES = {
 _NUMBER = r"[+-]?\d+(?:[.,p]\d+)?"
 _NAMES = {
     "wind_speed": r"(wind|air|flow|free ?stream|tunnel) ?(speed|velocity)|v ?wind|"
-    r"(wind|luft|str[öo]mungs|anstr[öo]m)geschwindigkeit|vitesse (du )?vent|velocidad del viento|velocit[àa] del vento",
-    "air_density": r"(air ?)?density|rho( ?air)?|ρ|(luft)?dichte|densité( de l.air)?|densidad|densità",
-    "spring_stiffness": r"((spring|torsional|rotational) ?)?stiffness|spring ?(constant|rate)|k ?r|(torsions|dreh)?feder"
-    r"(konstante|steifigkeit|rate)|(dreh|torsions)?steifigkeit|raideur|rigidez|rigidezza",
-    "release_angle": r"(release|initial|start) ?angle|(anfangs|start|auslenk|auslöse)winkel|(theta|psi|beta|θ|ψ|β) ?0",
+    r"(wind|luft|str[öo]mungs|anstr[öo]m)geschwindigkeit",
+    "air_density": r"(air ?)?density|rho( ?air)?|ρ|(luft)?dichte",
+    "spring_stiffness": r"((spring|torsional|rotational) ?)?stiffness|spring ?(constant|rate)|k ?r|"
+    r"(torsions|dreh)?feder(konstante|steifigkeit|rate)|(dreh|torsions)?steifigkeit",
+    "release_angle": r"(release|initial|start) ?angle|(anfangs|start|auslenk)winkel|(theta|psi|beta|[θψβ]) ?0",
 }
 _KEYS = {key: re.compile(f"(?i)({names})") for key, names in _NAMES.items()}
 _SYMBOL = re.compile(r"(?i)[vu](_?(0|inf|∞))?|wind|speed")
-_KINDS = {"wind_speed": "speed", "air_density": "density", "spring_stiffness": "stiffness", "release_angle": "angle"}
+_KINDS = {
+    "wind_speed": "speed",
+    "air_density": "density",
+    "spring_stiffness": "stiffness",
+    "release_angle": "angle",
+}
 _EVEN = 1e-9  # of a value: a column that varies less is constant
 
 
@@ -102,7 +107,7 @@ def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[s
     if factor is None:
         said.append(_no_unit(column.name, key))
         return None
-    low, middle, high = np.quantile(values, (0.05, 0.5, 0.95)).tolist()
+    low, middle, high = map(float, np.quantile(values, (0.05, 0.5, 0.95)))
     if high - low <= _EVEN * abs(middle):
         return middle * factor
     off = key == "wind_speed" and low <= 0.0
@@ -115,7 +120,9 @@ def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[s
 
 def _no_unit(heading: str, key: str) -> str:
     kind = ", ".join(UNITS[_KINDS[key]])
-    return f"'{one_line(heading, 60)}' is left out: its unit is not one of {kind}; --set {key}=NUMBER states it"
+    return (
+        f"'{one_line(heading, 60)}' is left out: its unit is not one of {kind}; --set {key}=NUMBER states it"
+    )
 
 
 def name_pattern(text: str) -> re.Pattern[str]:

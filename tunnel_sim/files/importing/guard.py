@@ -1,8 +1,8 @@
 """Libraries that parse files of instruments run in a process of their own, with limits of time and memory.
 
-A damaged file may keep a parser busy for ever, make it ask for all memory, or end the process. One such process
-serves one file after another; it is ended when it exceeds a limit, and another one takes its place. Tables come back
-as JSON and raw numbers. The reason for each limit is in `tunnel_sim.vocabulary.limits`.
+A damaged file may keep a parser busy for ever, make it ask for all memory, or end the process. One process serves
+one file after another. It is ended when it exceeds a limit, and another one takes its place. Tables come back as
+JSON and raw numbers. `tunnel_sim.vocabulary.limits` holds the limits.
 """
 
 from __future__ import annotations
@@ -103,7 +103,12 @@ class _Server:
         """The tables of a file, as `read_guarded`."""
         allowed = limits.READER_SECONDS + len(content) / limits.READER_PACE
         late = threading.Event()
-        watch = threading.Timer(allowed, lambda: (late.set(), self._process.kill()))
+
+        def stop() -> None:
+            late.set()
+            self._process.kill()
+
+        watch = threading.Timer(allowed, stop)
         watch.daemon = True
         watch.start()
         try:

@@ -59,7 +59,11 @@ class Layout:
     @property
     def runs(self) -> int | None:
         """Index of the column that says to which run a row belongs."""
-        found = (i for i, (name, unit) in enumerate(zip(self.names, self.units, strict=True)) if names_runs(name) and not unit)
+        found = (
+            i
+            for i, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
+            if names_runs(name) and not unit
+        )
         return next(found, None)
 
 
@@ -139,7 +143,9 @@ def _are_units(cells: Sequence[str]) -> bool:
     said = [cell for cell in cells if cell.strip("-")]
     known = sum(known_unit(cell) is not None for cell in said)
     others = [cell for cell in said if known_unit(cell) is None and not re.fullmatch(r"[\[({].*[\])}]", cell)]
-    return known > 0 and (not others or (known > len(others) and all(len(cell) <= _LONG_UNIT for cell in others)))
+    return known > 0 and (
+        not others or (known > len(others) and all(len(cell) <= _LONG_UNIT for cell in others))
+    )
 
 
 def _facts(lines: Sequence[str]) -> dict[str, float]:

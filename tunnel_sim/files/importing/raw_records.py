@@ -75,7 +75,9 @@ class Raw:
         }
         names = [(key, self.columns[key].name) for key in found]
         if names:
-            listed = ", ".join(key if key == name else f"{key} ('{one_line(name, 40)}')" for key, name in names)
+            listed = ", ".join(
+                key if key == name else f"{key} ('{one_line(name, 40)}')" for key, name in names
+            )
             said.append(f"from columns: {listed}")
         return found
 

@@ -189,8 +189,8 @@ def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: Cond
     given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
     in_table = {} if table is None else table.of(raw.source, name)
     # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
-    stated = raw.stated | raw.measured(*raw.cleaned.time_s[[piece.first, piece.last - 1]].tolist(), said) | raw.named
-    stated |= in_table | given
+    measured = raw.measured(float(time[0]), float(time[-1]), said)
+    stated = raw.stated | measured | raw.named | in_table | given
     sizes = {key: stated.pop(key) for key in RIG_KEYS if key in stated}
     sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
     validate(Conditions, stated | sizes, raw.source)

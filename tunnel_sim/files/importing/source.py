@@ -70,7 +70,7 @@ READERS: Mapping[str, str] = {
     ".tdms": _ROOM + "tdms",
     ".parquet": _ROOM + "parquet",
 }
-"""Modules that read a format (`LibraryReader`), by the ending of the file's name; any other file is read as text."""
+"""Modules that read a format (`LibraryReader`), by the ending of the name; any other file is read as text."""
 
 _BEGINNINGS = {
     b"PK\x03\x04": "an Excel workbook or another archive",

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 _RUN_NAMES = re.compile(
-    r"(?i)(run|trial|versuch|lauf)[ _]?(id|name|no|nr|number|nummer|#)?\.?|(mess(ung|reihe)|versuchs)[ _]?(nr|nummer)\.?"
+    r"(?i)(run|trial|versuch|lauf)[ _]?(id|name|no|nr|number|nummer|#)?\.?|"
+    r"(mess(ung|reihe)|versuchs)[ _]?(nr|nummer)\.?"
 )
 _LEAST_ROWS = 8  # of a run, on average: a column that changes more often numbers something else
 
@@ -69,7 +70,9 @@ def by_run(table: Table) -> list[Table]:
         return [table]
     number = np.nan_to_num(channel.values, nan=-np.inf)
     starts = np.flatnonzero(number[1:] != number[:-1]) + 1
-    return by_label(table, channel.name, starts, [f"{n:.15g}" if n > -np.inf else "" for n in number[[0, *starts]]])
+    return by_label(
+        table, channel.name, starts, [f"{n:.15g}" if n > -np.inf else "" for n in number[[0, *starts]]]
+    )
 
 
 def by_texts(table: Table, column: str, texts: pl.Series) -> list[Table]:

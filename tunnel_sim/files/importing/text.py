@@ -168,8 +168,8 @@ def _tables(content: bytes, dialect: Dialect, layout: Layout, where: str, said: 
             labels = pl.read_csv(content, schema=schema, columns=[at], **options).to_series()
         try:
             kinds = {name: pl.String if i == layout.runs else pl.Float64 for i, name in enumerate(names)}
-            comma = {"decimal_comma": dialect.decimal == ",", "quote_char": None}
-            frame = pl.read_csv(content, schema=kinds, null_values=missing, **comma, **options)
+            numbers = {**options, "decimal_comma": dialect.decimal == ",", "quote_char": None}
+            frame = pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
         except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
             texts = dict.fromkeys(names, pl.String)
             frame = pl.read_csv(content, schema=texts, null_values=missing, **options)
@@ -198,7 +198,9 @@ def tables_of(
         One, or one for each run, with the columns that hold numbers or times of day.
     """
     channels, notes = [], {-1: table.said[0]}
-    for i, (name, unit, column) in enumerate(zip(layout.names, layout.units, frame.get_columns(), strict=True)):
+    for i, (name, unit, column) in enumerate(
+        zip(layout.names, layout.units, frame.get_columns(), strict=True)
+    ):
         number, lost = column, 0
         if column.dtype == pl.String:
             cells = column.str.strip_chars(' \t\r"')

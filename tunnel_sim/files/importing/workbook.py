@@ -32,7 +32,10 @@ def read(content: bytes, where: str) -> list[Table]:
     with faults(KIND, where):
         _check_archive(content, where)
         book = fastexcel.read_excel(content)
-        rows = {name: _rows(book.load_sheet(name, header_row=None, dtypes="string", n_rows=_HEAD), where) for name in book.sheet_names}
+        rows = {
+            name: _rows(book.load_sheet(name, header_row=None, dtypes="string", n_rows=_HEAD), where)
+            for name in book.sheet_names
+        }
         described: dict[str, dict[str, Any]] = {}
         for name in list(rows):
             if found := _descriptions(book, name, rows[name]):
@@ -57,7 +60,9 @@ def _descriptions(book: Any, name: str, rows: Sequence[Sequence[str]]) -> dict[s
     kinds = {i: "string" if key in ("sheet", "run") else "float" for i, key in enumerate(heading)}
     body = book.load_sheet(name, header_row=None, skip_rows=1, dtypes=kinds).to_polars()
     found = [dict(zip(heading, row, strict=True)) for row in body.iter_rows()]
-    return {row["sheet"]: row for row in found} if all(row["sheet"] in book.sheet_names for row in found) else {}
+    return (
+        {row["sheet"]: row for row in found} if all(row["sheet"] in book.sheet_names for row in found) else {}
+    )
 
 
 def _tables(book: Any, name: str, rows: Sequence[Sequence[str]], described: Mapping[str, Any]) -> list[Table]:
@@ -75,7 +80,7 @@ def _tables(book: Any, name: str, rows: Sequence[Sequence[str]], described: Mapp
     run = described.get("run") or ""
     part = run or (name if len(book.sheet_names) > 1 else "")
     labels = None if layout.runs is None else body.to_series(layout.runs)
-    table = Table((), part, layout.facts | facts, (said,), named=bool(run))
+    table = Table((), part, {**layout.facts, **facts}, (said,), named=bool(run))
     return tables_of(body, layout, ".", labels, table)
 
 
