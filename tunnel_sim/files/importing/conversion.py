@@ -114,7 +114,7 @@ def in_radians(
 
     Raises:
         TunnelError: counts without counts per turn, volts without a calibration, another unit, or a swing of more
-            than half a turn in a unit that the user has not stated.
+            than half a turn in degrees that the user has not stated.
     """
     kinds = ("angle", "counts", "voltage", "rate", "acceleration")
     unit = stated_unit(choices.unit, kinds, "--unit") or reading.unit
@@ -147,12 +147,12 @@ def in_radians(
     quantity: Quantity = "rate" if kind == "rate" else "acceleration" if kind == "acceleration" else "angle"
     values = values if factor == 1.0 else values * factor
     swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
-    stated = choices.unit is not None or choices.counts_per_turn is not None or calibration is not None
-    if quantity == "angle" and not stated and swing > _HALF_TURN:
+    # A disc between springs swings as far, but counts look like degrees.
+    if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
         raise TunnelError(
-            f"'{one_line(reading.name, 40)}' would swing by ±{swing / factor:.4g} {unit}, more than half a turn",
+            f"'{one_line(reading.name, 40)}' would swing by ±{swing / factor:.4g}°, more than half a turn",
             where=where,
-            remedy=f"give --unit {unit} if it does; of an encoder --counts-per-turn N",
+            remedy="give --unit deg if it does; of an encoder --counts-per-turn N",
         )
     return values, quantity, unit
 

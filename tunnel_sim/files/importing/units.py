@@ -44,7 +44,7 @@ _WORDS = {
     "mph": "mph",
     "kn": "kn knot knots kts",
     "ft/s": "ft/s ft_s fps",
-    "N m/rad": "nm/rad n-m/rad nm_rad n_m_rad n_m_per_rad nmrad-1 nmrad^-1",
+    "N m/rad": "nm/rad n-m/rad nm_rad n_m_rad n_m/rad nmrad-1 nmrad^-1",
     "N cm/rad": "ncm/rad n-cm/rad",
     "N mm/rad": "nmm/rad n-mm/rad mnm/rad",
     "N m/deg": "nm/deg nm/° n-m/deg nm_deg",
@@ -54,7 +54,8 @@ _WORDS = {
 _UNIT_OF = {word: unit for unit, words in _WORDS.items() for word in words.split()}
 _BRACKETS = re.compile(r"\s*[(\[{<]\s*([^()\[\]{}<>]*?)\s*[)\]}>]")
 _SEPARATOR = re.compile(r"(?<=\w)[\s_,]*[\s_,/][\s_,]*")
-_PER_TIME = re.compile(r"(s|sec|min|h)(\d|\b)")
+_PER = re.compile(r"(?i)[\s_]per[\s_]")
+_PER_TIME = ("s", "sec", "min", "h")
 _ALIKE = str.maketrans({"µ": "u", "μ": "u", "²": "2", "³": "3", **dict.fromkeys(" ·⋅*")})
 
 
@@ -90,9 +91,11 @@ def split_unit(heading: str) -> tuple[str, str]:
     bracket = _BRACKETS.search(heading)
     if bracket is not None:  # what ends in one, such as "[kN/s]", does not end in a unit
         return heading, "" if bracket.start() == 0 or bracket[1].isdigit() else bracket[1]
-    for place, found in enumerate(_SEPARATOR.finditer(heading)):
-        unit = known_unit(heading[found.end() :])
-        # "t/s" is a time in s, and "F N/s" is not.
-        if unit is not None and not (place and "/" in found[0] and _PER_TIME.match(heading, found.end())):
-            return heading[: found.start()], unit
+    text = _PER.sub("/", heading)
+    for place, found in enumerate(_SEPARATOR.finditer(text)):
+        word = text[found.end() :]
+        unit = known_unit(word)
+        # "t/s" is a time in s, and neither "F N/s" nor "flow_kg_s" is.
+        if unit is not None and not (place and "," not in found[0] and word.lower() in _PER_TIME):
+            return text[: found.start()], unit
     return heading, ""
