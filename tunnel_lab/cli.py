@@ -173,9 +173,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}; check disk and path"
         )
     finally:
-        if (
-            "tunnel_sim.files.writing" in sys.modules
-        ):  # loading it would slow --help, and without it nothing is written
+        # Without this module nothing has been written, and loading it would slow --help.
+        if "tunnel_sim.files.writing" in sys.modules:
             from tunnel_sim.files.writing import remove_empty_folders
 
             remove_empty_folders()

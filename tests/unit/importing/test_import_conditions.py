@@ -117,7 +117,9 @@ def test_a_measured_wind_speed_is_its_median_and_one_about_zero_is_none(tmp_path
     )
     found = imported(tmp_path, ["V [m/s]"], [noise + 0.02])
     assert found.campaign.runs[0].wind_speed == 0.0
-    assert any("wind_speed is zero, which it passes" in line for line in found.remarks())
+    assert any("wind_speed is zero, about which it lies" in line for line in found.remarks())
+    late = np.where(np.arange(TIME.size) < 0.2 * TIME.size, 0.0, 12.0)
+    assert imported(tmp_path, ["V [m/s]", "rho"], [late, 1.2]).campaign.runs[0].wind_speed == 12.0
 
 
 def test_a_condition_that_changes_between_releases_belongs_to_each_run(tmp_path: Path) -> None:

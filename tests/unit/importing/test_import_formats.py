@@ -10,6 +10,7 @@ import sys
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
+from datetime import datetime, timedelta
 from pathlib import Path
 from types import ModuleType
 
@@ -216,6 +217,28 @@ def test_a_damaged_heap_in_which_hdf5_goes_round_for_ever_is_one_line(
     monkeypatch.setattr(limits, "READER_SECONDS", 1.0)
     with pytest.raises(TunnelError, match="takes longer than 1 s to read; it may be damaged"):
         read_records([written(tmp_path, name, bytes(content))])
+
+
+@pytest.mark.parametrize(
+    ("form", "shown"),
+    [
+        ("yyyy-mm-dd hh:mm:ss.000", None),
+        ("hh:mm:ss.000", None),
+        ("", "%m/%d/%Y %I:%M:%S.%f %p"),
+    ],
+)
+def test_dates_and_times_of_day_in_a_workbook_are_times(form: str, shown: str | None, tmp_path: Path) -> None:
+    start = datetime(2026, 3, 12, 23, 59, 58)
+    with xlsxwriter.Workbook(tmp_path / "log.xlsx") as book:
+        sheet, style = book.add_worksheet(), book.add_format({"num_format": form})
+        sheet.write_row(0, 0, ["stamp", "yaw_rad"])
+        for row, (seconds, angle) in enumerate(zip(TIME.tolist(), ANGLE, strict=True), 1):
+            stamp = start + timedelta(seconds=seconds)
+            day = stamp if form.startswith("yyyy") else stamp.time()
+            sheet.write(row, 0, stamp.strftime(shown) if shown else day, None if shown else style)
+            sheet.write(row, 1, angle)
+    (run,) = read_records([tmp_path / "log.xlsx"]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, TIME, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("value", [np.int8(3), np.float32(3.0), np.array([3]), np.array([[3.0]]), 3])

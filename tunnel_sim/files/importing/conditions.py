@@ -39,6 +39,7 @@ _KINDS = {
     "spring_stiffness": "stiffness",
     "release_angle": "angle",
 }
+_OFF = 0.5  # of the range: the median of a wind speed that starts late is further from zero
 _EVEN = 1e-9  # of a value: a column that varies less is constant
 
 
@@ -97,7 +98,7 @@ def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[s
         said: a remark is added where it varies, or its unit is not known.
 
     Returns:
-        The median; zero for a wind speed that passes zero; None where the column says nothing.
+        The median; zero for a wind speed that lies about zero; None where the column says nothing.
     """
     values = column.values[rows]
     values = values[np.isfinite(values)]
@@ -110,10 +111,10 @@ def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[s
     low, middle, high = map(float, np.quantile(values, (0.05, 0.5, 0.95)))
     if high - low <= _EVEN * abs(middle):
         return middle * factor
-    off = key == "wind_speed" and low <= 0.0
+    off = key == "wind_speed" and low <= 0.0 and middle < _OFF * (high - low)
     said.append(
         f"the column '{column.name}' varies from {low:.4g} to {high:.4g}: {key} is "
-        + ("zero, which it passes" if off else f"its median, {middle * factor:.6g}")
+        + ("zero, about which it lies" if off else f"its median, {middle * factor:.6g}")
     )
     return 0.0 if off else middle * factor
 

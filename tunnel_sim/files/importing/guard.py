@@ -76,7 +76,7 @@ class _Server:
         from tunnel_sim.processes import ONE_THREAD
 
         self._process = subprocess.Popen(
-            [os.fsdecode(get_executable()), "-W", "ignore", "-c", _SERVE, json.dumps(sys.path)],
+            [os.fsdecode(get_executable()), "-W", "ignore", "-c", _SERVE, json.dumps([*map(str, sys.path)])],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

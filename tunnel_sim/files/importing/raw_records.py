@@ -66,8 +66,7 @@ class Raw:
             last: time of its last sample, s.
             said: remarks are added.
         """
-        # The clock of the cleaned samples may have been evened out: a run's ends are inside all the same.
-        rows = (self.clock >= first) & (self.clock <= last) if not self.whole else np.isfinite(self.clock)
+        rows = (self.clock >= first) & (self.clock <= last)
         found = {
             key: value
             for key, column in self.columns.items()
@@ -155,7 +154,7 @@ def _raws(
                     named,
                     (*said, *clean.said),
                     columns,
-                    time[a:b] - np.nanmin(time[a:b]),
+                    time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
                     table.named and len(starts) == 2,
                 )
             )
