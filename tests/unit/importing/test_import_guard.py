@@ -38,7 +38,7 @@ def test_tables_come_back_as_they_were() -> None:
 @pytest.mark.parametrize(
     ("content", "what"),
     [
-        (b"spin", "log.h5: takes longer than 1 s to read; it may be damaged"),
+        (b"spin", "log.h5: takes longer than 0.3 s to read; it may be damaged"),
         (b"die", "log.h5: ends the program that reads it (exit status 1); it may be damaged"),
         pytest.param(
             b"fill",
@@ -52,7 +52,7 @@ def test_a_reader_that_exceeds_its_limits_is_one_line_and_the_next_file_is_read(
     monkeypatch: pytest.MonkeyPatch, content: bytes, what: str
 ) -> None:
     read(b"good")  # starting the process is not judged
-    monkeypatch.setattr(limits, "READER_SECONDS", 1.0 if content == b"spin" else 60.0)
+    monkeypatch.setattr(limits, "READER_SECONDS", 0.3 if content == b"spin" else 60.0)
     begun = time.monotonic()
     with pytest.raises(TunnelError) as caught:
         read(content)

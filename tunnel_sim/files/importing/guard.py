@@ -119,7 +119,7 @@ class _Server:
             status = self._process.wait()
             ended = f"ends the program that reads it (exit status {status})"
             raise TunnelError(
-                f"takes longer than {allowed:.0f} s to read" if late.is_set() else ended,
+                f"takes longer than {allowed:.3g} s to read" if late.is_set() else ended,
                 where=where,
                 remedy=f"it may be damaged: {_DAMAGED}",
             ) from None
