@@ -172,6 +172,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(
             f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}; check disk and path"
         )
+    finally:
+        # Without this module nothing has been written, and loading it would slow --help.
+        if "tunnel_sim.files.writing" in sys.modules:
+            from tunnel_sim.files.writing import remove_empty_folders
+
+            remove_empty_folders()
     if status == INTERRUPTED:
         print("tunnel: interrupted; no file is left half written", file=sys.stderr)
     return status if isinstance(status, int) else 0

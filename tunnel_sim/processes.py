@@ -20,13 +20,14 @@ from typing import ParamSpec, TypeVar
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
 Given = ParamSpec("Given")
-_ONE_THREAD = (
+ONE_THREAD = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
     "MKL_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
     "POLARS_MAX_THREADS",
 )
+"""Environment variables of the libraries that would start threads of their own, for a process of one thread."""
 
 
 def in_processes(
@@ -96,8 +97,8 @@ class Worker:
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     try:
         yield
     finally:

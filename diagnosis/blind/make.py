@@ -64,7 +64,7 @@ def make_blind(
         if path.is_file() or (path.is_dir() and any(path.iterdir())):
             raise TunnelError("exists already", where=str(path), remedy="name another")
     mixture = mixture or Mixture()
-    with whole_folder(out) as partial:
+    with whole_folder(out, replace=False) as partial:
         truths = _write_campaigns(partial, count, seed, shares, mixture, progress, show_steps)
         document = {
             "schema_version": SCHEMA_VERSION,

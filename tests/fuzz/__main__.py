@@ -12,6 +12,7 @@ import contextlib
 import sys
 import time
 
+from tests.fuzz.readers import READERS
 from tests.fuzz.summary import causes_table, counts_table
 from tests.fuzz.trials import SHARES, Outcome
 
@@ -30,7 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=2000, help="number of trials")
     parser.add_argument("--first", type=int, default=0, help="number of the first trial")
     parser.add_argument("--workers", type=int, default=2, help="number of processes")
-    parser.add_argument("--only", choices=list(SHARES), help="one group of targets alone")
+    parser.add_argument("--only", choices=[*SHARES, *READERS], help="one group or reader alone")
     parser.add_argument("--trial", type=int, help="repeat this trial alone, and show its traceback")
     given = parser.parse_args(arguments)
     shares = SHARES if given.only is None else {given.only: 1.0}

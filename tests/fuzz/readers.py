@@ -10,16 +10,21 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
 from tests.fuzz import seeds
 from tests.fuzz.places import estranged
 from tests.fuzz.tables import changed_csv, changed_parquet
-from tests.fuzz.texts import as_json, as_toml, changed_bytes, changed_line, nested
+from tests.fuzz.texts import as_json, as_toml, changed_bytes, changed_head, changed_line, damaged, nested
 from tests.fuzz.values import Rng, mutated
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError
 
 Target = Callable[[Path, Rng], None]
+READER_SECONDS = 3.0
+"""After which the guard ends a library, so that the trial does not wait for too long."""
 STRANGE = 0.02
 """Share of the trials in which a file becomes something other than a file."""
 
@@ -89,13 +94,44 @@ def import_text(folder: Path, rng: Rng) -> None:
     read_records([_written(folder / "log.txt", content, rng)])
 
 
-def import_file(folder: Path, rng: Rng) -> None:
-    """A MAT, HDF5, Excel, TDMS or Parquet file changed."""
+def import_head(folder: Path, rng: Rng) -> None:
+    """The lines above a logger's table changed: numbers stated there, names, units and runs."""
+    content = seeds.logger_head().decode()
+    for _ in range(int(rng.integers(1, 4))):
+        content = changed_head(content, rng)
+    timed = bool(rng.random() < 0.6)
+    content = content if timed else content.replace("time [s];", "")
+    rows = seeds.logger_rows(named=bool(rng.random() < 0.25), timed=timed)
+    choices = seeds.CHOICES[rng.integers(len(seeds.CHOICES))]
+    _read_log(_written(folder / "log.csv", content.encode("utf-8", "surrogatepass") + rows, rng), **choices)
+
+
+def import_hdf5(folder: Path, rng: Rng) -> None:
+    """An HDF5 or MAT 7.3 file with attributes, groups and tables, damaged without being moved."""
+    name = ("nested.h5", "seven.mat")[rng.integers(2)]
+    _read_log(_written(folder / name, damaged(seeds.nested_hdf5(name), rng), rng))
+
+
+def _read_log(path: Path, **choices: Any) -> None:
+    """Read a file of an instrument; a reader that ends its process by an exception is a finding."""
+    from tunnel_sim.files.importing.choices import ImportChoices
     from tunnel_sim.files.importing.records import read_records
 
+    try:
+        with patch.object(limits, "READER_SECONDS", READER_SECONDS):
+            read_records([path], ImportChoices(**choices))
+    except TunnelError as error:
+        if "(exit status 1)" in error.what:
+            raise RuntimeError(error.what) from None
+        raise
+
+
+def import_file(folder: Path, rng: Rng) -> None:
+    """A MAT, HDF5, Excel, TDMS or Parquet file changed."""
     names = ("log.mat", "log.h5", "log.xlsx", "log.tdms", "log.parquet")
     name = names[rng.integers(len(names))]
-    read_records([_written(folder / name, changed_bytes(seeds.logger_file(name), rng), rng)])
+    change = changed_bytes if rng.random() < 0.5 else damaged
+    _read_log(_written(folder / name, change(seeds.logger_file(name), rng), rng))
 
 
 def plan(folder: Path, rng: Rng) -> None:
@@ -346,6 +382,8 @@ READERS: dict[str, tuple[Target, float]] = {
     "run_parquet": (run_parquet, 2.0),
     "import_text": (import_text, 2.0),
     "import_file": (import_file, 1.0),
+    "import_head": (import_head, 1.0),
+    "import_hdf5": (import_hdf5, 1.0),
     "plan": (plan, 2.0),
     "rig": (rig, 1.0),
     "spring_table": (spring_table, 1.0),

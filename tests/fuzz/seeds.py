@@ -197,6 +197,82 @@ def run_file(name: str) -> bytes:
     return run_frame().write_csv().encode() if name.endswith(".csv") else parquet(run_frame())
 
 
+CHOICES: tuple[dict[str, Any], ...] = (
+    {}, {}, {}, {"time": "1"}, {"time": "2"}, {"angle": ("1",)}, {"angle": ("2",)},
+    {"angle": ("4",), "unit": "deg"}, {"rate": 50.0}, {"counts_per_turn": 1024.0}, {"calibration": "0.1 + 2*V"},
+    {"start": 0.5, "end": 3.0}, {"rest": 0.01}, {"time_unit": "ms"}, {"cut": False},
+)  # fmt: skip
+"""What a user may state about a log."""
+
+
+@cache
+def logger_head() -> bytes:
+    """The head of a log: numbers, names and a row of units."""
+    return b"""Logger 7; 12.3.2026
+Sample rate: 50 Hz
+fs = 50, Ts = 0.02 s
+Wind speed: 54 km/h
+Kr = 16.12 N m/rad
+rho;1.2;kg/m3
+frontal_area = 0.036
+Gain: 3 V
+time [s];yaw (rad);V [m/s];run;Kr
+"""
+
+
+def logger_rows(*, named: bool, timed: bool) -> bytes:
+    """The rows of a log under `logger_head`: two runs.
+
+    Args:
+        named: whether the runs have names, not numbers.
+        timed: whether there is a column of times.
+    """
+    rows = list(run_frame().iter_rows())
+    half = len(rows) // 2
+    names = ("a", "b") if named else (1, 2)
+    head = [f"{t};" if timed else "" for t, _ in rows]
+    return "".join(
+        f"{head[i]}{y};{15.0 * (i < half)};{names[i >= half]};16.12\n" for i, (_, y) in enumerate(rows)
+    ).encode()
+
+
+@cache
+def nested_hdf5(name: str) -> bytes:
+    """The seed run in an HDF5 file with groups, attributes of many kinds, tables, texts and references.
+
+    Args:
+        name: of the file; a ``.mat`` begins as MATLAB's version 7.3 does.
+    """
+    import h5py
+
+    frame = run_frame()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        block = 512 if name.endswith(".mat") else 0
+        with h5py.File(path, "w", userblock_size=block) as file:
+            for number in (1, 2):
+                group = file.create_group(f"run-{number}")
+                group.attrs.update(
+                    {"id": f"r{number}", "wind_speed": 0.0, "text": "long" * 20, "many": np.arange(40)}
+                )
+                group.create_dataset(
+                    "time_s", data=frame["time_s"].to_numpy(), compression="gzip", chunks=(64,)
+                )
+                group["yaw_rad"] = frame["yaw_rad"].to_numpy()[None]
+                group["yaw_rad"].attrs["MATLAB_class"] = np.bytes_("double")
+                group["yaw_rad"].attrs["unit"] = "rad"
+            file.attrs["name"] = "seed"
+            file["note"] = np.array([[72], [105]], np.uint16)
+            file["note"].attrs["MATLAB_class"] = np.bytes_("char")
+            file["texts"] = np.array(["a", "bc"], dtype=h5py.string_dtype())
+            file["link"] = h5py.SoftLink("/run-1")
+            file["again"] = file["run-2"]
+            file["table"] = np.array([(1.0, 2)] * 8, dtype=[("a", "f8"), ("b", "i4")])
+            file["table"].attrs["point"] = file["run-1"].ref
+        content = path.read_bytes()
+    return b"MATLAB 7.3 MAT-file".ljust(block) + content[block:] if block else content
+
+
 @cache
 def logger_file(name: str) -> bytes:
     """The seed run as a file of an instrument, of the kind its name says."""

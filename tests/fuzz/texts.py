@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import tomli_w
@@ -88,6 +89,74 @@ def changed_bytes(content: bytes, rng: Rng, start: int = 0, end: int | None = No
         elif kind == 5 and rng.random() < 0.2:
             del data[place:]
     return bytes(data)
+
+
+def damaged(content: bytes, rng: Rng) -> bytes:
+    """Bytes changed without being moved: the addresses in a file of blocks stay right, or become wrong.
+
+    Args:
+        content: any.
+        rng: decides what is changed.
+    """
+    data = bytearray(content)
+    last = len(data) - 8
+    # Few blocks describe a file; most of it is numbers.
+    known = [i for i in range(0, last, 8) if data[i : i + 8].count(0) in (4, 5, 6, 7)] or list(
+        range(0, last, 8)
+    )
+    for _ in range(int(rng.integers(1, 9))):
+        near = rng.random() < 0.8
+        place = (
+            known[rng.integers(len(known))] + int(rng.integers(-8, 16)) if near else int(rng.integers(last))
+        )
+        place = min(max(place, 0), last)
+        kind = rng.integers(5)
+        if kind == 0:
+            data[place] = int(rng.integers(256))
+        elif kind == 1:
+            data[place] ^= 1 << int(rng.integers(8))
+        elif kind == 2:  # another address, a count, or text
+            other = known[rng.integers(len(known))]
+            data[place : place + 8] = data[other : other + 8]
+        elif kind == 3:
+            data[place : place + 8] = int(rng.choice(known)).to_bytes(8, "little")
+        else:
+            size = int(rng.integers(1, 5))
+            data[place : place + size] = (b"\0", b"\xff")[rng.integers(2)] * size
+    return bytes(data)
+
+
+def changed_head(text: str, rng: Rng) -> str:
+    """A head of lines with one word exchanged, repeated or removed, or one of its lines moved.
+
+    Args:
+        text: lines of words, numbers and units.
+        rng: decides which.
+    """
+    words = re.split(r"([\s:;=,()\[\]]+)", text)
+    at = int(rng.integers(len(words)))
+    kind = rng.integers(6)
+    if kind < 2:
+        words[at] = _HEADINGS[rng.integers(len(_HEADINGS))]
+    elif kind == 2:
+        words[at] = HOSTILE[rng.integers(len(HOSTILE))] if rng.random() < 0.3 else _number(rng)
+    elif kind == 3:
+        words[at] = words[rng.integers(len(words))]
+    elif kind == 4:
+        del words[at]
+    else:
+        lines = text.split("\n")
+        lines.insert(int(rng.integers(len(lines))), lines[rng.integers(len(lines))])
+        return "\n".join(lines)
+    return "".join(words)
+
+
+_HEADINGS = (
+    "time", "t", "Zeit", "yaw", "angle", "run", "Lauf", "fs", "dt", "Ts", "wind_speed", "V", "Kr", "rho", "width",
+    "frontal_area", "release_angle", "s", "ms", "h", "rad", "deg", "m/s", "km/h", "counts", "Inkr.", "V", "mV",
+    "rad/s", "N m/rad", "kg/m3", "Hz", "kHz", "#1", "Run #2", "(rad)", "[m/s]", "1e999", "-1e999", "1e-320", "0",
+    "-0.0", "1e18",
+)  # fmt: skip
 
 
 def changed_line(text: str, rng: Rng) -> str:

@@ -72,12 +72,14 @@ def chosen(
     Args:
         seed: of all trials.
         index: of the trial.
-        shares: of the groups; `SHARES` where not given.
+        shares: of the groups, or of single readers; `SHARES` where not given.
     """
     rng = np.random.default_rng([seed, index])
     shares = shares or SHARES
     weights = np.array(list(shares.values()))
     group = list(shares)[rng.choice(len(weights), p=weights / weights.sum())]
+    if group in READERS:
+        return "readers", group, rng
     if group != "readers":
         return group, group, rng
     weights = np.array([weight for _, weight in READERS.values()])

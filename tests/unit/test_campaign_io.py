@@ -298,6 +298,21 @@ def test_a_disk_that_fails_leaves_the_old_campaign_and_no_litter(
     assert_same(read_campaign(folder), campaign())
 
 
+def test_a_campaign_written_meanwhile_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = replace(campaign(), name="the other")
+
+    def overtaken(record: Record, path: Path, quantity: Quantity) -> bytes:
+        monkeypatch.setattr(campaign_io, "table_bytes", table_bytes)
+        write_campaign(other, tmp_path / "c")
+        return table_bytes(record, path, quantity)
+
+    monkeypatch.setattr(campaign_io, "table_bytes", overtaken)
+    with pytest.raises(TunnelError, match="c: the folder exists"):
+        write_campaign(campaign(), tmp_path / "c")
+    assert read_campaign(tmp_path / "c").name == "the other"
+    assert list(tmp_path.iterdir()) == [tmp_path / "c"]
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -99,7 +99,7 @@ def stop(*_):
     time.sleep(60)
 target = Path(sys.argv[1])
 if sys.argv[2] == "filling":
-    with writing.whole_folder(target) as folder:
+    with writing.whole_folder(target, replace=True) as folder:
         (folder / "file").write_text("new")
         stop()
 rename, calls = Path.rename, []
@@ -108,7 +108,7 @@ def second(self, to):
     calls.append(to)
     return rename(self, to)
 Path.rename = second
-with writing.whole_folder(target) as folder:
+with writing.whole_folder(target, replace=True) as folder:
     (folder / "file").write_text("new")
 """
 
@@ -148,7 +148,7 @@ def test_an_interrupt_between_the_renamings_puts_the_old_folder_back(
         return rename(self, to)
 
     monkeypatch.setattr(Path, "rename", interrupted)
-    with pytest.raises(KeyboardInterrupt), whole_folder(target) as folder:
+    with pytest.raises(KeyboardInterrupt), whole_folder(target, replace=True) as folder:
         (folder / "file").write_text("new")
     assert [path.name for path in tmp_path.iterdir()] == ["campaign"]
     assert (target / "file").read_text() == "old"

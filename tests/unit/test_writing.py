@@ -20,6 +20,8 @@ from tunnel_sim.files import writing
 from tunnel_sim.files.writing import (
     output_folder,
     refuse_unwritable,
+    remove_empty_folders,
+    whole_folder,
     write_encoded,
     write_json,
     write_whole,
@@ -77,6 +79,32 @@ def test_an_output_folder_is_made_with_its_parents(tmp_path: Path) -> None:
     folder = output_folder(tmp_path / "a" / "b")
     assert folder.is_dir()
     assert list(folder.iterdir()) == []
+
+
+def test_empty_folders_for_output_are_removed_and_no_others(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    output_folder(tmp_path / "mine")
+    (output_folder(tmp_path / "full" / "of") / "it").write_text("")
+    output_folder(output_folder(tmp_path / "mine" / "a" / "b") / "c")
+    remove_empty_folders()
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["full", "it", "mine", "of"]
+
+
+@pytest.mark.parametrize("before", ["nothing", "empty"])
+def test_of_two_writers_of_a_new_folder_one_is_refused(before: str, tmp_path: Path) -> None:
+    target = tmp_path / "rig"
+    if before == "empty":
+        target.mkdir()
+
+    def slow() -> None:
+        with whole_folder(target, replace=False) as mine, whole_folder(target, replace=False) as quick:
+            (mine / "slow").write_text("")
+            (quick / "quick").write_text("")
+
+    with pytest.raises(TunnelError, match="rig: the folder exists; another command has written it meanwhile"):
+        slow()
+    assert [path.name for path in target.iterdir()] == ["quick"]
+    assert list(tmp_path.iterdir()) == [target]
 
 
 def test_a_file_is_no_output_folder(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ def run(
     Times are in s, angles in rad, conditions in SI units. MAT holds a structure
     array runs; HDF5 a group for each run with its conditions as attributes;
     Excel a sheet for each run and one of conditions; CSV one row for each sample
-    with the run's id and conditions. tunnel import reads the records again.
+    with the run's id and conditions. tunnel import reads the same runs again.
 
     [bold]Examples[/bold]
       tunnel export my-campaign --format mat

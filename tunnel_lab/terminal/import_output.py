@@ -22,7 +22,7 @@ def parts_table(imported: Imported) -> TextTable:
     """The runs of an import, a row for each.
 
     Returns:
-        Samples, rate, the stretch of the record, the swing and the conditions.
+        The file where there are several, samples, rate, the stretch of the record, the swing and the conditions.
     """
     unit = imported.campaign.sensor.unit
     headings = (
@@ -34,8 +34,11 @@ def parts_table(imported: Imported) -> TextTable:
         "V\n[m/s]",
         "Kr\n[N m/rad]",
     )
-    rows = tuple((part.id, part.raw.source.name, *_figures(part)) for part in imported.parts)
-    return TextTable("Read", ("run", "file", *headings), rows, right=headings)
+    several = len(imported.sources) > 1
+    rows = tuple(
+        (part.id, *([part.raw.source.name] if several else []), *_figures(part)) for part in imported.parts
+    )
+    return TextTable("Read", ("run", *(["file"] if several else []), *headings), rows, right=headings)
 
 
 def _figures(part: Part) -> tuple[str, ...]:

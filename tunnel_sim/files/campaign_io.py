@@ -120,7 +120,7 @@ def write_campaign(
     if not checked:
         _check_records(campaign, folder)
     truth_text = None if truth is None else json_text(truth)
-    with whole_folder(folder) as partial:
+    with whole_folder(folder, replace=overwrite) as partial:
         (partial / RUN_FOLDER).mkdir()
         for run in campaign.runs:
             (partial / files[run.id]).write_bytes(

@@ -50,11 +50,11 @@ def _stated(values: object, keys: tuple[str, ...]) -> dict[str, float]:
 
 
 def _as_csv(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
-    """One row for each sample, with the run's id and conditions."""
+    """One row for each sample, with the run's id and conditions and the rig's sizes."""
     frames = [
-        pl.DataFrame({"time_s": run.record.time_s, _column(campaign): run.record.yaw_rad}).select(
+        pl.DataFrame(_record(campaign, run)).select(
             pl.lit(run.id).alias("run"),
-            *(pl.lit(getattr(run, key), dtype=pl.Float64).alias(key) for key in _CONDITIONS),
+            *(pl.lit(value, dtype=pl.Float64).alias(key) for key, value in _numbers(campaign, run).items()),
             pl.all(),
         )
         for run in campaign.runs
@@ -75,24 +75,30 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
     savemat(cast(Any, stream), {"runs": runs, "rig": rig}, do_compression=True, oned_as="column")
 
 
+def _numbers(campaign: Campaign, run: Run) -> dict[str, float | None]:
+    """The conditions of a run, None where they are not stated, and the stated sizes of the rig."""
+    return {key: getattr(run, key) for key in _CONDITIONS} | _stated(campaign.rig, _RIG)
+
+
 def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
     return {"time_s": run.record.time_s, _column(campaign): run.record.yaw_rad}
 
 
 def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
-    """A group for each run, with its conditions as attributes."""
+    """A group for each run, with its id and conditions as attributes; an id may hold any character."""
     h5py = library("h5py", "HDF5", "import", where)
     with h5py.File(stream, "w") as file:
         file.attrs.update({"name": campaign.name, **_stated(campaign.rig, _RIG)})
-        for run in campaign.runs:
-            group = file.create_group(run.id.replace("/", "_"))
-            group.attrs.update(_stated(run, _CONDITIONS))
+        width = len(str(len(campaign.runs)))  # programs sort groups by name
+        for number, run in enumerate(campaign.runs, 1):
+            group = file.create_group(f"run-{number:0{width}d}")
+            group.attrs.update({"id": run.id, **_stated(run, _CONDITIONS)})
             for name, values in _record(campaign, run).items():
                 group.create_dataset(name, data=values, compression="gzip", shuffle=True)
 
 
 def _as_xlsx(campaign: Campaign, stream: BinaryIO, where: str) -> None:
-    """A sheet of conditions, and one for each run."""
+    """A sheet of conditions and sizes, and one for each run."""
     xlsxwriter = library("xlsxwriter", "Excel", "import", where)
     for run in campaign.runs:
         if run.record.time_s.size >= _SHEET_ROWS:
@@ -106,9 +112,9 @@ def _as_xlsx(campaign: Campaign, stream: BinaryIO, where: str) -> None:
     with xlsxwriter.Workbook(stream, options) as book:
         names = [f"run {place}" for place in range(1, len(campaign.runs) + 1)]
         sheet = book.add_worksheet("conditions")
-        sheet.write_row(0, 0, ["sheet", "run", *_CONDITIONS])
+        sheet.write_row(0, 0, ["sheet", "run", *_CONDITIONS, *_stated(campaign.rig, _RIG)])
         for row, (name, run) in enumerate(zip(names, campaign.runs, strict=True), 1):
-            sheet.write_row(row, 0, [name, run.id, *(getattr(run, key) for key in _CONDITIONS)])
+            sheet.write_row(row, 0, [name, run.id, *_numbers(campaign, run).values()])
         for name, run in zip(names, campaign.runs, strict=True):
             sheet = book.add_worksheet(name)
             for place, (heading, values) in enumerate(_record(campaign, run).items()):

@@ -9,7 +9,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -18,6 +18,7 @@ from tunnel_sim.files.leftovers import clear_leftovers, clear_leftovers_once, di
 from tunnel_sim.files.toml_input import one_line, shown
 from tunnel_sim.vocabulary.errors import TunnelError
 
+_made: list[Path] = []  # folders for output
 _PASSED_ON = (TunnelError, BrokenPipeError, KeyboardInterrupt, SystemExit, GeneratorExit)
 
 
@@ -31,10 +32,18 @@ def output_folder(folder: Path) -> Path:
         TunnelError: when it is a file, or cannot be created or written to.
     """
     with refusals(folder):
-        folder.mkdir(parents=True, exist_ok=True)
+        _make(folder)
         with tempfile.TemporaryFile(dir=folder):
             pass
     return folder
+
+
+def remove_empty_folders() -> None:
+    """Remove the folders that this process has made for its output and that hold nothing, as after a full disk."""
+    for folder in sorted(_made, key=lambda path: len(path.parts), reverse=True):
+        with suppress(OSError):
+            folder.rmdir()
+    _made.clear()
 
 
 def refuse_unwritable(path: Path) -> None:
@@ -123,27 +132,32 @@ def write_json(path: Path, document: Mapping[str, object]) -> Path:
 
 
 @contextmanager
-def whole_folder(folder: Path) -> Iterator[Path]:
-    """Write a folder completely or not at all; an existing one is replaced.
+def whole_folder(folder: Path, *, replace: bool) -> Iterator[Path]:
+    """Write a folder completely or not at all.
 
     Args:
         folder: missing parents are created; symbolic links are followed.
+        replace: whether a folder that holds something is replaced; otherwise it is refused, also one that another
+            process has written meanwhile.
 
     Yields:
         A new, empty folder to write in, which is renamed at the end.
 
     Raises:
-        TunnelError: when the disk reports an error.
+        TunnelError: when the disk reports an error, or the folder holds something.
     """
     target = Path(os.path.realpath(folder))
     with refusals(folder, (OSError,)):
-        target.parent.mkdir(parents=True, exist_ok=True)
+        _make(target.parent)
         clear_leftovers(target.parent)
         partial, replaced = temporary_names(target)
         try:
             partial.mkdir()
             yield partial
-            _put_in_place(partial, target, replaced)
+            if replace:
+                _put_in_place(partial, target, replaced)
+            else:
+                _put_where_nothing_is(partial, target, shown(folder))
         finally:
             shutil.rmtree(partial, ignore_errors=True)
         discard(replaced, partial)
@@ -210,6 +224,24 @@ def _replace(target: Path, content: bytes) -> None:
         partial.replace(target)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def _put_where_nothing_is(partial: Path, target: Path, where: str) -> None:
+    with suppress(OSError):
+        target.rmdir()  # an empty folder may be in the way
+    try:
+        partial.rename(target)  # the system refuses it where a folder holds something: no check can be outrun
+    except OSError:
+        if not target.is_dir():
+            raise
+        remedy = "another command has written it meanwhile; choose another one"
+        raise TunnelError("the folder exists", where=where, remedy=remedy) from None
+
+
+def _make(folder: Path) -> None:
+    """Create a folder with its parents, and remember which were missing."""
+    _made.extend(path for path in (folder, *folder.parents) if not path.exists())
+    folder.mkdir(parents=True, exist_ok=True)
 
 
 def _put_in_place(partial: Path, target: Path, replaced: Path) -> None:

@@ -19,6 +19,13 @@ WEIGHTS_BYTES = 64 * 2**20
 UPLOAD_BYTES = 128 * 2**20
 """Most bytes dropped on the bench at once: they pass through memory; tunnel import reads larger files."""
 
+READER_SECONDS = 20.0
+"""Longest that a library may take to read a file, s, with more for a large one by READER_PACE: most take 0.01 s."""
+READER_PACE = 2.0**19
+"""Slowest pace at which a library may read, bytes per s: workbooks, the slowest, are read at 2 MB/s."""
+READER_MEMORY = 4 * 2**30
+"""Most memory of the process in which a library reads, bytes, on Linux: the largest file fits in three times."""
+
 NESTING = 32
 """Deepest nesting of tables and lists: the formats need six levels, and Python's recursion limit is a thousand."""
 KEY_PARTS = 32

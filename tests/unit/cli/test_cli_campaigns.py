@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from tunnel_sim.files import writing
 
 Tunnel = Callable[..., tuple[int, str, str]]
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -107,3 +111,17 @@ def test_plot_refuses_a_folder_that_cannot_be_made(
     assert (status, out) == (2, "")
     assert err.count("\n") == 1
     assert "taken" in err
+
+
+def test_a_full_disk_leaves_no_empty_folder(
+    tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(descriptor: int, _content: bytes) -> None:
+        os.close(descriptor)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(writing, "_write_to", full)
+    status, _, err = tunnel("plot", tiny_campaign, "--out", tmp_path / "new" / "figures")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "no space left on device" in err
+    assert not (tmp_path / "new").exists()

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.unit.importing.import_files import RATE, csv, decay, written
+from tests.unit.importing.import_files import csv, decay, written
 from tunnel_sim import TunnelError, read_campaign
-from tunnel_sim.files.exporting import WRITERS, export_campaign
 from tunnel_sim.files.importing.choices import Conditions, ImportChoices, Stretch, parse_setting, read_recipe
 from tunnel_sim.files.importing.conversion import read_calibration
 from tunnel_sim.files.importing.records import read_records
@@ -230,20 +229,3 @@ def test_a_run_that_is_too_short_is_left_out_and_said(tmp_path: Path) -> None:
     assert any("short: left out: about" in line for line in imported.remarks())
     with pytest.raises(TunnelError, match="no run can be used"):
         read_records([tmp_path / "short.csv"])
-
-
-@pytest.mark.parametrize("kind", WRITERS)
-def test_an_export_holds_the_same_numbers(kind: str, tmp_path: Path) -> None:
-    campaign = import_records([csv(tmp_path)], tmp_path / "rig", ImportChoices(conditions=WIND)).campaign
-    path = export_campaign(campaign, tmp_path / f"rig.{kind}", kind)
-    again = read_records([path], ImportChoices(cut=False, conditions=WIND)).campaign.runs[0].record
-    np.testing.assert_array_equal(again.yaw_rad, campaign.runs[0].record.yaw_rad)
-    np.testing.assert_allclose(again.time_s, campaign.runs[0].record.time_s, atol=1e-12)
-    assert again.sample_rate == pytest.approx(RATE)
-
-
-def test_an_export_to_matlab_or_hdf5_keeps_the_conditions(tmp_path: Path) -> None:
-    campaign = read_records([csv(tmp_path)], ImportChoices(conditions=WIND)).campaign
-    for kind in ("mat", "hdf5"):
-        (run,) = read_records([export_campaign(campaign, tmp_path / f"rig.{kind}", kind)]).campaign.runs
-        assert (run.wind_speed, run.spring_stiffness, run.air_density) == (12.0, 16.0, 1.2)

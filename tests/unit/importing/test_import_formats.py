@@ -10,7 +10,9 @@ import sys
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
+from datetime import datetime, timedelta
 from pathlib import Path
+from types import ModuleType
 
 import h5py
 import nptdms
@@ -22,6 +24,8 @@ import xlsxwriter
 
 from tests.unit.importing.import_files import RATE, decay, written
 from tunnel_sim import TunnelError
+from tunnel_sim.files.importing import matlab, workbook
+from tunnel_sim.files.importing import tdms as tdms_reader
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.matlab import _unpacked
 from tunnel_sim.files.importing.records import Imported, read_records
@@ -115,17 +119,22 @@ def test_a_format_is_read(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "module"), [("excel.xlsx", "fastexcel"), ("seven.mat", "h5py"), ("labview.tdms", "nptdms")]
+    ("name", "reader", "module"),
+    [
+        ("excel.xlsx", workbook, "fastexcel"),
+        ("seven.mat", matlab, "h5py"),
+        ("labview.tdms", tdms_reader, "nptdms"),
+    ],
 )
 def test_a_missing_library_is_said(
-    name: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, reader: ModuleType, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     FILES[name](tmp_path / name)
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(
         TunnelError, match=rf"needs the package {module}.*pip install 'virtual-wind-tunnel\[import\]'"
     ):
-        read_records([tmp_path / name])
+        reader.read((tmp_path / name).read_bytes(), name)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -168,12 +177,10 @@ def archive(*names: str, size: int = 10) -> bytes:
     ],
     ids=["macros", "links", "bomb", "other"],
 )
-def test_dangerous_workbooks_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes, what: str
-) -> None:
+def test_dangerous_workbooks_are_refused(monkeypatch: pytest.MonkeyPatch, content: bytes, what: str) -> None:
     monkeypatch.setattr(limits, "DATA_BYTES", 2**20)
     with pytest.raises(TunnelError, match=what):
-        read_records([written(tmp_path, "book.xlsx", content)])
+        workbook.read(content, "book.xlsx")
 
 
 def test_sizes_are_counted_before_anything_is_unpacked(
@@ -186,7 +193,7 @@ def test_sizes_are_counted_before_anything_is_unpacked(
     scipy.io.savemat(tmp_path / "zeros.mat", {"a": np.zeros(2**18)}, do_compression=True)
     monkeypatch.setattr(limits, "DATA_BYTES", 2**20)
     with pytest.raises(TunnelError, match="numbers, more than"):
-        read_records([tmp_path / "zeros.mat"])
+        matlab.read((tmp_path / "zeros.mat").read_bytes(), "zeros.mat")
 
 
 @pytest.mark.parametrize("compressed", [False, True])
@@ -194,6 +201,55 @@ def test_the_size_of_a_mat_file_is_that_of_all_its_arrays(tmp_path: Path, compre
     arrays = {name: np.zeros(1000) for name in ("a", "b", "c")}
     scipy.io.savemat(tmp_path / "three.mat", arrays, do_compression=compressed)
     assert 3 * 8000 <= _unpacked((tmp_path / "three.mat").read_bytes()) < 3 * 8100
+
+
+@pytest.mark.parametrize("name", ["log.h5", "log.mat"])
+def test_a_damaged_heap_in_which_hdf5_goes_round_for_ever_is_one_line(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stream = io.BytesIO()
+    with h5py.File(stream, "w") as file:
+        file.attrs["id"] = "run 1"
+        file["yaw_rad"] = ANGLE
+    content = bytearray(stream.getvalue())
+    size = content.index(b"GCOL") + 24  # of the text in the heap: the next object is then this one
+    content[size : size + 8] = (2**64 - 16).to_bytes(8, "little")
+    monkeypatch.setattr(limits, "READER_SECONDS", 0.4)
+    with pytest.raises(TunnelError, match=r"takes longer than [\d.]+ s to read; it may be damaged"):
+        read_records([written(tmp_path, name, bytes(content))])
+
+
+@pytest.mark.parametrize(
+    ("form", "shown"),
+    [
+        ("yyyy-mm-dd hh:mm:ss.000", None),
+        ("hh:mm:ss.000", None),
+        ("", "%m/%d/%Y %I:%M:%S.%f %p"),
+    ],
+)
+def test_dates_and_times_of_day_in_a_workbook_are_times(form: str, shown: str | None, tmp_path: Path) -> None:
+    start = datetime(2026, 3, 12, 23, 59, 58)
+    with xlsxwriter.Workbook(tmp_path / "log.xlsx") as book:
+        sheet, style = book.add_worksheet(), book.add_format({"num_format": form})
+        sheet.write_row(0, 0, ["stamp", "yaw_rad"])
+        for row, (seconds, angle) in enumerate(zip(TIME.tolist(), ANGLE, strict=True), 1):
+            stamp = start + timedelta(seconds=seconds)
+            day = stamp if form.startswith("yyyy") else stamp.time()
+            sheet.write(row, 0, stamp.strftime(shown) if shown else day, None if shown else style)
+            sheet.write(row, 1, angle)
+    (run,) = read_records([tmp_path / "log.xlsx"]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, TIME, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("value", [np.int8(3), np.float32(3.0), np.array([3]), np.array([[3.0]]), 3])
+def test_numbers_of_any_kind_are_attributes(value: object, tmp_path: Path) -> None:
+    hdf5(tmp_path / "log.h5")
+    with h5py.File(tmp_path / "log.h5", "a") as file:
+        file.attrs["wind_speed"], file.attrs["air_density"] = value, 1.2
+        file.attrs["rho"] = "text"
+        file.attrs["empty"] = h5py.Empty("f8")
+    (run,) = read_records([tmp_path / "log.h5"]).campaign.runs
+    assert (run.wind_speed, run.air_density) == (3.0, 1.2)
 
 
 def test_a_link_out_of_an_hdf5_file_is_not_followed(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.columns import _blocks
 from tunnel_sim.files.importing.records import _with_unique_ids, read_records
-from tunnel_sim.files.importing.source import Channel
+from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.text import find_dialect
 from tunnel_sim.files.importing.units import known_unit, split_unit
 
@@ -64,6 +64,16 @@ def test_the_dialect_of_some_lines(lines: list[str], delimiter: str, decimal: st
         ("data[1]", "data[1]", ""),
         ("angle", "angle", ""),
         ("yaw_rate_rad_s", "yaw_rate", "rad/s"),
+        ("omega_n_rad_per_s", "omega_n", "rad/s"),
+        ("V [m/s]", "V", "m/s"),
+        ("v / (km/h)", "v", "km/h"),
+        ("wind speed m/s", "wind speed", "m/s"),
+        ("m/s", "m/s", ""),
+        ("t/s", "t", "s"),
+        ("F N/s", "F N/s", ""),
+        ("flow_kg_s", "flow_kg_s", ""),
+        ("Kraft [daN/s]", "Kraft [daN/s]", "daN/s"),
+        ("Winkel [Inkr.]", "Winkel", "counts"),
     ],
 )
 def test_names_and_units(heading: str, name: str, unit: str) -> None:
@@ -110,11 +120,31 @@ def test_a_rate_beside_the_angle_is_not_taken_for_it(tmp_path: Path) -> None:
     assert any("'column 3' is left out: it is the rate" in line for line in imported.remarks())
 
 
-@pytest.mark.parametrize("stamp", ["{}", "2026-03-01 {}", "2026-03-01T{}Z", '"{}"'])
-def test_times_of_day_are_seconds_and_go_on_at_midnight(stamp: str, tmp_path: Path) -> None:
-    seconds, angle = 86397.5 + 0.05 * np.arange(120), 0.2 * np.cos(9.0 * 0.05 * np.arange(120))
-    clocks = [f"{s % 86400 // 3600:02.0f}:{s % 3600 // 60:02.0f}:{s % 60:06.3f}" for s in seconds]
-    lines = [f"{stamp.format(clock)};{value:.6f}" for clock, value in zip(clocks, angle, strict=True)]
+@pytest.mark.parametrize(
+    ("stamp", "hours"),
+    [
+        ("{}", 24),
+        ("2026-03-01 {}", 24),
+        ("2026-03-01T{}Z", 24),
+        ('"{}"', 24),
+        ("{} {half}M", 12),
+        ("3/1/2026 {}{half}m", 12),
+        ('"{} {half}.M."', 12),
+    ],
+)
+@pytest.mark.parametrize("start", [86397.5, 43197.5])
+def test_times_of_day_are_seconds_and_go_on_at_noon_and_midnight(
+    stamp: str, hours: int, start: float, tmp_path: Path
+) -> None:
+    seconds, angle = start + 0.05 * np.arange(120), 0.2 * np.cos(9.0 * 0.05 * np.arange(120))
+    halves = ["AP"[int(s % 86400 // 43200)] for s in seconds]
+    whole = [int(s % 86400 // 3600) for s in seconds]
+    shown = [hour if hours == 24 else (hour + 11) % 12 + 1 for hour in whole]
+    clocks = [f"{h}:{s % 3600 // 60:02.0f}:{s % 60:06.3f}" for h, s in zip(shown, seconds, strict=True)]
+    lines = [
+        f"{stamp.format(clock, half=half)};{value:.6f}"
+        for clock, half, value in zip(clocks, halves, angle, strict=True)
+    ]
     path = tmp_path / "log.csv"
     path.write_text("\n".join(["stamp;yaw_rad", *lines]))
     imported = read_records([path])
@@ -192,3 +222,55 @@ def test_names_and_units_in_two_rows(tmp_path: Path) -> None:
     rows = "".join(f"{t:.3f},{np.rad2deg(a):.6f}\n" for t, a in zip(time, angle, strict=True))
     (tmp_path / "log.csv").write_text("clock,swing\ns,deg\n" + rows)
     assert read_records([tmp_path / "log.csv"]).choices.angle == ("swing",)
+
+
+def log(folder: Path, heading: str, factor: float, name: str = "log.csv") -> Path:
+    """A file of times and a reading under a heading."""
+    time, angle = decay()
+    rows = "".join(f"{t};{a}\n" for t, a in zip(time.tolist(), (factor * angle).tolist(), strict=True))
+    return written(folder, name, f"time_s;{heading}\n{rows}")
+
+
+@pytest.mark.parametrize("word", ["Inkr.", "Inkremente", "increments", "Pulse", "digits"])
+def test_counts_of_an_encoder_are_not_degrees(word: str, tmp_path: Path) -> None:
+    for option in ({}, {"angle": ("Winkel",)}):
+        with pytest.raises(TunnelError, match="'Winkel' is in counts; give --counts-per-turn N"):
+            read_records([log(tmp_path, f"Winkel [{word}]", 551.0)], ImportChoices(**option))
+
+
+def test_a_unit_that_is_not_known_is_asked_about(tmp_path: Path) -> None:
+    path = log(tmp_path, "Winkel [Schr.]", 551.0)
+    with pytest.raises(
+        TunnelError, match=r"is in 'Schr.', which is not a known unit of an angle; give --unit"
+    ):
+        read_records([path], ImportChoices(angle=("2",)))
+    (run,) = read_records([path], ImportChoices(angle=("2",), counts_per_turn=3462.0)).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, decay()[1] * 551.0 * 2.0 * np.pi / 3462.0)
+
+
+@pytest.mark.parametrize("heading", ["Winkel", "yaw [deg]"])
+def test_a_swing_of_more_than_half_a_turn_is_asked_about(heading: str, tmp_path: Path) -> None:
+    path = log(tmp_path, heading, 551.0)
+    with pytest.raises(
+        TunnelError, match=r"would swing by ±189\.3°, more than half a turn; give --unit deg if"
+    ):
+        read_records([path])
+    (run,) = read_records([path], ImportChoices(unit="deg")).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, np.deg2rad(551.0 * decay()[1]))
+
+
+@pytest.mark.parametrize(("unit", "column"), [("rad", "clock"), ("V", "1")])
+def test_a_column_of_times_in_another_unit_is_refused(unit: str, column: str, tmp_path: Path) -> None:
+    path = log(tmp_path, "yaw (rad)", 1.0)
+    path.write_text(path.read_text().replace("time_s", f"clock ({unit})"))
+    with pytest.raises(TunnelError, match="which is not a unit of time"):
+        read_records([path], ImportChoices(time=column))
+
+
+@pytest.mark.parametrize(
+    "stated", ["fs=1e999", "fs = 1e-320", "dt = 1e999", "Ts: 1e-320", "fs = -1", "sample rate;0;Hz"]
+)
+def test_a_rate_that_is_not_one_is_not_believed(stated: str, tmp_path: Path) -> None:
+    rows = "".join(f"{a}\n" for a in decay()[1].tolist())
+    with pytest.raises(TunnelError, match="no column of times"):
+        read_records([written(tmp_path, "log.csv", f"{stated}\nyaw (rad)\n{rows}")])

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.source import Channel, Table
+from tunnel_sim.files.importing.tables import Channel, Table
 from tunnel_sim.files.importing.units import split_unit
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
 
+RUN_IDS = ("id", "run", "run_id")
+"""Members and attributes whose text is the name of the run that a group holds."""
 _LEAST = 16  # values: a shorter array is not a record
 _MOST_CHANNELS = 256  # rows of a matrix: it is turned so that they are fewer than its samples
 
 
 def tables_of(
-    arrays: Mapping[str, NDArray[np.generic]], kind: str, units: Mapping[str, str] | None = None
+    arrays: Mapping[str, NDArray[np.generic]],
+    kind: str,
+    units: Mapping[str, str] = MappingProxyType({}),
+    runs: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Table]:
     """Tables of arrays: those of the same group and length belong together.
 
@@ -25,9 +31,11 @@ def tables_of(
         arrays: by path, with ``/`` between groups; matrices hold one channel in each row or column.
         kind: of the file, for the remark.
         units: stated units of arrays, by path.
+        runs: names of the runs that groups hold, by path.
 
     Returns:
-        A table for each group of arrays. Single numbers are facts of the tables of their group and below.
+        A table for each group of arrays. Single numbers are facts of the tables of their group and below, those of
+        a group ``rig`` of all beside it.
     """
     facts: dict[str, dict[str, float]] = {}
     groups: dict[tuple[str, int], list[Channel]] = {}
@@ -36,7 +44,8 @@ def tables_of(
             continue
         group, _, name = path.rpartition("/")
         if array.size == 1:
-            facts.setdefault(group, {})[name] = float(array.reshape(-1)[0])
+            above, _, last = group.rpartition("/")
+            facts.setdefault(above if last == "rig" else group, {})[name] = float(array.reshape(-1)[0])
             continue
         matrix = np.atleast_2d(np.squeeze(array))
         if matrix.ndim != 2 or matrix.shape[1] == 0:
@@ -46,7 +55,7 @@ def tables_of(
         if matrix.shape[1] < _LEAST or matrix.shape[0] > _MOST_CHANNELS:
             continue
         stem, unit = split_unit(name)
-        unit = (units or {}).get(path, unit)
+        unit = units.get(path, unit)
         for i, row in enumerate(matrix):
             label = stem if matrix.shape[0] == 1 else f"{stem}[{i + 1}]"
             groups.setdefault((group, matrix.shape[1]), []).append(
@@ -54,7 +63,11 @@ def tables_of(
             )
     return [
         Table(
-            tuple(channels), _part(group, groups), _facts_of(group, facts), (f"{kind}: {_shape(channels)}",)
+            tuple(channels),
+            runs.get(group) or _part(group, groups),
+            _facts_of(group, facts),
+            (f"{kind}: {_shape(channels)}",),
+            named=bool(runs.get(group)),
         )
         for (group, _), channels in groups.items()
     ]

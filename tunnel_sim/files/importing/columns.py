@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.source import Channel, Table
+from tunnel_sim.files.importing.conditions import condition_of
+from tunnel_sim.files.importing.tables import Channel, Table
 from tunnel_sim.files.importing.units import kind_of
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
 
@@ -104,6 +105,8 @@ def _blocks(channels: Sequence[Channel], choices: ImportChoices) -> list[list[Ch
 
 def _is_time(channel: Channel) -> bool:
     kind = kind_of(channel.unit)
+    if condition_of(channel.name, channel.unit) is not None:
+        return False
     return kind == "time" or (kind == "" and _TIME.search(channel.name) is not None)
 
 
@@ -144,9 +147,8 @@ def _time(
         return named[0]
     if choices.rate is not None:
         return None
-    guessed = next(
-        (c for c in block if not _OTHER.search(c.name) and c.unit == "" and _is_clock(c.values)), None
-    )
+    free = [c for c in _unconditional(block) if c.unit == "" and not _OTHER.search(c.name)]
+    guessed = next((c for c in free if _is_clock(c.values)), None)
     if guessed is not None:
         why = "evenly stepped numbers" + ("" if headed else ", and the file names no columns")
         said.append(f"times from '{guessed.name}': {why}")
@@ -171,7 +173,7 @@ def _readings(
     if choices.angle:
         chosen = [c for name in choices.angle for c in _chosen(block, name, "--angle", where)]
         return [channel for channel in chosen if channel is not time]
-    others = [channel for channel in block if channel is not time]
+    others = [channel for channel in _unconditional(block) if channel is not time]
     moving = [channel for channel in others if _span(channel) > 0.0]
     levels = [
         [
@@ -204,6 +206,10 @@ def _readings(
         )
     said += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
     return found
+
+
+def _unconditional(block: Sequence[Channel]) -> list[Channel]:
+    return [channel for channel in block if condition_of(channel.name, channel.unit) is None]
 
 
 def _by_name(channel: Channel) -> bool:

@@ -6,8 +6,13 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from tunnel_sim.files.importing.choices import RUN_KEYS, Conditions
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_sim.files.importing.choices import RIG_KEYS, RUN_KEYS, Conditions
+from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.text import read_cells
+from tunnel_sim.files.importing.units import UNITS, kind_of, split_unit
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 
@@ -18,21 +23,107 @@ _ALIASES = {
     "angle": "release_angle",
 }
 _NUMBER = r"[+-]?\d+(?:[.,p]\d+)?"
-_FACTS = {
-    "wind_speed": re.compile(r"(?i)^(wind[ _]?speed|speed|airspeed|v_?wind)$"),
-    "air_density": re.compile(r"(?i)^(air[ _]?density|rho|density)$"),
-    "spring_stiffness": re.compile(r"(?i)^(spring[ _]?stiffness|stiffness)$"),
+_NAMES = {
+    "wind_speed": r"(wind|air|flow|free ?stream|tunnel) ?(speed|velocity)|v ?wind|"
+    r"(wind|luft|str[öo]mungs|anstr[öo]m)geschwindigkeit",
+    "air_density": r"(air ?)?density|rho( ?air)?|ρ|(luft)?dichte",
+    "spring_stiffness": r"((spring|torsional|rotational) ?)?stiffness|spring ?(constant|rate)|k ?r|"
+    r"(torsions|dreh)?feder(konstante|steifigkeit|rate)|(dreh|torsions)?steifigkeit",
+    "release_angle": r"(release|initial|start) ?angle|(anfangs|start|auslenk)winkel|(theta|psi|beta|[θψβ]) ?0",
 }
+_KEYS = {key: re.compile(f"(?i)({names})") for key, names in _NAMES.items()}
+_SYMBOL = re.compile(r"(?i)[vu](_?(0|inf|∞))?|wind|speed")
+_KINDS = {
+    "wind_speed": "speed",
+    "air_density": "density",
+    "spring_stiffness": "stiffness",
+    "release_angle": "angle",
+}
+_OFF = 0.5  # of the range: the median of a wind speed that starts late is further from zero
+_EVEN = 1e-9  # of a value: a column that varies less is constant
 
 
-def from_facts(facts: Mapping[str, float]) -> dict[str, float]:
-    """Conditions that a file states beside its columns."""
+def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
+    """The condition or size that a column or a number states, a key of `Conditions`.
+
+    Args:
+        name: as `split_unit` gives it.
+        unit: of it.
+        alone: whether it is a single number, for which "speed" is the wind's.
+    """
+    if name in RIG_KEYS and unit == "":
+        return name
+    name = re.sub(r"\s*[(\[{<].*", "", name)  # a unit that is not known stays in the name
+    plain = re.sub(r"[\s_.-]+", " ", name).strip()
+    found = next((key for key, pattern in _KEYS.items() if pattern.fullmatch(plain)), None)
+    # No unit of time measures what is named so.
+    symbol = kind_of(unit) == "speed" or unit == "ms" or (alone and unit == "" and plain.lower() == "speed")
+    return "wind_speed" if found is None and symbol and _SYMBOL.fullmatch(name) else found
+
+
+def in_si(key: str, unit: str) -> float | None:
+    """The factor to SI of a condition in a unit; None where the unit does not measure it."""
+    unit = "m/s" if (key, unit) == ("wind_speed", "ms") else unit  # no wind speed is in milliseconds
+    return 1.0 if unit == "" else UNITS[_KINDS[key]].get(unit)
+
+
+def from_facts(facts: Mapping[str, float], said: list[str]) -> dict[str, float]:
+    """Conditions of the runs and sizes of the rig that a file states beside its columns.
+
+    Args:
+        facts: numbers by name.
+        said: a remark is added on each.
+
+    Returns:
+        By key of `Conditions`, in its units.
+    """
     found = {}
-    for key, pattern in _FACTS.items():
-        for name, value in facts.items():
-            if pattern.match(name):
-                found[key] = float(value)
+    for heading, value in facts.items():
+        name, unit = split_unit(heading)
+        key = condition_of(name, unit, alone=True)
+        if key is not None and (factor := in_si(key, unit)) is not None:
+            found[key] = float(value) * factor
+        elif key is not None:
+            said.append(_no_unit(heading, key))
+    said += [f"{key} = {value:g} from the file" for key, value in found.items()]
     return found
+
+
+def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[str]) -> float | None:
+    """The condition of a run that a column states, in the unit of `Conditions`.
+
+    Args:
+        key: of `Conditions`.
+        rows: those of the run, shape (n,).
+        said: a remark is added where it varies, or its unit is not known.
+
+    Returns:
+        The median; zero for a wind speed that lies about zero; None where the column says nothing.
+    """
+    values = column.values[rows]
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return None
+    factor = in_si(key, column.unit)
+    if factor is None:
+        said.append(_no_unit(column.name, key))
+        return None
+    low, middle, high = map(float, np.quantile(values, (0.05, 0.5, 0.95)))
+    if high - low <= _EVEN * abs(middle):
+        return middle * factor
+    off = key == "wind_speed" and low <= 0.0 and middle < _OFF * (high - low)
+    said.append(
+        f"the column '{column.name}' varies from {low:.4g} to {high:.4g}: {key} is "
+        + ("zero, about which it lies" if off else f"its median, {middle * factor:.6g}")
+    )
+    return 0.0 if off else middle * factor
+
+
+def _no_unit(heading: str, key: str) -> str:
+    kind = ", ".join(UNITS[_KINDS[key]])
+    return (
+        f"'{one_line(heading, 60)}' is left out: its unit is not one of {kind}; --set {key}=NUMBER states it"
+    )
 
 
 def name_pattern(text: str) -> re.Pattern[str]:

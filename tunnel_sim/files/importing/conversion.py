@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.source import Channel
+from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit
+from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 from tunnel_sim.vocabulary.record import Array
@@ -26,6 +27,8 @@ _RATE_FACTS = re.compile(
 _STEP_FACTS = re.compile(
     r"(?i)(^|[^a-z])(ts|dt|delta_?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval)|wf_increment)($|[^a-z])"
 )
+
+_STEPS = (1.0 / limits.FASTEST_RATE, 1.0 / limits.SLOWEST_RATE)  # s
 
 Calibration = tuple[Array, Array] | tuple[float, float]
 """Voltages and readings of a table, each of shape (n,); or offset and factor of a straight line."""
@@ -60,14 +63,15 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
     """
     if choices.rate is not None:
         return 1.0 / choices.rate, f"{choices.rate:g} Hz as stated"
-    for pattern, power in ((_RATE_FACTS, -1), (_STEP_FACTS, 1)):
+    for pattern, is_rate in ((_RATE_FACTS, True), (_STEP_FACTS, False)):
+        least, most = (limits.SLOWEST_RATE, limits.FASTEST_RATE) if is_rate else _STEPS
         for name, value in facts.items():
-            if pattern.search(name) and value > 0.0:
-                return float(value) ** power, f"'{name}' = {value:g} in the file"
+            if pattern.search(name) and least <= value <= most:
+                return 1.0 / value if is_rate else float(value), f"'{name}' = {value:g} in the file"
     return None, ""
 
 
-def in_seconds(time: Channel, choices: ImportChoices, said: list[str]) -> Array:
+def in_seconds(time: Channel, choices: ImportChoices, said: list[str], where: str) -> Array:
     """Times in s.
 
     Args:
@@ -76,10 +80,17 @@ def in_seconds(time: Channel, choices: ImportChoices, said: list[str]) -> Array:
 
     Returns:
         Shape (n,).
+
+    Raises:
+        TunnelError: a column in another unit.
     """
-    unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or (
-        time.unit if kind_of(time.unit) else ""
-    )
+    unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or time.unit
+    if unit and kind_of(unit) != "time":
+        raise TunnelError(
+            f"'{one_line(time.name, 40)}' is in '{one_line(unit, 20)}', which is not a unit of time",
+            where=where,
+            remedy="give --time-unit, or --time with the name of another column",
+        )
     if not unit:
         steps = np.diff(np.sort(time.values[np.isfinite(time.values)]))  # rows may be out of order
         step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
@@ -102,10 +113,17 @@ def in_radians(
         The readings, shape (n,), what they are, and the unit they were taken to have.
 
     Raises:
-        TunnelError: counts without counts per turn, volts without a calibration.
+        TunnelError: counts without counts per turn, volts without a calibration, another unit, or a swing of more
+            than half a turn in degrees that the user has not stated.
     """
     kinds = ("angle", "counts", "voltage", "rate", "acceleration")
-    unit = stated_unit(choices.unit, kinds, "--unit") or (reading.unit if kind_of(reading.unit) else "")
+    unit = stated_unit(choices.unit, kinds, "--unit") or reading.unit
+    if unit and kind_of(unit) not in kinds and choices.counts_per_turn is None and calibration is None:
+        raise TunnelError(
+            f"'{one_line(reading.name, 40)}' is in '{one_line(unit, 20)}', which is not a known unit of an angle",
+            where=where,
+            remedy="give --unit, --counts-per-turn N or --calibration",
+        )
     values = reading.values
     if calibration is not None:
         volts = values * UNITS["voltage"].get(unit, 1.0)
@@ -127,7 +145,16 @@ def in_radians(
     kind = kind_of(unit)
     factor = UNITS[kind][unit]
     quantity: Quantity = "rate" if kind == "rate" else "acceleration" if kind == "acceleration" else "angle"
-    return (values if factor == 1.0 else values * factor), quantity, unit
+    values = values if factor == 1.0 else values * factor
+    swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
+    # A disc between springs swings as far, but counts look like degrees.
+    if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
+        raise TunnelError(
+            f"'{one_line(reading.name, 40)}' would swing by ±{swing / factor:.4g}°, more than half a turn",
+            where=where,
+            remedy="give --unit deg if it does; of an encoder --counts-per-turn N",
+        )
+    return values, quantity, unit
 
 
 def read_calibration(text: str | None) -> Calibration | None:

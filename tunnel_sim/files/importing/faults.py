@@ -10,7 +10,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, one_line
 
 @contextmanager
 def faults(kind: str, where: str) -> Iterator[None]:
-    """Convert whatever a library raises on a malformed file to a `TunnelError`.
+    """Convert whatever a library raises on a malformed file, except `MemoryError`, to a `TunnelError`.
 
     Args:
         kind: what the file is not, with its article.
@@ -20,7 +20,7 @@ def faults(kind: str, where: str) -> Iterator[None]:
     """
     try:
         yield
-    except TunnelError:
+    except (TunnelError, MemoryError):  # the guard reports memory
         raise
     except BaseException as error:
         # A panic of a library in Rust is not a subclass of Exception, and has no name to import.

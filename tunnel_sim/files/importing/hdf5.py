@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.arrays import check_size, tables_of
-from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.arrays import RUN_IDS, check_size, tables_of
 from tunnel_sim.files.importing.faults import faults
-from tunnel_sim.files.importing.source import Table
+from tunnel_sim.files.importing.tables import Table
 from tunnel_sim.files.importing.units import known_unit
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
@@ -25,12 +24,13 @@ KIND = "an HDF5 file"
 """As messages name it."""
 
 
-def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
-    """The tables of an HDF5 file; arguments as in `source.Reader`."""
+def read(content: bytes, where: str) -> list[Table]:
+    """The tables of an HDF5 file; arguments as in `source.LibraryReader`."""
     h5py = library("h5py", "HDF5 (also MAT 7.3)", "import", where)
     with faults(KIND, where), h5py.File(io.BytesIO(content), "r") as file:
         datasets: dict[str, Any] = {}
         attributes: dict[str, NDArray[np.generic]] = {}
+        runs: dict[str, str] = {}
 
         def visit(path: str, item: Any) -> None:
             check_count(
@@ -38,17 +38,21 @@ def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Tabl
             )
             if isinstance(item, h5py.Dataset) and not path.startswith("#refs#") and not _is_text(item):
                 datasets[path] = item
-            for name, value in item.attrs.items():
-                if np.size(value) == 1 and np.asarray(value).dtype.kind in "iuf":
-                    folder = path if isinstance(item, h5py.Group) else path.rpartition("/")[0]
-                    attributes[f"{folder}/{name}".lstrip("/")] = np.asarray(value)
+            group = isinstance(item, h5py.Group)
+            for name in item.attrs:
+                held = item.attrs.get_id(name)  # others are not read: a text may lie in a damaged heap
+                if held.dtype.kind in "iuf" and held.get_space().get_simple_extent_npoints() == 1:
+                    folder = path if group else path.rpartition("/")[0]
+                    attributes[f"{folder}/{name}".lstrip("/")] = np.asarray(item.attrs[name])
+                elif group and name in RUN_IDS and isinstance(text := item.attrs[name], str):
+                    runs[path] = text
 
         visit("", file)
         file.visititems(visit)  # does not follow links, so nothing outside the file is opened
         check_size(sum(int(np.prod(item.shape, dtype=float)) for item in datasets.values()), where)
         arrays = attributes | dict(_columns(datasets))
         units = {path: _unit(item) for path, item in datasets.items() if _unit(item)}
-    return tables_of(arrays, KIND.partition(" ")[2], units), {}
+    return tables_of(arrays, KIND.partition(" ")[2], units, runs)
 
 
 def _columns(datasets: dict[str, Any]) -> list[tuple[str, NDArray[np.generic]]]:

@@ -6,7 +6,8 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from tunnel_sim.files.importing.units import known_unit, split_unit
+from tunnel_sim.files.importing.tables import names_runs
+from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_unit
 
 MISSING = ("", "nan", "-nan", "#n/a", "n/a", "na", "null", "none", "-", "--", "inf", "-inf", "#num!")
 """Texts, in lower case, that stand for a missing number."""
@@ -15,8 +16,12 @@ _NUMBER = {
     ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
 }
 _FACT = re.compile(
-    r"^\W*([A-Za-z][^\d:=,;\t]*?)\s*[:=,;\t]\s*([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*([^\s\d;,\t]\S*)?"
+    r"(?:^|[,;|\t])\W*([^\W\d_][^\d:=,;\t]*?)\s*[:=,;\t]\s*([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
+    r" *([;,\t]? *[^\s\d;,\t|=:][^;,\t|=:]*(?![^;,\t|]))?"
 )
+"""A name, a number, and its unit, perhaps in the next cell."""
+_HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
+_LONG_UNIT = 8  # characters: a longer text is a name
 
 
 def is_number(text: str, decimal: str = ".") -> bool:
@@ -42,7 +47,7 @@ class Layout:
         names: of the columns, without units.
         units: of the columns, as `split_unit` gives them.
         headed: whether the names are those of the file.
-        facts: numbers that the lines above the table state, by name; a unit of s or Hz has been applied.
+        facts: numbers that the lines above the table state, by name, in SI units where their unit is known.
     """
 
     first: int
@@ -50,6 +55,16 @@ class Layout:
     units: tuple[str, ...]
     headed: bool
     facts: Mapping[str, float]
+
+    @property
+    def runs(self) -> int | None:
+        """Index of the column that says to which run a row belongs."""
+        found = (
+            i
+            for i, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
+            if names_runs(name) and not unit
+        )
+        return next(found, None)
 
 
 def find_layout(
@@ -124,21 +139,24 @@ def _heading(row: Sequence[str], width: int, number: Callable[[str], bool]) -> l
 
 
 def _are_units(cells: Sequence[str]) -> bool:
+    """Whether a row holds units: known ones or others in brackets, or as many known ones as short texts."""
     said = [cell for cell in cells if cell.strip("-")]
-    return (
-        bool(said)
-        and all(known_unit(cell) or re.fullmatch(r"[\[({].*[\])}]", cell) for cell in said)
-        and any(known_unit(cell) for cell in said)
+    known = sum(known_unit(cell) is not None for cell in said)
+    others = [cell for cell in said if known_unit(cell) is None and not re.fullmatch(r"[\[({].*[\])}]", cell)]
+    return known > 0 and (
+        not others or (known > len(others) and all(len(cell) <= _LONG_UNIT for cell in others))
     )
 
 
 def _facts(lines: Sequence[str]) -> dict[str, float]:
-    """Numbers such as ``Sample rate: 1000 Hz``, in s and Hz where such a unit follows."""
+    """Numbers such as ``Sample rate: 1000 Hz`` or ``V = 54 km/h``, in SI units where the unit is known."""
     found = {}
     for line in lines:
-        match = _FACT.match(line)
-        if match:
-            unit = (match[3] or "").strip("()[]").lower()
-            factor = {"khz": 1e3, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}.get(unit, 1.0)
-            found[match[1].strip()] = float(match[2].replace(",", ".")) * factor
+        for name, number, text in _FACT.findall(line):
+            text = text.lstrip(";,\t ").strip("()[] ")
+            unit = known_unit(text) or ""
+            factor = _HERTZ.get(text.lower()) or UNITS.get(kind_of(unit), {}).get(unit, 1.0)
+            value = float(number.replace(",", ".")) * factor
+            strange = text and not unit and text.lower() not in _HERTZ
+            found[f"{name.strip()} ({text})" if strange else name.strip()] = value
     return found

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.files.importing import hdf5
-from tunnel_sim.files.importing.arrays import check_size, tables_of
-from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.arrays import RUN_IDS, check_size, tables_of
 from tunnel_sim.files.importing.faults import faults
-from tunnel_sim.files.importing.source import Table
+from tunnel_sim.files.importing.tables import Table
 from tunnel_sim.vocabulary import limits
 
 LIMIT = limits.DATA_BYTES
@@ -27,17 +26,20 @@ _COMPRESSED = 15  # data type of an element that zlib has packed
 _HEADER = 128  # bytes before the first element of version 5
 
 
-def read(content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
-    """The tables of a MAT file; arguments as in `source.Reader`."""
+def read(content: bytes, where: str) -> list[Table]:
+    """The tables of a MAT file; arguments as in `source.LibraryReader`."""
     if content.startswith((b"MATLAB 7.3", b"\x89HDF")):
-        return hdf5.read(content, where, choices)
+        return hdf5.read(content, where)
     from scipy.io import loadmat
 
     with faults(KIND, where):
         check_size(_unpacked(content) // 8, where)
         held = loadmat(cast(Any, io.BytesIO(content)), simplify_cells=True)  # the stubs know paths only
-    arrays = dict(_leaves({name: value for name, value in held.items() if not name.startswith("__")}))
-    return tables_of(arrays, "MAT file"), {}
+    leaves = dict(_leaves({name: value for name, value in held.items() if not name.startswith("__")}))
+    arrays = {path: value for path, value in leaves.items() if not isinstance(value, str)}
+    texts = {path.rpartition("/"): value for path, value in leaves.items() if isinstance(value, str)}
+    runs = {group: text for (group, _, name), text in texts.items() if name in RUN_IDS}
+    return tables_of(arrays, "MAT file", runs=runs)
 
 
 def _unpacked(content: bytes) -> int:
@@ -57,13 +59,15 @@ def _unpacked(content: bytes) -> int:
     return total
 
 
-def _leaves(value: object, path: str = "") -> Iterator[tuple[str, NDArray[np.generic]]]:
-    """Arrays of structures and cells, by path."""
+def _leaves(value: object, path: str = "") -> Iterator[tuple[str, NDArray[np.generic] | str]]:
+    """Arrays and texts of structures and cells, by path."""
     if isinstance(value, dict):
         for name, member in value.items():
             yield from _leaves(member, f"{path}/{name}" if path else str(name))
     elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
         for i, member in enumerate(np.ravel(value) if isinstance(value, np.ndarray) else value, 1):
             yield from _leaves(member, f"{path}[{i}]")
+    elif isinstance(value, str):
+        yield path, value
     elif isinstance(value, int | float | np.ndarray | np.generic):
         yield path, np.asarray(value)

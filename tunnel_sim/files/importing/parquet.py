@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import polars as pl
 
-from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.source import Channel, Table
+from tunnel_sim.files.importing.tables import Channel, Table, by_texts, names_runs
 from tunnel_sim.files.importing.units import split_unit
 from tunnel_sim.files.reading import frame_schema, read_frame
 from tunnel_sim.vocabulary import limits
@@ -19,13 +18,16 @@ KIND = "a Parquet file"
 _REMEDY = "write the file again, as Parquet or as text"
 
 
-def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
-    """The table of a Parquet file; arguments as in `source.Reader`."""
+def read(content: bytes, where: str) -> list[Table]:
+    """The table of a Parquet file; arguments as in `source.LibraryReader`."""
     schema = frame_schema(content, where, _REMEDY, rows=limits.RUN_SAMPLES, counted="samples")
-    used = [name for name, kind in schema.items() if kind.is_numeric() or kind.is_temporal()]
+    runs = next((name for name, kind in schema.items() if names_runs(name) and kind == pl.String), None)
+    used = [name for name, kind in schema.items() if kind.is_numeric() or kind.is_temporal() or name == runs]
     frame = read_frame(content, where, _REMEDY, used)
     channels = []
     for column in frame.get_columns():
+        if column.name == runs:
+            continue
         name, unit = split_unit(column.name)
         if column.dtype.is_temporal():
             if column.dtype not in (pl.Datetime, pl.Duration):
@@ -35,4 +37,5 @@ def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Tabl
         values = column.cast(pl.Float64).fill_null(float("nan")).to_numpy()
         channels.append(Channel(name, values, unit))
     said = f"Parquet file: {len(channels)} columns of {frame.height} samples"
-    return [Table(tuple(channels), said=(said,))], {}
+    table = Table(tuple(channels), said=(said,))
+    return [table] if runs is None else by_texts(table, runs, frame.get_column(runs))

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts, without_overflow
 from tunnel_sim.files.importing.columns import Pair, find_pairs
-from tunnel_sim.files.importing.conditions import from_facts
+from tunnel_sim.files.importing.conditions import condition_of, from_column, from_facts
 from tunnel_sim.files.importing.conversion import Calibration, in_radians, in_seconds, sample_interval
-from tunnel_sim.files.importing.source import Channel, Source, Table
+from tunnel_sim.files.importing.source import Source
+from tunnel_sim.files.importing.tables import Channel, Table
+from tunnel_sim.files.importing.units import kind_of
 from tunnel_sim.files.toml_input import one_line, shown
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -33,8 +37,12 @@ class Raw:
         cleaned: times and readings.
         quantity: what the readings are.
         unit: that the readings had in the file.
-        stated: conditions in the file.
+        stated: conditions and sizes in the file, beside its columns.
+        named: conditions in the name of the file.
         said: how it was read, and what was changed.
+        columns: of conditions, by key, with the rows of the record.
+        clock: of these rows, from the first sample on, shape (n,), s; NaN where there is no time.
+        whole: whether the file itself says that it is one run.
     """
 
     id: str
@@ -44,7 +52,33 @@ class Raw:
     quantity: Quantity
     unit: str
     stated: dict[str, float]
+    named: dict[str, float]
     said: tuple[str, ...]
+    columns: Mapping[str, Channel]
+    clock: Array
+    whole: bool
+
+    def measured(self, first: float, last: float, said: list[str]) -> dict[str, float]:
+        """Conditions that columns of the file state.
+
+        Args:
+            first: time of a run's first sample, s.
+            last: time of its last sample, s.
+            said: remarks are added.
+        """
+        rows = (self.clock >= first) & (self.clock <= last)
+        found = {
+            key: value
+            for key, column in self.columns.items()
+            if (value := from_column(key, column, rows, said)) is not None
+        }
+        names = [(key, self.columns[key].name) for key in found]
+        if names:
+            listed = ", ".join(
+                key if key == name else f"{key} ('{one_line(name, 40)}')" for key, name in names
+            )
+            said.append(f"from columns: {listed}")
+        return found
 
 
 def raw_records(
@@ -92,11 +126,13 @@ def _raws(
         values = without_overflow(pair.reading.values, said)
         reading = Channel(pair.reading.name, values, pair.reading.unit)
         readings, quantity, unit = in_radians(reading, choices, calibration, said, where)
-        time, readings = _within(time, readings, choices, said)
+        kept = _within(time, choices, said)
+        time, readings = time[kept], readings[kept]
+        conditions = _condition_columns(table, pair, kept, said)
         names = [source.path.stem if several or not (table.part or pair.run) else "", table.part, pair.run]
         name = one_line("-".join(part for part in names if part))
-        stated = from_facts(table.facts) | named
-        said += [f"{key} = {value:g} from the file" for key, value in stated.items()]
+        stated = from_facts(table.facts, said)
+        said += [f"{key} = {value:g} from the file's name" for key, value in named.items()]
         starts = [0, *restarts(time), time.size]
         if len(starts) > 2:
             said.append(f"the clock starts anew {len(starts) - 2} times: another run each")
@@ -105,9 +141,21 @@ def _raws(
             label = name if len(starts) == 2 else f"{name}-{place}"
             if clean.time_s.size < 2:
                 raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
+            columns = {key: replace(c, values=c.values[a:b]) for key, c in conditions.items()}
             found.append(
                 Raw(
-                    label, source.path, pair.reading.name, clean, quantity, unit, stated, (*said, *clean.said)
+                    label,
+                    source.path,
+                    pair.reading.name,
+                    clean,
+                    quantity,
+                    unit,
+                    stated,
+                    named,
+                    (*said, *clean.said),
+                    columns,
+                    time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
+                    table.named and len(starts) == 2,
                 )
             )
     return found
@@ -117,7 +165,7 @@ def _times(pair: Pair, table: Table, choices: ImportChoices, said: list[str], wh
     """The times of a run, s."""
     if pair.time is not None:
         values = without_overflow(pair.time.values, said)
-        return in_seconds(Channel(pair.time.name, values, pair.time.unit), choices, said)
+        return in_seconds(Channel(pair.time.name, values, pair.time.unit), choices, said, where)
     interval, origin = sample_interval(table.facts, choices)
     if interval is None:
         raise TunnelError("no column of times", where=where, remedy="give --time NAME, or --rate in Hz")
@@ -125,14 +173,32 @@ def _times(pair: Pair, table: Table, choices: ImportChoices, said: list[str], wh
     return np.arange(pair.reading.values.size, dtype=np.float64) * interval
 
 
-def _within(time: Array, reading: Array, choices: ImportChoices, said: list[str]) -> tuple[Array, Array]:
-    """The samples between the stated start and end."""
+def _condition_columns(
+    table: Table, pair: Pair, kept: NDArray[np.bool_], said: list[str]
+) -> dict[str, Channel]:
+    """The columns that state conditions, by key; of several that state the same, the first."""
+    found: dict[str, Channel] = {}
+    for channel in table.channels:
+        key = condition_of(channel.name, channel.unit)
+        if channel is pair.time or channel is pair.reading:
+            continue
+        if key is not None:
+            found.setdefault(key, replace(channel, values=channel.values[kept]))
+        elif kind_of(channel.unit) in ("speed", "stiffness", "density"):
+            said.append(
+                f"'{one_line(channel.name, 60)}' in {channel.unit} is left out: its name is not that of a condition"
+            )
+    return found
+
+
+def _within(time: Array, choices: ImportChoices, said: list[str]) -> NDArray[np.bool_]:
+    """Which samples lie between the stated start and end, shape (n,)."""
     first = -np.inf if choices.start is None else choices.start
     last = np.inf if choices.end is None else choices.end
     if choices.start is None and choices.end is None:
-        return time, reading
+        return np.ones(time.shape, dtype=bool)
     # Stamps are decimals: a start at one of them includes it.
     slack = 1e-9 * max(abs(first) if np.isfinite(first) else 0.0, abs(last) if np.isfinite(last) else 0.0)
     kept = (time >= first - slack) & (time <= last + slack)
     said.append(f"{int(kept.sum())} of {time.size} samples lie from --start to --end")
-    return time[kept], reading[kept]
+    return kept

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,6 +47,7 @@ class Part:
         run: the run; None where it is left out.
         said: why it is left out, or what is assumed of it.
         rest: the reading at rest that is stated and subtracted, rad (rad/s or rad/s²); None: not stated.
+        sizes: of the rig, as the file states them, by key of `Conditions`.
     """
 
     id: str
@@ -55,6 +56,7 @@ class Part:
     run: Run | None
     said: tuple[str, ...]
     rest: float | None
+    sizes: Mapping[str, float]
 
     @property
     def reading(self) -> Array:
@@ -91,7 +93,7 @@ class Imported:
         found = [(text, s.path.name) for s in sources for table in s.tables for text in table.said]
         found += [(text, part.id) for part in parts for text in (*part.raw.said, *part.said)]
         places: dict[str, list[str]] = {}
-        for text, place in found:
+        for text, place in dict.fromkeys(found):
             places.setdefault(text, []).append(place)
         everywhere = len(self.parts)
         lines = [
@@ -173,7 +175,8 @@ def _parts(
     for label, raw in named:
         time, reading = raw.cleaned.time_s, raw.cleaned.reading
         angle = raw.quantity == "angle"
-        pieces = find_runs(time, reading) if choices.cut and angle else [Piece(0, time.size)]
+        cut = choices.cut and angle and not raw.whole
+        pieces = find_runs(time, reading) if cut else [Piece(0, time.size)]
         for number, piece in enumerate(pieces, 1):
             name = label if len(pieces) == 1 else f"{label}-{number}"
             parts.append(_part(name, raw, piece, choices, table))
@@ -191,9 +194,14 @@ def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: Cond
     if rest is not None:
         reading = from_rest(reading, rest, SensorProperties(quantity=raw.quantity).unit, said, where)
     given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
-    stated = raw.stated | (table.of(raw.source, name) if table is not None else {}) | given
-    validate(Conditions, stated, raw.source)
-    plausible_values(stated, where)
+    in_table = {} if table is None else table.of(raw.source, name)
+    # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
+    measured = raw.measured(float(time[0]), float(time[-1]), said)
+    stated = raw.stated | measured | raw.named | in_table | given
+    sizes = {key: stated.pop(key) for key in RIG_KEYS if key in stated}
+    sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
+    validate(Conditions, stated | sizes, raw.source)
+    plausible_values(stated | sizes, where)
     if "wind_speed" not in stated:
         if _WIND_ON.search(f"{raw.source.stem} {name}"):
             raise TunnelError(
@@ -213,9 +221,9 @@ def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: Cond
     try:
         record = _judged(from_zero(time), reading, raw.quantity, stated.get("release_angle"), where)
     except TunnelError as error:
-        return Part(name, raw, piece, None, (*said, f"left out: {error.what}"), rest)
+        return Part(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
     run = Run(name, record, **({"wind_speed": 0.0} | stated))
-    return Part(name, raw, piece, run, tuple(said), rest)
+    return Part(name, raw, piece, run, tuple(said), rest, sizes)
 
 
 def _judged(
@@ -251,8 +259,7 @@ def _campaign(parts: Sequence[Part], choices: ImportChoices, name: str, quantity
             remedy="check --time, --time-unit, --rate, --angle and --unit, or keep it whole with --no-cut",
         )
     files = list(dict.fromkeys(part.raw.source.name for part in parts))
-    rig = choices.conditions.model_dump(include=set(RIG_KEYS))
-    plausible_values(rig, "--set")
+    rig = _rig(parts, choices)
     return Campaign(
         name,
         RigProperties(**rig),
@@ -266,6 +273,21 @@ def _campaign(parts: Sequence[Part], choices: ImportChoices, name: str, quantity
         runs,
         one_line(f"Imported from {', '.join(files[:3])}{' and others' if len(files) > 3 else ''}"),
     )
+
+
+def _rig(parts: Sequence[Part], choices: ImportChoices) -> dict[str, float]:
+    """The sizes of the rig, as stated or else from the files."""
+    rig = choices.conditions.model_dump(include=set(RIG_KEYS), exclude_none=True)
+    plausible_values(rig, "--set")
+    for part in parts:
+        for key, value in part.sizes.items():
+            if rig.setdefault(key, value) != value and getattr(choices.conditions, key) is None:
+                raise TunnelError(
+                    f"{key} = {value:g}, and {rig[key]:g} in another run",
+                    where=f"{shown(part.raw.source)}, run '{part.id}'",
+                    remedy=f"give --set {key}=NUMBER, or import them separately",
+                )
+    return rig
 
 
 def _found(raws: Sequence[Raw], choices: ImportChoices) -> dict[str, object]:

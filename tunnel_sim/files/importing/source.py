@@ -1,4 +1,4 @@
-"""What a file holds before anybody knows what its columns mean: numbers by name."""
+"""Files of any known format as tables, before anybody knows what their columns mean."""
 
 from __future__ import annotations
 
@@ -11,45 +11,13 @@ from typing import Protocol, cast
 
 import numpy as np
 
+from tunnel_sim.files.importing import text
 from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.guard import read_guarded
+from tunnel_sim.files.importing.tables import Table, by_run
 from tunnel_sim.files.reading import check_count, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
-from tunnel_sim.vocabulary.record import Array
-
-
-@dataclass(frozen=True, eq=False)
-class Channel:
-    """One column of a table.
-
-    Args:
-        name: as in the file, without its unit.
-        values: shape (n,), in the unit of the file; NaN where there is no number.
-        unit: one of `units.UNITS`, another text, or empty where none is stated.
-    """
-
-    name: str
-    values: Array
-    unit: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Table:
-    """Columns of the same length.
-
-    Args:
-        channels: the columns that hold numbers, in their order.
-        part: sheet, group or structure in the file; empty where the file holds one table.
-        facts: single numbers beside the columns, by name.
-        said: how the table was read, and what was left out.
-        headed: whether the columns are named in the file.
-    """
-
-    channels: tuple[Channel, ...]
-    part: str = ""
-    facts: Mapping[str, float] = field(default_factory=dict)
-    said: tuple[str, ...] = ()
-    headed: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +37,7 @@ class Source:
     known: Mapping[str, str] = field(default_factory=dict)
 
 
-class Reader(Protocol):
+class Format(Protocol):
     """A module that reads one format."""
 
     LIMIT: int
@@ -79,8 +47,12 @@ class Reader(Protocol):
     KIND: str
     """The name of the format, with its article."""
 
-    def read(self, content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
-        """The tables, and how they were read, for the recipe.
+
+class LibraryReader(Format, Protocol):
+    """A module that reads a format with a library, which `guard` therefore runs in a process with limits."""
+
+    def read(self, content: bytes, where: str) -> list[Table]:
+        """The tables.
 
         Raises:
             TunnelError: when it is not such a file, or too large.
@@ -98,7 +70,7 @@ READERS: Mapping[str, str] = {
     ".tdms": _ROOM + "tdms",
     ".parquet": _ROOM + "parquet",
 }
-"""Modules that read a format (`Reader`), by the ending of the file's name; any other file is read as text."""
+"""Modules that read a format (`LibraryReader`), by the ending of the name; any other file is read as text."""
 
 _BEGINNINGS = {
     b"PK\x03\x04": "an Excel workbook or another archive",
@@ -122,13 +94,18 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
         TunnelError: no such file, too large, or not of the format that its name says.
     """
     where = shown(path)
-    reader = cast("Reader", import_module(READERS.get(path.suffix.lower(), _ROOM + "text")))
-    content = read_regular(path, reader.LIMIT)
+    module = READERS.get(path.suffix.lower())
+    form = cast("Format", text if module is None else import_module(module))
+    content = read_regular(path, form.LIMIT)
     if not content.strip():
         raise TunnelError("the file is empty", where=where, remedy="name a file that holds a record")
-    _check_beginning(content, reader, where)
-    tables, known = reader.read(content, where, choices)
-    tables = [_computable(table) for table in tables if table.channels]
+    _check_beginning(content, form, where)
+    known: dict[str, str] = {}
+    if module is None:
+        tables, known = text.read(content, where, choices)
+    else:
+        tables = read_guarded(module, content, where)
+    tables = [part for table in tables if table.channels for part in by_run(_computable(table))]
     if not tables:
         raise TunnelError(
             "no column of numbers", where=where, remedy="name a file that holds times and angles"
@@ -150,14 +127,14 @@ def _computable(table: Table) -> Table:
     return replace(table, channels=tuple(channels), said=(*table.said, *said)) if said else table
 
 
-def _check_beginning(content: bytes, reader: Reader, where: str) -> None:
-    if reader.MAGIC and content.startswith(reader.MAGIC):
+def _check_beginning(content: bytes, form: Format, where: str) -> None:
+    if form.MAGIC and content.startswith(form.MAGIC):
         return
     really = next((kind for magic, kind in _BEGINNINGS.items() if content.startswith(magic)), None)
-    if really is not None or reader.MAGIC:
+    if really is not None or form.MAGIC:
         remedy = "give the file the ending of its format, or export it again"
         raise TunnelError(
-            f"is not {reader.KIND}" + (f": it begins like {really}" if really else ""),
+            f"is not {form.KIND}" + (f": it begins like {really}" if really else ""),
             where=where,
             remedy=remedy,
         )

@@ -7,9 +7,8 @@ import io
 import numpy as np
 
 from tunnel_sim.files.importing.arrays import check_size
-from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.faults import faults
-from tunnel_sim.files.importing.source import Channel, Table
+from tunnel_sim.files.importing.tables import Channel, Table
 from tunnel_sim.files.importing.units import known_unit, split_unit
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
@@ -23,8 +22,8 @@ KIND = "a TDMS file"
 """As messages name it."""
 
 
-def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
-    """The tables of a TDMS file, one for each group; arguments as in `source.Reader`."""
+def read(content: bytes, where: str) -> list[Table]:
+    """The tables of a TDMS file, one for each group; arguments as in `source.LibraryReader`."""
     nptdms = library("nptdms", "TDMS", "import", where)
     tables = []
     with faults(KIND, where), nptdms.TdmsFile.open(io.BytesIO(content)) as file:
@@ -50,7 +49,7 @@ def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Tabl
                 part = group.name if len(groups) > 1 else ""
                 said = (f"TDMS file: group '{group.name}', {len(columns)} channels of {length} samples",)
                 tables.append(Table(tuple(columns), part, facts, said))
-    return tables, {}
+    return tables
 
 
 def _numbers(properties: dict[str, object]) -> dict[str, float]:

@@ -7,16 +7,18 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.layout import MISSING, Layout, find_layout, is_missing, is_number
-from tunnel_sim.files.importing.source import Channel, Table
+from tunnel_sim.files.importing.tables import Channel, Table, by_texts
 from tunnel_sim.files.reading import check_count, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+
+if TYPE_CHECKING:
+    from tunnel_sim.files.importing.choices import ImportChoices
 
 LIMIT = limits.CSV_BYTES
 """Largest file, bytes."""
@@ -24,7 +26,7 @@ MAGIC: tuple[bytes, ...] = ()
 """Text begins with anything."""
 KIND = "a table of text"
 """As messages name it."""
-_CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:Z|[+-]\d{2}:?\d{2})?$"
+_CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:\s*([AaPp])\.?[Mm]\.?|Z|[+-]\d{2}:?\d{2})?$"
 _DAY = 86400.0  # s
 _HEAD, _MIDDLE = 2**18, 2**14  # bytes that are looked at
 _HEAD_LINES = 400
@@ -57,7 +59,7 @@ class Dialect:
 
 
 def read(content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
-    """The table of a text file; arguments as in `source.Reader`."""
+    """The table of a text file; and how it was read, for the recipe."""
     content, encoding = _as_utf8(content, where)
     head, body = _samples(content)
     dialect = find_dialect(body, choices)
@@ -76,18 +78,16 @@ def read(content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table
             where=where,
             remedy="remove the lines above the table",
         )
-    channels, notes = _channels(content, dialect, layout, where)
     heading = "names in the line above the numbers" if layout.headed else "no names of columns"
     said = (
         f"text ({encoding}), {dialect.width} columns separated by {_SAID[dialect.delimiter]}, decimal "
-        f"{'comma' if dialect.decimal == ',' else 'point'}, numbers from line {layout.first + 1}, {heading}",
-        *notes,
+        f"{'comma' if dialect.decimal == ',' else 'point'}, numbers from line {layout.first + 1}, {heading}"
     )
     known = {
         "delimiter": next(name for name, sign in _NAMES.items() if sign == dialect.delimiter),
         "decimal": dialect.decimal,
     }
-    return [Table(channels, facts=layout.facts, said=said, headed=layout.headed)], known
+    return _tables(content, dialect, layout, where, said), known
 
 
 def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
@@ -148,10 +148,8 @@ def _samples(content: bytes) -> tuple[list[str], list[str]]:
     return head, [line for line in body if line.strip() and line[0] not in "#%"]
 
 
-def _channels(
-    content: bytes, dialect: Dialect, layout: Layout, where: str
-) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
-    """The columns of numbers, and remarks on what is no number."""
+def _tables(content: bytes, dialect: Dialect, layout: Layout, where: str, said: str) -> list[Table]:
+    """The columns of numbers, run by run where a column names the runs, with remarks on what is not a number."""
     if dialect.delimiter == " ":
         content = re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", content)
         content = re.sub(rb"[ \t]+", b" ", content)
@@ -159,19 +157,23 @@ def _channels(
         "separator": dialect.delimiter,
         "has_header": False,
         "skip_lines": layout.first,
-        "null_values": sorted({*MISSING[1:], *map(str.upper, MISSING[1:]), "NaN", "Inf", "-Inf"}),
         "truncate_ragged_lines": True,
     }
+    names = [f"column_{i + 1}" for i in range(dialect.width)]
+    missing = sorted({*MISSING[1:], *map(str.upper, MISSING[1:]), "NaN", "Inf", "-Inf"})
     try:
+        labels = None
+        if (at := layout.runs) is not None:  # a name of a run is what it is, also where it is "nan"
+            schema = dict.fromkeys(names, pl.String)
+            labels = pl.read_csv(content, schema=schema, columns=[at], **options).to_series()
         try:
-            floats = {f"column_{i + 1}": pl.Float64 for i in range(dialect.width)}
-            frame = pl.read_csv(
-                content, schema=floats, decimal_comma=dialect.decimal == ",", quote_char=None, **options
-            )
-            return channels_of(frame, layout), ()
+            kinds = {name: pl.String if i == layout.runs else pl.Float64 for i, name in enumerate(names)}
+            numbers = {**options, "decimal_comma": dialect.decimal == ",", "quote_char": None}
+            frame = pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
         except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
-            texts = {f"column_{i + 1}": pl.String for i in range(dialect.width)}
-            return _from_texts(pl.read_csv(content, schema=texts, **options), dialect, layout)
+            texts = dict.fromkeys(names, pl.String)
+            frame = pl.read_csv(content, schema=texts, null_values=missing, **options)
+        return tables_of(frame, layout, dialect.decimal, labels, Table((), said=(said,), facts=layout.facts))
     except pl.exceptions.PolarsError as error:
         raise TunnelError(
             f"not a table of text ({one_line(error, 60)})",
@@ -180,45 +182,58 @@ def _channels(
         ) from None
 
 
-def channels_of(frame: pl.DataFrame, layout: Layout) -> tuple[Channel, ...]:
-    """The columns that hold at least one number, with the names and units of a layout.
+def tables_of(
+    frame: pl.DataFrame, layout: Layout, decimal: str, labels: pl.Series | None, table: Table
+) -> list[Table]:
+    """The tables of a sheet.
 
     Args:
-        frame: of numbers, nulls where there are none.
+        frame: numbers and texts, nulls where there are none.
         layout: as many names and units.
+        decimal: the decimal sign of the texts.
+        labels: the run of each row, where a column names the runs.
+        table: what else is known of it.
+
+    Returns:
+        One, or one for each run, with the columns that hold numbers or times of day.
     """
-    return tuple(
-        Channel(name, column.fill_null(float("nan")).to_numpy(), unit)
-        for name, unit, column in zip(layout.names, layout.units, frame.get_columns(), strict=True)
-        if column.null_count() < column.len()
-    )
-
-
-def _from_texts(
-    frame: pl.DataFrame, dialect: Dialect, layout: Layout
-) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
-    cells = pl.all().str.strip_chars(' \t\r"')
-    cells = cells.str.replace(",", ".", literal=True) if dialect.decimal == "," else cells
-    numbers = frame.select(cells.cast(pl.Float64, strict=False))
-    notes, units = [], list(layout.units)
-    for i, (name, text) in enumerate(zip(layout.names, frame.get_columns(), strict=True)):
-        number = numbers.to_series(i)
-        lost = number.null_count() - text.null_count()
-        if number.null_count() == text.len() and lost and (clock := _clock(text)) is not None:
-            numbers.replace_column(i, clock)
-            units[i] = "s"
-            notes.append(f"the column '{name}' holds times of day, taken as seconds")
-        elif number.null_count() == text.len() and lost:
-            notes.append(f"the column '{name}' holds text and is left out")
+    channels, notes = [], {-1: table.said[0]}
+    for i, (name, unit, column) in enumerate(
+        zip(layout.names, layout.units, frame.get_columns(), strict=True)
+    ):
+        number, lost = column, 0
+        if column.dtype == pl.String:
+            cells = column.str.strip_chars(' \t\r"')
+            cells = cells.str.replace(",", ".", literal=True) if decimal == "," else cells
+            number = cells.cast(pl.Float64, strict=False)
+            lost = number.null_count() - column.null_count()
+        if lost and number.null_count() == column.len():
+            clock = _clock(column)
+            if clock is not None:
+                number, unit = clock, "s"
+                notes[i] = f"the column '{name}' holds times of day, taken as seconds"
+            else:
+                notes[i] = f"the column '{name}' holds text and is left out"
         elif lost:
-            notes.append(f"{lost} texts in the column '{name}' are taken as missing")
-    return channels_of(numbers, replace(layout, units=tuple(units))), tuple(notes)
+            notes[i] = f"{lost} texts in the column '{name}' are taken as missing"
+        if number.null_count() < number.len():
+            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit))
+    table = replace(table, channels=tuple(channels), headed=layout.headed)
+    tables = [table]
+    if labels is not None and layout.runs is not None and labels.len() == frame.height:
+        tables = by_texts(table, layout.names[layout.runs], labels)
+    said = tuple(note for i, note in notes.items() if not (tables[0].named and i == layout.runs))
+    return [replace(one, said=(*said, *one.said[1:])) for one in tables]
 
 
 def _clock(text: pl.Series) -> pl.Series | None:
     """Times of day such as 14:03:07.25, with or without a date, in s; they go on at midnight."""
+    text = text.str.strip_chars(' \t\r"')
     fields = [text.str.extract(_CLOCK, group).str.replace(",", ".").cast(pl.Float64) for group in (1, 2, 3)]
-    seconds = 3600.0 * fields[0] + 60.0 * fields[1] + fields[2]
+    half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half
+    hours = pl.select(pl.when(half.is_null()).then(fields[0]).otherwise(fields[0] % 12.0)).to_series()
+    hours += (half == "p").fill_null(value=False).cast(pl.Float64) * 12.0
+    seconds = 3600.0 * hours + 60.0 * fields[1] + fields[2]
     if 2 * seconds.null_count() > seconds.len():
         return None
     midnights = (seconds.forward_fill().diff() < -_DAY / 2).fill_null(value=False).cum_sum()

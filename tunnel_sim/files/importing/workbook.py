@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.faults import faults
-from tunnel_sim.files.importing.layout import find_layout
-from tunnel_sim.files.importing.source import Table
-from tunnel_sim.files.importing.text import channels_of
+from tunnel_sim.files.importing.layout import find_layout, is_number
+from tunnel_sim.files.importing.tables import Table
+from tunnel_sim.files.importing.text import tables_of
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -24,30 +25,63 @@ KIND = "an Excel workbook"
 _HEAD = 400
 
 
-def read(content: bytes, where: str, _choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
-    """The tables of a workbook, one for each sheet; arguments as in `source.Reader`."""
+def read(content: bytes, where: str) -> list[Table]:
+    """The tables of a workbook, one for each sheet; arguments as in `source.LibraryReader`."""
     fastexcel = library("fastexcel", "Excel", "import", where)
     tables = []
     with faults(KIND, where):
         _check_archive(content, where)
         book = fastexcel.read_excel(content)
-        for name in book.sheet_names:
-            head = book.load_sheet(name, header_row=None, dtypes="string", n_rows=_HEAD)
-            check_count(head.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
-            rows = (
-                [[cell or "" for cell in row] for row in head.to_polars().iter_rows()] if head.width else []
-            )
-            layout = find_layout(rows, ["\t".join(row) for row in rows], ".", head.width)
-            if layout is None:
-                continue
-            kinds = dict.fromkeys(range(head.width), "float")
-            body = book.load_sheet(name, header_row=None, skip_rows=layout.first, dtypes=kinds)
-            heading = "names in the row above the numbers" if layout.headed else "no names of columns"
-            said = f"workbook: sheet '{name}', {head.width} columns, numbers from row {layout.first + 1}, {heading}"
-            part = name if len(book.sheet_names) > 1 else ""
-            channels = channels_of(body.to_polars(), layout)
-            tables.append(Table(channels, part, layout.facts, (said,), layout.headed))
-    return tables, {}
+        rows = {
+            name: _rows(book.load_sheet(name, header_row=None, dtypes="string", n_rows=_HEAD), where)
+            for name in book.sheet_names
+        }
+        described: dict[str, dict[str, Any]] = {}
+        for name in list(rows):
+            if found := _descriptions(book, name, rows[name]):
+                described |= found
+                del rows[name]
+        for name, sheet in rows.items():
+            tables += _tables(book, name, sheet, described.get(name, {}))
+    return tables
+
+
+def _rows(sheet: Any, where: str) -> list[list[str]]:
+    check_count(sheet.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
+    return [[cell or "" for cell in row] for row in sheet.to_polars().iter_rows()] if sheet.width else []
+
+
+def _descriptions(book: Any, name: str, rows: Sequence[Sequence[str]]) -> dict[str, dict[str, Any]]:
+    """What a sheet with a column ``sheet`` says about other sheets: cells by heading, by name of the sheet."""
+    heading = [cell.strip().lower() for cell in rows[0]] if rows else []
+    if "sheet" not in heading:
+        return {}
+    # As texts, numbers would lose digits.
+    kinds = {i: "string" if key in ("sheet", "run") else "float" for i, key in enumerate(heading)}
+    body = book.load_sheet(name, header_row=None, skip_rows=1, dtypes=kinds).to_polars()
+    found = [dict(zip(heading, row, strict=True)) for row in body.iter_rows()]
+    return (
+        {row["sheet"]: row for row in found} if all(row["sheet"] in book.sheet_names for row in found) else {}
+    )
+
+
+def _tables(book: Any, name: str, rows: Sequence[Sequence[str]], described: Mapping[str, Any]) -> list[Table]:
+    """The tables of a sheet: one, or one for each run."""
+    width = len(rows[0]) if rows else 0
+    layout = find_layout(rows, ["\t".join(row) for row in rows], ".", width)
+    if layout is None:
+        return []
+    numeric = [any(is_number(row[i]) for row in rows[layout.first :]) for i in range(width)]
+    kinds = {i: "float" if number and i != layout.runs else "string" for i, number in enumerate(numeric)}
+    body = book.load_sheet(name, header_row=None, skip_rows=layout.first, dtypes=kinds).to_polars()
+    heading = "names in the row above the numbers" if layout.headed else "no names of columns"
+    said = f"workbook: sheet '{name}', {width} columns, numbers from row {layout.first + 1}, {heading}"
+    facts = {key: cell for key, cell in described.items() if isinstance(cell, float)}
+    run = described.get("run") or ""
+    part = run or (name if len(book.sheet_names) > 1 else "")
+    labels = None if layout.runs is None else body.to_series(layout.runs)
+    table = Table((), part, {**layout.facts, **facts}, (said,), named=bool(run))
+    return tables_of(body, layout, ".", labels, table)
 
 
 def _check_archive(content: bytes, where: str) -> None:

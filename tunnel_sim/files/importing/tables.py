@@ -1,0 +1,112 @@
+"""Tables of a file: columns of numbers by name, before anybody knows what they mean."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_RUN_NAMES = re.compile(
+    r"(?i)(run|trial|versuch|lauf)[ _]?(id|name|no|nr|number|nummer|#)?\.?|"
+    r"(mess(ung|reihe)|versuchs)[ _]?(nr|nummer)\.?"
+)
+_LEAST_ROWS = 8  # of a run, on average: a column that changes more often numbers something else
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One column of a table.
+
+    Args:
+        name: as in the file, without its unit.
+        values: shape (n,), in the unit of the file; NaN where there is no number.
+        unit: one of `units.UNITS`, another text, or empty where none is stated.
+    """
+
+    name: str
+    values: Array
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Columns of the same length.
+
+    Args:
+        channels: the columns that hold numbers, in their order.
+        part: sheet, group, structure or run in the file; empty where the file holds one table.
+        facts: single numbers beside the columns, by name.
+        said: how the table was read, and what was left out.
+        headed: whether the columns are named in the file.
+        named: whether the part is the name that the file gives to a run, which the table then holds whole.
+    """
+
+    channels: tuple[Channel, ...]
+    part: str = ""
+    facts: Mapping[str, float] = field(default_factory=dict)
+    said: tuple[str, ...] = ()
+    headed: bool = True
+    named: bool = False
+
+
+def names_runs(heading: str) -> bool:
+    """Whether a column of that name says to which run each row belongs."""
+    return _RUN_NAMES.fullmatch(heading.strip()) is not None
+
+
+def by_run(table: Table) -> list[Table]:
+    """A table with a column of the numbers of its runs as one table for each run; any other as it is."""
+    channel = next((c for c in table.channels if not table.named and names_runs(c.name) and not c.unit), None)
+    if channel is None:
+        return [table]
+    number = np.nan_to_num(channel.values, nan=-np.inf)
+    starts = np.flatnonzero(number[1:] != number[:-1]) + 1
+    return by_label(
+        table, channel.name, starts, [f"{n:.15g}" if n > -np.inf else "" for n in number[[0, *starts]]]
+    )
+
+
+def by_texts(table: Table, column: str, texts: pl.Series) -> list[Table]:
+    """A table as one for each run that a column of texts names; as it is where the column names none."""
+    texts = texts.cast(str).fill_null("").str.strip_chars(" \t\r")
+    changes = (texts != texts.shift()).fill_null(value=False).arg_true().to_numpy()
+    return by_label(table, column, changes, texts.gather([0, *changes]).to_list() if texts.len() else [])
+
+
+def by_label(table: Table, column: str, starts: NDArray[np.integer], names: Sequence[str]) -> list[Table]:
+    """A table as one for each run.
+
+    Args:
+        column: that names the runs.
+        starts: the first row of each stretch of rows of one name, but for the first.
+        names: of these stretches; the rows of an empty one belong to no run.
+
+    Returns:
+        In their order; the table as it is where the column cannot name runs, because it is no such column.
+    """
+    runs = [name for name in names if name]
+    rows = table.channels[0].values.size if table.channels else 0
+    if not 0 < len(names) <= rows / _LEAST_ROWS or len(set(runs)) < len(runs):
+        return [table]
+    channels = [channel for channel in table.channels if channel.name != column]
+    said = (*table.said, f"the column '{column}' names the runs")
+    return [
+        replace(
+            table,
+            channels=tuple(replace(channel, values=channel.values[a:b]) for channel in channels),
+            part="-".join(filter(None, (table.part, name))),
+            said=said,
+            named=True,
+        )
+        for name, a, b in zip(names, [0, *starts], [*starts, rows], strict=True)
+        if name
+    ]
