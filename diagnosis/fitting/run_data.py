@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import lfilter
 
 from diagnosis.fitting.samples import Samples, hermite_basis, hermite_means
 from diagnosis.fitting.similarity import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
@@ -122,6 +121,8 @@ class RunData:
         found = whiten(values, self.whitening)
         if self.innovations is None:
             return found
+        from scipy.signal import lfilter  # only here: slow to load
+
         with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
             return np.asarray(lfilter(*self.innovations, found, axis=0), np.float64)
 
@@ -130,6 +131,8 @@ class RunData:
         """Response of `white` to one value well inside the run, dimensionless, shape (m,)."""
         if self.innovations is None:
             return self.whitening
+        from scipy.signal import lfilter  # only here: slow to load
+
         impulse = np.zeros(self.reading.size)
         impulse[: self.whitening.size] = self.whitening[: impulse.size]
         return np.asarray(lfilter(*self.innovations, impulse), np.float64)
@@ -159,6 +162,8 @@ class RunData:
             residual = residual / np.sqrt(np.maximum(self.samples.count, 1) / self.block)
         innovations = residual * np.sqrt(self.noise_variance)
         if self.innovations is not None:
+            from scipy.signal import lfilter  # only here: slow to load
+
             numerator, denominator = self.innovations
             innovations = lfilter(denominator, numerator, innovations)
         return np.asarray(colour(innovations, self.whitening), np.float64)

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 from identification.estimate import NoiseLevel
 from identification.statistics.information import inverse
@@ -59,4 +58,4 @@ def scatter_of_runs(influences: Array, speaking: NDArray[np.int64]) -> Array:
     """
     free = np.maximum(speaking - 2, 1)
     spread = np.sqrt(np.sum(influences**2, axis=0) * speaking / free)
-    return np.asarray(spread * student.ppf(0.975, free) / norm.ppf(0.975))
+    return np.asarray(spread * stdtrit(free, 0.975) / ndtri(0.975))

@@ -180,6 +180,7 @@ static void check_forward(void) {
     vwt_evaluate(6 - i, broken + i, 1, &in, &value);
     EXPECT(value != value);
   }
+  EXPECT(vwt_no_clock() == 0);
   vwt_backlash(kSamples, angle, 0.01, 0.3, angle);
   for (int i = 0; i < vwt_run_count(); i++) {
     EXPECT(vwt_run_offset(i) + (int)sizeof(double) <= vwt_run_size() && vwt_run_name(i)[0]);
