@@ -100,7 +100,7 @@ def test_laws_of_a_rig_without_a_spring_are_finite(without_spring, kind):
 
 def test_the_end_of_a_run_at_rest_is_left_out():
     """The angle at which dry friction stops the body is off its equilibrium; the swing before stays."""
-    data = prepared(pendulum(0.5, 40.0))
+    data = prepared(pendulum(0.5, 26.0))
     (whole,), (cut,) = data.runs, without_rest(data).runs
     gone = whole.reading[cut.reading.size :]
     np.testing.assert_array_equal(cut.reading, whole.reading[: cut.reading.size])
@@ -167,7 +167,7 @@ def test_gravity_is_found_where_the_nominal_model_does_not_miss_the_motion():
 
 
 def test_a_long_rest_is_left_out():
-    data = prepared(pendulum(0.3, 60.0))
+    data = prepared(pendulum(0.3, 30.0))
     cut, rested = without_long_rest(data)
     (run,) = cut.runs
     assert rested == (run.id,)
