@@ -18,6 +18,13 @@ from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.record import Array
 
 
+def _filtered(fraction: tuple[Array, Array], values: Array) -> Array:
+    """Values, in columns or in one, after a filter of this numerator and denominator."""
+    from scipy.signal import lfilter  # only here: slow to load
+
+    return np.asarray(lfilter(*fraction, values, axis=0), np.float64)
+
+
 @dataclass(frozen=True, eq=False)
 class RunData:
     """One run as the fits see it.
@@ -121,21 +128,17 @@ class RunData:
         found = whiten(values, self.whitening)
         if self.innovations is None:
             return found
-        from scipy.signal import lfilter  # only here: slow to load
-
         with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
-            return np.asarray(lfilter(*self.innovations, found, axis=0), np.float64)
+            return _filtered(self.innovations, found)
 
     @cached_property
     def taps(self) -> Array:
         """Response of `white` to one value well inside the run, dimensionless, shape (m,)."""
         if self.innovations is None:
             return self.whitening
-        from scipy.signal import lfilter  # only here: slow to load
-
         impulse = np.zeros(self.reading.size)
         impulse[: self.whitening.size] = self.whitening[: impulse.size]
-        return np.asarray(lfilter(*self.innovations, impulse), np.float64)
+        return _filtered(self.innovations, impulse)
 
     def unwhitened(self, difference: Array) -> Array:
         """A difference of readings over the noise of its innovations, not whitened.
@@ -162,10 +165,7 @@ class RunData:
             residual = residual / np.sqrt(np.maximum(self.samples.count, 1) / self.block)
         innovations = residual * np.sqrt(self.noise_variance)
         if self.innovations is not None:
-            from scipy.signal import lfilter  # only here: slow to load
-
-            numerator, denominator = self.innovations
-            innovations = lfilter(denominator, numerator, innovations)
+            innovations = _filtered(self.innovations[::-1], innovations)
         return np.asarray(colour(innovations, self.whitening), np.float64)
 
     @property
