@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from diagnosis.attribution.process_noise import ProcessNoise
 from diagnosis.policy import BURST, BURST_FALSE_ALARM_RATE, ONE_RUN_FALSE_ALARM_RATE, WHITE_INNOVATIONS
@@ -62,7 +62,7 @@ def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
     lengths = [1 << k for k in range(20)]
     windows = [(i, n) for i in result.innovations for n in lengths if 4 * n <= i.size]
     rate = false_alarm_rate / max(sum(i.size - n + 1 for i, n in windows), 1)
-    highest = [float(np.max(_moving_power(i, n))) / float(chi2.isf(rate, n)) for i, n in windows]
+    highest = [float(np.max(_moving_power(i, n))) / float(chdtri(n, rate)) for i, n in windows]
     return max(highest, default=0.0)
 
 

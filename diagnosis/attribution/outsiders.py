@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.signal import lfilter
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import RunData
@@ -75,6 +74,8 @@ def _motions(nominal: Fit) -> list[_Motion]:
 
 def _zero_follows_power(motions: list[_Motion]) -> list[list[Array]]:
     """A zero that follows the squared angle with a lag, starting from zero or from a settled value."""
+    from scipy.signal import lfilter  # only here: slow to load
+
     trials = []
     for time, settled in product(_TIMES, (False, True)):
         columns = []

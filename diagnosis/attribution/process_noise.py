@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import minimize
-from scipy.signal import lfilter
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import Data
@@ -242,6 +241,8 @@ def _skip(channel: _Channel) -> int:
 
 def _filtered(channels: Sequence[_Channel], spectrum: Spectrum) -> list[tuple[float, Array]]:
     """−2 ln L (without constants) and scaled innovations of the steady filter, by run."""
+    from scipy.signal import lfilter  # only here: slow to load
+
     results = []
     for channel, (numerator, denominator, spread) in zip(channels, _filters(channels, spectrum), strict=True):
         if not (np.isfinite(spread) and spread > 0.0):

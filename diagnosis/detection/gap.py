@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from diagnosis.detection.noise_colour import noise_colour, whitened
 from diagnosis.detection.noise_under_null import level_p_value, trend_p_values
@@ -154,7 +154,7 @@ def chance(total: float, freedom: float, relative: float) -> float:
     if freedom <= 0.0:
         return 1.0
     stretch = 1.0 + 0.5 * freedom * relative**2
-    return float(chi2.sf(total / stretch, freedom / stretch))
+    return float(chdtrc(freedom / stretch, total / stretch))
 
 
 def _known(_frequency: Array) -> float:

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.signal.windows import tukey
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from diagnosis.detection.scattered_noise import beside_the_motion
 from diagnosis.fitting.least_squares import Fit
@@ -139,6 +138,8 @@ def _line_power(record: Record, values: Array, frequency: float) -> float:
 
 def _remove(record: Record, frequency: float, swells: bool) -> tuple[Record, float, float]:
     """A record without the line and its harmonics, the fundamental's amplitude and the mean square removed."""
+    from scipy.signal.windows import tukey  # only here: slow to load
+
     design = np.column_stack([_lines(record, frequency), *([_swell(record, frequency)] if swells else [])])
     # a window that keeps the ends, where a swelling hum may be strongest
     window = tukey(record.time_s.size, 0.3) if swells else np.hanning(record.time_s.size)
@@ -183,7 +184,7 @@ def _swells(records: list[Record], frequency: float, variance: float) -> bool:
         found = both.T @ reading
         power += float(found @ np.linalg.solve(share, found)) / variance
         count += swelling.shape[1]
-    return count > 0 and power > float(chi2.isf(SWELL_FALSE_ALARM_RATE, count))
+    return count > 0 and power > float(chdtri(count, SWELL_FALSE_ALARM_RATE))
 
 
 def _windowed_fit(record: Record, design: Array, window: Array) -> Array:

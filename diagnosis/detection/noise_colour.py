@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import Data, RunData
@@ -221,7 +221,7 @@ def _steady(power: Array, count: Array) -> np.ndarray:
     corrected = count / (1.0 + 1.0 / (6.0 * np.maximum(count, 1e-300)))
     statistic = 2.0 * np.sum(corrected * (ratio - 1.0 - np.log(ratio)), axis=0)
     freedom = np.sum(count > 0, axis=0) - 1
-    limit = chi2.isf(COLOUR_STEADY_RATE, np.maximum(freedom, 1))
+    limit = chdtri(np.maximum(freedom, 1), COLOUR_STEADY_RATE)
     return np.asarray((freedom > 0) & (mean > 0.0) & (statistic < limit))
 
 
@@ -229,7 +229,7 @@ def _flat(level: Array, std: Array) -> bool:
     """Whether the levels are one constant within the tolerance and chance."""
     weight = 1.0 / (std**2 + FLOOR_TOLERANCE**2)
     mean = float(weight @ level / weight.sum())
-    return float(weight @ (level - mean) ** 2) < float(chi2.isf(COLOUR_FALSE_ALARM_RATE, level.size - 1))
+    return float(weight @ (level - mean) ** 2) < float(chdtri(level.size - 1, COLOUR_FALSE_ALARM_RATE))
 
 
 def _slope(place: Array, level: Array, std: Array) -> tuple[float, float]:

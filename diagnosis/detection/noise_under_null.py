@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.stats import binom, t
+from scipy.special import bdtrc, stdtr
 
 from diagnosis.detection.rounding import repeated, samples
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend, trend_statistics
@@ -50,8 +50,8 @@ def _p_values(trend: NoiseTrend, chance: Array) -> Array:
     mean, scatter = chance.mean(axis=0), np.maximum(chance.std(axis=0, ddof=1), 1e-9)
     observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(NOISE_TAILS)])
     score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / count))
-    two_sided = 2.0 * t.sf(np.abs(score[:2]), count - 1)
-    return np.append(two_sided, t.sf(score[2], count - 1))
+    two_sided = 2.0 * stdtr(count - 1, -np.abs(score[:2]))
+    return np.append(two_sided, stdtr(count - 1, -score[2]))
 
 
 def _repetitions(fit: Fit, white: Mapping[str, float], step: float) -> Array:
@@ -77,7 +77,7 @@ def level_p_value(fit: Fit, noise: Noise) -> float:
     assert noise.stated_variance is not None
     level = noise.estimated / (ROUNDED_NOISE * noise.stated_variance)
     ordinates = max(int(_ABOVE * 0.5 * samples(fit) / _HANN), 1)
-    return float(binom.sf((ordinates - 1) // 2, ordinates, 2.0**-level))
+    return float(bdtrc((ordinates - 1) // 2, ordinates, 2.0**-level))
 
 
 _ABOVE = 0.48  # share of the ordinates that the estimate uses, where sampling is slowest

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from diagnosis.detection.noise_colour import HANN, Colour, between_harmonics
 from diagnosis.fitting.least_squares import Fit
@@ -37,7 +37,7 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     relative = frequency / colour.frequency[0]
     seen = _least_loss(relative, power, 1.0)
     free = min(seen, _least_loss(relative, power, _LOWEST_CORNER))
-    return bool(2.0 * (seen - free) / HANN > chi2.isf(2.0 * COLOUR_FALSE_ALARM_RATE, 1))
+    return bool(2.0 * (seen - free) / HANN > chdtri(1, 2.0 * COLOUR_FALSE_ALARM_RATE))
 
 
 def _least_loss(frequency: Array, power: Array, lowest: float) -> float:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import lfilter
 
 from diagnosis.fitting.samples import Samples, hermite_basis, hermite_means
 from diagnosis.fitting.similarity import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
@@ -17,6 +16,13 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.aero import aerodynamic_stiffness
 from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.record import Array
+
+
+def _filtered(fraction: tuple[Array, Array], values: Array) -> Array:
+    """Values, in columns or in one, after a filter of this numerator and denominator."""
+    from scipy.signal import lfilter  # only here: slow to load
+
+    return np.asarray(lfilter(*fraction, values, axis=0), np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +129,7 @@ class RunData:
         if self.innovations is None:
             return found
         with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
-            return np.asarray(lfilter(*self.innovations, found, axis=0), np.float64)
+            return _filtered(self.innovations, found)
 
     @cached_property
     def taps(self) -> Array:
@@ -132,7 +138,7 @@ class RunData:
             return self.whitening
         impulse = np.zeros(self.reading.size)
         impulse[: self.whitening.size] = self.whitening[: impulse.size]
-        return np.asarray(lfilter(*self.innovations, impulse), np.float64)
+        return _filtered(self.innovations, impulse)
 
     def unwhitened(self, difference: Array) -> Array:
         """A difference of readings over the noise of its innovations, not whitened.
@@ -159,8 +165,7 @@ class RunData:
             residual = residual / np.sqrt(np.maximum(self.samples.count, 1) / self.block)
         innovations = residual * np.sqrt(self.noise_variance)
         if self.innovations is not None:
-            numerator, denominator = self.innovations
-            innovations = lfilter(denominator, numerator, innovations)
+            innovations = _filtered(self.innovations[::-1], innovations)
         return np.asarray(colour(innovations, self.whitening), np.float64)
 
     @property

@@ -6,7 +6,6 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.signal import lfilter, lfiltic, oaconvolve
 
 from tunnel_sim.vocabulary.record import Array
 
@@ -27,6 +26,8 @@ def whiten(values: Array, whitening: Array) -> Array:
     """
     if whitening.size == 1:
         return values
+    from scipy.signal import oaconvolve  # only here: slow to load
+
     taps = whitening.reshape(-1, *[1] * (values.ndim - 1))
     start = _start(whitening.tobytes())[: len(values), : len(values)]
     with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
@@ -47,6 +48,8 @@ def colour(errors: Array, whitening: Array) -> Array:
     """
     if whitening.size == 1:
         return errors
+    from scipy.signal import lfilter, lfiltic  # only here: slow to load
+
     start = _start(whitening.tobytes())[: errors.size, : errors.size]
     first = solve_triangular(start, errors[: len(start)], lower=True)
     memory = lfiltic([1.0], whitening, first[::-1])
@@ -66,6 +69,8 @@ def correlate(errors: Array, whitening: Array) -> Array:
     """
     if whitening.size == 1:
         return np.asarray(errors * whitening[0], np.float64)
+    from scipy.signal import oaconvolve  # only here: slow to load
+
     taps = whitening.reshape(-1, *[1] * (errors.ndim - 1))
     return np.asarray(oaconvolve(errors[::-1], taps, axes=0)[: len(errors)][::-1], np.float64)
 

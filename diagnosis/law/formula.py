@@ -11,7 +11,7 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.problem import Point
@@ -145,7 +145,7 @@ def _of(whole: Normal, chosen: Sequence[int]) -> Normal:
 def _greedy(rest: Rest, parts: Sequence[Normal], count: int, closable: float) -> tuple[list[int], float]:
     """Terms added as long as each pays on held-out runs."""
     whole = total(parts)
-    threshold = float(chi2.isf(LAW_FALSE_RATE / count, 1))
+    threshold = float(chdtri(1, LAW_FALSE_RATE / count))
     before = float(rest.before[rest.seen].sum())
     chosen: list[int] = []
     gained = 0.0

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import median_filter
 from scipy.optimize import minimize_scalar
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from diagnosis.closable import Ceiling
 from diagnosis.fitting.spectra import Spectrum, block_gain, resonance, smooth_spectra
@@ -97,7 +96,8 @@ def _strongest(rest: Rest) -> tuple[float | None, float]:
         power += np.where(seen, spectrum.power(grid) / floor, 0.0)
         count += seen
         floors += np.where(seen, floor, 0.0)
-    chance = np.where(count > 0, chi2.logsf(power, 2.0 * np.maximum(count, 1.0)), 0.0)
+    with np.errstate(divide="ignore"):
+        chance = np.where(count > 0, np.log(chdtrc(2.0 * np.maximum(count, 1.0), power)), 0.0)
     best = int(np.argmin(chance))
     clear = power[best] >= LINE_CONTRAST * 2.0 * count[best]
     if not clear or chance[best] + np.log(grid.size) > np.log(PLACE_FALSE_ALARM_RATE):
@@ -107,6 +107,8 @@ def _strongest(rest: Rest) -> tuple[float | None, float]:
 
 def _floor(spectrum: Spectrum) -> tuple[Array, Array]:
     """Frequencies, and the median power around each over that of white noise, at least 1."""
+    from scipy.ndimage import median_filter  # only here: slow to load
+
     step = max(1, round(1.0 / (spectrum.duration * spectrum.frequency[1])))  # the padding
     frequency = spectrum.frequency[::step]
     around = median_filter(spectrum.power(frequency), _AROUND, mode="nearest")

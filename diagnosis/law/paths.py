@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter, savgol_filter
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import RunData
@@ -66,6 +65,8 @@ class Path:
         width = 2 * round(np.pi * (_NARROW if large else _WINDOW) / (omega * run.interval)) + 1
         if width < 5 or width > residual.size // 4:
             return fitted, slope
+        from scipy.signal import savgol_filter  # only here: slow to load
+
         smooth = savgol_filter(residual, width, 3)
         smooth_slope = savgol_filter(residual, width, 3, deriv=1, delta=run.interval)
         return fitted + smooth, slope + smooth_slope
@@ -102,6 +103,8 @@ class Path:
 
     def _filter(self, interval: float) -> tuple[Array, Array]:
         """Numerator and denominator of the reading's response to a moment that is linear in between."""
+        from scipy.signal import cont2discrete  # only here: slow to load
+
         numerator = np.array([1.0] + [0.0] * self.run.derivative)
         denominator = np.array(linear_coefficients(self.fit, self.index))
         found = cont2discrete((numerator, denominator), interval, "foh")
@@ -116,6 +119,8 @@ class Path:
         Returns:
             White residuals averaged in groups, shape (rows, k), in noise standard deviations.
         """
+        from scipy.signal import lfilter  # only here: slow to load
+
         run = self.run
         if self._white:
             rows = self.rows(moment) / np.sqrt(run.noise_variance)

@@ -7,10 +7,11 @@ surface of Masri & Caughey, J. Appl. Mech. 46 (1979) 433, doi 10.1115/1.3424568,
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_coeffs
+from scipy.linalg import lstsq
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import RunData
@@ -96,13 +97,24 @@ def apparent_moment(fit: Fit, index: int) -> Apparent | None:
     return Apparent(angle[inner], rate[inner], moment, half, kernel, scale)
 
 
+def _cubic_weights(width: int, order: int, interval: float) -> Array:
+    """Weights of a convolution for the derivative of the cubic fitted to `width` samples, in their middle.
+
+    Savitzky & Golay, Anal. Chem. 36 (1964) 1627, doi 10.1021/ac60214a047; SciPy's own are slow to load.
+    """
+    places = np.arange(width)[::-1] - width // 2.0
+    wanted = np.zeros(4)
+    wanted[order] = math.factorial(order) / interval**order
+    return np.asarray(lstsq(places ** np.arange(4.0)[:, None], wanted)[0])
+
+
 def _kernel(width: int, interval: float, frequency: float, coefficients: tuple[float, float, float]) -> Array:
     """Weights of K ρ + C ρ̇ + I ρ̈, smoothed, and exact at the run's own frequency."""
     omega = 2.0 * np.pi * frequency
     phase = np.exp(-1j * omega * interval * (np.arange(width) - width // 2))
     result = np.zeros(width)
     for order, coefficient in enumerate(coefficients):
-        weights = savgol_coeffs(width, 3, deriv=order, delta=interval)
+        weights = _cubic_weights(width, order, interval)
         gain = complex(weights @ phase) / (1j * omega) ** order
         # derivatives of the local cubic fall short by a few per cent, as much as the moment sought
         result += coefficient * weights / gain.real

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from identification.campaign.derivatives import (
     Derivatives,
@@ -141,7 +141,7 @@ def _birge_ratio(design: Design, parameters: Array, decays: Array, informations:
         return 1.0
     away = [decay - link @ parameters for decay, link in zip(decays, design.links, strict=True)]
     scatter = sum(float(d @ weight @ d) for d, weight in zip(away, informations, strict=True))
-    return scatter / freedom if scatter > float(chi2.isf(MISFIT_RATE, freedom)) else 1.0
+    return scatter / freedom if scatter > float(chdtri(freedom, MISFIT_RATE)) else 1.0
 
 
 def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> set[Status]:

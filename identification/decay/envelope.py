@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import next_fast_len
-from scipy.signal import hilbert
 
 from identification.decay.damped_oscillation import free_decay
 from identification.decay.decay_fit import Reading, RunFit
@@ -56,6 +55,8 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
     Returns:
         At least one average per half cycle of the record.
     """
+    from scipy.signal import hilbert  # only here: slow to load
+
     reading = even_reading(reading)
     interval = float(reading.time[-1]) / (reading.time.size - 1)
     omega = rough.decay.omega_d

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import expm
-from scipy.signal import lfilter
 
 from identification.decay.damped_oscillation import Decay, response_rows
 from tunnel_sim.vocabulary.record import Array
@@ -83,6 +82,8 @@ def innovations(values: Array, interval: float, model: Driven, noise_variance: f
         return None
     variance = noise_variance
     if model.intensity > 0.0:
+        from scipy.signal import lfilter  # only here: slow to load
+
         factors = _factored(interval, model, noise_variance)
         if factors is None:
             return None

@@ -22,7 +22,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from identification.campaign.assembly import departures
 from identification.campaign.pairing import PairedRun
@@ -192,7 +192,7 @@ def _average(values: Array, covariance: Array) -> tuple[float, float, bool]:
     inverse = np.linalg.inv(covariance)
     away = values - float(inverse.sum(axis=0) @ values) / float(inverse.sum())
     scatter = float(away @ inverse @ away)
-    chance = SCATTER_TOLERANCE * float(chi2.isf(0.5 * MISFIT_RATE, values.size - 1))
+    chance = SCATTER_TOLERANCE * float(chdtri(values.size - 1, 0.5 * MISFIT_RATE))
     departs = scatter > chance
     return mean, std * float(np.sqrt(scatter / (values.size - 1))) if departs else std, departs
 

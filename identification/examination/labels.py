@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, f
+from scipy.special import chdtri, fdtri
 
 from identification.examination.swings import Swing
 from identification.policy import (
@@ -71,19 +71,19 @@ class _Misfit:
     @property
     def contradicts(self) -> bool:
         """Whether the residuals are beyond chance."""
-        return self.freedom > 0 and self.squares > float(chi2.isf(REFUSAL_RATE, self.freedom))
+        return self.freedom > 0 and self.squares > float(chdtri(self.freedom, REFUSAL_RATE))
 
     @property
     def agrees(self) -> bool:
         """Whether the residuals are within chance."""
-        return self.squares <= float(chi2.isf(MISFIT_RATE, self.freedom))
+        return self.squares <= float(chdtri(self.freedom, MISFIT_RATE))
 
     def mends(self, before: _Misfit, trials: int) -> bool:
         """Whether the statements now agree, or agree better than before by more than chance."""
         if self.agrees:
             return True
         ratio = before.squares / max(self.squares, 1e-300)
-        return ratio > float(f.isf(REFUSAL_RATE / max(trials, 1), self.freedom, self.freedom))
+        return ratio > float(fdtri(self.freedom, self.freedom, 1.0 - REFUSAL_RATE / max(trials, 1)))
 
 
 def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
@@ -172,7 +172,7 @@ def _best_exchanges(
         return []
     least = min(found.squares for _, found in mended)
     # Exchanges that fit as well as the best one cannot be distinguished.
-    limit = least + float(chi2.isf(MISFIT_RATE, 1))
+    limit = least + float(chdtri(1, MISFIT_RATE))
     return [places for places, found in mended if found.squares <= limit]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as variance_ratio
+from scipy.special import fdtrc
 
 from identification.decay.damped_oscillation import envelope_amplitude
 from identification.decay.decay_fit import Reading, project_run
@@ -155,7 +155,7 @@ def _grows(amplitude: Array) -> bool:
     """
     quarter = amplitude.size // 4
     first, last = (float(np.mean(part**2)) for part in (amplitude[:quarter], amplitude[-quarter:]))
-    return bool(variance_ratio.sf(last / first, 2 * quarter, 2 * quarter) < REFUSAL_RATE)
+    return bool(fdtrc(2 * quarter, 2 * quarter, last / first) < REFUSAL_RATE)
 
 
 def _settled_from(windows: Windows) -> int | None:

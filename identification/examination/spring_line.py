@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtri, ndtri
 
 from identification.examination.labels import other_fits
 from identification.examination.swings import Swing
@@ -71,7 +71,7 @@ class _Springs:
     def disagree(self) -> bool:
         """Whether the springs' inertias differ beyond chance."""
         away = (self.inertia - self.mean()[0]) / self.std
-        return float(away @ away) > float(chi2.isf(MISFIT_RATE, self.stiffness.size - 1))
+        return float(away @ away) > float(chdtri(self.stiffness.size - 1, MISFIT_RATE))
 
 
 def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
@@ -144,7 +144,7 @@ def _the_one(springs: _Springs) -> int | None:
         score = abs(springs.inertia[place] - mean) / float(np.hypot(std, springs.std[place]))
         scores.append(-1.0 if rest.disagree() else score)
     best = int(np.argmax(scores))
-    beyond = float(norm.isf(0.5 * MISFIT_RATE / springs.stiffness.size))
+    beyond = float(-ndtri(0.5 * MISFIT_RATE / springs.stiffness.size))
     return best if scores[best] > beyond else None
 
 

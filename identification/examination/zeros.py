@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from identification.decay.first_guess import starting_frequency
 from identification.decay.peaks import follow_peaks
@@ -50,7 +50,7 @@ def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     found = [centre_of(run, campaign.sensor.resolution or 0.0) for run in campaign.runs]
     groups = list(_alike([centre for centre in found if centre is not None]))
     freedom = sum(len(group) - 1 for group in groups)
-    if freedom == 0 or sum(map(_scatter, groups)) <= float(chi2.isf(MISFIT_RATE, freedom)):
+    if freedom == 0 or sum(map(_scatter, groups)) <= float(chdtri(freedom, MISFIT_RATE)):
         return campaign, ()
     largest = max(max(c.zero for c in group) - min(c.zero for c in group) for group in groups)
     compared = {centre.run.id for group in groups for centre in group}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from identification.policy import MISFIT_RATE
 from identification.statistics.information import inverse, scaled_solve
@@ -41,7 +41,7 @@ def weighted_fit(columns: Array, target: Array, variance: Array) -> WeightedFit:
     residual = target - columns @ values
     freedom = target.size - values.size
     scatter = float(residual @ (weights * residual))
-    beyond = scatter > float(chi2.isf(MISFIT_RATE, freedom))
+    beyond = scatter > float(chdtri(freedom, MISFIT_RATE))
     return WeightedFit(values, inverse(normal) * (scatter / freedom if beyond else 1.0), residual)
 
 

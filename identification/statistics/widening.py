@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 from identification.estimate import Estimate, NoiseLevel, Quantity
 from identification.remark import Remark
@@ -69,7 +68,7 @@ def scatter_of_runs(influences: Array, speaking: NDArray[np.int64]) -> Array:
     """
     free = np.maximum(speaking - 2, 1)
     spread = np.sqrt(np.sum(influences**2, axis=0) * speaking / free)
-    return np.asarray(spread * student.ppf(0.975, free) / norm.ppf(0.975))
+    return np.asarray(spread * stdtrit(free, 0.975) / ndtri(0.975))
 
 
 def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: Sequence[Remark]) -> Estimate:
@@ -131,6 +130,6 @@ def _reaching(
     std = max(found.std, max(away) / sqrt(3.0))
     interval = found.interval
     if interval is not None and std > found.std:
-        half = float(norm.ppf(0.975)) * std
+        half = float(ndtri(0.975)) * std
         interval = min(interval[0], found.value - half), max(interval[1], found.value + half)
     return replace(found, std=std, interval=interval)

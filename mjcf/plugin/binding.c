@@ -6,10 +6,6 @@
 
 _Static_assert(sizeof(mjtNum) == sizeof(double), "the law and the state are in double precision");
 
-typedef struct {
-  mjtNum time, angle, rate, twist, twist_rate;
-} Motion;
-
 static mjtNum mass_diagonal(const mjModel* m, const mjData* d, int dof) {
   return d->M[m->M_rowadr[dof] + m->M_rownnz[dof] - 1];
 }
@@ -41,8 +37,8 @@ static mjtNum wind_speed_at(const mjModel* m, const mjData* d, const vwt_ids* se
   return speed > 0 ? speed : 0;
 }
 
-static Motion present_motion(const mjModel* m, const mjData* d, const vwt_ids* self) {
-  Motion now = {d->time, d->qpos[m->jnt_qposadr[self->joint]], d->qvel[self->dof], 0, 0};
+static vwt_motion present_motion(const mjModel* m, const mjData* d, const vwt_ids* self) {
+  vwt_motion now = {d->time, d->qpos[m->jnt_qposadr[self->joint]], d->qvel[self->dof], 0, 0};
   if (self->twist_dof >= 0) {
     now.twist = d->qpos[m->jnt_qposadr[self->twist_joint]];
     now.twist_rate = d->qvel[self->twist_dof];
@@ -51,17 +47,17 @@ static Motion present_motion(const mjModel* m, const mjData* d, const vwt_ids* s
 }
 
 // Motion at the start of the step; the present one before the first step.
-static Motion start_motion(const vwt_state* state, const Motion* now) {
+static vwt_motion start_motion(const vwt_state* state, const vwt_motion* now) {
   if (state->started == 0) {
     return *now;
   }
-  const Motion start = {state->time, state->angle, state->rate, state->twist, state->twist_rate};
+  const vwt_motion start = {state->time, state->angle, state->rate, state->twist, state->twist_rate};
   return start;
 }
 
 // The lag's time constant depends on the wind speed, which is taken halfway between the step's start and now.
 static mjtNum lagged_at(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
-                        const vwt_state* state, const Motion* now) {
+                        const vwt_state* state, const vwt_motion* now) {
   const mjtNum angle = now->angle + now->twist, rate = now->rate + now->twist_rate;
   if (p->aero_lag == 0 || state->started == 0) {
     return angle;
@@ -72,7 +68,7 @@ static mjtNum lagged_at(const mjModel* m, const mjData* d, const vwt_ids* self, 
 }
 
 static mjtNum air_moment(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
-                         const vwt_state* state, const Motion* at) {
+                         const vwt_state* state, const vwt_motion* at) {
   const vwt_air_state air = {
       .time = at->time,
       .wind_speed = wind_speed_at(m, d, self, at->time),
@@ -84,23 +80,29 @@ static mjtNum air_moment(const mjModel* m, const mjData* d, const vwt_ids* self,
   return vwt_air_moment(p, &air);
 }
 
-// The moment stated as an expression.
-static mjtNum stated_moment(const mjModel* m, const mjData* d, const vwt_ids* self, const Motion* at) {
+// The mechanism's moment, with the moment stated as an expression.
+static mjtNum mechanism_moment(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
+                               const vwt_motion* at) {
+  const mjtNum built_in = vwt_mechanism_moment(p, at->angle, at->rate);
   if (self->program < 0) {
-    return 0;
+    return built_in;
   }
   const vwt_program program = {m->numeric_data + m->numeric_adr[self->program], m->numeric_size[self->program]};
   const vwt_program_input in = {at->angle, at->rate, at->time, wind_speed_at(m, d, self, at->time)};
-  return vwt_program_value(&program, &in);
+  return built_in + vwt_program_value(&program, &in);
+}
+
+static vwt_moments moments_at(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
+                              const vwt_state* state, const vwt_motion* at) {
+  return (vwt_moments){air_moment(m, d, self, p, state, at), mechanism_moment(m, d, self, p, at)};
 }
 
 // All moments on the rod's upper end except friction, including those of MuJoCo's spring, damper and twisted rod.
-static mjtNum other_moment(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
-                           mjtNum air, const Motion* at) {
-  const mjtNum mechanism = vwt_mechanism_moment(p, at->angle, at->rate) + stated_moment(m, d, self, at) -
-                           p->spring_stiffness * at->angle - p->mechanical_damping * at->rate;
+static mjtNum other_moment(const mjModel* m, const vwt_ids* self, const vwt_parameters* p, vwt_moments law,
+                           const vwt_motion* at) {
+  const mjtNum mechanism = law.mechanism - p->spring_stiffness * at->angle - p->mechanical_damping * at->rate;
   if (self->twist_dof < 0) {
-    return mechanism + air;
+    return mechanism + law.air;
   }
   return mechanism + m->jnt_stiffness[self->twist_joint] * at->twist + m->dof_damping[self->twist_dof] * at->twist_rate;
 }
@@ -111,7 +113,7 @@ static mjtNum end_inertia(const mjModel* m, const mjData* d, const vwt_ids* self
 }
 
 // Dahl's state; if the start is not known, it is zero until the end of the first step.
-static mjtNum deflection_at(const vwt_state* state, mjtNum range, const Motion* now) {
+static mjtNum deflection_at(const vwt_state* state, mjtNum range, const vwt_motion* now) {
   if (state->started == 0) {
     return 0;
   }
@@ -119,38 +121,58 @@ static mjtNum deflection_at(const vwt_state* state, mjtNum range, const Motion* 
                                 now->angle, now->rate);
 }
 
-static mjtNum friction(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
-                       const vwt_state* state, const Motion* now) {
+// The moments at the start of the step. In the first stage they are the present ones, and are kept for the later stages.
+// Coefficients may change between calls that do not step, but the time does not.
+static vwt_moments moments_at_start(const mjModel* m, const mjData* d, vwt_instance* instance, const vwt_parameters* p,
+                                    const vwt_state* state, const vwt_motion* start, const vwt_motion* now,
+                                    vwt_moments present) {
+  if (memcmp(start, now, sizeof(*now)) == 0) {
+    instance->started = 1;
+    instance->start = *start;
+    instance->start_moments = present;
+    return present;
+  }
+  if (instance->started && now->time > start->time && memcmp(start, &instance->start, sizeof(*start)) == 0) {
+    return instance->start_moments;
+  }
+  return moments_at(m, d, &instance->ids, p, state, start);
+}
+
+static mjtNum friction(const mjModel* m, const mjData* d, vwt_instance* instance, const vwt_parameters* p,
+                       const vwt_state* state, const vwt_motion* now, vwt_moments present) {
+  const vwt_ids* self = &instance->ids;
   const mjtNum inertia = end_inertia(m, d, self, p);
   if (p->presliding > 0) {
     const mjtNum range = vwt_presliding_range(p, inertia, m->opt.timestep);
     return -deflection_at(state, range, now) / range * p->friction_moment;
   }
-  const Motion start = start_motion(state, now);
+  const vwt_motion start = start_motion(state, now);
   const mjtNum applied = d->qfrc_applied[self->dof];  // by the user, on the rod's upper end
-  const mjtNum other = other_moment(m, d, self, p, air_moment(m, d, self, p, state, &start), &start) + applied;
+  const vwt_moments law = moments_at_start(m, d, instance, p, state, &start, now, present);
+  const mjtNum other = other_moment(m, self, p, law, &start) + applied;
   return vwt_friction_moment(p, inertia, start.rate, other, m->opt.timestep);
 }
 
-void vwt_apply_moments(const mjModel* m, mjData* d, const vwt_ids* self, const vwt_state* state) {
+void vwt_apply_moments(const mjModel* m, mjData* d, vwt_instance* instance, const vwt_state* state) {
+  const vwt_ids* self = &instance->ids;
   vwt_parameters p;
   read_parameters(m, d, self, &p);
-  const Motion now = present_motion(m, d, self);
-  const mjtNum air = air_moment(m, d, self, &p, state, &now);
-  mjtNum mechanism = vwt_mechanism_moment(&p, now.angle, now.rate) + stated_moment(m, d, self, &now);
+  const vwt_motion now = present_motion(m, d, self);
+  const vwt_moments law = moments_at(m, d, self, &p, state, &now);
+  mjtNum mechanism = law.mechanism;
   if (p.friction_moment > 0) {
-    mechanism += friction(m, d, self, &p, state, &now);
+    mechanism += friction(m, d, instance, &p, state, &now, law);
   }
-  d->qfrc_passive[self->dof] += air + mechanism;
+  d->qfrc_passive[self->dof] += law.air + mechanism;
   if (self->twist_dof >= 0) {
-    d->qfrc_passive[self->twist_dof] += air;
+    d->qfrc_passive[self->twist_dof] += law.air;
   }
 }
 
 void vwt_sense_moment(const mjModel* m, mjData* d, const vwt_ids* self, const vwt_state* state, int instance) {
   vwt_parameters p;
   read_parameters(m, d, self, &p);
-  const Motion now = present_motion(m, d, self);
+  const vwt_motion now = present_motion(m, d, self);
   const mjtNum moment = air_moment(m, d, self, &p, state, &now);
   for (int i = 0; i < m->nsensor; i++) {
     if (m->sensor_type[i] == mjSENS_PLUGIN && m->sensor_plugin[i] == instance) {
@@ -164,7 +186,7 @@ static int given(const mjModel* m, int numeric) {
 }
 
 void vwt_end_step(const mjModel* m, const mjData* d, const vwt_ids* self, vwt_state* state) {
-  const Motion now = present_motion(m, d, self);
+  const vwt_motion now = present_motion(m, d, self);
   vwt_state end = {
       .lagged = now.angle + now.twist, .angle = now.angle, .rate = now.rate, .twist = now.twist,
       .twist_rate = now.twist_rate, .time = now.time, .started = 1,

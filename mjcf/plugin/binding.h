@@ -10,7 +10,7 @@
 #include "state.h"
 
 // Adds the moments of air and mechanism to qfrc_passive.
-void vwt_apply_moments(const mjModel* m, mjData* d, const vwt_ids* self, const vwt_state* state);
+void vwt_apply_moments(const mjModel* m, mjData* d, vwt_instance* instance, const vwt_state* state);
 
 // Writes the aerodynamic moment on the body, N m, to the sensors of the instance.
 void vwt_sense_moment(const mjModel* m, mjData* d, const vwt_ids* self, const vwt_state* state, int instance);

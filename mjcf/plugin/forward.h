@@ -56,6 +56,9 @@ VWT_API int vwt_forward(int count, const vwt_parameters* parameters, const vwt_r
 // Reading behind a backlash of half width `half`: it moves only when pushed. `in` and `out` may be the same array.
 VWT_API void vwt_backlash(int count, const double* in, double half, double start, double* out);
 
+// Always 0, s: a clock for MuJoCo's timers, which read theirs about fifty times in a step.
+VWT_API double vwt_no_clock(void);
+
 // Values of a program for `count` inputs, N m.
 VWT_API void vwt_evaluate(int size, const double* code, int count, const vwt_program_input* in, double* out);
 

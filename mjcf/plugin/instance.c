@@ -28,48 +28,11 @@ static int same_sizes(const vwt_sizes* kept, const mjModel* m) {
 #undef X
 }
 
-// Contiguous strings of a model, including the terminating zero of the last.
-typedef struct {
-  const char* text;
-  int size;
-} Strings;
-
-static Strings strings(const char* first, const char* last) {
-  return (Strings){first, (int)(last - first + strlen(last) + 1)};
+static int same_hinge(const mjModel* m, int joint, int dof, int name) {
+  return joint < 0 || (m->jnt_type[joint] == mjJNT_HINGE && m->jnt_dofadr[joint] == dof && m->name_jntadr[joint] == name);
 }
 
-static Strings numeric_names(const mjModel* m) {
-  return strings(m->names + m->name_numericadr[0], m->names + m->name_numericadr[m->nnumeric - 1]);
-}
-
-// Values of the plugin's two attributes.
-static Strings attributes(const mjModel* m, int instance) {
-  const char* first = m->plugin_attr + m->plugin_attradr[instance];
-  return strings(first, first + strlen(first) + 1);
-}
-
-// Whether `size` bytes at `start` of a model's text pool equal those kept.
-static int same_text(const char* pool, mjtSize pool_size, int start, const char* kept, int size) {
-  return start >= 0 && start + size <= pool_size && memcmp(pool + start, kept, size) == 0;
-}
-
-// String comparison without a function call, which for a few characters would take longer than the comparison.
-static int same_word(const char* one, const char* other) {
-  while (*one == *other && *one) {
-    one++, other++;
-  }
-  return *one == *other;
-}
-
-static int same_attributes(const mjModel* m, int instance, const char* kept, int second) {
-  const int start = m->plugin_attradr[instance];
-  return start >= 0 && same_word(m->plugin_attr + start, kept) && same_word(m->plugin_attr + start + second, kept + second);
-}
-
-static int same_hinge(const mjModel* m, int joint, int dof, const char* name) {
-  return joint < 0 || (m->jnt_type[joint] == mjJNT_HINGE && m->jnt_dofadr[joint] == dof &&
-                       same_word(m->names + m->name_jntadr[joint], name));
-}
+static int name_of(const mjModel* m, int joint) { return joint < 0 ? -1 : m->name_jntadr[joint]; }
 
 // Whether the parameters of each span are contiguous in this model.
 static int same_spans(const mjModel* m, const vwt_ids* ids) {
@@ -83,33 +46,40 @@ static int same_spans(const mjModel* m, const vwt_ids* ids) {
   return 1;
 }
 
-// Whether the ids are valid for this model. This is checked at every call: models may share an mjData, and a new model
-// may have the address of an old one, so addresses cannot be compared instead.
+// Whether the ids are valid for this model. Models may share an mjData, and a new model may have the address of an old
+// one and the same signature, which covers the tree but not the numerics: only names are certain.
 static int holds(const vwt_instance* self, const mjModel* m, int instance) {
   const vwt_ids* ids = &self->ids;
-  const char* joint = self->text + self->names_size;
-  const char* twist_joint = joint + self->second;
-  return same_sizes(&self->size, m) &&
-         same_text(m->names, m->nnames, m->name_numericadr[0], self->text, self->names_size) &&
-         same_attributes(m, instance, joint, self->second) && same_hinge(m, ids->joint, ids->dof, joint) &&
-         same_hinge(m, ids->twist_joint, ids->twist_dof, twist_joint) && same_spans(m, ids);
+  return same_sizes(&self->size, m) && m->name_numericadr[0] == self->numeric_names &&
+         m->plugin_attradr[instance] == self->attributes &&
+         same_hinge(m, ids->joint, ids->dof, self->joint_name) &&
+         same_hinge(m, ids->twist_joint, ids->twist_dof, self->twist_joint_name) && same_spans(m, ids) &&
+         memcmp(m->names, self->text, m->nnames) == 0 &&
+         memcmp(m->plugin_attr, self->text + m->nnames, m->npluginattr) == 0;
+}
+
+void vwt_instance_release(vwt_instance* self) {
+  self->model = NULL;
+  self->started = 0;
 }
 
 static vwt_instance* make(const mjModel* m, int instance) {
   vwt_ids found;
   vwt_find_ids(m, instance, &found);  // before the allocation, because an error does not return
-  const Strings names = numeric_names(m), values = attributes(m, instance);
-  vwt_instance* self = (vwt_instance*)malloc(sizeof(vwt_instance) + names.size + values.size);
+  vwt_instance* self = (vwt_instance*)malloc(sizeof(vwt_instance) + m->nnames + m->npluginattr);
   if (!self) {
     return NULL;
   }
+  vwt_instance_release(self);
   self->layout = layout_of(m);
   self->size = sizes_of(m);
   self->ids = found;
-  self->names_size = names.size;
-  self->second = (int)strlen(values.text) + 1;
-  memcpy(self->text, names.text, names.size);
-  memcpy(self->text + names.size, values.text, values.size);
+  self->numeric_names = m->name_numericadr[0];
+  self->attributes = m->plugin_attradr[instance];
+  self->joint_name = name_of(m, found.joint);
+  self->twist_joint_name = name_of(m, found.twist_joint);
+  memcpy(self->text, m->names, m->nnames);
+  memcpy(self->text + m->nnames, m->plugin_attr, m->npluginattr);
   return self;
 }
 
@@ -129,15 +99,17 @@ void vwt_check_layout(const mjModel* m, const vwt_instance* kept) {
   }
 }
 
-const vwt_ids* vwt_ids_for(const mjModel* m, mjData* d, int instance) {
-  const int own = instance < d->nplugin && d->plugin[instance] == m->plugin[instance];
-  const vwt_instance* self = own ? (const vwt_instance*)d->plugin_data[instance] : NULL;
-  if (self && holds(self, m, instance)) {
-    return &self->ids;
+vwt_instance* vwt_instance_compared(const mjModel* m, mjData* d, int instance) {
+  vwt_instance* self = vwt_own_instance(m, d, instance);
+  if (!self || !holds(self, m, instance)) {
+    vwt_check_layout(m, self);
+    if (vwt_instance_renew(m, d, instance)) {
+      mju_error("vwt.yaw_moment: out of memory");
+    }
+    self = (vwt_instance*)d->plugin_data[instance];
   }
-  vwt_check_layout(m, self);
-  if (vwt_instance_renew(m, d, instance)) {
-    mju_error("vwt.yaw_moment: out of memory");
-  }
-  return &((const vwt_instance*)d->plugin_data[instance])->ids;
+  vwt_instance_release(self);
+  self->model = m;
+  self->signature = m->signature;
+  return self;
 }

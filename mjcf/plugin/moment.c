@@ -139,7 +139,11 @@ void vwt_lag_weights(double z, double w[4]) {
   double term = z / 4, sum = term;  // w[3] = sum of -(-z)^k 3!/(3+k)! over k from 1
   for (int k = 2; k < 16; k++) {
     term *= -z / (3 + k);
+    const double before = sum;
     sum += term;
+    if (sum == before) {  // the terms decrease: no later one changes a bit
+      break;
+    }
   }
   w[3] = sum;
   for (int n = 3; n > 0; n--) {

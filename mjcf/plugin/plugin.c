@@ -36,23 +36,27 @@ static void reset(const mjModel* m, mjtNum* plugin_state, void* plugin_data, int
   (void)instance;
   if (plugin_data) {
     vwt_check_layout(m, (const vwt_instance*)plugin_data);
+    vwt_instance_release((vwt_instance*)plugin_data);
   }
   memset(plugin_state, 0, sizeof(vwt_state));
 }
 
 static void compute(const mjModel* m, mjData* d, int instance, int capability_bit) {
-  const vwt_ids* self = vwt_ids_for(m, d, instance);
+  // MuJoCo computes sensors once, before the first stage of a step; the later stages skip them.
+  vwt_instance* self = capability_bit & mjPLUGIN_SENSOR ? vwt_instance_compared(m, d, instance)
+                                                        : vwt_instance_for(m, d, instance);
   const vwt_state* state = state_of(m, d, instance);
   if (capability_bit & mjPLUGIN_PASSIVE) {
     vwt_apply_moments(m, d, self, state);
   } else if (capability_bit & mjPLUGIN_SENSOR) {
-    vwt_sense_moment(m, d, self, state, instance);
+    vwt_sense_moment(m, d, &self->ids, state, instance);
   }
 }
 
 static void advance(const mjModel* m, mjData* d, int instance) {
-  const vwt_ids* self = vwt_ids_for(m, d, instance);
-  vwt_end_step(m, d, self, state_of(m, d, instance));
+  vwt_instance* self = vwt_instance_for(m, d, instance);
+  vwt_end_step(m, d, &self->ids, state_of(m, d, instance));
+  vwt_instance_release(self);
 }
 
 static int nstate(const mjModel* m, int instance) {

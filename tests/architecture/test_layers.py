@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import grimp
@@ -26,6 +27,9 @@ sys.exit(lint_imports(no_cache=True))
 
 #: What runs the engine or Gymnasium itself and says so; no command of ``tunnel`` but its own loads it.
 ENGINE_ROOMS = (
+    "diagnosis.answer.joint_law",
+    "diagnosis.answer.native_closure",
+    "diagnosis.answer.patched_model",
     "tunnel_lab.envs.",
     "tunnel_lab.show.live",
     "tunnel_lab.show.overlay",
@@ -41,9 +45,15 @@ def lint_imports(folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@cache
+def imports() -> grimp.ImportGraph:
+    """Which module imports which, of the sources."""
+    return grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
+
+
 def imported_by(script: str) -> set[str]:
-    """Top-level names of all modules loaded once a script has run in a fresh interpreter."""
-    report = "\nimport sys\nprint(*sorted({name.partition('.')[0] for name in sys.modules}))"
+    """Names of all modules loaded once a script has run in a fresh interpreter."""
+    report = "\nimport sys\nprint(*sorted(sys.modules))"
     done = subprocess.run(
         [sys.executable, "-c", script + report], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -92,7 +102,7 @@ def test_a_planted_breach_is_caught(tmp_path: Path, module: str, line: str) -> N
 
 
 def test_the_reference_simulator_rests_on_values_alone() -> None:
-    graph = grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
+    graph = imports()
     foreign = {
         name
         for module in graph.modules
@@ -106,7 +116,7 @@ def test_the_reference_simulator_rests_on_values_alone() -> None:
 
 
 def test_mujoco_is_imported_only_where_the_engine_runs() -> None:
-    graph = grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
+    graph = imports()
     importers = graph.find_modules_that_directly_import("mujoco")
     assert "tunnel_sim.engine.simulate" in importers
     outside = {name for name in importers if not name.startswith("tunnel_sim.")}
@@ -130,18 +140,18 @@ def test_reading_and_identifying_a_campaign_never_imports_the_engine() -> None:
 def test_no_module_of_the_upper_layers_loads_heavy_packages_at_import() -> None:
     modules = imported_by(
         "import importlib, pkgutil\n"
-        "for package in ('identification', 'tunnel_lab'):\n"
+        "for package in ('diagnosis', 'identification', 'tunnel_lab'):\n"
         "    found = pkgutil.walk_packages(importlib.import_module(package).__path__, package + '.')\n"
         "    for module in found:\n"
         f"        if not module.name.startswith({ENGINE_ROOMS}):\n"
         "            importlib.import_module(module.name)\n"
     )
-    assert {"identification", "tunnel_lab"} <= modules
-    assert not modules & {"mujoco", "gymnasium", "torch", "matplotlib"}
+    assert {"diagnosis", "identification", "tunnel_lab"} <= modules
+    assert not modules & {"mujoco", "gymnasium", "torch", "matplotlib", "scipy.signal", "scipy.stats"}
 
 
 def test_commands_do_not_import_each_other() -> None:
-    graph = grimp.build_graph("tunnel_lab", cache_dir=None)
+    graph = imports()
     commands = {name for name in graph.modules if name.startswith("tunnel_lab.commands.")}
     assert len(commands) > 10
     for name in sorted(commands):

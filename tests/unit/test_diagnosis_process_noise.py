@@ -80,9 +80,15 @@ def windy():
     return nominal(buffeted(campaign(), 0.01, 4.0))
 
 
-def test_intensity_and_bandwidth_are_recovered(windy):
+@pytest.fixture(scope="module")
+def found(windy):
+    """The random moment fitted to the windy campaign."""
     found = fit_turbulence(windy)
     assert found is not None
+    return found
+
+
+def test_intensity_and_bandwidth_are_recovered(found):
     # at the rig only the level of the spectrum around resonance is seen well: intensity²/bandwidth
     spectrum = found.spectrum
     assert spectrum.intensity**2 / spectrum.bandwidth == pytest.approx(0.01**2 / 4.0, rel=0.5)
@@ -91,38 +97,34 @@ def test_intensity_and_bandwidth_are_recovered(windy):
     assert abs(found.excess) < 0.1
 
 
-def test_innovations_of_the_right_model_are_white_and_steady(windy):
-    found = fit_turbulence(windy)
-    assert found is not None
+def test_innovations_of_the_right_model_are_white_and_steady(found):
     assert departure_from_white(found) < 5.0
     assert bursts(found, 0.001) < 1.0
     assert len(found.innovations) == sum(speed > 0.0 for _, speed in CONDITIONS)
 
 
 @pytest.mark.parametrize("length", [1, 4, 16, 60])
-def test_a_blow_in_steady_turbulence_is_a_burst(windy, length):
-    found = fit_turbulence(windy)
+def test_a_blow_in_steady_turbulence_is_a_burst(found, length):
     struck = [i.copy() for i in found.innovations]
     struck[0][100 : 100 + length] += 8.0 / length**0.25  # standard deviations
     assert bursts(replace(found, innovations=struck), 0.001) > 1.5
 
 
-def test_steady_innovations_burst_at_the_stated_rate_at_most(windy):
-    found, rng = fit_turbulence(windy), np.random.default_rng(11)
+def test_steady_innovations_burst_at_the_stated_rate_at_most(found):
+    rng = np.random.default_rng(11)
     drawn = [[rng.standard_normal(400) for _ in range(3)] for _ in range(300)]
     alarms = sum(bursts(replace(found, innovations=innovations), 0.05) > 1.0 for innovations in drawn)
     assert 1 <= alarms <= binom.ppf(0.999, 300, 0.05)  # none at all would mean that it cannot fail
 
 
-def test_a_random_moment_of_all_runs_is_taken_for_one_of_a_single_run_at_the_stated_rate_at_most(windy):
-    found, rng = fit_turbulence(windy), np.random.default_rng(12)
+def test_a_random_moment_of_all_runs_is_taken_for_one_of_a_single_run_at_the_stated_rate_at_most(found):
+    rng = np.random.default_rng(12)
     drawn = [rng.exponential(size=8) for _ in range(2000)]
     alarms = sum(of_all_runs(replace(found, by_run=power)) < 0.01 for power in drawn)
     assert binom.ppf(0.001, 2000, 0.01) <= alarms <= binom.ppf(0.999, 2000, 0.01)
 
 
-def test_turbulence_in_one_run_is_not_that_of_the_stream(windy):
-    found = fit_turbulence(windy)
+def test_turbulence_in_one_run_is_not_that_of_the_stream(found):
     assert of_all_runs(found) > 0.1
     assert is_steady_noise(found)
     assert not is_steady_noise(replace(found, by_run=np.array([1.0, *np.full(7, 0.01)])))
@@ -202,8 +204,7 @@ def test_sets_are_not_grown_anew_for_a_gap_that_is_in_still_air_too(monkeypatch)
     assert weigh_random_moments(base, [], (*BUFFETING, effect_class("coulomb_friction"))) == []
 
 
-def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy):
-    found = fit_turbulence(windy)
+def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy, found):
     data = with_response(windy, found.spectrum)
     again = fit(replace(windy.problem, data=data), windy.point)
     for run, residual in zip(data.runs, again.residuals, strict=True):

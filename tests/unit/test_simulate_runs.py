@@ -231,3 +231,12 @@ def test_flexible_rod_is_released_in_balance() -> None:
     end, twist = data.joint("yaw").qpos[0], data.joint("rod_twist").qpos[0]
     assert end + twist == pytest.approx(PLAIN.release_angle, rel=1e-15)
     assert PLAIN.spring_stiffness * end == pytest.approx(twist / TWIST.compliance, rel=1e-12)
+
+
+def test_the_timers_of_mujoco_go_on_after_a_simulation() -> None:
+    model = build_model(RIG, PLAIN)
+    simulate_motion(model, 100.0)
+    simulate_motions(RIG, [PLAIN], 100.0)
+    data = model.release_state()
+    mujoco.mj_step(model.mj, data)
+    assert data.timer[mujoco.mjtTimer.mjTIMER_STEP].duration > 0.0

@@ -117,6 +117,28 @@ static void check_models_on_one_data(void) {
   }
 }
 
+// Two models of the same law, signature and sizes, in turn at one address and without a reset in between.
+static void check_models_at_one_address(void) {
+  static const char* const play = "<numeric name='free_play' data='0.02'/><numeric name='user_abcd' data='0.3'/>";
+  static const char* const other = "<numeric name='user_abcd' data='0.3'/><numeric name='free_play' data='0.02'/>";
+  mjModel* models[] = {model(yaw_only, play, steady, "", ""), model(yaw_only, other, steady, "", "")};
+  EXPECT(models[0]->signature == models[1]->signature && models[0]->nbuffer == models[1]->nbuffer);
+  mjModel* place = mj_copyModel(NULL, models[0]);
+  mjData *d = mj_makeData(place), *own = mj_makeData(models[0]);
+  d->qpos[0] = own->qpos[0] = 0.3;
+  for (int i = 0; i < 8; i++) {
+    mj_copyModel(place, models[i % 2]);
+    (i < 4 ? mj_forward : mj_step)(place, d);
+    (i < 4 ? mj_forward : mj_step)(models[0], own);
+    EXPECT(d->qfrc_passive[0] == own->qfrc_passive[0] && d->qvel[0] == own->qvel[0]);
+  }
+  mj_deleteData(d);
+  mj_deleteData(own);
+  mj_deleteModel(place);
+  mj_deleteModel(models[0]);
+  mj_deleteModel(models[1]);
+}
+
 static void check_data_of_other_sizes(void) {
   const char* const other = "mjData was made for a model of other sizes";
   mjModel* small = model(yaw_only, steady, "", "", "");
@@ -158,6 +180,7 @@ static void check_forward(void) {
     vwt_evaluate(6 - i, broken + i, 1, &in, &value);
     EXPECT(value != value);
   }
+  EXPECT(vwt_no_clock() == 0);
   vwt_backlash(kSamples, angle, 0.01, 0.3, angle);
   for (int i = 0; i < vwt_run_count(); i++) {
     EXPECT(vwt_run_offset(i) + (int)sizeof(double) <= vwt_run_size() && vwt_run_name(i)[0]);
@@ -171,6 +194,7 @@ int main(void) {
   check_forward();
   mju_user_error = on_error;
   check_models_on_one_data();
+  check_models_at_one_address();
   check_data_of_other_sizes();
   puts("the plugin is clean with one model and with two");
   return 0;

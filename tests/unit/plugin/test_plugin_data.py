@@ -94,6 +94,17 @@ def test_coefficient_changed_in_the_model_acts_at_once() -> None:
     assert _same(_moving(model), _moving(_model({"cn_beta": "0.8"})))
 
 
+def test_friction_forgets_the_start_of_the_step_where_a_coefficient_changes() -> None:
+    model = _model({"friction_moment": "9", "gravity_stiffness": "1"})
+    held, fresh = _moving(model), _moving(model)  # friction balances the other moments
+    mujoco.mj_forward(model, held)
+    model.numeric("gravity_stiffness").data[0] = 2.0
+    for data in (held, fresh):
+        data.joint("yaw").qpos += 0.01
+        mujoco.mj_forwardSkip(model, data, mujoco.mjtStage.mjSTAGE_NONE, 1)
+    assert np.array_equal(held.qfrc_passive, fresh.qfrc_passive)
+
+
 def test_expanded_numerics_give_every_simulation_its_own_coefficients() -> None:
     model = _model()
     values = [0.2, 0.5, 0.8]
