@@ -60,7 +60,8 @@ class TextTable:
 
     def _cell(self, tag: str, text: str, heading: str) -> str:
         side = "right" if heading in self.right else "left"
-        return f'<{tag} style="text-align: {side}">{escape(text).replace(chr(10), "<br>")}</{tag}>'
+        style = f"text-align: {side}; padding: 0.15em 0.8em"
+        return f'<{tag} style="{style}">{escape(text).replace(chr(10), "<br>")}</{tag}>'
 
 
 def as_text(parts: Iterable[str | TextTable]) -> str:

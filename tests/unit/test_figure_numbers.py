@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 
 from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.unit.shown_numbers import assert_shows, numbers
@@ -19,6 +20,7 @@ from tunnel_lab.diagnosis_view.figures_backbone import backbone_figure
 from tunnel_lab.diagnosis_view.figures_common import run_label
 from tunnel_lab.diagnosis_view.figures_law import law_figure
 from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
+from tunnel_lab.plotting.common import styled
 
 Document = dict[str, Any]
 
@@ -284,11 +286,27 @@ def test_backbones(given: Document) -> None:
                 column = corners[np.isclose(corners[:, 0], x), 1]
                 assert (column.min(), column.max()) == pytest.approx((y - 1.96 * std, y + 1.96 * std))
         assert list(axes.lines[-1].get_ydata()) == [0.0, 0.0]
-    colours = {line.get_color() if isinstance(line.get_color(), str) else tuple(line.get_color())
-               for line in damping.lines}  # fmt: skip
-    assert len(colours) == 3
     labels = [line.get_label() for line in damping.lines[:2]]
     assert labels == [run_label(given["maps"]["runs"][0]), run_label(given["maps"]["runs"][2])]
+
+
+def test_no_two_backbones_are_of_one_colour(given: Document) -> None:
+    for name in ("backbones", "runs"):
+        first = given["maps"][name][0]
+        given["maps"][name] = [first | {"id": f"run-{i}"} for i in range(12)]
+    _, damping = backbone_figure(given).axes
+    curves = damping.lines[:-1]
+    assert len({to_hex(line.get_color()) for line in curves}) == len(curves) == 12
+
+
+@pytest.mark.parametrize("size", [2, 18, 40])
+def test_the_legend_of_the_backbones_is_no_wider_than_the_figure(given: Document, size: int) -> None:
+    for run, curve in zip(given["maps"]["runs"], given["maps"]["backbones"], strict=True):
+        run["id"] = curve["id"] = run["id"].rjust(size, "w")
+    fig = backbone_figure(given)
+    styled(fig.draw_without_rendering)()
+    legend = fig.legends[0].get_window_extent()
+    assert 0.0 <= legend.x0 < legend.x1 <= fig.bbox.x1
 
 
 def test_the_runs_that_carry_the_gap_are_drawn_first(given: Document) -> None:

@@ -5,6 +5,7 @@ Truth: closed forms, and signals whose spectrum is known.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,8 +13,10 @@ import numpy as np
 import pytest
 
 from identification.estimate import Quantity
+from tests.unit.diagnosis_document import campaign
 from tunnel_lab.plotting import plots
 from tunnel_lab.plotting.common import figure, limit_to_known, log_axis, styled
+from tunnel_lab.plotting.import_figure import thinned
 from tunnel_lab.plotting.window_figure import deviations, windows_figure
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Record
@@ -120,6 +123,21 @@ def test_estimates_without_errors_are_drawn_empty(tmp_path: Path) -> None:
 def test_a_reading_that_does_not_move_has_a_figure(tmp_path: Path) -> None:
     run = Run("r", Record(np.arange(100.0), np.zeros(100)), 0.0)
     assert plots.save(plots.spectrum_figure((run,)), tmp_path / "a.png").exists()
+
+
+def test_no_line_crosses_missing_samples() -> None:
+    time = np.delete(0.01 * np.arange(600), range(200, 300))
+    record = Record(time, np.cos(time))
+    run = Run("r", record, 0.0)
+    (page,) = plots.trace_pages(replace(campaign(), runs=(run,)))
+    drawn = [axes.lines[0].get_xydata() for axes in (*page.axes, *plots.wind_off_on_figure(run, run).axes)]
+    long = np.repeat(time, 20) + np.tile(0.0005 * np.arange(20), time.size)  # more samples than are drawn
+    drawn += [np.stack(thinned(t, np.cos(t)), axis=-1) for t in (time, long)]
+    for curve in map(np.asarray, drawn):
+        broken = curve[np.isnan(curve[:, 1]), 0]
+        assert broken == pytest.approx([0.5 * (1.99 + 3.0)], abs=0.02)
+        kept = curve[~np.isnan(curve[:, 1])]
+        assert np.allclose(kept[:, 1], np.cos(kept[:, 0]), atol=0.02)
 
 
 @pytest.mark.parametrize("ends", [(0.21, 0.9), (3.0, 70.0), (1e-6, 1e2)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import polars as pl
 import pytest
@@ -66,7 +67,7 @@ def test_many_runs_are_counted_not_listed(estimate: Estimate) -> None:
 
 def test_a_notebook_shows_the_same_with_names_escaped(estimate: Estimate) -> None:
     page = estimate._repr_html_()
-    assert '<td style="text-align: left">12.340 ± 0.056</td>' in page
+    assert '<td style="text-align: left; padding: 0.15em 0.8em">12.340 ± 0.056</td>' in page
     assert "&lt;off&gt;" in page
     assert "<off>" not in page
 
@@ -183,6 +184,12 @@ def test_a_cell_of_several_lines_keeps_its_column() -> None:
         "longer   3",
     ]
     assert "1<br>22" in table.html()
+
+
+def test_cells_stand_apart_also_without_a_style_sheet() -> None:
+    table = TextTable("t", ("a", "b"), (("x", "1"), ("y", "2")), right=("b",))
+    sides = re.findall(r"padding: [\d.]+em ([\d.]+)em", table.html())
+    assert [float(side) >= 0.5 for side in sides] == [True] * 6
 
 
 def test_tables_without_rows_and_empty_paragraphs_are_left_out() -> None:

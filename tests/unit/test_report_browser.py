@@ -5,16 +5,22 @@ Truth: a document written by hand, and what the style sheet and WCAG 2 ask for.
 
 from __future__ import annotations
 
+import copy
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.unit.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
 from tests.unit.diagnosis_document import campaign, document
 from tunnel_lab.diagnosis_view import Byline, write_report
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Record
 
 pytestmark = IN_A_BROWSER
 
@@ -38,9 +44,10 @@ def browser() -> Iterator[Any]:
 class Opened:
     """The report in a tab, and what it has complained about or asked for."""
 
-    def __init__(self, browser: Any, report: Path, width: int, **given: Any) -> None:
+    def __init__(self, browser: Any, report: Path, width: int, script: str = "", **given: Any) -> None:
         self.context = browser.new_context(viewport={"width": width, "height": 900}, **given)
         self.page = self.context.new_page()
+        self.page.add_init_script(script)
         self.complaints: list[str] = []
         self.requests: list[str] = []
         self.page.on("console", lambda message: self.complaints.append(message.text))
@@ -171,3 +178,129 @@ def test_tables_and_pictures_are_named_for_a_screen_reader(opened: Opened) -> No
       return !(one.getAttribute("aria-label") || one.ariaLabel || one.textContent.trim());
     }).map((one) => one.outerHTML.slice(0, 200))"""
     assert opened.page.evaluate(nameless) == []
+
+
+GAP = (3.0, 4.2)  # s, without samples, of the first run
+# Keeps the charts that a page makes, to ask where they draw a value.
+KEEP_CHARTS = """let kept; window.charts = [];
+const construct = (kind, given) => { charts.push(new kind(...given)); return charts.at(-1); };
+Object.defineProperty(window, "uPlot", { configurable: true, get: () => kept,
+  set: (made) => { kept = new Proxy(made, { construct }); } });
+window.live = (figure) => charts.filter((one) => one.root.isConnected
+  && one.root.closest(`[data-figure="${figure}"]`));"""
+# Of one curve alone: how many values it holds, and whether it is drawn at each of the places in its axes' units.
+DRAWN = """async ([figure, place, series, points]) => {
+  const chart = live(figure)[place];
+  const picture = async (shown) => {
+    chart.series.forEach((_, i) => { if (i) chart.setSeries(i, { show: i === shown }); });
+    await new Promise((done) => setTimeout(done));
+    return chart.ctx.getImageData(0, 0, chart.ctx.canvas.width, chart.ctx.canvas.height);
+  };
+  const [without, given] = [await picture(-1), await picture(series)];
+  const stroke = chart.series[series].stroke().match(/[\\d.]+/g).map(Number);
+  const far = (image, at) => stroke.slice(0, 3).reduce((sum, v, i) => sum + Math.abs(v - image.data[at + i]), 0);
+  const drawn = ([x, y]) => {
+    const [column, row] = [chart.valToPos(x, "x", true), chart.valToPos(y, "y", true)].map(Math.round);
+    const near = [-2, -1, 0, 1, 2];
+    return near.some((i) => near.some((j) => {
+      const at = 4 * ((row + j) * given.width + column + i);
+      return far(given, at) < 0.5 * far(without, at);
+    }));
+  };
+  return [chart.data[series].filter((v) => v != null).length, points.map(drawn)];
+}"""
+CELLS = """(figure) => {
+  const [chart] = live(figure);
+  const spec = JSON.parse(document.getElementById("chart-data").textContent)[figure][0];
+  const middles = (edges) => edges.slice(1).map((edge, i) => 0.5 * (edge + edges[i]));
+  return middles(spec.y.edges).map((y) => middles(spec.x.edges).map((x) => chart.ctx.getImageData(
+    Math.round(chart.valToPos(x, "x", true)), Math.round(chart.valToPos(y, "y", true)), 1, 1).data[3] > 0));
+}"""
+
+
+Line = list[tuple[float, float]]
+
+
+def line(x: Any, y: Any) -> Line:
+    """The points of a curve that hold a value."""
+    return [(at, value) for at, value in zip(x, y, strict=True) if value is not None]
+
+
+def middles(points: Line, logarithmic: bool) -> Line:
+    """The middle of each part of a line on its axes."""
+    there, back = (np.log, np.exp) if logarithmic else (np.asarray, np.asarray)
+    given = there(np.array(points))
+    return [tuple(middle) for middle in back(0.5 * (given[1:] + given[:-1])).tolist()]
+
+
+def holed() -> tuple[dict[str, Any], Campaign]:
+    """A document whose spectrum has empty bins, other ones for every run; and a gap in the first run."""
+    given, data = copy.deepcopy(document()), campaign()
+    first, *others = data.runs
+    time, yaw = first.record.time_s, first.record.yaw_rad
+    kept = (time < GAP[0]) | (time > GAP[1])
+    first = replace(first, record=Record(time[kept], yaw[kept]))
+    excess = [8.0, 7.0, 15.0, None, 5.0, 3.0, 50.0, 2.0, 6.0, 0.2, -0.6, 0.4]
+    given["maps"]["frequency"] |= {
+        "edges_hz": [0.0, *np.geomspace(0.05, 20.0, 12).tolist()],
+        "excess": excess,
+        "after": [None if v is None else 0.1 * (i % 3) for i, v in enumerate(excess)],
+        "std": [None if v is None else 0.1 for v in excess],
+        "by_run": [[8.0, None, 20.0, None, None, 3.0, 60.0, 1.0, 2.0, None, -0.5, 0.2],
+                   [None, None, 9.0, None, 5.0, None, 70.0, 2.0, 9.0, 0.1, None, None],
+                   [None, 7.0, None, None, None, None, 20.0, 3.0, 6.0, 0.3, -0.9, 0.7]],
+    }  # fmt: skip
+    when = [t for t in np.arange(0.0, 7.3, 0.1).round(1).tolist() if not GAP[0] <= t <= GAP[1]]
+    before, after = ([size * np.sin(speed * t) for t in when] for size, speed in ((4e-3, 5.0), (1e-3, 3.0)))
+    given["maps"]["traces"][0] |= {"time_s": when, "before_rad": before, "after_rad": after}
+    return given, replace(data, runs=(first, *others))
+
+
+def expected_curves(given: dict[str, Any], data: Campaign) -> Iterator[tuple[str, int, int, int, Line]]:
+    """Figure, chart, view, series and points of every curve, from the document."""
+    spectrum = given["maps"]["frequency"]
+    edges = np.array(spectrum["edges_hz"])
+    centres = np.sqrt(np.array([0.5 * edges[1], *edges[1:-1]]) * edges[1:]).tolist()
+
+    def power(excess: Sequence[float | None]) -> Line:
+        return [(x, max(1.0 + value, 0.3)) for x, value in line(centres, excess)]
+
+    noise = [[None if v is None else factor * v for v in spectrum["std"]] for factor in (-3.0, 3.0)]
+    for series, values in enumerate((*noise, spectrum["excess"], spectrum["after"]), 1):
+        yield "where-spectrum", 0, 0, series, power(values)
+    for view, values in enumerate(spectrum["by_run"], 1):
+        yield "where-spectrum", 0, view, 3, power(values)
+    records = {run.id: run.record for run in data.runs}
+    for view, trace in enumerate(given["maps"]["traces"]):
+        record = records[trace["id"]]
+        thin = slice(None, None, record.time_s.size // 1000)
+        yield "residuals", 0, view, 1, line(record.time_s[thin].tolist(), record.yaw_rad[thin].tolist())
+        for series, name in enumerate(("before_rad", "after_rad"), 1):
+            if trace[name] is not None:
+                yield "residuals", 1, view, series, line(trace["time_s"], [1e3 * v for v in trace[name]])
+
+
+def test_every_curve_and_cell_is_drawn_as_in_the_document(browser: Any, tmp_path: Path) -> None:
+    given, data = holed()
+    report = write_report(given, data, tmp_path / "report.html", Byline("2026-05-31", "A. Smith"))
+    tab = Opened(browser, report, 1200, KEEP_CHARTS)
+    tab.open_all()
+    gaps = 0
+    for figure, place, view, series, points in expected_curves(given, data):
+        about = (figure, place, view, series)
+        tab.page.locator(f'figure[data-figure="{figure}"] select').select_option(index=view)
+        between = middles(points, logarithmic=figure == "where-spectrum")
+        broken = figure == "residuals" and view == 0
+        crosses = [broken and x <= GAP[0] and to >= GAP[1] for (x, _), (to, _) in pairwise(points)]
+        count, drawn = tab.page.evaluate(DRAWN, [figure, place, series, points + between])
+        assert count == len(points), about
+        assert drawn == [True] * len(points) + [not across for across in crosses], about
+        gaps += sum(crosses)
+    assert gaps == 3  # of the reading and of two residuals
+    painted = [[True, True, False], [True, False, True], [True, True, False]]
+    assert tab.page.evaluate(CELLS, "where-runs") == painted
+    assert tab.page.evaluate(CELLS, "where-phase-plane") == [[True, True], [False, False]]
+    assert [
+        said for said in tab.complaints if "willReadFrequently" not in said
+    ] == []  # the test's own readings
+    tab.context.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.raw_records import Raw
     from tunnel_sim.files.importing.records import Imported, Part
+    from tunnel_sim.vocabulary.record import Array
 
 MOST_RECORDS = 24
 """At most this many records are drawn."""
@@ -53,14 +55,14 @@ class Drawn:
         title: of the chart.
         unit: of the readings.
         time: s, few enough to draw.
-        reading: in the unit.
+        reading: in the unit; None within a gap.
         marks: the runs in it.
     """
 
     title: str
     unit: str
     time: list[float]
-    reading: list[float]
+    reading: list[float | None]
     marks: tuple[Mark, ...]
 
 
@@ -155,11 +157,24 @@ def drawn(imported: Imported) -> list[Drawn]:
 
 
 def _drawn(raw: Raw, parts: list[Part], unit: str) -> Drawn:
+    marks = tuple(_mark(part, unit) for part in parts)
+    return Drawn(raw.id, unit, *points(raw.cleaned.time_s, raw.cleaned.reading), marks)
+
+
+def points(time: Array, reading: Array) -> tuple[list[float], list[float | None]]:
+    """The curve of a record for a chart.
+
+    Args:
+        time: shape (n,), s.
+        reading: shape (n,).
+
+    Returns:
+        Times and readings, few enough to draw; None within a gap.
+    """
     from tunnel_lab.plotting.import_figure import thinned
 
-    time, reading = thinned(raw.cleaned.time_s, raw.cleaned.reading)
-    marks = tuple(_mark(part, unit) for part in parts)
-    return Drawn(raw.id, unit, time.tolist(), reading.tolist(), marks)
+    when, values = thinned(time, reading)
+    return when.tolist(), [None if isnan(value) else value for value in values.tolist()]
 
 
 def _mark(part: Part, unit: str) -> Mark:

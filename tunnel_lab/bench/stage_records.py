@@ -233,7 +233,6 @@ def _as_it_is(session: Session) -> None:
     place = ui.element("div")
 
     async def show() -> None:
-        from tunnel_lab.plotting.import_figure import thinned
         from tunnel_sim.files.campaign_io import read_campaign
 
         with fault.around():
@@ -242,10 +241,8 @@ def _as_it_is(session: Session) -> None:
                 return
             with place.classes("charts"):
                 for one in campaign.runs[: preview.MOST_RECORDS]:
-                    time, reading = thinned(one.record.time_s, one.record.yaw_rad)
                     label = f"reading [{campaign.sensor.unit}]"
-                    Chart(
-                        one.id, "time [s]", label, [("reading", "after")], [time.tolist(), reading.tolist()]
-                    )
+                    curve = preview.points(one.record.time_s, one.record.yaw_rad)
+                    Chart(one.id, "time [s]", label, [("reading", "after")], curve)
 
     ui.timer(0.0, show, once=True)

@@ -12,6 +12,7 @@ import numpy as np
 
 from tunnel_lab.diagnosis_view.figures_common import SIGMAS, array, run_label
 from tunnel_lab.diagnosis_view.figures_where import plane_cells, run_cells, spectrum_axis
+from tunnel_lab.plotting.common import with_breaks
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
@@ -75,19 +76,13 @@ def _plane(plane: Document) -> Chart:
 
 def _spectrum(maps: Document) -> Chart:
     given = maps["frequency"]
-    first = int(
-        np.argmax(np.isfinite(array(given["excess"])))
-    )  # the bins below the longest record's are empty
-    values = {key: given[key][first:] for key in ("excess", "std")}
-    after = [None] * len(values["std"]) if given["after"] is None else _power(given["after"][first:])
-    centre = spectrum_axis(given)[1][first:]
-    std = array(values["std"])
-    low, high = np.maximum(1.0 - SIGMAS * std, _LEAST_POWER), 1.0 + SIGMAS * std
-    nothing: list[float | None] = [None] * centre.size
-    views = [_view(_ALL, _rounded(low), _rounded(high), _power(values["excess"]), after)]
-    for run, excess in zip(maps["runs"], given.get("by_run", []), strict=False):
-        own = _power(excess[first:])
-        views.append(_view(run_label(run), nothing, nothing, own, nothing, run=run["id"]))
+    centre = spectrum_axis(given)[1]
+    nothing = np.full(centre.size, np.nan)
+    excess, std = array(given["excess"]), SIGMAS * array(given["std"])
+    after = nothing if given["after"] is None else array(given["after"])
+    views = [_filled(_ALL, centre, -std, std, excess, after)]
+    for run, own in zip(maps["runs"], given.get("by_run", []), strict=False):
+        views.append(_filled(run_label(run), centre, nothing, nothing, array(own), nothing, run=run["id"]))
     return {
         "kind": "lines",
         "title": "Residual power over noise against frequency",
@@ -100,12 +95,15 @@ def _spectrum(maps: Document) -> Chart:
             {"label": "with the causes", "role": "after"},
         ],
         "band": [2, 1],
-        "views": [view | {"data": [_rounded(centre), *view["data"]]} for view in views],
+        "views": views,
     }
 
 
-def _power(excess: Sequence[float | None]) -> list[float | None]:
-    return _rounded(np.maximum(array(excess) + 1.0, _LEAST_POWER))
+def _filled(label: str, centre: Array, *excesses: Array, run: str = "") -> Chart:
+    """A view of the bins that hold a value; the others are empty, and a null there would break the curves."""
+    filled = np.any(np.isfinite(excesses), axis=0)
+    power = (_rounded(np.maximum(1.0 + excess[filled], _LEAST_POWER)) for excess in excesses)
+    return _view(label, _rounded(centre[filled]), *power, run=run)
 
 
 def _traces(maps: Document, campaign: Campaign) -> list[Chart]:
@@ -118,12 +116,15 @@ def _traces(maps: Document, campaign: Campaign) -> list[Chart]:
             continue
         name, label = trace["id"], labels.get(trace["id"], str(trace["id"]))
         record = records[name]
-        step = max(1, record.yaw_rad.size // _POINTS)
-        time = (record.time_s - record.time_s[0])[::step]
-        readings.append(_view(label, _rounded(time, 6), _rounded(record.yaw_rad[::step]), run=name))
-        after = trace["after_rad"] or [None] * len(trace["time_s"])
-        both = (_rounded(1e3 * array(trace["before_rad"])), _rounded(1e3 * array(after)))
-        residuals.append(_view(label, trace["time_s"], *both, run=name))
+        thin = slice(None, None, max(1, record.yaw_rad.size // _POINTS))
+        readings.append(
+            _broken(label, record.time_s[thin] - record.time_s[0], record.yaw_rad[thin], run=name)
+        )
+        before = 1e3 * array(trace["before_rad"])
+        after = (
+            np.full(before.size, np.nan) if trace["after_rad"] is None else 1e3 * array(trace["after_rad"])
+        )
+        residuals.append(_broken(label, array(trace["time_s"]), before, after, run=name))
     if not readings:
         return []
     unit = campaign.sensor.unit
@@ -142,6 +143,12 @@ def _lines(title: str, x: Chart, unit: str, series: list[Chart], views: list[Cha
 
 def _view(label: str, *data: Sequence[float | None], run: str = "") -> Chart:
     return {"label": label, "run": run, "data": list(data)}
+
+
+def _broken(label: str, time: Array, *curves: Array, run: str) -> Chart:
+    """A view of curves over time, which break where samples are missing."""
+    when, *values = with_breaks(time, *curves)
+    return _view(label, _rounded(when, 6), *map(_rounded, values), run=run)
 
 
 def _rounded(values: Array, digits: int = 4) -> list[float | None]:

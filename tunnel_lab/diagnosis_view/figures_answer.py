@@ -23,7 +23,7 @@ from tunnel_lab.diagnosis_view.figures_common import (
     array,
     noise_axis,
 )
-from tunnel_lab.plotting.common import WIDTH, figure, figure_text, grid, styled
+from tunnel_lab.plotting.common import WIDTH, figure, figure_text, grid, styled, with_breaks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -119,15 +119,16 @@ def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
     for column, trace in enumerate(traces):
         top, bottom = panels[0, column], panels[1, column]
         record = records[trace["id"]]
-        step = max(1, record.yaw_rad.size // 1500)
-        time = record.time_s - record.time_s[0]
-        top.plot(time[::step], record.yaw_rad[::step], color=SOFT, linewidth=0.7)
+        thin = slice(None, None, max(1, record.yaw_rad.size // 1500))
+        time, reading = with_breaks(record.time_s[thin] - record.time_s[0], record.yaw_rad[thin])
+        top.plot(time, reading, color=SOFT, linewidth=0.7)
         top.set_title(f"{figure_text(trace['id'])}: reading [rad]")
-        when, before = array(trace["time_s"]), 1e3 * array(trace["before_rad"])
-        bottom.plot(when, before, color=BEFORE, linewidth=0.8, label="nominal model")
-        if trace["after_rad"] is not None:
-            after = 1e3 * array(trace["after_rad"])
-            bottom.plot(when, after, color=AFTER, linewidth=0.8, label="with the causes")
+        for name, colour, label in (
+            ("before_rad", BEFORE, "nominal model"), ("after_rad", AFTER, "with the causes")
+        ):  # fmt: skip
+            if trace[name] is not None:
+                when, residual = with_breaks(array(trace["time_s"]), 1e3 * array(trace[name]))
+                bottom.plot(when, residual, color=colour, linewidth=0.8, label=label)
         bottom.set_title("residual [10⁻³ rad]")
         bottom.set_xlabel("time since the start of the record [s]")
         bottom.margins(x=0.01)

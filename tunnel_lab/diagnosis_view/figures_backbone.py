@@ -8,14 +8,15 @@ import numpy as np
 
 from tunnel_lab.diagnosis_view.figures_common import INK, Document, array, drawn_label
 from tunnel_lab.plotting.common import WIDTH, figure, grid, limit_to_known, log_axis, styled
-from tunnel_lab.plotting.plots import MARKERS
+from tunnel_lab.plotting.plots import COLOURS, MARKERS
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MOST_CURVES = 16
+_MOST_CURVES = len(COLOURS)
+_LEGEND, _HANDLE = 108, 8  # characters: the width of the figure, and the line beside a label
 
 
 @styled
@@ -40,7 +41,7 @@ def backbone_figure(document: Document) -> Figure:
     for index, curve in enumerate(chosen):
         amplitude = array(curve["amplitude_rad"])
         nominal = curve["nominal_frequency_hz"]
-        style = {"color": f"C{index}", "marker": MARKERS[(index + index // len(MARKERS)) % len(MARKERS)]}
+        style = {"color": COLOURS[index], "marker": MARKERS[(index + index // len(MARKERS)) % len(MARKERS)]}
         shift = 100.0 * (array(curve["frequency_hz"]) / nominal - 1.0)
         shift_std = 100.0 * array(curve["frequency_std"]) / nominal
         _curve(frequency, amplitude, shift, shift_std, style)
@@ -60,7 +61,9 @@ def backbone_figure(document: Document) -> Figure:
             limit_to_known(axes, *(np.concatenate(column) for column in zip(*pairs, strict=True)))
             log_axis(axes, "x")
     if chosen:
-        fig.legend(loc="outside lower center", ncols=3)
+        longest = max(len(labels[curve["id"]]) for curve in chosen)
+        columns = min(3, _LEGEND // (longest + _HANDLE)) or 1
+        fig.legend(loc="outside lower center", ncols=columns)
     return fig
 
 

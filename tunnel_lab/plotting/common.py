@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
 
 import numpy as np
 
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,7 +64,7 @@ def log_axis(axes: Axes, which: Literal["x", "y"]) -> None:
     Args:
         axes: whose data are drawn, because the labels depend on the limits.
     """
-    from matplotlib.ticker import FuncFormatter, LogFormatterMathtext, LogLocator, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, NullFormatter
 
     least = axes.dataLim.minposx if which == "x" else axes.dataLim.minposy
     if not np.isfinite(least):  # nothing is drawn that a logarithmic axis could show
@@ -80,12 +80,12 @@ def log_axis(axes: Axes, which: Literal["x", "y"]) -> None:
     axis.set_minor_formatter(NullFormatter())
     if decades > _FEW_DECADES:
         axis.set_major_locator(LogLocator(10.0, (1.0,), numticks=8))
-        axis.set_major_formatter(LogFormatterMathtext(10.0))
+        axis.set_major_formatter(LogFormatterSciNotation(10.0))
     else:
         steps = (1.0, 2.0, 5.0) if decades > 1.0 else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
         axis.set_major_locator(LogLocator(10.0, steps))
         plain = min(limits) >= 1e-4 and max(limits) < 1e5
-        powers = LogFormatterMathtext(10.0, minor_thresholds=(np.inf, np.inf))
+        powers = LogFormatterSciNotation(10.0, minor_thresholds=(np.inf, np.inf))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}") if plain else powers)
 
 
@@ -106,6 +106,21 @@ def limit_to_known(axes: Axes, values: Array, stds: Array) -> None:
     low, high = np.min((values - 2.0 * stds)[known]), np.max((values + 2.0 * stds)[known])
     margin = 0.05 * (high - low) or 0.1 * abs(high) or 1.0
     axes.set_ylim(low - margin, high + margin)
+
+
+def with_breaks(time: Array, *readings: Array) -> tuple[Array, ...]:
+    """Curves that break where samples are missing, instead of crossing the gap in a straight line.
+
+    Args:
+        time: shape (n,), s, increasing.
+        readings: against it, shape (n,) each.
+
+    Returns:
+        The time and the readings, shape (m,) each: in the middle of every gap stands a time whose readings are NaN.
+    """
+    after = np.flatnonzero(gaps(time)) + 1
+    middles = 0.5 * (time[after - 1] + time[after])
+    return np.insert(time, after, middles), *(np.insert(reading, after, np.nan) for reading in readings)
 
 
 def figure_text(text: str) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tunnel_lab.plotting.common import figure_text, styled
+from tunnel_lab.plotting.common import figure_text, styled, with_breaks
 from tunnel_lab.plotting.plots import BLUE, COLOURS, VERMILION
 from tunnel_sim.vocabulary.record import Array
 
@@ -72,18 +72,19 @@ def _draw(axes: Axes, parts: list[Part], unit: str) -> None:
 
 
 def thinned(time: Array, reading: Array) -> tuple[Array, Array]:
-    """A curve with few points that looks the same.
+    """A curve with few points that looks the same, and that breaks where samples are missing.
 
     Args:
         time: shape (n,), s.
         reading: shape (n,).
 
     Returns:
-        Times and readings, shape (m,): the least and the greatest reading of each stretch.
+        Times and readings, shape (m,): the least and the greatest reading of each stretch; NaN within a gap.
     """
     size = time.size // _POINTS
-    if size < 2:
-        return time, reading
-    starts = np.arange(0, time.size, size)
-    ends = np.stack([np.minimum.reduceat(reading, starts), np.maximum.reduceat(reading, starts)], axis=1)
-    return np.repeat(time[starts], 2), ends.ravel()
+    if size > 1:
+        starts = np.arange(0, time.size, size)
+        ends = np.stack([np.minimum.reduceat(reading, starts), np.maximum.reduceat(reading, starts)], axis=1)
+        time, reading = np.repeat(time[starts], 2), ends.ravel()
+    when, values = with_breaks(time, reading)
+    return when, values

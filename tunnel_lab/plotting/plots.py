@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification.printing.numbers import SYMBOLS
-from tunnel_lab.plotting.common import WIDTH, figure, figure_text, grid, log_axis, styled
+from tunnel_lab.plotting.common import WIDTH, figure, figure_text, grid, log_axis, styled, with_breaks
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 COLOURS = (
     "#0072b2", "#d55e00", "#009e73", "#b0529b", "#9a6f00", "#2f8fb0", "#b5484f", "#6f8200", "#7a63c7", "#77808a",
+    "#c88090", "#207060", "#7090f0", "#989860", "#b878d8", "#805870",
 )  # fmt: skip
 """Of `figures.mplstyle`."""
 BLUE, VERMILION = COLOURS[:2]
@@ -102,7 +103,7 @@ def _trace_page(runs: Sequence[Run]) -> Figure:
     for place, run in enumerate(runs, 1):
         axes = fig.add_subplot(rows, columns, place)
         colour = WIND_ON if run.wind_on else WIND_OFF
-        axes.plot(run.record.time_s, run.record.yaw_rad, color=colour, linewidth=0.7)
+        axes.plot(*with_breaks(run.record.time_s, run.record.yaw_rad), color=colour, linewidth=0.7)
         axes.set_title(run_label(run))
         axes.margins(x=0.01)
         grid(axes)
@@ -124,7 +125,7 @@ def wind_off_on_figure(off: Run, on: Run) -> Figure:
     first: Axes | None = None
     for place, (run, colour) in enumerate(((off, WIND_OFF), (on, WIND_ON)), 1):
         axes = fig.add_subplot(2, 1, place, sharex=first, sharey=first)
-        axes.plot(run.record.time_s, run.record.yaw_rad, color=colour, linewidth=0.8)
+        axes.plot(*with_breaks(run.record.time_s, run.record.yaw_rad), color=colour, linewidth=0.8)
         axes.set_title(run_label(run))
         axes.set_ylabel("angle β [rad]")
         axes.margins(x=0.01)

@@ -16,19 +16,24 @@ if TYPE_CHECKING:
 
 
 class LiveRun:
-    """A run of the rig with its full physics, including the plugin."""
+    """A run of the rig with its full physics, including the plugin.
+
+    Its history is that of the physics, not of the frames that a viewer shows: a viewer may take a second for one.
+    """
 
     def __init__(self, run: ShownRun) -> None:
         self.run = run
+        self.history = History()
         self.model = build_model(run.rig, run.settings)
         self.data = self.model.release_state()
         self._released = self.model.release_state()
-        mujoco.mj_forward(self.model.mj, self.data)
+        self.release()
 
     def release(self) -> None:
         """Hold the model at its release angle and release it again."""
         mujoco.mj_copyData(self.data, self.model.mj, self._released)
         mujoco.mj_forward(self.model.mj, self.data)
+        self._record()
 
     def advance(self, seconds: float) -> None:
         """Advance; a run that is over is released again.
@@ -36,7 +41,7 @@ class LiveRun:
         Args:
             seconds: of the run, s.
         """
-        self.advance_by(lambda: mujoco.mj_step(self.model.mj, self.data, self._steps(seconds)))
+        self.advance_by(lambda: self._step(self._steps(seconds)))
 
     def advance_by(self, step: Callable[[], object]) -> None:
         """Advance by an external clock; a run that is over is released again.
@@ -47,6 +52,17 @@ class LiveRun:
         if self.data.time >= self.run.settings.duration:
             self.release()
         step()
+        self._record()
+
+    def _step(self, steps: int) -> None:
+        """Step, with a stop for every point of the history."""
+        apart = self._steps(self.history.interval) or 1
+        for done in range(0, steps, apart):
+            mujoco.mj_step(self.model.mj, self.data, min(apart, steps - done))
+            self._record()
+
+    def _record(self) -> None:
+        self.history.add(float(self.data.time), self.angle)
 
     def _steps(self, seconds: float) -> int:
         return max(0, round(seconds / float(self.model.mj.opt.timestep)))
@@ -84,7 +100,7 @@ def pose(target: mujoco.MjData, source: mujoco.MjData) -> None:
 
 
 class History:
-    """The last seconds of the angle, for a figure in the viewer.
+    """The last seconds of the angle, for a figure in the viewer; another thread may read it.
 
     Args:
         span: s.
@@ -92,10 +108,10 @@ class History:
     """
 
     def __init__(self, span: float = 10.0, points: int = 500) -> None:
-        self._interval = span / points
-        self._points = points
-        self._times: list[float] = []
-        self._angles: list[float] = []
+        self.span = span
+        self.interval = span / points
+        self._most = points
+        self._points: list[tuple[float, float]] = []
 
     def add(self, time: float, angle: float) -> None:
         """Add a point unless it is too close to the last one; a time before the last one starts a new trace.
@@ -104,14 +120,13 @@ class History:
             time: s from the release.
             angle: rad.
         """
-        if self._times and time < self._times[-1]:
-            self._times, self._angles = [], []
-        if self._times and time - self._times[-1] < self._interval:
-            return
-        self._times = [*self._times[1 - self._points :], time]
-        self._angles = [*self._angles[1 - self._points :], angle]
+        before = self._points
+        if before and time < before[-1][0]:
+            before = []
+        if not before or time - before[-1][0] > 0.99 * self.interval:  # sums of steps are not exact
+            self._points = [*before[1 - self._most :], (time, angle)]
 
     @property
     def points(self) -> Array:
         """Time [s] and angle [rad], shape (n, 2)."""
-        return np.column_stack((self._times, self._angles))
+        return np.array(self._points, dtype=np.float64).reshape(-1, 2)

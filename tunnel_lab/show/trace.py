@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tunnel_lab.plotting.common import with_breaks
 from tunnel_sim.vocabulary.record import Array, Record
 
 Image = NDArray[np.uint8]
@@ -73,7 +74,7 @@ def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
     canvas: Any = FigureCanvasAgg(figure)  # matplotlib types it in parts only
     axes = figure.add_subplot()
     time, angle = record.time_s - record.time_s[0], record.yaw_rad
-    (line,) = axes.plot(time, angle, color="0.85", linewidth=1.2)
+    (line,) = axes.plot(*with_breaks(time, angle), color="0.85", linewidth=1.2)
     axes.set_xlim(time[0], time[-1])
     axes.set_xlabel("time [s]")
     axes.set_ylabel("angle β [rad]")

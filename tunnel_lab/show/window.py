@@ -116,14 +116,13 @@ def window_loop(
         clock: wall time, s.
         sleep: waits for s.
     """
-    history, last = History(), clock()
+    last = clock()
     while handle.is_running():
         now = clock()
         with handle.lock():
             controls.advance(min(now - last, 0.1) * speed)
-            history.add(live.data.time, live.angle)
         last = now
-        handle.set_figures((_corner(handle.viewport), _figure(history)))
+        handle.set_figures((_corner(handle.viewport), _figure(live.history)))
         handle.set_texts((None, None, "space\nR", "pause\nrelease again"))
         handle.sync()
         sleep(max(0.0, FRAME_S - (clock() - now)))

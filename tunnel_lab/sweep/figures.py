@@ -24,6 +24,7 @@ DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "
 NAMES: Mapping[str, str] = {**DRAWN, **SYMBOLS, "sensor_zero": "zero"}
 BRACKETS = "In brackets: the standard error in the last digits, from the number of trials; of shares 95 %."
 _INTERVAL = 1.96
+_TICKS = 5  # intervals between labels of six digits, such as 0.00075, that do not touch
 _ASIDE = 0.012  # of the axis, between two estimators
 _LOGARITHMIC = ("noise_std", "spring_stiffness")
 _WIDE = 10.0  # ratio of the largest to the least value from which an axis is drawn logarithmic
@@ -69,9 +70,11 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
             _errorbars(left, at, [line.score.rmse for line in shown], place, estimator)
             _errorbars(right, at, [line.score.bias for line in shown], place, estimator)
         _dress(left, right, mine[0], name)
-    if logarithmic:
-        for axes in panels[-1]:
+    for axes in panels[-1]:
+        if logarithmic:
             log_axis(axes, "x")
+        else:
+            axes.locator_params(axis="x", nbins=_TICKS)
     for column in panels.T:
         fig.align_ylabels(column)
     one = lines[0]

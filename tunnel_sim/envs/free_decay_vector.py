@@ -207,4 +207,5 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
             **kwargs: not used.
         """
         del kwargs
-        self._view.close()
+        if hasattr(self, "_view"):  # Gymnasium before 1.3 closes also what could not be made
+            self._view.close()

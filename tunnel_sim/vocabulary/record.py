@@ -75,6 +75,19 @@ class Record:
         return bool(np.abs(away).max() <= allowed)
 
 
+def gaps(time: Array) -> NDArray[np.bool_]:
+    """Whether samples are missing between one time and the next.
+
+    Args:
+        time: of the samples, shape (n,), s, increasing.
+
+    Returns:
+        Shape (n - 1,): whether the step is longer than four mean intervals.
+    """
+    steps = np.diff(time)
+    return steps > _GAP * steps.mean() if steps.size else np.zeros(0, dtype=np.bool_)
+
+
 def evenly_spaced(record: Record, *, bridged: bool = True) -> Record:
     """A record on a uniform raster, for methods that need one.
 
@@ -97,7 +110,7 @@ def evenly_spaced(record: Record, *, bridged: bool = True) -> Record:
     first, last = slope[at], slope[at + 1]
     # Across a gap slopes may lead far off: up to three times the mean slope, a cubic stays between its ends.
     steepest = 3.0 * np.abs(np.diff(reading)[at]) / step
-    gap = step > _GAP * record.sample_interval
+    gap = gaps(given)[at]
     first, last = (np.where(gap, np.clip(end, -steepest, steepest), end) for end in (first, last))
     values = (
         (1.0 + 2.0 * u) * (1.0 - u) ** 2 * reading[at]

@@ -166,8 +166,12 @@ def test_the_live_run_is_the_simulated_one_and_begins_again() -> None:
         live.advance(0.1)
     assert live.data.time == pytest.approx(0.5)
     assert live.angle == pytest.approx(motion.angle[500], abs=1e-12)
+    time_, angle = live.history.points.T
+    assert np.diff([0.0, *time_, 0.5]).max() < 0.03  # s: also within an advance of a tenth of a second
+    np.testing.assert_allclose(angle, motion.angle[np.round(1000.0 * time_).astype(int)], atol=1e-12)
     live.advance(0.6)
     live.advance(0.0)
+    assert live.history.points.tolist() == [[0.0, run.settings.release_angle]]
     assert live.data.time == 0.0
     assert live.angle == pytest.approx(run.settings.release_angle)
 
@@ -196,6 +200,16 @@ def test_the_history_keeps_the_last_seconds_and_begins_anew() -> None:
     np.testing.assert_allclose(points[:, 1], 2.0 * points[:, 0])
     history.add(0.0, 1.0)
     assert history.points.tolist() == [[0.0, 1.0]]
+
+
+def test_the_panel_shows_a_long_title_whole_and_the_history_of_the_physics() -> None:
+    overlay = pytest.importorskip("tunnel_lab.show.overlay")
+    effects = ("coulomb_friction:friction_moment=0.01", "rod_flexibility:compliance=0.01")
+    live = LiveRun(shown_run(Request(effects=effects)))
+    panel = overlay.overlay(live, "http://localhost:8080/")
+    assert " ".join(panel._head) == live.run.title
+    assert max(map(len, panel._head)) <= 54  # characters of Studio's font in a panel of 380 pixels
+    assert panel._history is live.history
 
 
 class Window:

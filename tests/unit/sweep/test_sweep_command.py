@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +18,7 @@ import pytest
 from tests.unit.gone_reader import unheard
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
+from tunnel_lab.plotting.common import styled
 from tunnel_lab.sweep import cluster, figures
 from tunnel_lab.sweep.engine import run_sweep
 from tunnel_lab.sweep.product import Sweep
@@ -206,6 +209,34 @@ def test_a_figure_has_a_column_of_panels_for_each_quantity() -> None:
         [[getattr(line.score, figure).value for line in along if line.quantity == quantity]]
         for quantity, figure in wanted
     ]
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [(3e-4, 1e-3, 2e-3), (1e-4, 2e-3), (1e-5, 2e-4), (0.0, 1e-3), (1.25e-4, 2.5e-4, 5e-4), (2e-6, 1e-5)],
+)
+@styled  # as a figure is saved
+def test_labels_of_the_axes_do_not_touch(noise: tuple[float, ...]) -> None:
+    rows = pl.concat(
+        [hand_made([2.02, 1.98, 2.2, 2.3]).with_columns(noise_std=at) for at in map(pl.lit, noise)]
+    )
+    drawn = figures.error_figure([line for line in _lines(rows, "e", "zeta") if line.axis == "noise_std"])
+    assert drawn is not None
+    shown = []
+    drawn.draw_without_rendering()
+    for axes in drawn.axes:
+        low, high = axes.get_xlim()
+        shown += [
+            text
+            for at, text in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+            if low <= at <= high
+        ]
+    assert len(shown) >= 4
+    boxes = sorted((text.get_window_extent() for text in shown), key=lambda box: box.x0)
+    assert all(left.x1 + 4.0 < right.x0 for left, right in pairwise(boxes))  # pixels, about a digit's width
+    assert [
+        text.get_text() for text in shown if re.search(r"\{-?\d+\.\d", text.get_text())
+    ] == []  # such as 10^-3.7
 
 
 def test_each_line_has_the_rows_of_one_estimator_and_quantity_that_were_asked(tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ export default {
       made.tabIndex = 0;
       made.setAttribute("role", "slider");
       const mark = () => this.marks.find((one) => one.id === id);
-      const [axis, values] = mark().kind === "rest" ? ["y", this.data[1]] : ["x", this.data[0]];
+      const [axis, values] = mark().kind === "rest" ? ["y", this.data[1].filter((v) => v != null)] : ["x", this.data[0]];
       const least = Math.min(...values), most = Math.max(...values);
       made.setAttribute("aria-orientation", axis === "y" ? "vertical" : "horizontal");
       made.setAttribute("aria-valuemin", least);
