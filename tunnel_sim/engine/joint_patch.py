@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,9 +13,10 @@ import mujoco
 import numpy as np
 
 from tunnel_sim.engine.joint_model import JointModel
+from tunnel_sim.engine.model_files import engine_refusals
 from tunnel_sim.engine.simulate import no_log
 from tunnel_sim.physics.motion import Motion
-from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 _AIR = (
     "air_density",
@@ -116,18 +118,13 @@ def patched(
         if (known := spec.key(name)) is not None:
             spec.delete(known)
         spec.add_key(name=name, qpos=[model.law.rest + start.angle], qvel=[start.rate])
-    try:
+    with _refusals(model):
         after = spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
-        raise _refused(error, model) from error
     return spec, _differences(before, after)
 
 
-def _refused(error: Exception, model: JointModel) -> TunnelError:
-    said = one_line(" ".join(str(error).split()), 300)
-    return TunnelError(
-        f"MuJoCo refuses the patched model ({said})", where=shown(model.path), remedy="simplify the model"
-    )
+def _refusals(model: JointModel) -> AbstractContextManager[None]:
+    return engine_refusals("MuJoCo refuses the patched model", "simplify the model", shown(model.path))
 
 
 def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
@@ -147,10 +144,8 @@ def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
     for name in ("meshdir", "texturedir") if spec.meshes or spec.textures or spec.hfields else ():
         assets = model.path.parent.resolve() / getattr(spec.compiler, name)
         setattr(spec.compiler, name, os.path.relpath(assets, folder.resolve()))
-    try:
+    with _refusals(model):
         return str(spec.to_xml())
-    except (ValueError, mujoco.FatalError) as error:
-        raise _refused(error, model) from error
 
 
 def _write_inertia(
