@@ -45,9 +45,7 @@ def run(
         )
     build = library("sphinx.cmd.build", "the documentation", "docs").main
     if out.resolve().is_relative_to(source.resolve()):
-        raise TunnelError(
-            "is among the pages", where=shown(out), remedy="name a folder elsewhere with --out"
-        )
+        raise TunnelError("is among the pages", where=shown(out), remedy="name a folder elsewhere with --out")
     site = output_folder(out) / "html"  # the results of the notebooks are kept beside it
     if build(["-q", "-W", "--keep-going", "-b", "html", str(source), str(site)]):
         raise typer.Exit(1)
