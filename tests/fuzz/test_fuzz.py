@@ -41,7 +41,15 @@ def test_no_diagnosis_raises_anything_but_one_line_errors():
 @pytest.mark.parametrize("name", readers.READERS)
 def test_inputs_left_as_they_are_are_accepted(name, tmp_path, monkeypatch):
     """Mutation starts from valid inputs, else nothing past the first check would ever be reached."""
-    for changed in ("mutated", "changed_csv", "changed_bytes", "changed_line", "_changed_array"):
+    for changed in (
+        "mutated",
+        "changed_csv",
+        "changed_bytes",
+        "changed_line",
+        "changed_xml",
+        "changed_formula",
+        "_changed_array",
+    ):
         monkeypatch.setattr(readers, changed, lambda value, *_: value)
     monkeypatch.setattr(readers, "changed_parquet", lambda frame, _rng: tables.parquet(frame))
     monkeypatch.setattr(readers, "STRANGE", 0.0)
