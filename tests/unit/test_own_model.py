@@ -137,6 +137,8 @@ def test_a_urdf_is_read(tmp_path: Path) -> None:
         ({"body": BODY.replace('name="hinge"', 'name="hinges"')}, "did you mean 'hinges'?"),
         ({"body": '<body><joint name="hinge" type="ball"/>{}{}</body>'}, "is not a hinge or slide"),
         ({"body": BODY.replace("axis=", "axes=")}, "MuJoCo cannot load it"),
+        ({"option": 'timestep="0"'}, "its timestep of 0.0 s is not above zero"),
+        ({"option": 'timestep="-1"'}, "its timestep of -1.0 s is not above zero"),
         ({"free": ("mass",)}, "unknown parameter 'mass'"),
         ({"free": ("inertia", "stiffness"), "joint": 'stiffness="1"', "gravity": 0.0}, "cannot both be"),
     ],

@@ -152,8 +152,13 @@ def _checked_joint(model: mujoco.MjModel, joint: str) -> str:
     """The kind of the only joint.
 
     Raises:
-        TunnelError: when the joint is missing, of another kind, or not the only one, or a constraint holds it.
+        TunnelError: when the joint is missing, of another kind, or not the only one, or a constraint holds it, or
+            the model cannot be simulated.
     """
+    if not model.opt.timestep > 0.0:
+        raise TunnelError(
+            f"its timestep of {model.opt.timestep} s is not above zero", remedy="correct the model's option"
+        )
     names = [model.joint(i).name for i in range(model.njnt)]
     if joint not in names:
         known = [name for name in names if name]

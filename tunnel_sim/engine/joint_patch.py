@@ -15,7 +15,9 @@ import numpy as np
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.model_files import engine_refusals
 from tunnel_sim.engine.simulate import no_log
+from tunnel_sim.files.reading import check_count
 from tunnel_sim.physics.motion import Motion
+from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 _AIR = (
@@ -282,11 +284,14 @@ def simulate_joint(model: mujoco.MjModel, law_rest: float, start: Start, duratio
         The displacement from rest and its rate at every step.
 
     Raises:
-        TunnelError: when the motion grows without bound.
+        TunnelError: when the motion grows without bound, or its steps are too many.
     """
+    steps = duration / model.opt.timestep
+    remedy = "lengthen the model's timestep"
+    check_count(steps, limits.RUN_SAMPLES, "steps", f"run {start.run}", remedy)
+    count = math.ceil(steps) + 1
     data = mujoco.MjData(model)
     data.qpos[0], data.qvel[0] = law_rest + start.angle, start.rate
-    count = math.ceil(duration / model.opt.timestep) + 1
     angle, rate = np.empty(count), np.empty(count)
     with no_log():
         for i in range(count):
