@@ -253,7 +253,9 @@ def timed_fit(lead: StartingPoint, nominal: Fit) -> tuple[float, float]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.diagnosis", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("--candidates", type=int, default=len(ALL_EFFECTS), help="effects fitted with sysid")
     parser.add_argument("--only", choices=("diagnosis", "sysid"), help="one of the two parts")
     options = parser.parse_args()

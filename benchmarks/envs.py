@@ -98,7 +98,7 @@ def campaigns(table: Table) -> None:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.envs", description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=256, help="runs in parallel, against mujoco.batch")
     parser.add_argument("--workers", type=int, default=32, help="runs in parallel, against async")
     parser.add_argument("--periods", type=int, default=40, help="control periods of a repetition")

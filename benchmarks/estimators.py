@@ -155,7 +155,9 @@ def show(console: Console, tallies: dict[str, Tally], ours: list[str]) -> None:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.estimators", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("--records", type=int, default=10, help="records in each of the 18 cells")
     parser.add_argument("--seed", type=int, default=1, help="of the noise")
     parser.add_argument("--only", nargs="*", help="names of methods, as in the table")

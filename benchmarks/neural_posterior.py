@@ -266,7 +266,9 @@ def kept(rows: Iterable[Row], path: Path) -> list[Row]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.neural_posterior", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("what", choices=("clean", "blind", "calibration", "curve", "show"))
     parser.add_argument(
         "folders", nargs="*", type=Path, help="blind sets, shards of a training, or tables to show"

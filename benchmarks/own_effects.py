@@ -102,7 +102,9 @@ def answers() -> Table:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.own_effects", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("--repetitions", type=int, default=25, help="repetitions of each side")
     options = parser.parse_args()
     for table in (speeds(options.repetitions), answers()):

@@ -165,7 +165,9 @@ def judged(posterior: Any, variant: str, box: Array, cells: Sequence[Any]) -> It
 
 def main() -> None:
     """Simulate unless the samples are there, train, measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.sbi_posterior", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("variant", choices=tuple(VARIANTS))
     parser.add_argument("--samples", type=Path, default=Path("sbi-samples.npz"), help="written where absent")
     parser.add_argument("--shards", type=int, default=15, help="of 200 campaigns each, as in our training")

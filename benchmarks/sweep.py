@@ -180,7 +180,7 @@ def grow(folder: Path, options: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.sweep", description=__doc__.splitlines()[0])
     parser.add_argument("--small", type=int, default=400, help="runs of each sweep that is compared in turn")
     parser.add_argument("--turns", type=int, default=3, help="turns")
     parser.add_argument("--large", type=int, default=10_000, help="runs of the largest sweep")

@@ -123,7 +123,9 @@ def row(
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.throughput", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("--steps", type=int, default=20_000, help="steps of each repetition on one thread")
     parser.add_argument("--repetitions", type=int, default=25, help="repetitions of each side")
     options = parser.parse_args()

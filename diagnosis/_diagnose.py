@@ -63,7 +63,11 @@ def diagnose(
 
 
 def read_model(
-    path: Path | str, joint: str, campaign: Campaign, free: Sequence[str] | None = None
+    path: Path | str,
+    joint: str,
+    campaign: Campaign,
+    free: Sequence[str] | None = None,
+    asset_dir: Path | str | None = None,
 ) -> JointModel:
     """Read a model of one's own for the diagnosis of a campaign.
 
@@ -72,6 +76,7 @@ def read_model(
         joint: name of the joint recorded, the only one that moves.
         campaign: whose records say how far the joint moves.
         free: what is fitted, of ``inertia``, ``damping``, ``stiffness`` and ``rest``; None: what matters.
+        asset_dir: a further folder in which its includes and meshes may be, beside the model's own.
 
     Returns:
         The model with the law of its joint.
@@ -81,7 +86,8 @@ def read_model(
     """
     from tunnel_sim.engine.joint_model import read_joint_model  # only here: MuJoCo is slow to load
 
-    return read_joint_model(Path(path), joint, reach(campaign), free)
+    assets = None if asset_dir is None else Path(asset_dir)
+    return read_joint_model(Path(path), joint, reach(campaign), free, assets)
 
 
 def _diagnose(

@@ -20,6 +20,14 @@ def test_every_benchmark_is_on_the_page() -> None:
     assert set(COMMANDS) == files - {"benchmarks.peers"}  # used by another
 
 
+@pytest.mark.parametrize("module", COMMANDS)
+def test_each_says_how_it_is_run(module: str) -> None:
+    """A file's own path would put its folder first on Python's, where ``diagnosis`` is a benchmark."""
+    text = (ROOT / f"{module.replace('.', '/')}.py").read_text()
+    assert f'prog="python -m {module}"' in text
+    assert f"``python -m {module}" in text.split('"""')[1]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("module", COMMANDS)
 def test_it_starts(module: str) -> None:

@@ -15,9 +15,20 @@ from unittest.mock import patch
 import numpy as np
 
 from tests.fuzz import seeds
+from tests.fuzz.forks import in_fork
 from tests.fuzz.places import estranged
 from tests.fuzz.tables import changed_csv, changed_parquet
-from tests.fuzz.texts import as_json, as_toml, changed_bytes, changed_head, changed_line, damaged, nested
+from tests.fuzz.texts import (
+    as_json,
+    as_toml,
+    changed_bytes,
+    changed_formula,
+    changed_head,
+    changed_line,
+    changed_xml,
+    damaged,
+    nested,
+)
 from tests.fuzz.values import Rng, mutated
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -177,6 +188,51 @@ def kinds_option(_folder: Path, rng: Rng) -> None:
     from tunnel_reference.make import parse_shares
 
     parse_shares(changed_line(seeds.KINDS, rng))
+
+
+def effects_file(folder: Path, rng: Rng) -> None:
+    """An effects file changed, or a formula in it; what is accepted is made, weighed and compiled."""
+    from tunnel_sim.effects.effects_file import read_effects
+    from tunnel_sim.physics.run_settings import RunSettings
+    from tunnel_sim.vocabulary.aero import AeroDerivatives
+
+    document = seeds.effects_document()
+    if rng.random() < 0.6:
+        formula = seeds.FORMULAS[rng.integers(len(seeds.FORMULAS))]
+        document["effects"][0]["moment"] = changed_formula(formula, rng)
+        content = as_toml(document, rng)
+    else:
+        content = _toml(document, rng)
+    stated = RunSettings(16.12, AeroDerivatives(0.4, -0.1), 0.1, 0.01, wind_speed=15.0)
+    for kind in read_effects(_written(folder / "effects.toml", content, rng)):
+        effect = kind(*kind.example)
+        effect.on_run(stated, stated, None)
+        effect.on_angle(np.linspace(-0.3, 0.3, 5), np.arange(5.0), stated, None)
+        if oracle := effect.moment_oracle(stated):
+            oracle(0.0, 0.1, -0.1)
+
+
+def model_file(folder: Path, rng: Rng) -> None:
+    """A model of one's own changed, or what it includes; where its joint is accepted, it is patched."""
+    from tunnel_sim.engine import joint_model
+    from tunnel_sim.engine.joint_patch import JointPatch, patched, patched_xml
+
+    files = dict(seeds.MODEL_FILES) if rng.random() < 0.8 else {"model.xml": seeds.URDF}
+    changed = "model.xml" if rng.random() < 0.8 else list(files)[rng.integers(len(files))]
+    xml = changed.endswith("xml") and rng.random() < 0.8
+    files[changed] = changed_xml(files[changed], rng) if xml else changed_bytes(files[changed], rng)
+    for name, content in files.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(content)
+    if rng.random() < STRANGE:
+        estranged(folder / changed, rng)
+    with patch.object(joint_model, "in_limited_process", in_fork):
+        found = joint_model.read_joint_model(
+            folder / "model.xml", "hinge", float(10.0 ** rng.uniform(-6.0, 1.0))
+        )
+    law = JointPatch(found.law.inertia * float(rng.uniform(0.5, 2.0)), friction=0.01)
+    spec, _ = patched(found, law)
+    patched_xml(spec, found, folder)
 
 
 def uncertainties(folder: Path, rng: Rng) -> None:
@@ -389,6 +445,8 @@ READERS: dict[str, tuple[Target, float]] = {
     "spring_table": (spring_table, 1.0),
     "effect_option": (effect_option, 1.0),
     "kinds_option": (kinds_option, 0.2),
+    "effects_file": (effects_file, 1.0),
+    "model_file": (model_file, 1.0),
     "uncertainties": (uncertainties, 1.0),
     "estimate": (estimate, 2.0),
     "blind_answers": (blind_answers, 2.0),

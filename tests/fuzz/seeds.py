@@ -48,8 +48,61 @@ common = { spring_stiffness = 0.005, wind_speed = 0.01, air_density = 0.003, clo
 individual = { spring_stiffness = 0.002, wind_speed = 0.005 }
 correlations = [{ between = ["wind_speed", "air_density"], coefficient = -0.5 }]
 """
+MODEL_FILES: dict[str, bytes] = {
+    "model.xml": b"""<mujoco model="pendulum">
+  <compiler angle="radian" meshdir="parts"/>
+  <option timestep="0.002" gravity="0 0 -9.81" integrator="RK4"/>
+  <size memory="1M"/>
+  <include file="more.xml"/>
+  <default><geom contype="0" conaffinity="0"/></default>
+  <asset><mesh name="arm" file="arm.obj" scale="1 1 1"/><hfield name="h" nrow="3" ncol="3" size="1 1 0.1 0.1"/>
+    <texture name="t" type="2d" builtin="checker" width="8" height="8"/></asset>
+  <worldbody>
+    <replicate count="2" offset="1 0 0"><geom size="0.1" mass="1"/></replicate>
+    <body name="b" pos="0 0 1">
+      <joint name="hinge" axis="0 1 0" stiffness="2 0 0.1" springref="0.1" damping="0.01" frictionloss="0.002"/>
+      <geom type="mesh" mesh="arm" mass="0.2"/>
+      <geom name="bob" type="sphere" size="0.02" mass="0.4" pos="0 0 -0.3"/>
+    </body>
+  </worldbody>
+  <sensor><jointpos name="s" joint="hinge" noise="0.001"/></sensor>
+  <keyframe><key name="k" qpos="0.1"/></keyframe>
+</mujoco>""",
+    "more.xml": b"<mujocoinclude><custom><numeric name='n' data='1 2'/></custom></mujocoinclude>",
+    "parts/arm.obj": b"v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 -0.5\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
+}
+URDF = b"""<robot name="r"><link name="base"/><link name="arm"><inertial><origin xyz="0 0 -0.3"/><mass value="0.4"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="hinge" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+<dynamics damping="0.1" friction="0.01"/></joint></robot>"""
+FORMULAS = (
+    "-k*b*exp(-(b/w)^2)",
+    "-k*b^3*V^0",
+    "-abs(-k)*min(b, w)*tanh(b/w)",
+    "-k*sign(r)*abs(b)",
+    "--k*w*sin(b/w)",
+)
 EFFECT = "rod_flexibility:compliance=1e-4,inertia_share=0.3"
 KINDS = "single:2.0,pair:1.0,none:0.5,outside:0.5"
+
+
+def effects_document() -> dict[str, Any]:
+    """The tables of an effects file."""
+    stiffness = {"unit": "N m/rad", "scale": 0.1, "lower": 0.0, "upper": 50.0}
+    width = {"unit": "rad", "scale": 0.05, "lower": 0.01, "upper": 0.3, "default": 0.06}
+    share = {"unit": "1/rad", "scale": 0.1, "lower": -1.0, "upper": 1.0}
+    first = {
+        "name": "detent",
+        "channel": "stiffness",
+        "moment": FORMULAS[0],
+        "parameters": {"k": stiffness, "w": width},
+    }
+    return {
+        "effects": [
+            first,
+            {"name": "curved", "channel": "sensor", "reading": "y+k*y^2", "parameters": {"k": share}},
+        ]
+    }
 
 
 @cache

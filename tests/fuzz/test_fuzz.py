@@ -48,6 +48,8 @@ def test_inputs_left_as_they_are_are_accepted(name, tmp_path, monkeypatch):
         "changed_line",
         "changed_head",
         "damaged",
+        "changed_xml",
+        "changed_formula",
         "_changed_array",
     ):
         monkeypatch.setattr(readers, changed, lambda value, *_: value)

@@ -172,6 +172,66 @@ def changed_line(text: str, rng: Rng) -> str:
     return text[: cuts[at] + (at > 0)] + odd + text[cuts[at + 1] :]
 
 
+def changed_xml(text: bytes, rng: Rng) -> bytes:
+    """XML with values of attributes exchanged for odd ones, or elements repeated, nested or lost.
+
+    Args:
+        text: any.
+        rng: decides what is changed.
+    """
+    whole = text.decode()
+    for _ in range(int(rng.integers(1, 4))):
+        values = list(re.finditer(r'="[^"]*"', whole))
+        elements = list(re.finditer(r"<\w[^<>]*/>", whole))
+        if rng.random() < 0.75 and values:
+            found = values[rng.integers(len(values))]
+            words = found[0][2:-1].split() or [""]
+            at = int(rng.integers(len(words)))
+            words[at] = HOSTILE[rng.integers(len(HOSTILE))] if rng.random() < 0.3 else _number(rng)
+            if rng.random() < 0.1:
+                words *= int(rng.integers(2, 2000))
+            quoted = " ".join(words).replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")
+            whole = f'{whole[: found.start()]}="{quoted}"{whole[found.end() :]}'
+        elif elements:
+            found = elements[rng.integers(len(elements))]
+            odd = (f"<body>{found[0]}</body>" * 3, found[0] * int(rng.integers(0, 200)), elements[0][0])
+            whole = whole[: found.start()] + odd[rng.integers(3)] + whole[found.end() :]
+    return whole.encode("utf-8", "surrogatepass")
+
+
+def changed_formula(text: str, rng: Rng) -> str:
+    """A formula with tokens exchanged, repeated or lost.
+
+    Args:
+        text: any.
+        rng: decides which.
+    """
+    tokens = re.findall(r"\w+|\W", text)
+    for _ in range(int(rng.integers(1, 4))):
+        at = int(rng.integers(len(tokens)))
+        token = tokens[at]
+        odd = (
+            *"+-*/^(),bkwVrt#",
+            "**",
+            "e",
+            "pi",
+            "1e999",
+            "1e-320",
+            "0",
+            "lambda:",
+            "0/0",
+            "b^0.5",
+            "(b)",
+            _number(rng),
+        )
+        kinds = (token * int(rng.integers(0, 500)), str(odd[rng.integers(len(odd))]), f"({token})" * 2)
+        tokens[at] = f"{FUNCTION[rng.integers(3)]}({token})" if rng.random() < 0.2 else kinds[rng.integers(3)]
+    return "".join(tokens)
+
+
+FUNCTION = ("sqrt", "log", "tan")
+
+
 def _number(rng: Rng) -> str:
     return str(NUMBERS[rng.integers(len(NUMBERS))])
 

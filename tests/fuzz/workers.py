@@ -198,6 +198,7 @@ def _prepare() -> None:
 
     mpl.use("agg")
     __import__("torch")
+    __import__("tunnel_sim.engine.joint_patch")
     __import__("tunnel_sim.engine.virtual_campaign")
     __import__("diagnosis._diagnose")
     __import__("tunnel_lab.diagnosis_view")

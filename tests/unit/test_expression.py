@@ -117,7 +117,12 @@ def test_length_and_depth_are_limited() -> None:
         parse("b" + "+b" * 250, NAMES)
     with pytest.raises(TunnelError, match="nested too deep"):
         parse("b^(" * 60 + "b" + ")" * 60, NAMES)
-    assert parse("-" * 200 + "b", NAMES).value({"b": 2.0}) == 2.0
+    for count in (200, 400, 499):  # more levels than Python's stack allows
+        formula = parse("-" * count + "b", NAMES)
+        assert formula.value({"b": 2.0}) == 2.0 * (-1.0) ** count
+        assert formula.names == {"b"}
+    assert compiled(code("-" * 399 + "b"), np.array([[2.0, 0.0, 0.0, 0.0]]))[0] == -2.0
+    assert parse("-+" * 200 + "-b", NAMES).dimension({"b": dimension("rad")}) == dimension("rad")
 
 
 def test_an_unknown_name_is_suggested() -> None:

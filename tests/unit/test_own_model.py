@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
+import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,15 +13,30 @@ import mujoco
 import numpy as np
 import pytest
 
+from tunnel_sim.engine import joint_model
 from tunnel_sim.engine.joint_model import JointModel, read_joint_model
 from tunnel_sim.engine.joint_patch import JointPatch, Start, patched, patched_xml, simulate_joint
 from tunnel_sim.physics.expression import parse
+from tunnel_sim.processes import in_limited_process
+from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 
 MASS, LENGTH, G = 0.4, 0.3, 9.81
 BOB = f'<geom name="bob" type="sphere" size="0.02" mass="{MASS}" pos="0 0 {-LENGTH}"/>'
 INERTIA = MASS * LENGTH**2 + 0.4 * MASS * 0.02**2
 BODY = '<body name="arm"><joint name="hinge" axis="0 1 0" {}/>{}</body>'
+
+
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process with limits takes half a second to start: only what is about it waits for it."""
+    joint_model.prepare()
+    monkeypatch.setattr(joint_model, "in_limited_process", lambda work, given, **_: work(given))
+
+
+@pytest.fixture
+def with_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(joint_model, "in_limited_process", in_limited_process)
 
 
 def model(
@@ -119,6 +137,8 @@ def test_a_urdf_is_read(tmp_path: Path) -> None:
         ({"body": BODY.replace('name="hinge"', 'name="hinges"')}, "did you mean 'hinges'?"),
         ({"body": '<body><joint name="hinge" type="ball"/>{}{}</body>'}, "is not a hinge or slide"),
         ({"body": BODY.replace("axis=", "axes=")}, "MuJoCo cannot load it"),
+        ({"option": 'timestep="0"'}, "its timestep of 0.0 s is not above zero"),
+        ({"option": 'timestep="-1"'}, "its timestep of -1.0 s is not above zero"),
         ({"free": ("mass",)}, "unknown parameter 'mass'"),
         ({"free": ("inertia", "stiffness"), "joint": 'stiffness="1"', "gravity": 0.0}, "cannot both be"),
     ],
@@ -241,6 +261,168 @@ def test_meshes_are_found_from_another_folder(tmp_path: Path) -> None:
     found = read_joint_model(tmp_path / "in" / "model.xml", "hinge", 1.0)
     spec, _ = patched(found, replace(JointPatch(found.law.inertia), friction=0.1))
     (tmp_path / "out" / "out.xml").write_text(patched_xml(spec, found, tmp_path / "out"))
-    law = read_joint_model(tmp_path / "out" / "out.xml", "hinge", 1.0).law
+    law = read_joint_model(tmp_path / "out" / "out.xml", "hinge", 1.0, asset_dir=tmp_path / "in").law
     assert law.friction == pytest.approx(0.1)
     assert law.stiffness == pytest.approx(found.law.stiffness, rel=1e-5)
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "model.xml"
+    path.write_text(text)
+    return path
+
+
+MESH = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 -0.5\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+ARM = '<body><joint name="hinge" axis="0 1 0"/>{}</body>'
+OF_MESH = (
+    '<mujoco>{}<asset><mesh name="arm" file="arm.obj"/></asset><worldbody>'
+    + ARM.format('<geom type="mesh" mesh="arm"/>')
+    + "</worldbody></mujoco>"
+)
+PENDULUM = f"<mujocoinclude><worldbody>{ARM.format(BOB)}</worldbody></mujocoinclude>"
+
+
+@pytest.mark.usefixtures("with_limits")
+def test_the_law_from_the_process_with_limits_is_the_same(tmp_path: Path) -> None:
+    found = model(tmp_path, 'stiffness="2 0.3" springref="0.5" frictionloss="0.002"')
+    request = b'["hinge", 1.0]\n' + found.files.to_bytes()
+    here = json.loads(joint_model.law_of_request(request))
+    assert (found.law.rest, found.law.stiffness) == (here["law"]["rest"], here["law"]["stiffness"])
+    assert terms(found) == {term["expression"]: term["coefficient"] for term in here["law"]["terms"]}
+    assert found.law.free == ("inertia", "damping", "stiffness", "rest")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (f'<mujoco><asset><hfield name="h" nrow="100000" ncol="100000" size="1 1 1 1"/></asset><worldbody>'
+         f"{ARM.format(BOB)}</worldbody></mujoco>", "not enough memory"),
+        (f'<mujoco><size memory="100G"/><worldbody>{ARM.format(BOB)}</worldbody></mujoco>', "memory"),
+        ('<mujoco><worldbody><replicate count="100000000"><geom size="1"/></replicate>'
+         f"{ARM.format(BOB)}</worldbody></mujoco>", "takes more than 0.2 s; leave out"),
+    ],
+    ids=["height field", "arena", "copies"],
+)  # fmt: skip
+@pytest.mark.usefixtures("with_limits")
+def test_a_model_that_takes_too_much_is_refused(
+    tmp_path: Path, text: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, "MODEL_SECONDS", 0.2)
+    with pytest.raises(TunnelError, match=said):
+        read_joint_model(written(tmp_path, text), "hinge", 1.0)
+
+
+def long(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(400 * 2**20)  # of holes
+
+
+def link(path: Path) -> None:
+    path.symlink_to("/etc/hostname")
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "make", "said"),
+    [
+        ("", "model.xml", os.mkfifo, "model.xml: cannot be read (it is not a regular file)"),
+        ("", "model.xml", long, "model.xml: 419,430,400 bytes, more than 16,777,216"),
+        ('<mujoco><include file="more.xml"/></mujoco>', "more.xml", os.mkfifo, "more.xml: cannot be read (it"),
+        ('<mujoco><include file="more.xml"/></mujoco>', "more.xml", long, "more.xml: 419,430,400 bytes"),
+        (OF_MESH.format(""), "arm.obj", os.mkfifo, "arm.obj: cannot be read (it is not a regular file)"),
+        (OF_MESH.format(""), "arm.obj", long, "arm.obj: 419,430,400 bytes, more than 134,217,728"),
+        (OF_MESH.format(""), "arm.obj", link, "names 'arm.obj', which is outside the model's folder"),
+        (OF_MESH.format(""), "arm.obj", Path.mkdir, "MuJoCo cannot load it"),
+        ('<mujoco><include file="/etc/hostname"/></mujoco>', "", os.mkfifo, "'/etc/hostname', which is outside"),
+        ("<mujoco><include file='sub/../../more.xml'/></mujoco>", "../more.xml", os.mkfifo, "'../more.xml', wh"),
+        ('<mujoco><include file="a.xml"/></mujoco>', "a.xml", lambda p: p.write_bytes(b"\xff"), "not UTF-8"),
+        ('<mujoco><include file="model.xml"/></mujoco>', "", os.mkfifo, "MuJoCo cannot load it"),
+        ('<mujoco><include file="&#0;"/></mujoco>', "", os.mkfifo, "MuJoCo cannot load it"),
+        ("<mujoco>" + "".join(f'<include file="{i}"/>' for i in range(1001)), "", os.mkfifo, "1,001 names"),
+        ("<mujoco>" + "".join(f'<compiler meshdir="{i}"/>' for i in range(21)), "", os.mkfifo, "21 folders"),
+    ],
+)  # fmt: skip
+def test_only_small_regular_files_beside_the_model_are_read(
+    tmp_path: Path, text: str, name: str, make: Callable[[Path], None], said: str
+) -> None:
+    (tmp_path / "in").mkdir()
+    if text:
+        written(tmp_path / "in", text)
+    if name:
+        make(tmp_path / "in" / name)
+    with pytest.raises(TunnelError) as refusal:
+        read_joint_model(tmp_path / "in" / "model.xml", "hinge", 1.0)
+    assert said in str(refusal.value)
+    assert refusal.value.remedy
+
+
+@pytest.mark.usefixtures("with_limits")
+def test_a_file_that_is_named_in_no_usual_way_is_not_opened(tmp_path: Path) -> None:
+    """What the reading of the names overlooks, MuJoCo cannot open in the process with limits."""
+    text = '<mujoco><include a=">" file="more.xml"/></mujoco>'
+    (tmp_path / "more.xml").write_text(PENDULUM)
+    with pytest.raises(TunnelError, match="MuJoCo cannot load it"):
+        read_joint_model(written(tmp_path, text), "hinge", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        (OF_MESH.format('<compiler meshdir="parts"/>'), {"parts/arm.obj": MESH}),
+        (OF_MESH.format("").replace("arm.obj", "parts\\arm.obj"), {"parts/arm.obj": MESH}),
+        (OF_MESH.format('<compiler strippath="true"/>').replace("arm.obj", "/home/me/arm.obj"), {"arm.obj": MESH}),
+        ('<mujoco><include file="sub/a.xml"/></mujoco>',
+         {"sub/a.xml": '<mujocoinclude><include file="b.xml"/></mujocoinclude>', "sub/b.xml": PENDULUM}),
+        ('<mujoco><!-- <mesh file="/etc/hostname"/> --><include file="a.xml"/></mujoco>', {"a.xml": PENDULUM}),
+        ('<mujoco><asset><model name="m" file="sub/m.xml"/></asset><worldbody>'
+         '<attach model="m" body="b" prefix="hin"/></worldbody></mujoco>',
+         {"sub/m.xml": OF_MESH.format("").replace("<body>", '<body name="b">').replace("hinge", "ge"),
+          "sub/arm.obj": MESH}),
+        ('<mujoco><asset><mesh name="arm" file="l/a.obj"/><mesh name="other" file="r/a.obj"/></asset><worldbody>'
+         '<geom type="mesh" mesh="other" contype="0" conaffinity="0"/>'
+         + ARM.format('<geom type="mesh" mesh="arm"/>') + "</worldbody></mujoco>",
+         {"l/a.obj": MESH, "r/a.obj": MESH.replace("v 0 0", "v 9 9")}),
+    ],
+    ids=["meshdir", "backslash", "strippath", "nested", "comment", "submodel", "same name"],
+)  # fmt: skip
+def test_its_files_are_found_as_mujoco_finds_them(tmp_path: Path, text: str, names: dict[str, str]) -> None:
+    for name, content in names.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(content)
+    found = read_joint_model(written(tmp_path, text), "hinge", 1.0)
+    direct = mujoco.MjModel.from_xml_path(str(tmp_path / "model.xml")) if "home" not in text else None
+    assert found.law.stiffness > 0.0
+    if direct is not None:
+        assert found.spec().compile().body_mass == pytest.approx(direct.body_mass)
+
+
+def test_another_file_of_the_same_name_is_not_taken(tmp_path: Path) -> None:
+    (tmp_path / "l").mkdir()
+    (tmp_path / "l" / "a.obj").write_text(MESH)
+    text = (
+        OF_MESH.format("")
+        .replace("</asset>", '<mesh name="b" file="l/a.obj"/></asset>')
+        .replace("arm.obj", "a.obj")
+    )
+    with pytest.raises(TunnelError, match=r"names 'a\.obj', which is not there"):
+        read_joint_model(written(tmp_path, text), "hinge", 1.0)
+
+
+def test_files_of_another_folder_where_it_is_named(tmp_path: Path) -> None:
+    for name in ("in", "parts"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "parts" / "arm.obj").write_text(MESH)
+    path = written(tmp_path / "in", OF_MESH.format('<compiler meshdir="../parts"/>'))
+    with pytest.raises(TunnelError, match="--asset-dir"):
+        read_joint_model(path, "hinge", 1.0)
+    assert read_joint_model(path, "hinge", 1.0, asset_dir=tmp_path / "parts").law.stiffness > 0.0
+
+
+def test_names_and_numbers_that_no_text_holds(tmp_path: Path) -> None:
+    (tmp_path / "model.xml").write_bytes(BODY.format("", "").encode().replace(b"hinge", b"h\xff"))
+    with pytest.raises(TunnelError, match="not UTF-8 text"):
+        read_joint_model(tmp_path / "model.xml", "h\udcff", 1.0)
+    model(tmp_path)
+    with pytest.raises(TunnelError, match="there is no such joint; did you mean 'hinge'"):
+        read_joint_model(tmp_path / "model.xml", "hing\udcff", 1.0)
+    with pytest.raises(TunnelError, match="its moment overflows"):
+        model(tmp_path, gravity=1e308)

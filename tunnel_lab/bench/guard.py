@@ -7,9 +7,10 @@ says where it comes from, and must carry the token: in the address at first, the
 from __future__ import annotations
 
 import hmac
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
-from urllib.parse import parse_qsl, urlencode
+from urllib.parse import parse_qsl, quote, urlencode
 
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from starlette.types import ASGIApp, Receive, Scope, Send
 
+_LENGTH = re.compile(r"[0-9]{1,20}")
 _HEADERS = [(b"content-type", b"text/plain; charset=utf-8"), (b"cache-control", b"no-store")]
 
 
@@ -78,7 +80,7 @@ class Guard:
                 403, "The token is missing or old; use the whole address that tunnel bench printed."
             )
         length = headers.get("content-length", "0")
-        if "transfer-encoding" in headers or not length.isdigit():
+        if "transfer-encoding" in headers or not _LENGTH.fullmatch(length):
             return Refusal(411, "The length of the request is not stated.")
         if int(length) > UPLOAD_BYTES:
             return Refusal(413, too_large(int(length)))
@@ -87,9 +89,9 @@ class Guard:
     async def _welcome(self, scope: Scope, query: dict[str, str], send: Send) -> None:
         """Move the token from the address into a cookie, so that it is in no history or bookmark."""
         rest = urlencode({name: value for name, value in query.items() if name != "token"})
-        place = f"{scope['path']}?{rest}" if rest else scope["path"]
+        place = _same_site(scope["path"]) + (f"?{rest}" if rest else "")
         cookie = f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
-        found = [*_HEADERS, (b"location", _same_site(place)), (b"set-cookie", cookie.encode())]
+        found = [*_HEADERS, (b"location", place.encode()), (b"set-cookie", cookie.encode())]
         await send({"type": "http.response.start", "status": 303, "headers": found})
         await send({"type": "http.response.body", "body": b""})
 
@@ -106,9 +108,9 @@ def too_large(size: int) -> str:
     )
 
 
-def _same_site(place: str) -> bytes:
-    """A path for a Location header: it cannot name another host."""
-    return ("/" + place.lstrip("/\\")).encode("ascii", "ignore")
+def _same_site(path: str) -> str:
+    """A path for a Location header: it cannot name another host or end the header."""
+    return "/" + quote(path.lstrip("/\\"), errors="replace")
 
 
 def _cookies(header: str) -> dict[str, str]:

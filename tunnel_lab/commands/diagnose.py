@@ -78,6 +78,14 @@ def run(
             "runs can determine.",
         ),
     ] = None,
+    asset_dir: Annotated[
+        Path | None,
+        typer.Option(
+            "--asset-dir",
+            metavar="DIR",
+            help="Folder of the model's includes and meshes, where they are not in or below its own.",
+        ),
+    ] = None,
     patch: Annotated[
         Path | None,
         typer.Option(
@@ -128,15 +136,16 @@ def run(
     kinds = vocabulary(split_names(effects), split_names(exclude))
     to_stdout = json is not None and str(json) == "-"
     refuse_unwritable_files(None if to_stdout else json, report, patch, propose)
-    if (model is None) != (joint is None) or (model is None and (free or patch)):
+    if (model is None) != (joint is None) or (model is None and (free or patch or asset_dir)):
         raise TunnelError(
-            "--model and --joint belong together, and --free and --patch to them", remedy="give both"
+            "--model and --joint belong together, and --free, --patch and --asset-dir to them",
+            remedy="give both",
         )
     data = given_campaign(campaign)
     hashes = file_hashes(campaign)
-    own = (
-        None if model is None or joint is None else read_model(model, joint, data, split_names(free) or None)
-    )
+    own = None
+    if model is not None and joint is not None:
+        own = read_model(model, joint, data, split_names(free) or None, asset_dir)
     if own is not None and patch is not None:
         from diagnosis.answer.patched_model import refuse_unpatchable
 

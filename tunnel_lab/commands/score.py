@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 NAME = "score"
 PACKAGED = "packaged"
 """Name of the installed baseline."""
+_RESULTS = ("trials.", "score", "breakdown")  # how the names of the files in --out begin
 
 
 def run(
@@ -213,7 +214,10 @@ def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
     clear_leftovers(out)
     if not out.is_dir():
         raise TunnelError("is a file, not a folder", where=str(out), remedy="name another --out")
-    if any(path.name != "parts" for path in out.iterdir()) and not overwrite:
+    names = {path.name for path in out.iterdir()}
+    # The parts are removed when all results are written: a full disk may have stopped it in between.
+    interrupted = "parts" in names and all(name.startswith(_RESULTS) for name in names - {"parts"})
+    if names and not interrupted and not overwrite:
         raise TunnelError("exists already", where=str(out), remedy="name another --out or add --overwrite")
 
 

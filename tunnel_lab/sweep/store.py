@@ -160,17 +160,12 @@ def begin(sweep: Sweep, folder: Path) -> Store:
     if (folder / MANIFEST).is_file():
         store = open_store(folder)
         _check_same(store, sweep, made_with())
-        output_folder(folder / CHECKSUMS)  # a folder of an earlier version has none
-        return store
-    clear_leftovers(folder)
-    if folder.is_dir() and any(not path.name.startswith(f".{MANIFEST}.") for path in folder.iterdir()):
-        raise TunnelError("the folder holds something else", where=shown(folder), remedy=_ELSEWHERE)
-    output_folder(folder)
-    for name in (RESULTS, TIMINGS, CHECKSUMS, *([RECORDS] if sweep.document.records else [])):
-        output_folder(folder / name)
-    write_json(
-        folder / MANIFEST,
-        {
+    else:
+        clear_leftovers(folder)
+        if folder.is_dir() and not all(map(_is_begun, folder.iterdir())):
+            raise TunnelError("the folder holds something else", where=shown(folder), remedy=_ELSEWHERE)
+        output_folder(folder)
+        document = {
             "schema_version": SCHEMA_VERSION,
             "name": sweep.document.name,
             "cases": sweep.size,
@@ -178,9 +173,18 @@ def begin(sweep: Sweep, folder: Path) -> Store:
             "shards": sweep.shards,
             "made_with": made_with(),
             "sweep": json.loads(sweep.to_json()),
-        },
-    )
-    return Store(folder, sweep, made_with())
+        }
+        write_json(folder / MANIFEST, document)  # first: what is stopped afterwards is continued
+        store = Store(folder, sweep, made_with())
+    for name in (RESULTS, TIMINGS, CHECKSUMS, *([RECORDS] if sweep.document.records else [])):
+        output_folder(folder / name)
+    return store
+
+
+def _is_begun(path: Path) -> bool:
+    """Whether a sweep that was stopped before its ``sweep.json`` was written may have left this."""
+    own = path.name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS) and path.is_dir() and not any(path.iterdir())
+    return own or path.name.startswith(f".{MANIFEST}.")
 
 
 def open_store(folder: Path) -> Store:

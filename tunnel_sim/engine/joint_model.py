@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from importlib import import_module
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
+from tunnel_sim.engine.model_files import ModelFiles, engine_refusals, read_model_files
 from tunnel_sim.engine.plugin import load_plugin
+from tunnel_sim.engine.simulate import no_log
+from tunnel_sim.processes import LimitReached, in_limited_process
+from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 from tunnel_sim.vocabulary.joint_law import FREE_PARAMETERS, JointLaw, Term
 from tunnel_sim.vocabulary.record import Array
@@ -38,19 +44,23 @@ class JointModel:
         path: of the file.
         joint: its name.
         law: of the joint.
+        files: the content of the file and of those that it names.
     """
 
     path: Path
     joint: str
     law: JointLaw
+    files: ModelFiles
 
     def spec(self) -> mujoco.MjSpec:
         """The model's specification, read again, to be changed."""
-        return _read(self.path)
+        return self.files.spec()
 
 
-def read_joint_model(path: Path, joint: str, reach: float, free: Sequence[str] | None = None) -> JointModel:
-    """Read a model, and the law of one joint from the engine's moments.
+def read_joint_model(
+    path: Path, joint: str, reach: float, free: Sequence[str] | None = None, asset_dir: Path | None = None
+) -> JointModel:
+    """Read a model, and the law of one joint from the engine's moments, in a process with limits.
 
     Args:
         path: MJCF, or URDF that MuJoCo loads.
@@ -58,26 +68,67 @@ def read_joint_model(path: Path, joint: str, reach: float, free: Sequence[str] |
         reach: greatest displacement from rest in the records, rad (m for a slide).
         free: which of `FREE_PARAMETERS` are fitted; None: inertia, damping and rest position, and the stiffness
             where the joint has a spring beside gravity.
+        asset_dir: a further folder in which its files may be, beside the model's own.
 
     Returns:
         The model. Its law is exact: the restoring moment is that of gravity and springs over the whole turn (for a
         slide, over twice the reach).
 
     Raises:
-        TunnelError: when MuJoCo refuses it, another joint moves, there is contact, a limit or another constraint in
-            the path, the joint does not oscillate, or its moment is not of a kind that the law has.
+        TunnelError: when a file of it is refused, MuJoCo refuses it, another joint moves, there is contact, a limit
+            or another constraint in the path, the joint does not oscillate, its moment is not of a kind that the
+            law has, or all this takes longer or more memory than the limits allow.
     """
-    where = f"{shown(path)}, joint {one_line(joint)!r}"
-    model = _compiled(_read(path), path)
+    files = read_model_files(path, asset_dir)
+    request = json.dumps([joint, reach]).encode() + b"\n" + files.to_bytes()
     try:
-        kind = _checked_joint(model, joint)
-        law = _law(model, reach, slide=kind == "slide")
-    except TunnelError as error:
-        raise TunnelError(error.what, where=where, remedy=error.remedy) from error
-    spring = bool(model.jnt_stiffness[0])
+        answer = json.loads(
+            in_limited_process(
+                law_of_request,
+                request,
+                prepare=prepare,
+                seconds=limits.MODEL_SECONDS,
+                memory=limits.MODEL_MEMORY,
+            )
+        )
+    except LimitReached as error:
+        remedy = "leave out what the motion of the joint does not need"
+        raise TunnelError(f"loading it {error}", where=shown(path), remedy=remedy) from None
+    if "what" in answer:
+        where = f"{shown(path)}, joint {one_line(joint)!r}"
+        raise TunnelError(answer["what"], where=where, remedy=answer["remedy"])
+    law = JointLaw(**{**answer["law"], "terms": tuple(Term(**one) for one in answer["law"]["terms"])})
     gravity = any(term.expression.startswith(("sin", "cos")) for term in law.terms)
-    usual = ("inertia", "damping", *(("stiffness",) if spring and gravity else ()), "rest")
-    return JointModel(path, joint, _with_free(law, usual if free is None else tuple(free)))
+    usual = ("inertia", "damping", *(("stiffness",) if answer["spring"] and gravity else ()), "rest")
+    return JointModel(path, joint, _with_free(law, usual if free is None else tuple(free)), files)
+
+
+def prepare() -> None:
+    """Load what `law_of_request` needs, while files can still be opened."""
+    for name in ("scipy.optimize", "tunnel_sim.physics.expression"):
+        import_module(name)
+    load_plugin()
+
+
+def law_of_request(request: bytes) -> bytes:
+    """The law of a joint, for `read_joint_model` in a process with limits.
+
+    Args:
+        request: joint and reach as JSON in a line, then the files.
+
+    Returns:
+        As JSON the law, and whether the joint has a spring; or what is refused, and the remedy.
+    """
+    at = request.index(b"\n") + 1
+    joint, reach = json.loads(request[:at])
+    try:
+        with no_log(), np.errstate(all="ignore"):
+            with engine_refusals("MuJoCo cannot load it", "correct the file"):
+                model = ModelFiles.from_bytes(request[at:]).spec().compile()
+            law = _law(model, reach, slide=_checked_joint(model, joint) == "slide")
+    except TunnelError as error:
+        return json.dumps({"what": error.what, "remedy": error.remedy}).encode()
+    return json.dumps({"law": asdict(law), "spring": bool(model.jnt_stiffness[0])}).encode()
 
 
 def _with_free(law: JointLaw, free: tuple[str, ...]) -> JointLaw:
@@ -97,34 +148,17 @@ def _with_free(law: JointLaw, free: tuple[str, ...]) -> JointLaw:
     return replace(law, free=tuple(name for name in FREE_PARAMETERS if name in free))
 
 
-def _read(path: Path) -> mujoco.MjSpec:
-    load_plugin()
-    if not path.is_file():
-        raise TunnelError("is not a file", where=shown(path), remedy="name an MJCF or URDF file")
-    try:
-        return mujoco.MjSpec.from_file(str(path))
-    except (ValueError, mujoco.FatalError) as error:
-        raise _refused(error, path) from error
-
-
-def _compiled(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
-    try:
-        return spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
-        raise _refused(error, path) from error
-
-
-def _refused(error: Exception, path: Path) -> TunnelError:
-    said = one_line(" ".join(str(error).split()), 300)
-    return TunnelError(f"MuJoCo cannot load it ({said})", where=shown(path), remedy="correct the file")
-
-
 def _checked_joint(model: mujoco.MjModel, joint: str) -> str:
     """The kind of the only joint.
 
     Raises:
-        TunnelError: when the joint is missing, of another kind, or not the only one, or a constraint holds it.
+        TunnelError: when the joint is missing, of another kind, or not the only one, or a constraint holds it, or
+            the model cannot be simulated.
     """
+    if not model.opt.timestep > 0.0:
+        raise TunnelError(
+            f"its timestep of {model.opt.timestep} s is not above zero", remedy="correct the model's option"
+        )
     names = [model.joint(i).name for i in range(model.njnt)]
     if joint not in names:
         known = [name for name in names if name]
@@ -157,7 +191,12 @@ class _Engine:
         """Of gravity, springs, dampers and actuators without control; constraints excluded, N m."""
         self.data.qpos[0], self.data.qvel[0] = position, rate
         mujoco.mj_forward(self.model, self.data)
-        return float(self.data.qfrc_passive[0] + self.data.qfrc_actuator[0] - self.data.qfrc_bias[0])
+        moment = float(self.data.qfrc_passive[0] + self.data.qfrc_actuator[0] - self.data.qfrc_bias[0])
+        if not abs(moment) <= limits.LARGEST_NUMBER:
+            raise TunnelError(
+                "its moment overflows", remedy="correct gravity, masses and stiffness, in SI units"
+            )
+        return moment
 
     def inertia(self) -> float:
         """At the position of the last moment, kg m²."""

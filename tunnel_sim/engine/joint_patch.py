@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,9 +13,12 @@ import mujoco
 import numpy as np
 
 from tunnel_sim.engine.joint_model import JointModel
+from tunnel_sim.engine.model_files import engine_refusals
 from tunnel_sim.engine.simulate import no_log
+from tunnel_sim.files.reading import check_count
 from tunnel_sim.physics.motion import Motion
-from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 _AIR = (
     "air_density",
@@ -116,18 +120,13 @@ def patched(
         if (known := spec.key(name)) is not None:
             spec.delete(known)
         spec.add_key(name=name, qpos=[model.law.rest + start.angle], qvel=[start.rate])
-    try:
+    with _refusals(model):
         after = spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
-        raise _refused(error, model) from error
     return spec, _differences(before, after)
 
 
-def _refused(error: Exception, model: JointModel) -> TunnelError:
-    said = one_line(" ".join(str(error).split()), 300)
-    return TunnelError(
-        f"MuJoCo refuses the patched model ({said})", where=shown(model.path), remedy="simplify the model"
-    )
+def _refusals(model: JointModel) -> AbstractContextManager[None]:
+    return engine_refusals("MuJoCo refuses the patched model", "simplify the model", shown(model.path))
 
 
 def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
@@ -147,10 +146,8 @@ def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
     for name in ("meshdir", "texturedir") if spec.meshes or spec.textures or spec.hfields else ():
         assets = model.path.parent.resolve() / getattr(spec.compiler, name)
         setattr(spec.compiler, name, os.path.relpath(assets, folder.resolve()))
-    try:
+    with _refusals(model):
         return str(spec.to_xml())
-    except (ValueError, mujoco.FatalError) as error:
-        raise _refused(error, model) from error
 
 
 def _write_inertia(
@@ -287,11 +284,14 @@ def simulate_joint(model: mujoco.MjModel, law_rest: float, start: Start, duratio
         The displacement from rest and its rate at every step.
 
     Raises:
-        TunnelError: when the motion grows without bound.
+        TunnelError: when the motion grows without bound, or its steps are too many.
     """
+    steps = duration / model.opt.timestep
+    remedy = "lengthen the model's timestep"
+    check_count(steps, limits.RUN_SAMPLES, "steps", f"run {start.run}", remedy)
+    count = math.ceil(steps) + 1
     data = mujoco.MjData(model)
     data.qpos[0], data.qvel[0] = law_rest + start.angle, start.rate
-    count = math.ceil(duration / model.opt.timestep) + 1
     angle, rate = np.empty(count), np.empty(count)
     with no_log():
         for i in range(count):

@@ -139,16 +139,23 @@ def _node(tree: ast.expr, names: frozenset[str]) -> Node:
             return float(value)
         case ast.Name(id=name):
             return _named(name, names)
-        case ast.UnaryOp(op=ast.USub(), operand=one):
-            return "negative", _node(one, names)
-        case ast.UnaryOp(op=ast.UAdd(), operand=one):
-            return _node(one, names)
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd()):
+            return _signed(tree, names)
         case ast.BinOp(op=operator, left=left, right=right) if type(operator) in _BINARY:
             return _BINARY[type(operator)], _node(left, names), _node(right, names)
         case ast.Call(func=ast.Name(id=name), args=list(given), keywords=[]) if name in FUNCTIONS:
             if len(given) == (2 if name in ("min", "max") else 1):
                 return name, *(_node(one, names) for one in given)
     raise _refused(f"{one_line(ast.unparse(tree))!r} is not part of a formula")
+
+
+def _signed(tree: ast.expr, names: frozenset[str]) -> Node:
+    """What follows signs: hundreds of them are more levels than Python's stack allows."""
+    negative = False
+    while isinstance(tree, ast.UnaryOp) and isinstance(tree.op, ast.USub | ast.UAdd):
+        negative ^= isinstance(tree.op, ast.USub)
+        tree = tree.operand
+    return ("negative", _node(tree, names)) if negative else _node(tree, names)
 
 
 def _named(name: str, names: frozenset[str]) -> Node:

@@ -16,6 +16,10 @@ CSV_BYTES = 384 * 2**20
 """Largest run file as CSV, bytes: ten million samples take 300 MB, and five times as much memory."""
 WEIGHTS_BYTES = 64 * 2**20
 """Largest file of network weights or training checkpoint, bytes: the paper's networks take 0.2 MB."""
+MODEL_BYTES = 16 * 2**20
+"""Most XML of a model of one's own, bytes: MJCF with its vertices in the text takes a few MB."""
+ASSET_BYTES = 128 * 2**20
+"""Most meshes, height fields and images of a model together, bytes: those of a whole robot take 50 MB."""
 UPLOAD_BYTES = 128 * 2**20
 """Most bytes dropped on the bench at once: they pass through memory; tunnel import reads larger files."""
 
@@ -61,6 +65,12 @@ CAMPAIGN_STEPS = 1_000_000_000
 """Most integration steps of a campaign: one and a half hours on one core."""
 SPRINGS = 1_000
 """Most springs of a spring table: each is printed as one line."""
+MODEL_FILES = 1_000
+"""Most names of files in a model of one's own: a robot has a hundred meshes."""
+MODEL_MEMORY = 2**30
+"""Most memory that MuJoCo may take for a model, bytes: 8 times as much as all its meshes may have."""
+MODEL_SECONDS = 30
+"""Longest processor time for the law of a model's joint, s: a thousand bodies take 0.1 s."""
 
 SWEEP_CASES = 100_000_000
 """Most cases of a sweep: years on one core."""

@@ -15,7 +15,11 @@ COOKIE = f"other=1; tunnel-bench-8050={TOKEN}"
 
 
 def answer(
-    headers: dict[str, str], query: str = "", kind: str = "http", method: str = "GET"
+    headers: dict[str, str],
+    query: str = "",
+    kind: str = "http",
+    method: str = "GET",
+    path: str = "/rig/records",
 ) -> list[dict[str, Any]]:
     """What is sent in answer to a request; the guarded application sends ``passed``."""
     sent: list[dict[str, Any]] = []
@@ -29,9 +33,11 @@ def answer(
     scope = {
         "type": kind,
         "method": method,
-        "path": "/rig/records",
+        "path": path,
         "query_string": query.encode(),
-        "headers": [(name.encode(), value.encode()) for name, value in ({"host": HOST} | headers).items()],
+        "headers": [
+            (name.encode(), value.encode("latin-1")) for name, value in ({"host": HOST} | headers).items()
+        ],
     }
     asyncio.run(Guard(app, 8050, TOKEN)(scope, None, send))  # type: ignore[arg-type]
     return sent
@@ -59,6 +65,8 @@ def status(*given: Any, **named: Any) -> int:
         ({"cookie": COOKIE, "content-length": str(UPLOAD_BYTES)}, 200),
         ({"cookie": COOKIE, "content-length": str(UPLOAD_BYTES + 1)}, 413),
         ({"cookie": COOKIE, "content-length": "-1"}, 411),
+        ({"cookie": COOKIE, "content-length": "²"}, 411),
+        ({"cookie": COOKIE, "content-length": "9" * 5000}, 411),
         ({"cookie": COOKIE, "transfer-encoding": "chunked"}, 411),
     ],
 )
@@ -78,6 +86,21 @@ def test_the_token_moves_from_the_address_into_a_cookie() -> None:
     assert b"SameSite=Strict" in headers[b"set-cookie"]
     assert status({}, query="token=guess") == 403
     assert status({}, query="token=") == 403
+
+
+@pytest.mark.parametrize(
+    ("path", "place"),
+    [
+        ("/a\r\nX:1", b"/a%0D%0AX%3A1"),  # would end the header, and the server with it
+        ("//evil.example", b"/evil.example"),
+        ("/\\evil.example", b"/evil.example"),
+        ("/prüfstand/a?b", b"/pr%C3%BCfstand/a%3Fb"),
+        ("/\x00\ud800", b"/%00%3F"),
+    ],
+)
+def test_the_address_without_the_token_is_the_same_and_of_this_server(path: str, place: bytes) -> None:
+    first, _ = answer({}, query=f"token={TOKEN}", path=path)
+    assert dict(first["headers"])[b"location"] == place
 
 
 def test_a_refusal_is_one_line_and_does_not_echo_the_request() -> None:

@@ -44,7 +44,12 @@ def spring(tmp_path: Path) -> Path:
     [
         (["--model", "rig.xml"], "--model and --joint belong together"),
         (["--patch", "out.xml"], "--model and --joint belong together"),
-        (["--model", "none.xml", "--joint", "yaw"], "none.xml: is not a file"),
+        (["--model", "none.xml", "--joint", "yaw"], "none.xml: no such file"),
+        (["--asset-dir", "."], "--model and --joint belong together"),
+        (
+            ["--model", "slow.xml", "--joint", "yaw", "--patch", "out.xml"],
+            " steps, more than 20,000,000; lengthen the model's timestep",
+        ),
         (["--model", "rig.xml", "--joint", "jaw"], "there is no such joint; did you mean 'yaw'?"),
         (["--model", "rig.xml", "--joint", "yaw", "--free", "mass"], "unknown parameter 'mass'"),
         (["--model", "rig.xml", "--joint", "yaw", "--patch", "no/out.xml"], "its folder does not exist"),
@@ -57,6 +62,7 @@ def test_bad_options_are_one_line_and_nothing_is_written(
 ) -> None:
     monkeypatch.chdir(spring.parent)
     monkeypatch.setattr(commands, "diagnose_with_progress", not_yet)
+    Path("slow.xml").write_text(MODEL.replace("0.001", "1e-12"))
     Path("stiff.xml").write_text(MODEL.replace("0.001", "0.5"))
     status, _, err = tunnel("diagnose", spring, *options)
     assert status == 2

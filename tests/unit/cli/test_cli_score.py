@@ -88,6 +88,13 @@ def test_figures_come_with_their_sampling_errors_and_are_kept(
     status, _, err = tunnel("score", grid, *HERE, "--trials", "3", "--out", folder)
     assert status == 2
     assert "exists already" in err
+    (folder / "score.png").unlink()
+    (folder / "parts").mkdir()  # a full disk stopped it while it wrote the results
+    assert tunnel("score", grid, *HERE, "--trials", "3", "--out", folder)[0] == 0
+    assert {path.name for path in folder.iterdir()} == written
+    for name in ("parts", "mine"):
+        (folder / name).mkdir()
+    assert tunnel("score", grid, *HERE, "--trials", "3", "--out", folder)[0] == 2
 
 
 @pytest.mark.slow

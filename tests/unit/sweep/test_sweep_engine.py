@@ -18,6 +18,7 @@ import pytest
 from tests.unit.killed import names_of_the_dead
 from tests.unit.sweep.small_sweep import SMALL, contents
 from tunnel_lab.sweep import shard as shard_module
+from tunnel_lab.sweep import store as store_module
 from tunnel_lab.sweep.engine import run_sweep
 from tunnel_lab.sweep.processes import shards_in_processes
 from tunnel_lab.sweep.product import Sweep
@@ -108,6 +109,43 @@ def _is_worker(process: Path) -> bool:
         return parent == str(os.getpid()) and b"spawn_main" in (process / "cmdline").read_bytes()
     except OSError:
         return False
+
+
+@pytest.mark.parametrize("step", range(5))
+def test_stopped_or_out_of_disk_at_the_beginning_it_continues(
+    step: int, sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = [step]
+
+    def failing(write):
+        def tried(*given):
+            left[0] -= 1
+            if left[0] < 0:
+                raise TunnelError("cannot be written (no space left on device)")
+            return write(*given)
+
+        return tried
+
+    with monkeypatch.context() as patch:
+        for name in ("output_folder", "write_json"):
+            patch.setattr(store_module, name, failing(getattr(store_module, name)))
+        with pytest.raises(TunnelError, match="no space left"):
+            begin(sweep, tmp_path / "out")
+    store = begin(sweep, tmp_path / "out")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(
+        ["sweep.json", "results", "records", "timings", "checksums"]
+    )
+    assert store.finished() == []
+
+
+def test_the_folders_that_an_earlier_version_made_first_are_no_obstacle(sweep: Sweep, tmp_path: Path) -> None:
+    for name in ("results", "timings"):
+        (tmp_path / "out" / name).mkdir(parents=True)
+    begin(sweep, tmp_path / "out")
+    (tmp_path / "other" / "results").mkdir(parents=True)
+    (tmp_path / "other" / "results" / "mine.txt").write_text("")
+    with pytest.raises(TunnelError, match="the folder holds something else"):
+        begin(sweep, tmp_path / "other")
 
 
 def test_half_a_part_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
