@@ -206,12 +206,14 @@ def rival_lines(document: Document) -> list[str]:
     Returns:
         Lines; none where the answer has no rival.
     """
-    rivals, run = document["ambiguous_with"], document["next_run"]
+    decided = document.get("decided", True)
+    rivals, run = document["ambiguous_with"] if decided else (), document["next_run"]
     lines = []
-    if rivals and document.get("decided", True):
+    if rivals:
         lines.append(f"These runs cannot distinguish it from: {', '.join(rivals)}")
     if run is not None:
-        lines.append(f"A run that could: {run_words(run)}")
+        which = "A run that could" if decided else "A run that would distinguish the likely answers"
+        lines.append(f"{which}: {run_words(run)}")
     elif rivals:
         lines.append(
             "The run that could cannot be computed from these runs: state every spring_stiffness, or add runs"

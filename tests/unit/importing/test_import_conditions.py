@@ -175,8 +175,8 @@ def test_numbers_above_the_table_have_their_units(tmp_path: Path) -> None:
     head = "Wind speed: 54 km/h, Kr = 16120 N mm/rad, ρ = 1,21"
     (run,) = imported(tmp_path, [], [], head=head).campaign.runs
     assert (run.wind_speed, run.spring_stiffness, run.air_density) == pytest.approx((15.0, 16.12, 1.21))
-    with pytest.raises(TunnelError, match="wind-on"):
-        imported(tmp_path, [], [], head="Wind speed;54;km/h")
+    with pytest.raises(TunnelError, match="density"):
+        imported(tmp_path, [], [], head="Wind speed: 54 km/h, Kr = 16120 N mm/rad")
 
 
 def test_files_that_state_different_rigs_are_refused(tmp_path: Path) -> None:
