@@ -139,6 +139,7 @@ def test_a_urdf_is_read(tmp_path: Path) -> None:
         ({"body": BODY.replace("axis=", "axes=")}, "MuJoCo cannot load it"),
         ({"option": 'timestep="0"'}, "its timestep of 0.0 s is not above zero"),
         ({"option": 'timestep="-1"'}, "its timestep of -1.0 s is not above zero"),
+        ({"body": BODY.replace("0 1 0", "0 1 -1e308"), "joint": 'stiffness="1"'}, "its inertia is 0 kg m2"),
         ({"free": ("mass",)}, "unknown parameter 'mass'"),
         ({"free": ("inertia", "stiffness"), "joint": 'stiffness="1"', "gravity": 0.0}, "cannot both be"),
     ],

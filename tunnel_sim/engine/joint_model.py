@@ -221,6 +221,10 @@ def _law(model: mujoco.MjModel, reach: float, *, slide: bool) -> JointLaw:
     stiffness = terms.pop("b", 0.0)
     _check_path(engine, rest, reach)
     inertias = [(engine.moment(rest + x), engine.inertia())[1] for x in (0.0, 0.4 * span, -0.7 * span)]
+    if not limits.SMALLEST_NUMBER <= inertias[0] <= limits.LARGEST_NUMBER:
+        raise TunnelError(
+            f"its inertia is {inertias[0]:g} kg m2", remedy="correct its axis and the masses, in SI units"
+        )
     if np.ptp(inertias) > _EXACT * inertias[0]:
         raise TunnelError("its inertia changes with its position", remedy="remove the tendon's armature")
     if not stiffness > 0.0:
