@@ -46,7 +46,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 UNKNOWN_LEFT, UNKNOWN_STEEPNESS = 0.04, 1.5
-"""Share that an unknown cause leaves in every channel, and the exponent beside it: a flat optimum on 96 campaigns."""
+"""What an unknown cause leaves in every channel, a share, and the exponent beside it: tuned on 96 campaigns."""
 
 Names = tuple[str, ...]
 Answers = list[tuple[Names, float]]
