@@ -94,7 +94,7 @@ def weigh(
     odds = 0.0
     for names, share in answers.items():
         further = (numbers or {}).get(names, 0)
-        agrees = _agreement(names, place)
+        agrees = _agreement(names, answers, place)
         weights[names] = agrees * evidence(names, share - least, further, excess, chance)
         odds += agrees * _odds_against_unknown(names, share, further, outside, excess, chance)
     known = odds / (1.0 + odds) / (sum(weights.values()) or 1.0)
@@ -109,10 +109,14 @@ def weigh(
     return sorted(found, key=lambda w: -w.probability)
 
 
-def _agreement(effects: Sequence[str], place: str | None) -> float:
-    """Weight of a set by whether one of its effects acts in the channel that the residuals show."""
-    channels = {kind.channel for kind in known_effects() if kind.name in effects}
-    return 1.0 if place is None or not channels or place in channels else PLACE_WRONG / (1.0 - PLACE_WRONG)
+def _agreement(effects: Sequence[str], shares: Mapping[tuple[str, ...], float], place: str | None) -> float:
+    """Weight of a set by whether its main effect acts in the channel that the residuals show.
+
+    That is the one that leaves least by itself: a small effect beside it would agree with any place.
+    """
+    main = min(effects, key=lambda name: shares.get((name,), np.inf))
+    channel = next((kind.channel for kind in known_effects() if kind.name == main), place)
+    return 1.0 if place in (None, channel) else PLACE_WRONG / (1.0 - PLACE_WRONG)
 
 
 def evidence(effects: Sequence[str], share: float, numbers: int, excess: float, chance: float) -> float:

@@ -158,3 +158,12 @@ def test_names_that_act_elsewhere_than_the_residuals_show_lose_weight():
         for p in (None, "damping")
     ]
     assert alone[1] > 5.0 * (alone[0] - EVEN_SHARE / 2)
+
+
+def test_a_small_effect_beside_the_main_one_does_not_make_it_agree():
+    shares = [(("coulomb_friction",), 0.02), (("asymmetric_stiffness", "coulomb_friction"), 0.015)]
+    odds = []
+    for place in (None, "stiffness"):
+        found = {w.effects: w.probability for w in weigh(shares, 0.0, 5.0, place=place)}
+        odds.append((found[shares[0][0]] - EVEN_SHARE / 3) / (found[shares[1][0]] - EVEN_SHARE / 3))
+    assert odds[0] == pytest.approx(odds[1])
