@@ -11,6 +11,7 @@ from diagnosis.policy import CREDIBLE, DECIDED_FROM
 from tunnel_sim.effects import known_effects
 
 Answers = Sequence[tuple[str, float]]
+_SHOWN = 5  # answers in words; the document lists all
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,9 @@ def _common(held: Iterable[tuple[set[str], float]]) -> dict[str, float]:
 
 def undecided_words(found: Decision) -> str:
     """What an undecided diagnosis does say, in sentences."""
-    answers = [f"{_words(effect)} ({value:.2f})" for effect, value in found.credible]
+    answers = [f"{_words(effect)} ({value:.2f})" for effect, value in found.credible[:_SHOWN]]
+    if len(found.credible) > _SHOWN:
+        answers.append(f"{len(found.credible) - _SHOWN} more")
     most = answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
     together = sum(value for _, value in found.credible)
     return f"{_common_words(found)} The answer is one of these, with probability {together:.2f} together: {most}."

@@ -131,6 +131,20 @@ def test_below_one_half_no_set_is_named_as_the_cause():
     assert "comes from" in said(*causes, answers=((" + ".join(causes), 0.5), ("unknown", 0.5)))
 
 
+def test_of_many_likely_answers_five_are_said_and_the_others_counted():
+    names = (
+        "free_play",
+        "cubic_stiffness",
+        "sensor_drift",
+        "mains_hum",
+        "coulomb_friction",
+        "gravity_stiffness",
+    )
+    text = said(*names[:1], answers=tuple((name, 1.0 / 6.0) for name in names))
+    assert "mains hum (0.17), coulomb friction (0.17) or 1 more." in text
+    assert "gravity" not in text
+
+
 def test_where_no_effect_is_common_the_channel_may_be():
     answers = (("coulomb_friction", 0.45), ("quadratic_damping", 0.46), ("unknown", 0.09))
     found = decision(answers)
