@@ -15,6 +15,7 @@ from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import cleaned, from_zero, resolution, restarts, without_overflow
 from tunnel_sim.files.importing.cutting import find_runs
 from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.tables import Channel
 
 
 def held(angle: float, seconds: float) -> np.ndarray:
@@ -180,3 +181,12 @@ def test_samples_outside_start_and_end_are_left_out(tmp_path: Path) -> None:
     inside = (time >= 0.4999) & (time <= 5.0001)
     np.testing.assert_allclose(run.record.yaw_rad, angle[inside], atol=1e-8)
     assert run.record.time_s[0] == 0.0
+
+
+def test_a_signalling_nan_of_a_damaged_file_does_not_hide_the_numbers_beside_it():
+    values = np.full(172, np.nan)
+    values[::3] = np.linspace(-1.0, 2.0, values[::3].size)
+    values.view(np.uint64)[1::3] = 0x7FF0000000000001  # signalling
+    quiet = Channel("angle", values).values
+    assert (np.nanmin(quiet), np.nanmax(quiet)) == (-1.0, 2.0)
+    assert set(quiet.view(np.uint64)[1::3].tolist()) == {int(np.array(np.nan).view(np.uint64))}

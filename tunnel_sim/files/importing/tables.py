@@ -36,6 +36,10 @@ class Channel:
     values: Array
     unit: str = ""
 
+    def __post_init__(self) -> None:
+        """Make every NaN quiet: a damaged file may hold signalling ones, and a minimum that meets one is NaN."""
+        object.__setattr__(self, "values", np.where(np.isnan(self.values), np.nan, self.values))
+
 
 @dataclass(frozen=True, eq=False)
 class Table:
