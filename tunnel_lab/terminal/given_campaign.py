@@ -30,7 +30,6 @@ def given_campaign(path: Path) -> Campaign:
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.campaign_io import read_campaign
     from tunnel_sim.files.campaign_schema import CAMPAIGN_FILE
-    from tunnel_sim.files.importing.records import read_records
     from tunnel_sim.vocabulary.errors import TunnelError, shown
 
     if not path.is_file() or path.name == CAMPAIGN_FILE:
@@ -41,6 +40,8 @@ def given_campaign(path: Path) -> Campaign:
             where=shown(path),
             remedy=f"if it is a plan: tunnel simulate {shlex.quote(str(path))} --out FOLDER",
         )
+    from tunnel_sim.files.importing.records import read_records  # only here: a campaign needs none of it
+
     try:
         imported = read_records([path])
     except TunnelError as error:
