@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from diagnosis.attribution.decide import main_effect
 from diagnosis.localisation.excess import bands_beyond_chance
 from diagnosis.localisation.inference import blow_interval
 from diagnosis.localisation.mapping import with_answer
 from diagnosis.localisation.maps import Maps
-from diagnosis.localisation.words import acts_otherwise, describe, nowhere
+from diagnosis.localisation.words import agreement, describe, nowhere
 from diagnosis.policy import INTERVAL_SHARE
 from diagnosis.result import Where
 from diagnosis.study import Study, located
-from tunnel_sim.effects import effect_class
+from tunnel_sim.effects import Effect, effect_class
 
 
 def localise(study: Study) -> tuple[Where, Maps]:
@@ -38,6 +39,14 @@ def localise(study: Study) -> tuple[Where, Maps]:
         frequency_hz=found.frequency_interval,
     )
     bands = bands_beyond_chance(found.maps.bands)
-    kinds = [effect_class(name) for name in study.causes] if study.named else []
     words = describe(where, found, bands, place.channel, place.condition)
-    return replace(where, words=f"{words} {acts_otherwise(where, kinds)}".rstrip()), maps
+    return replace(where, words=f"{words} {agreement(where, _compared(study))}".rstrip()), maps
+
+
+def _compared(study: Study) -> list[type[Effect]]:
+    """The causes that have to agree with the place: the main one, and those read off the records."""
+    if not study.named:
+        return []
+    shares = {answer.effects: answer.share for answer in study.weighed}
+    main = [main_effect(study.fitted, shares)] if study.fitted else []
+    return [effect_class(name) for name in (*main, *study.read_off)]

@@ -109,12 +109,18 @@ def weigh(
     return sorted(found, key=lambda w: -w.probability)
 
 
-def _agreement(effects: Sequence[str], shares: Mapping[tuple[str, ...], float], place: str | None) -> float:
-    """Weight of a set by whether its main effect acts in the channel that the residuals show.
+def main_effect(effects: Sequence[str], shares: Mapping[tuple[str, ...], float]) -> str:
+    """The effect of a set that leaves least by itself: a small one beside it would agree with any place of the gap.
 
-    That is the one that leaves least by itself: a small effect beside it would agree with any place.
+    Args:
+        shares: of the gap that sets leave, fractions, single effects among them.
     """
-    main = min(effects, key=lambda name: shares.get((name,), np.inf))
+    return min(effects, key=lambda name: shares.get((name,), np.inf))
+
+
+def _agreement(effects: Sequence[str], shares: Mapping[tuple[str, ...], float], place: str | None) -> float:
+    """Weight of a set by whether its main effect acts in the channel that the residuals show."""
+    main = main_effect(effects, shares)
     channel = next((kind.channel for kind in known_effects() if kind.name == main), place)
     return 1.0 if place in (None, channel) else PLACE_WRONG / (1.0 - PLACE_WRONG)
 

@@ -57,12 +57,12 @@ def describe(
     return " ".join(part for part in parts if part)
 
 
-def acts_otherwise(where: Where, kinds: Sequence[type[Effect]]) -> str:
-    """Whether the named causes act where the residuals say that the gap is.
+def agreement(where: Where, kinds: Sequence[type[Effect]]) -> str:
+    """Whether causes act where the residuals say that the gap is.
 
     Args:
         where: from the residuals.
-        kinds: of the causes; none where none is named.
+        kinds: the causes that are compared; none where none is named.
 
     Returns:
         A sentence; empty where there is nothing to compare.

@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import binom
 
 from diagnosis.answer.where import localise
+from diagnosis.attribution.decide import Weighed
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.prepare import without_start
 from diagnosis.fitting.problem import Problem
@@ -59,6 +60,17 @@ def test_the_place_does_not_depend_on_the_names(cause):
     agrees = effect_class(cause).channel == "damping"
     said = named.words.removeprefix(unnamed.words).strip()
     assert said.startswith("That agrees with" if agrees else "That does not agree with")
+
+
+def test_a_small_cause_beside_the_main_one_is_not_said_to_agree():
+    data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
+    study = studied(data, nominal(data), ("cubic_stiffness", "structural_damping"))
+    alone = (Weighed(("cubic_stiffness",), 0.1, 0.1), Weighed(("structural_damping",), 0.9, 0.0))
+    where, _ = localise(dataclasses.replace(study, weighed=(*study.weighed, *alone)))
+    assert "does not agree with cubic stiffness: it acts on the restoring moment" in where.words
+    turned = (Weighed(("cubic_stiffness",), 0.9, 0.0), Weighed(("structural_damping",), 0.1, 0.1))
+    where, _ = localise(dataclasses.replace(study, weighed=(*study.weighed, *turned)))
+    assert where.words.endswith("That agrees with structural damping.")
 
 
 def test_runs_whose_frequencies_disagree_leave_the_channel_open():
