@@ -100,9 +100,7 @@ def _diagnose(
     if campaign.sensor.derivative:
         # Their sizes are those of angles, and their ranges too; a mode moves the body.
         kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
-        said = (
-            f"Of the effects of the sensor, none but a second mode is tried on {campaign.sensor.quantity}s."
-        )
+        said = f"A second mode is the only effect of the sensor that is tried on {campaign.sensor.quantity}s."
         left_out = (*left_out, said)
     if campaign.law is not None and campaign.law.slide:
         left_out = (*left_out, SLIDE)
