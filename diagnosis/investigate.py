@@ -9,16 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.attribution.decide import UNKNOWN, Weighed, weigh
+from diagnosis.attribution.decide import UNKNOWN, FittedSet, Weighed, weigh
 from diagnosis.attribution.grow import exchange, grow, prune, second_mode_alone
 from diagnosis.attribution.grow_in_stretches import InStretches, grow_in_stretches
 from diagnosis.attribution.hypothesis import Hypothesis, polish, with_forms
-from diagnosis.attribution.outsiders import weigh_outsiders
 from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
 from diagnosis.detection.gap import judge
 from diagnosis.detection.mains import Hum, find_hum, refine_frequency, remove_hum
 from diagnosis.detection.refusal import refuse_indefinite
 from diagnosis.detection.sensor_noise import Noise, campaign_noise, noise_trend, reading_step
+from diagnosis.fitting.channels import misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.fitting.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.fitting.problem import Problem
@@ -33,10 +33,9 @@ from diagnosis.policy import (
     NOISE_EXPLAINS_UP_TO,
     NOISE_LEAVES,
     RIVAL_PROBABILITY,
-    UNKNOWN_SHARE,
 )
 from diagnosis.study import COARSE_STEP, HUM, Study, located
-from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
+from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -142,7 +141,7 @@ def _without_hum(campaign: Campaign, frequency: float, noise: Noise) -> tuple[Ca
 
 
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
-    """The study with sets of effects, random moments and outsiders fitted and weighed."""
+    """The study with sets of effects and random moments fitted and weighed."""
     fitted = [kind for kind in kinds if kind.fitted]
     first = second_mode_alone(found.nominal, fitted) if is_gross(found.nominal) else None
     if fitted and first is None and is_gross(found.nominal):
@@ -155,7 +154,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
         found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress, first)))
     with clock.step("random moments"):
         random = weigh_random_moments(found.nominal, found.hypotheses, kinds)
-    found = replace(found, random=tuple(random), outsider=weigh_outsiders(found.nominal))
+    found = replace(found, random=tuple(random))
     found = _pruned(found, found.nominal, clock)
     weighed = _weighed(found, found.nominal)
     if weighed[0].effects == UNKNOWN and _read_off_explains(found):
@@ -175,7 +174,7 @@ def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clo
     """The study where the nominal model misses the motion itself: sets are weighed by their fits to stretches."""
     with clock.step("effects"):
         grown = grow_in_stretches(found.nominal.problem.data, fit_nominal, kinds, clock.progress)
-    found = replace(found, hypotheses=grown.hypotheses, outsider=weigh_outsiders(grown.nominal))
+    found = replace(found, hypotheses=grown.hypotheses)
     found = _pruned(found, grown.nominal, clock)
     with clock.step("polishing"):
         return _with_whole_runs(found, grown)
@@ -198,7 +197,8 @@ def _with_whole_runs(found: Study, grown: InStretches) -> Study:
 
 def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
     """The study with every set that has one effect less than the answer, or another one that does the same."""
-    best = found.hypothesis(_weighed(found, base)[0].effects)
+    named = (found.hypothesis(w.effects) for w in _weighed(found, base))
+    best = next((hypothesis for hypothesis in named if hypothesis is not None), None)
     if best is None or len(best.effects) == 1:
         return found
     with clock.step("pruning"):
@@ -221,22 +221,10 @@ def _with_forms(found: Study, base: Fit) -> Study:
 
 def _weighed(found: Study, base: Fit) -> list[Weighed]:
     """The answers with their probabilities, most probable first; shares of the gap that ``base`` leaves."""
-    shares = [(h.effects, h.share_left(base)) for h in found.hypotheses]
-    shares += [(answer.effects, answer.share) for answer in found.random]
-    return weigh(
-        shares,
-        chance=base.chance,
-        excess=base.gap,
-        outside=UNKNOWN_SHARE if found.outsider is None else found.outsider.share,
-        numbers={h.names: h.further_numbers for h in found.hypotheses},
-        place=_open_place(found),
-    )
-
-
-def _open_place(found: Study) -> str | None:
-    """The channel that the residuals show, unless a cause read off the records acts there."""
-    channel = None if found.place is None else found.place.channel.value
-    return None if channel in {effect_class(name).channel for name in found.read_off} else channel
+    nominal = misfit(base)
+    sets = [h.fitted_set(base) for h in found.hypotheses]
+    sets += [FittedSet(r.effects, r.share, r.share * nominal.excess) for r in found.random]
+    return weigh(sets, nominal)
 
 
 def _polished(

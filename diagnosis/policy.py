@@ -79,16 +79,12 @@ ALWAYS_FITTED = 7
 PREDICTED_SHARE = 0.01
 #: Sets of each size to which another effect is added, and effects fitted to each. Judgement: time against coverage.
 GROWN_FROM, GROWN_BY = 2, 4
-#: Excess, in that of the best set of its size that goes on, up to which another is grown. Judgement: time against
-#: coverage.
-BEAM_WIDTH = 3.0
 #: Share of the power by which two sets change the nominal prediction, by which they may differ and still count as
 #: one. Judgement: far below what the growth could tell apart.
 SAME_CHANGE = 0.02
-#: Factor by which the evidence for a set may fall when an effect is added, for the growth to go on from it. An
-#: effect that closes nothing lowers it to 0.085, one that closes a twentieth of what is left to 0.1. Judgement:
-#: time against coverage; the foreign sample three-a and a simulated pendulum had stopped too early at larger ones.
-GROWTH_EVIDENCE = 0.1
+#: Logarithm of the weight that a set may lose when an effect is added, for the growth to go on from it: less than an
+#: effect costs that closes nothing. Judgement: time against coverage; one of two equal causes closes only half.
+GROWTH_LOSS = 2.8
 #: Block means on which sets are grown in stretches; of longer campaigns every second, third, ... stretch is used.
 #: Judgement: time. Twelve runs of 10 s are below it.
 GROWN_ON = 45_000
@@ -101,44 +97,37 @@ FREED_HYPOTHESES, FREED_FROM = 3, 0.02
 
 # ---- How answers are weighed (0007) ---------------------------------------------------------------------------
 
-#: Exponent of the share left open. Tuned.
-STEEPNESS = 3.0
-#: Exponent beside it of a share beyond `UNKNOWN_SHARE`, three times as steep together. Tuned: many effects that
-#: close little must not together outweigh ``unknown``.
-STEEPNESS_BEYOND = 6.0
-#: Misfit of form that counts as none, as a share of the gap. Tuned.
-FORM_MISFIT = 0.005
-#: The same of effects that have no form to miss. Tuned.
-EXACT_MISFIT = 0.001
-#: Excess of block means beyond which that share no longer grows with the gap. Tuned: a motion missed grossly is no
-#: reason to overlook a second effect. With 1000, simulated pendulums lacked a quadratic damping of 2 to 6 noise
-#: powers; 33 blind campaigns of large gaps and eight real records were hardly changed.
-FORM_MISFIT_UP_TO = 300.0
-#: Standard deviations by which chance may change a share or a slope. Convention.
-CHANCE_STDS = 2.0
-#: χ² by which a set with a needless effect may be better than one without. By chance alone two numbers lower it by
-#: more than 20 once in 22,000 effects tried, so that of 25 effects one does in one campaign of 900.
+#: Exponent of what is left in a channel. Tuned.
+STEEPNESS = 1.25
+#: Logarithm of the weight that every further effect of a set costs, and every freed form. Tuned: an effect must leave
+#: less than an eleventh of one channel, or as much of several together.
+SET_PRICE, FORM_PRICE = 3.0, 1.0
+#: Misfit that needs no cause, as a share of the motion in every channel. Convention: sensors and springs are linear and
+#: repeat to one part in a thousand. Fits of the true causes leave as much or more in every measured record.
+MODEL_ERROR = 1e-3
+#: Share of what is left in the other channels that counts in a channel: an error of the phase, squared, is one of the
+#: amplitude. Tuned.
+LEAK = 0.05
+#: χ² of a channel by which a set with a needless effect may be better than one without. By chance alone two numbers
+#: lower it by more than 20 once in 22,000 effects tried, so that of 25 effects one does in one campaign of 900.
 NEEDLESS_CHI2 = 20.0
-#: Share at which a cause is as likely as an unknown one. Tuned.
-UNKNOWN_SHARE = 0.2
-#: Factor on that share for every further effect of the set that is compared with ``unknown``. Tuned (0018): on 15
-#: campaigns whose cause was not among the effects tried, four effects seldom closed much more than one.
-UNKNOWN_FURTHER = 0.7
-#: A further effect must leave less than this share of what is left without it. Tuned, at last on 79 campaigns of
-#: one to four causes (0007).
-PAIR_SHARE = 0.44
-#: A freed form must leave less than this share of what is left without it. Tuned.
-FORM_SHARE = 0.80
+#: Standard deviations by which chance may change what is left, or a slope. Convention.
+CHANCE_STDS = 2.0
+#: Logarithm of the odds that the effects of a set are the causes: a number, and by how much it rises with the
+#: significance of the gap, falls with the logarithm of what is left, and rises with that of the share closed. A
+#: logistic regression on fits with and without the true effects, of simulated campaigns and measured records.
+UNKNOWN_AT, UNKNOWN_GAP, UNKNOWN_LEFT, UNKNOWN_CLOSED = -0.7, 0.2, 1.7, 1.9
+#: Misfit of form that counts as none, as a share of the gap, and the excess beyond which it no longer grows. Tuned.
+FORM_MISFIT, FORM_MISFIT_UP_TO = 0.005, 300.0
 #: Stiffness of an unstated spring beside gravity, as a share of both, below which the rig needs no spring. The set
 #: then counts as one with a number less: a spring would have to soften by chance as gravity does. Judgement, made
 #: when three simulated pendulums had been given a cubic spring (0018).
 NEEDLESS_SPRING = 0.05
-#: How often the channel found from the residuals alone is not that of a true cause. Measured: in 7 of 63 opened
-#: campaigns of the reference simulator in which one was found (seed 20270101).
-PLACE_WRONG = 0.11
 #: Share of the probability that is spread evenly over all answers. Tuned: how often an answer of overwhelming
 #: weight was wrong, where something was at work that neither fits nor rivals know.
 EVEN_SHARE = 0.03
+#: A freed form must leave less than this share of the excess that is left without it. Tuned.
+FORM_SHARE = 0.80
 
 # ---- Random moments (0009) ------------------------------------------------------------------------------------
 

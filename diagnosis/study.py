@@ -9,7 +9,6 @@ import numpy as np
 
 from diagnosis.attribution.decide import UNKNOWN, Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.attribution.outsiders import Outsider
 from diagnosis.attribution.random_moments import RandomAnswer
 from diagnosis.detection.gap import GapTest
 from diagnosis.detection.mains import Hum
@@ -46,7 +45,6 @@ class Study:
         hypotheses: fitted sets of effects.
         weighed: answers with probabilities, most probable first; empty where there is no gap.
         random: answers with a random moment that passed its tests.
-        outsider: the cause outside the vocabulary that closes most of the gap; None where there is no gap.
         seconds: wall time by step, s.
     """
 
@@ -66,7 +64,6 @@ class Study:
     hypotheses: tuple[Hypothesis, ...] = ()
     weighed: tuple[Weighed, ...] = ()
     random: tuple[RandomAnswer, ...] = ()
-    outsider: Outsider | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property

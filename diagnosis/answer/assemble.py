@@ -28,7 +28,7 @@ from diagnosis.decision import decision
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.localisation.maps import Maps
 from diagnosis.patch import PatchedModel
-from diagnosis.policy import RIVAL_PROBABILITY, UNKNOWN_SHARE
+from diagnosis.policy import RIVAL_PROBABILITY
 from diagnosis.result import (
     Coefficients,
     Diagnosis,
@@ -125,7 +125,6 @@ def assemble(
             ),
             *((_CUT_RECORDS,) if study.cut else ()),
             *((_RESTED.format(", ".join(study.rested)),) if study.rested else ()),
-            *_outside(study),
         ),
         inclusion=inclusion(weighed, study.read_off),
         waterfall=steps,
@@ -143,16 +142,6 @@ def _in_own_units(
         name: study.similarity.own(coefficient_move(chosen, coefficient), given.unit)
         for (name, given), coefficient in zip(stated.items(), names, strict=False)
     }
-
-
-def _outside(study: Study) -> tuple[str, ...]:
-    """The cause outside the vocabulary that would explain a gap of unknown cause."""
-    outsider = study.outsider
-    if study.causes != UNKNOWN or outsider is None or outsider.share >= UNKNOWN_SHARE:
-        return ()
-    closed = 100.0 * (1.0 - outsider.share)
-    words = outsider.words[0].upper() + outsider.words[1:]
-    return (f"{words}, which is not in the vocabulary, would close {closed:.0f} % of the gap.",)
 
 
 def _coefficients(study: Study, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Coefficients:

@@ -1,13 +1,19 @@
-"""From fitted hypotheses to answers with probabilities (docs/decisions/0007-how-causes-are-weighed.md).
+"""From fitted sets of effects to answers with probabilities (docs/decisions/0007-how-causes-are-weighed.md).
 
 Real effects never have exactly a textbook form, and at the rig's signal-to-noise ratio every misfit of form is
-significant. So hypotheses are weighed by the share s of the gap that they leave open, not by χ² itself:
+significant. So sets are weighed by what they leave relative to a scale, and not by χ² itself. The model's error
+has an unknown scale of its own in every channel c of the residuals (`diagnosis.fitting.channels`), with an
+inverse-gamma prior. Integrated over these scales, a set of k effects has the weight
 
-    weight = δ^(γ−1) (s + δ)^−γ [(u + δ)/(max(s, u) + δ)]^2γ
+    ln w = −γ Σ_c ln(1 + x_c/φ_c) − SET_PRICE (k − 1) − FORM_PRICE numbers
 
-δ is the misfit of form that is common among true causes, γ is `STEEPNESS` and u is `UNKNOWN_SHARE`. A second effect
-must close most of what the first leaves. Against a set of n effects ``unknown`` weighs as much as such a set that
-leaves the share u `UNKNOWN_FURTHER`^(n−1): effects that do not act close an unknown gap little further.
+where x_c is the χ² beyond noise that it leaves in the channel, with a small part of what it leaves in the others,
+because an error of the phase leaks into the amplitude. φ_c is the misfit that needs no cause: what chance does, and
+the share `MODEL_ERROR` of the motion.
+
+The odds against an unknown cause are those of a logistic regression. With G = Σ_c ln(1 + x_c/φ_c) of the nominal model
+and L of the set, it uses G, ln(1 + L) and ln(1 − L/G): how significant the gap is in all its channels, what the set leaves
+in them, and the share that it closes.
 """
 
 from __future__ import annotations
@@ -17,24 +23,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.fitting.channels import Misfit
 from diagnosis.policy import (
     CHANCE_STDS,
     EVEN_SHARE,
-    EXACT_MISFIT,
     FORM_MISFIT,
     FORM_MISFIT_UP_TO,
-    FORM_SHARE,
+    FORM_PRICE,
+    LEAK,
+    MODEL_ERROR,
     NEEDLESS_CHI2,
-    PAIR_SHARE,
-    PLACE_WRONG,
+    SET_PRICE,
     STEEPNESS,
-    STEEPNESS_BEYOND,
-    UNKNOWN_FURTHER,
-    UNKNOWN_SHARE,
+    UNKNOWN_AT,
+    UNKNOWN_CLOSED,
+    UNKNOWN_GAP,
+    UNKNOWN_LEFT,
 )
-from tunnel_sim.effects import known_effects
+from tunnel_sim.vocabulary.record import Array
 
 UNKNOWN = ("unknown",)
+_LEAST_CLOSED = 0.02  # a share: keeps its logarithm finite
 
 
 @dataclass(frozen=True)
@@ -52,61 +61,115 @@ class Weighed:
     probability: float
 
 
-def form_floor(excess: float, effects: Sequence[str] = ()) -> float:
-    """Share of the gap that a misfit of form may leave.
+@dataclass(frozen=True, eq=False)
+class FittedSet:
+    """What a fitted set of effects leaves.
 
     Args:
-        excess: of the nominal model's block means, above 0.
-        effects: that were fitted.
+        effects: names, in any order.
+        share: of the gap that it leaves open, a fraction; below 0 by chance.
+        excess: χ² beyond that of noise by channel, shape (6,), dimensionless.
+        numbers: how many it has beside its own: freed forms, less a spring that gravity replaces.
     """
-    exact = {kind.name for kind in known_effects() if kind.exact}
-    misfit = EXACT_MISFIT if effects and exact.issuperset(effects) else FORM_MISFIT
-    return misfit * min(1.0, FORM_MISFIT_UP_TO / excess)
+
+    effects: tuple[str, ...]
+    share: float
+    excess: Array
+    numbers: int = 0
 
 
-def weigh(
-    shares: Sequence[tuple[tuple[str, ...], float]],
-    chance: float,
-    excess: float,
-    outside: float = UNKNOWN_SHARE,
-    numbers: Mapping[tuple[str, ...], int] | None = None,
-    place: str | None = None,
-) -> list[Weighed]:
+def weigh(sets: Sequence[FittedSet], nominal: Misfit) -> list[Weighed]:
     """Probabilities of the answers.
 
     Args:
-        shares: effect names and share of the gap they leave open, for sets of any size; below 0 by chance.
-        chance: standard deviation of a share by chance alone.
-        excess: of the nominal model's block means.
-        outside: share that a cause outside the vocabulary leaves open; `UNKNOWN_SHARE` at most counts.
-        numbers: as `evidence` takes them, by sorted effect names; 0 where not given.
-        place: the channel that the residuals alone show; None: none.
+        sets: fitted sets of effects; of two with the same effects the better one counts.
+        nominal: what the nominal model leaves.
 
     Returns:
         All answers, ``unknown`` among them, most probable first.
     """
-    answers: dict[tuple[str, ...], float] = {}
-    for names, share in shares:
-        key = tuple(sorted(names))
-        answers[key] = min(share, answers.get(key, np.inf))
-    least = min((0.0, *answers.values()))
-    weights: dict[tuple[str, ...], float] = {}
-    odds = 0.0
-    for names, share in answers.items():
-        further = (numbers or {}).get(names, 0)
-        agrees = _agreement(names, answers, place)
-        weights[names] = agrees * evidence(names, share - least, further, excess, chance)
-        odds += agrees * _odds_against_unknown(names, share, further, outside, excess, chance)
-    known = odds / (1.0 + odds) / (sum(weights.values()) or 1.0)
-    probabilities = {names: known * weight for names, weight in weights.items()}
-    answers = {names: max(share, 0.0) for names, share in answers.items()}
-    answers[UNKNOWN], probabilities[UNKNOWN] = min(UNKNOWN_SHARE, max(outside, 0.0)), 1.0 / (1.0 + odds)
-    even = EVEN_SHARE / len(answers)
+    best: dict[tuple[str, ...], FittedSet] = {}
+    for given in sets:
+        key = tuple(sorted(given.effects))
+        if key not in best or given.share < best[key].share:
+            best[key] = given
+    least = least_excess([given.excess for given in best.values()])
+    scale = misfit_scale(nominal)
+    logs = np.array([log_weight(s.excess - least, scale, len(key), s.numbers) for key, s in best.items()])
+    weights = np.exp(logs - logs.max(initial=-np.inf))
+    against = np.array([_log_odds(given.excess, nominal) for given in best.values()])
+    odds = float(weights @ np.exp(against) / weights.sum()) if best else 0.0
+    known = (1.0 - EVEN_SHARE) * odds / (1.0 + odds) * weights / (weights.sum() or 1.0)
+    even = EVEN_SHARE / (len(best) + 1)
     found = [
-        Weighed(names, share, (1.0 - EVEN_SHARE) * probabilities[names] + even)
-        for names, share in answers.items()
+        Weighed(key, max(given.share, 0.0), float(probability) + even)
+        for (key, given), probability in zip(best.items(), known, strict=True)
     ]
+    found.append(Weighed(UNKNOWN, 1.0, (1.0 - EVEN_SHARE) / (1.0 + odds) + even))
     return sorted(found, key=lambda w: -w.probability)
+
+
+def least_excess(excesses: Sequence[Array]) -> Array:
+    """By channel the least that any set leaves, or 0, shape (6,).
+
+    What chance adds is common to all sets, because they are fitted to the same noise; only differences count.
+
+    Args:
+        excesses: χ² beyond noise, each of shape (6,).
+    """
+    return np.asarray(np.min([np.zeros(6), *excesses], axis=0), np.float64)
+
+
+def misfit_scale(nominal: Misfit, chance: float | Array = NEEDLESS_CHI2) -> Array:
+    """χ² by channel that needs no cause, shape (6,).
+
+    Args:
+        nominal: gives the motion.
+        chance: χ² that chance explains, by channel or common to all.
+    """
+    return np.asarray(np.broadcast_to(chance, 6) + MODEL_ERROR**2 * nominal.motion, np.float64)
+
+
+def log_weight(left: Array, scale: Array, effects: int, numbers: int) -> float:
+    """Logarithm of the weight of a set among all sets.
+
+    Args:
+        left: χ² by channel beyond that of the best set, shape (6,).
+        scale: as `misfit_scale` gives it, shape (6,).
+        effects: how many it has, a count.
+        numbers: how many it has beside their own, a count.
+    """
+    price = SET_PRICE * max(effects - 1, 0) + FORM_PRICE * numbers
+    return -STEEPNESS * log_misfit(left, scale) - price
+
+
+def log_misfit(left: Array, scale: Array) -> float:
+    """Sum over the channels of the logarithm of what is left, 0 where nothing is.
+
+    Args:
+        left: χ² by channel, shape (6,), dimensionless.
+        scale: as `misfit_scale` gives it, shape (6,).
+    """
+    above = np.maximum(left, 0.0)
+    return float(np.sum(np.log1p((above + LEAK * (above.sum() - above)) / scale)))
+
+
+def _log_odds(excess: Array, nominal: Misfit) -> float:
+    """Logarithm of the odds of a set against an unknown cause."""
+    scale = misfit_scale(nominal, CHANCE_STDS * np.sqrt(2.0 * nominal.count))
+    gap, left = log_misfit(nominal.excess, scale), log_misfit(excess, scale)
+    closed = max(1.0 - left / gap, 0.0) if gap > 0.0 else 0.0
+    against = UNKNOWN_LEFT * np.log1p(left) - UNKNOWN_CLOSED * np.log(closed + _LEAST_CLOSED)
+    return float(UNKNOWN_AT + UNKNOWN_GAP * gap - against)
+
+
+def form_floor(excess: float) -> float:
+    """Share of the gap that a misfit of form may leave.
+
+    Args:
+        excess: of the nominal model's block means, above 0.
+    """
+    return FORM_MISFIT * min(1.0, FORM_MISFIT_UP_TO / excess)
 
 
 def main_effect(effects: Sequence[str], shares: Mapping[tuple[str, ...], float]) -> str:
@@ -116,55 +179,3 @@ def main_effect(effects: Sequence[str], shares: Mapping[tuple[str, ...], float])
         shares: of the gap that sets leave, fractions, single effects among them.
     """
     return min(effects, key=lambda name: shares.get((name,), np.inf))
-
-
-def _agreement(effects: Sequence[str], shares: Mapping[tuple[str, ...], float], place: str | None) -> float:
-    """Weight of a set by whether its main effect acts in the channel that the residuals show."""
-    main = main_effect(effects, shares)
-    channel = next((kind.channel for kind in known_effects() if kind.name == main), place)
-    return 1.0 if place in (None, channel) else PLACE_WRONG / (1.0 - PLACE_WRONG)
-
-
-def evidence(effects: Sequence[str], share: float, numbers: int, excess: float, chance: float) -> float:
-    """Weight of a set of effects among all sets.
-
-    The sets are fitted to the same noise. What chance adds to the shares is common to them, however much it is, and
-    only their differences count: an effect that does not act seldom lowers χ² by more than `NEEDLESS_CHI2`.
-
-    Args:
-        share: of the gap that they leave open, a fraction; above that of the best set where that is below 0.
-        numbers: how many they have beside their own: freed forms, less a spring that gravity replaces.
-        excess: of the nominal model's block means.
-        chance: standard deviation of a share by chance alone.
-    """
-    needless = NEEDLESS_CHI2 * chance**2 * excess / 2.0  # χ² as a share of the gap
-    return _density(share, form_floor(excess, effects) + needless) * _prior(len(effects), numbers)
-
-
-def _odds_against_unknown(
-    effects: Sequence[str], share: float, numbers: int, outside: float, excess: float, chance: float
-) -> float:
-    """Weight of a set of effects over that of ``unknown``; an outsider that closes more weighs as one effect."""
-    by_chance = CHANCE_STDS * chance
-    known = _density(max(share, 0.0), form_floor(excess, effects) + by_chance) * _prior(len(effects), numbers)
-    floor = form_floor(excess) + by_chance
-    if outside < UNKNOWN_SHARE:
-        return known / _density(max(outside, 0.0), floor)
-    further = len(effects) - 1
-    return known / (_density(UNKNOWN_SHARE * UNKNOWN_FURTHER**further, floor) * _prior(len(effects), 0))
-
-
-def _density(share: float, floor: float) -> float:
-    """Weight of an answer that leaves a share of the gap: the density of such a share under a true cause.
-
-    Beyond `UNKNOWN_SHARE` it falls three times as steeply, so that many effects that close little do not together
-    outweigh ``unknown``.
-    """
-    known = floor ** (STEEPNESS - 1.0) * (share + floor) ** -STEEPNESS
-    beyond = (UNKNOWN_SHARE + floor) / (max(share, UNKNOWN_SHARE) + floor)
-    return float(known * beyond**STEEPNESS_BEYOND)
-
-
-def _prior(count: int, numbers: int) -> float:
-    """Prior weight: every further effect and every further number must close so much more of what is left."""
-    return float(PAIR_SHARE ** (STEEPNESS * max(0, count - 1)) * FORM_SHARE ** (STEEPNESS * numbers))

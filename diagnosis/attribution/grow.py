@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.attribution.decide import evidence
+from diagnosis.attribution.decide import least_excess, log_misfit, log_weight, misfit_scale
 from diagnosis.attribution.hypothesis import (
     Hypothesis,
     is_plausible,
@@ -17,23 +17,23 @@ from diagnosis.attribution.hypothesis import (
     turned_back,
     with_forms,
 )
+from diagnosis.fitting.channels import misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
 from diagnosis.policy import (
     ALWAYS_FITTED,
-    BEAM_WIDTH,
-    CHANCE_STDS,
     FREED_FROM,
     FREED_HYPOTHESES,
     GROWN_BY,
     GROWN_FROM,
-    GROWTH_EVIDENCE,
+    GROWTH_LOSS,
     MOST_CAUSES,
     NEEDLESS_CHI2,
     PREDICTED_SHARE,
     SAME_CHANGE,
 )
 from tunnel_sim.effects import Effect
+from tunnel_sim.vocabulary.record import Array
 
 _ITERATIONS = 12  # of a fit on the way; the answer's own is polished
 
@@ -62,13 +62,13 @@ def grow(
     level = [Hypothesis((), nominal) if first is None else first]
     while level:
         children = sets_with_one_more(level, kinds, progress)
-        if all(_may_gain(child, nominal) for child in children):  # else freeing a form gains nothing
+        scale = Scale.of(children, nominal)
+        if all(_may_gain(child, scale) for child in children):  # else freeing a form gains nothing
             count = FREED_HYPOTHESES if not level[0].effects else 1
             children = with_forms(children, FREED_FROM * level[0].fit.excess, count)
         found |= {child.names: child for child in children}
         going = going_on(children, level, nominal)
-        near = [h for h in going if _left(h) <= BEAM_WIDTH * _left(going[0])]
-        level = _distinct(near, nominal)[:GROWN_FROM]
+        level = _distinct(going, nominal)[:GROWN_FROM]
     return sorted(found.values(), key=lambda h: h.fit.total)
 
 
@@ -102,24 +102,31 @@ def _same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
     return apart < SAME_CHANGE * (nominal.total - max(one.total, other.total))
 
 
-def _left(hypothesis: Hypothesis) -> float:
-    return max(hypothesis.fit.excess, 0.0)
-
-
-def evidence_of(hypothesis: Hypothesis, nominal: Fit, least: float) -> float:
-    """Weight of a fitted set among all sets, as `decide.evidence` gives it.
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """What sets are compared by: the misfit by channel that needs no cause, and the least that any of them leaves.
 
     Args:
-        nominal: the fit without any effect, whose excess is the gap.
-        least: `least_share` of the sets that it is compared with, a fraction.
+        misfit: χ² by channel, shape (6,).
+        least: χ² by channel, shape (6,), 0 or less.
     """
-    share = hypothesis.share_left(nominal) - least
-    return evidence(hypothesis.effects, share, hypothesis.further_numbers, nominal.gap, nominal.chance)
 
+    misfit: Array
+    least: Array
 
-def least_share(hypotheses: Sequence[Hypothesis], nominal: Fit) -> float:
-    """What the best set leaves of the gap, a fraction, where chance makes that less than nothing; else 0."""
-    return min(0.0, *(h.share_left(nominal) for h in hypotheses))
+    @classmethod
+    def of(cls, sets: Sequence[Hypothesis], nominal: Fit) -> Scale:
+        """The scale of some sets beside the nominal model."""
+        return cls(misfit_scale(misfit(nominal)), least_excess([h.excess for h in sets]))
+
+    def weight(self, hypothesis: Hypothesis) -> float:
+        """Logarithm of the weight of a set."""
+        left = hypothesis.excess - self.least
+        return log_weight(left, self.misfit, len(hypothesis.effects), hypothesis.further_numbers)
+
+    def greatest(self, hypothesis: Hypothesis) -> float:
+        """The same of the set with one more effect that leaves nothing."""
+        return log_weight(np.zeros(6), self.misfit, len(hypothesis.effects) + 1, hypothesis.further_numbers)
 
 
 def going_on(children: Sequence[Hypothesis], parents: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
@@ -133,31 +140,26 @@ def going_on(children: Sequence[Hypothesis], parents: Sequence[Hypothesis], nomi
     Returns:
         Best first; none where the best of all could gain nothing.
     """
-    least = least_share((*children, *parents), nominal)
-    ranked = sorted(children, key=lambda h: -evidence_of(h, nominal, least))
-    if not ranked or not _may_gain(ranked[0], nominal):
+    scale = Scale.of((*children, *parents), nominal)
+    ranked = sorted(children, key=lambda h: -scale.weight(h))
+    if not ranked or not _may_gain(ranked[0], scale):
         return []
-    return [child for child in ranked if _goes_on(child, parents, nominal)]
+    return [child for child in ranked if _goes_on(child, parents, scale)]
 
 
-def _may_gain(hypothesis: Hypothesis, nominal: Fit) -> bool:
-    """Whether the evidence could rise if one more effect left no more than chance allows at the least."""
+def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
+    """Whether the weight could rise if one more effect left nothing."""
     if not hypothesis.effects:
         return True
-    larger = (*hypothesis.effects, "")
-    best = evidence(larger, 0.0, hypothesis.further_numbers, nominal.gap, nominal.chance)
-    least = -CHANCE_STDS * nominal.chance
-    return len(hypothesis.effects) < MOST_CAUSES and best > evidence_of(hypothesis, nominal, least)
+    return len(hypothesis.effects) < MOST_CAUSES and scale.greatest(hypothesis) > scale.weight(hypothesis)
 
 
-def _goes_on(child: Hypothesis, level: Sequence[Hypothesis], nominal: Fit) -> bool:
+def _goes_on(child: Hypothesis, level: Sequence[Hypothesis], scale: Scale) -> bool:
     """Whether a set may still lead on from the best it grew from: one of two equal causes closes only half."""
     parents = [h for h in level if set(h.effects) < set(child.effects)]
     if not any(parent.effects for parent in parents):
         return True
-    least = least_share((child, *parents), nominal)
-    best = max(evidence_of(parent, nominal, least) for parent in parents)
-    return evidence_of(child, nominal, least) > GROWTH_EVIDENCE * best
+    return scale.weight(child) > max(scale.weight(parent) for parent in parents) - GROWTH_LOSS
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -275,7 +277,8 @@ def _worth_fitting(
     Beside other effects, those that are predicted to do no more than a needless one are left out.
     """
     scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
-    scored.sort(key=lambda item: -item[1][0].predicted_drop)
+    scale = misfit_scale(misfit(parent.fit))
+    scored.sort(key=lambda item: min(log_misfit(start.predicted, scale) for start in item[1]))
     if parent.effects:
         return [(kind, starts) for kind, starts in scored[:GROWN_BY] if _is_needed(starts[0], parent.fit)]
     limit = PREDICTED_SHARE * parent.fit.total

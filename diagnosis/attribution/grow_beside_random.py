@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.attribution.grow import evidence_of, grow, least_share, sets_with_one_more
+from diagnosis.attribution.grow import Scale, grow, sets_with_one_more
 from diagnosis.attribution.hypothesis import Hypothesis, restricted
 from diagnosis.attribution.process_noise import (
     ProcessNoise,
@@ -57,8 +57,7 @@ def grow_beside_random(nominal: Fit, kinds: Sequence[type[Effect]]) -> list[Hypo
             base = fit(Problem(noisy), nominal.point)
             grown = grow(base, kinds)
             every = [Hypothesis((), base), *grown]
-            least = least_share(every, base)
-            top = _sought_again(max(every, key=lambda h: evidence_of(h, base, least)))
+            top = _sought_again(max(every, key=Scale.of(every, base).weight))
             sets = [*grown, *_with_more_of_the_wind(top, kinds)]
             found = [_seen_in(h, data) for h in sorted(sets, key=lambda h: h.fit.total) if h.effects]
             best = _seen_in(sets[-1], data)

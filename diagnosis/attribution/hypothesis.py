@@ -6,15 +6,19 @@ import dataclasses
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from diagnosis.attribution.decide import FittedSet
+from diagnosis.fitting.channels import CHANNELS, misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.spectra import linear_coefficients, resonance
 from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES, NEEDLESS_SPRING, OWN_EVIDENCE
 from tunnel_sim.effects.base import IN_RUNS
 from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.vocabulary.record import Array
 
 _POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
 _AS_WELL = 1.01  # of χ², up to which a fit explains the readings as well as another
@@ -48,8 +52,11 @@ class Hypothesis:
 
     @property
     def further_numbers(self) -> int:
-        """How many form parameters were freed, less one where gravity leaves the rig no need of a spring."""
-        return self.forms - _needs_no_spring(self.fit)
+        """How many form parameters were freed, less two where gravity leaves the rig no need of a spring.
+
+        A spring would have to soften by chance, and as much as gravity does.
+        """
+        return self.forms - 2 * _needs_no_spring(self.fit)
 
     def share_left(self, nominal: Fit) -> float:
         """Share of the nominal gap that the set leaves open; below 0 by chance.
@@ -58,6 +65,27 @@ class Hypothesis:
         """
         by_chance = own_gain(self.fit.problem, self.fit.point) / self.fit.count
         return (self.fit.excess + by_chance) / nominal.gap
+
+    @cached_property
+    def excess(self) -> Array:
+        """χ² beyond noise that the set leaves by channel, shape (6,), dimensionless.
+
+        What instants of the runs gain by chance counts as left in the frequency, and what phases gain in the
+        harmonics.
+        """
+        problem, width = self.fit.problem, self.fit.point.release.shape[1]
+        found = misfit(self.fit).excess
+        for kind in problem.effects:
+            if kind.name in problem.phased:
+                place = problem.own_places(width)[kind.name]
+                channel = "frequency" if kind.skips else "harmonics"
+                count = (place.stop - place.start) * len(problem.data.runs)
+                found[CHANNELS.index(channel)] += OWN_EVIDENCE * count
+        return found
+
+    def fitted_set(self, nominal: Fit) -> FittedSet:
+        """What the weighing needs to know of it; the share is of the gap that ``nominal`` leaves."""
+        return FittedSet(self.effects, self.share_left(nominal), self.excess, self.further_numbers)
 
 
 def own_gain(problem: Problem, point: Point) -> float:

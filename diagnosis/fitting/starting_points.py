@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.fitting.channels import CHANNELS, misfit
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.normal_equations import normal_equations
 from diagnosis.fitting.own_numbers import OwnNumbers, ringing, skip
@@ -127,12 +128,14 @@ class StartingPoint:
         problem: the fit with the effect added.
         point: where to start.
         predicted_drop: of χ² by linear theory, dimensionless.
+        predicted: χ² beyond noise that linear theory leaves by channel, shape (6,), dimensionless.
         scaled: place of the common parameter that linear theory has scaled; None where it scaled none.
     """
 
     problem: Problem
     point: Point
     predicted_drop: float
+    predicted: Array
     scaled: int | None
 
     def nearer(self) -> StartingPoint | None:
@@ -198,7 +201,9 @@ def _own_start(base: Fit, kind: type[Effect], found: OwnNumbers) -> StartingPoin
     values = [np.clip(value, info.lower, info.upper) for value, info in zip(found.values, infos, strict=True)]
     release = np.column_stack([base.point.release, found.numbers])
     point = Point(np.concatenate([base.point.common, values]), release)
-    return StartingPoint(problem, point, found.drop, base.point.common.size)
+    predicted = misfit(base).excess
+    predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= found.drop
+    return StartingPoint(problem, point, found.drop, predicted, base.point.common.size)
 
 
 def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]:
@@ -243,7 +248,8 @@ def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint 
             start[scaled] = min(start[scaled], base.point.common[replaced])
     point = Point(_with_effect(base, start, scaled, replaced), base.point.release)
     place = None if scaled is None else base.point.common.size + scaled
-    return StartingPoint(problem, point, drop, place)
+    after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
+    return StartingPoint(problem, point, drop, misfit(base, after).excess, place)
 
 
 def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | None) -> Array:

@@ -68,7 +68,6 @@ class Effect:
     - ``lattice``: whether it changes the quantisation step.
     - ``remembers``: whether a reading depends on earlier samples.
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
-    - ``exact``: whether it is a factor on a stated number, so that its form is known exactly.
     - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty where the
       effect is not periodic in the angle.
     - ``tries``: how many starting points of a fit are worth trying.
@@ -92,7 +91,6 @@ class Effect:
     lattice: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
     ahead_of_sensor: ClassVar[bool] = False
-    exact: ClassVar[bool] = False
     turns: ClassVar[str] = ""
     tries: ClassVar[int] = 1
     caveat: ClassVar[str] = ""

@@ -33,7 +33,6 @@ class SpringMiscalibration(Effect):
     )
     references = ("Paper, Table II: springs 4 and 7 lie off the line by −12 % and +10 %",)
     example = (0.05, 16.12)
-    exact = True
     tries = 2
 
     error: float = parameter(

@@ -3,6 +3,9 @@
 An error in the damping changes the amplitude of the motion, and one in the stiffness its phase. In every cycle of a
 run the residual is split into its part along the motion, its part along the rate, its mean, and the rest. What
 changes in proportion to time over a run is a damping or a frequency of the run's own.
+
+An error of the frequency makes χ² large, because phases add up over the cycles. Apart, it does not hide a cause in
+the damping, nor the other way round.
 """
 
 from __future__ import annotations
@@ -30,10 +33,12 @@ class Misfit:
     Args:
         chi2: by channel, shape (6,), dimensionless.
         count: of independent values by channel, which is what noise alone gives, shape (6,).
+        motion: sum of squares of the motion in noise standard deviations, dimensionless.
     """
 
     chi2: Array
     count: Array
+    motion: float
 
     @property
     def excess(self) -> Array:
@@ -53,10 +58,11 @@ def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> Misfit:
         _of_run(fit, i, run, own)
         for i, (run, own) in enumerate(zip(fit.problem.data.runs, left, strict=True))
     ]
-    return Misfit(np.sum([chi2 for chi2, _ in parts], axis=0), np.sum([count for _, count in parts], axis=0))
+    chi2, count, motion = (np.sum(values, axis=0) for values in zip(*parts, strict=True))
+    return Misfit(chi2, count, float(motion))
 
 
-def _of_run(fit: Fit, index: int, run: RunData, left: Array) -> tuple[Array, Array]:
+def _of_run(fit: Fit, index: int, run: RunData, left: Array) -> tuple[Array, Array, float]:
     motion = run.scaled(run.reading - fit.zero(index)) - fit.residuals[index]
     cycle = max(_LEAST, round(1.0 / (resonance(fit, index) * run.interval)))
     starts = np.arange(max(1, left.size // cycle)) * cycle
@@ -87,7 +93,7 @@ def _of_run(fit: Fit, index: int, run: RunData, left: Array) -> tuple[Array, Arr
         starts.size,
         left.size - 3 * starts.size,
     ]
-    return chi2, np.array(counts, np.float64)
+    return chi2, np.array(counts, np.float64), float(along @ along)
 
 
 def _curve_and_line(values: Array, weights: Array) -> tuple[float, float]:
