@@ -82,8 +82,8 @@ GROWN_FROM, GROWN_BY = 2, 4
 #: Share of the power by which two sets change the nominal prediction, by which they may differ and still count as
 #: one. Judgement: far below what the growth could tell apart.
 SAME_CHANGE = 0.02
-#: Logarithm of the weight that a set may lose when an effect is added, for the growth to go on from it: less than an
-#: effect costs that closes nothing. Judgement: time against coverage; one of two equal causes closes only half.
+#: Logarithm of the weight that a set may lose when an effect is added, for the growth to go on from it: less than
+#: an effect costs that closes nothing. Judgement: time against coverage; one of two equal causes closes only half.
 GROWTH_LOSS = 2.8
 #: Block means on which sets are grown in stretches; of longer campaigns every second, third, ... stretch is used.
 #: Judgement: time. Twelve runs of 10 s are below it.
@@ -99,14 +99,14 @@ FREED_HYPOTHESES, FREED_FROM = 3, 0.02
 
 #: Exponent of what is left in a channel. Tuned.
 STEEPNESS = 1.25
-#: Logarithm of the weight that every further effect of a set costs, and every freed form. Tuned: an effect must leave
-#: less than an eleventh of one channel, or as much of several together.
+#: Logarithm of the weight that every further effect of a set costs, and every freed form. Tuned: an effect must
+#: leave less than an eleventh of one channel, or close as much of several together.
 SET_PRICE, FORM_PRICE = 3.0, 1.0
-#: Misfit that needs no cause, as a share of the motion in every channel. Convention: sensors and springs are linear and
-#: repeat to one part in a thousand. Fits of the true causes leave as much or more in every measured record.
+#: Misfit that needs no cause, as a share of the motion in every channel. Convention: sensors and springs are linear
+#: and repeat to one part in a thousand. Fits of the true causes leave as much or more in every measured record.
 MODEL_ERROR = 1e-3
-#: Share of what is left in the other channels that counts in a channel: an error of the phase, squared, is one of the
-#: amplitude. Tuned.
+#: Share of what is left in the other channels that counts in a channel: an error of the phase, squared, is one of
+#: the amplitude. Tuned.
 LEAK = 0.05
 #: χ² of a channel by which a set with a needless effect may be better than one without. By chance alone two numbers
 #: lower it by more than 20 once in 22,000 effects tried, so that of 25 effects one does in one campaign of 900.

@@ -11,9 +11,9 @@ where x_c is the χ² beyond noise that it leaves in the channel, with a small p
 because an error of the phase leaks into the amplitude. φ_c is the misfit that needs no cause: what chance does, and
 the share `MODEL_ERROR` of the motion.
 
-The odds against an unknown cause are those of a logistic regression. With G = Σ_c ln(1 + x_c/φ_c) of the nominal model
-and L of the set, it uses G, ln(1 + L) and ln(1 − L/G): how significant the gap is in all its channels, what the set leaves
-in them, and the share that it closes.
+The odds against an unknown cause are those of a logistic regression. With G = Σ_c ln(1 + x_c/φ_c) of the nominal
+model and L of the set, it uses G, ln(1 + L) and ln(1 − L/G): how significant the gap is in all its channels, what
+the set leaves in them, and the share that it closes.
 """
 
 from __future__ import annotations

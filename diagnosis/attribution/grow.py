@@ -17,7 +17,7 @@ from diagnosis.attribution.hypothesis import (
     turned_back,
     with_forms,
 )
-from diagnosis.fitting.channels import misfit
+from diagnosis.fitting.channels import Misfit, misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
 from diagnosis.policy import (
@@ -59,15 +59,15 @@ def grow(
         could not rise, and at `MOST_CAUSES`.
     """
     found: dict[tuple[str, ...], Hypothesis] = {} if first is None else {first.names: first}
-    level = [Hypothesis((), nominal) if first is None else first]
+    level, gap = [Hypothesis((), nominal) if first is None else first], misfit(nominal)
     while level:
         children = sets_with_one_more(level, kinds, progress)
-        scale = Scale.of(children, nominal)
+        scale = Scale.of(children, gap)
         if all(_may_gain(child, scale) for child in children):  # else freeing a form gains nothing
             count = FREED_HYPOTHESES if not level[0].effects else 1
             children = with_forms(children, FREED_FROM * level[0].fit.excess, count)
         found |= {child.names: child for child in children}
-        going = going_on(children, level, nominal)
+        going = going_on(children, level, gap)
         level = _distinct(going, nominal)[:GROWN_FROM]
     return sorted(found.values(), key=lambda h: h.fit.total)
 
@@ -115,9 +115,9 @@ class Scale:
     least: Array
 
     @classmethod
-    def of(cls, sets: Sequence[Hypothesis], nominal: Fit) -> Scale:
-        """The scale of some sets beside the nominal model."""
-        return cls(misfit_scale(misfit(nominal)), least_excess([h.excess for h in sets]))
+    def of(cls, sets: Sequence[Hypothesis], gap: Misfit) -> Scale:
+        """The scale of some sets, from what the nominal model leaves."""
+        return cls(misfit_scale(gap), least_excess([h.excess for h in sets]))
 
     def weight(self, hypothesis: Hypothesis) -> float:
         """Logarithm of the weight of a set."""
@@ -129,18 +129,18 @@ class Scale:
         return log_weight(np.zeros(6), self.misfit, len(hypothesis.effects) + 1, hypothesis.further_numbers)
 
 
-def going_on(children: Sequence[Hypothesis], parents: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
+def going_on(children: Sequence[Hypothesis], parents: Sequence[Hypothesis], gap: Misfit) -> list[Hypothesis]:
     """The sets to grow further.
 
     Args:
         children: fitted sets of one size.
         parents: those that they grew from.
-        nominal: the fit without any effect.
+        gap: what the nominal model leaves.
 
     Returns:
         Best first; none where the best of all could gain nothing.
     """
-    scale = Scale.of((*children, *parents), nominal)
+    scale = Scale.of((*children, *parents), gap)
     ranked = sorted(children, key=lambda h: -scale.weight(h))
     if not ranked or not _may_gain(ranked[0], scale):
         return []

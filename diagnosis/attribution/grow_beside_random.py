@@ -21,6 +21,7 @@ from diagnosis.attribution.process_noise import (
     fit_wandering_shedding,
     with_response,
 )
+from diagnosis.fitting.channels import misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_at
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data
@@ -57,7 +58,7 @@ def grow_beside_random(nominal: Fit, kinds: Sequence[type[Effect]]) -> list[Hypo
             base = fit(Problem(noisy), nominal.point)
             grown = grow(base, kinds)
             every = [Hypothesis((), base), *grown]
-            top = _sought_again(max(every, key=Scale.of(every, base).weight))
+            top = _sought_again(max(every, key=Scale.of(every, misfit(base)).weight))
             sets = [*grown, *_with_more_of_the_wind(top, kinds)]
             found = [_seen_in(h, data) for h in sorted(sets, key=lambda h: h.fit.total) if h.effects]
             best = _seen_in(sets[-1], data)

@@ -11,6 +11,7 @@ import numpy as np
 from diagnosis.attribution.decide import form_floor
 from diagnosis.attribution.grow import Progress, going_on, sets_with_one_more
 from diagnosis.attribution.hypothesis import Hypothesis, with_forms
+from diagnosis.fitting.channels import misfit
 from diagnosis.fitting.least_squares import Fit, FitError
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.starting_points import is_gross
@@ -79,14 +80,14 @@ def grow_in_stretches(
     except (FitError, np.linalg.LinAlgError):  # a model without the causes may run away in long stretches
         nominal, long = first, short
     level, found = [_Grown(Hypothesis((), nominal), Hypothesis((), first))], []
-    able = [kind for kind in kinds if kind.autonomous]
+    able, gap = [kind for kind in kinds if kind.autonomous], misfit(nominal)
     while level:
         grown = _longer_sets(level, short, data, able, progress)
         least = min(FREED_FROM * level[0].long.fit.excess, form_floor(nominal.gap) * nominal.gap)
         children = with_forms([child.long for child in grown.values()], least)
         found += children
         parents = [g.long for g in level]
-        going = _of_each(parents, going_on(children, parents, nominal))
+        going = _of_each(parents, going_on(children, parents, gap))
         level = [replace(grown[h.names], long=h) for h in going[:GROWN_FROM]]
     return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
 

@@ -33,7 +33,7 @@ class Misfit:
     Args:
         chi2: by channel, shape (6,), dimensionless.
         count: of independent values by channel, which is what noise alone gives, shape (6,).
-        motion: sum of squares of the motion in noise standard deviations, dimensionless.
+        motion: sum of squares of the readings about their means in every cycle, in noise variances.
     """
 
     chi2: Array
@@ -63,7 +63,8 @@ def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> Misfit:
 
 
 def _of_run(fit: Fit, index: int, run: RunData, left: Array) -> tuple[Array, Array, float]:
-    motion = run.scaled(run.reading - fit.zero(index)) - fit.residuals[index]
+    reading = run.scaled(run.reading - fit.zero(index))
+    motion = reading - fit.residuals[index]
     cycle = max(_LEAST, round(1.0 / (resonance(fit, index) * run.interval)))
     starts = np.arange(max(1, left.size // cycle)) * cycle
     sizes = np.diff([*starts, left.size])
@@ -93,7 +94,7 @@ def _of_run(fit: Fit, index: int, run: RunData, left: Array) -> tuple[Array, Arr
         starts.size,
         left.size - 3 * starts.size,
     ]
-    return chi2, np.array(counts, np.float64), float(along @ along)
+    return chi2, np.array(counts, np.float64), float(np.sum(centred(reading) ** 2))
 
 
 def _curve_and_line(values: Array, weights: Array) -> tuple[float, float]:

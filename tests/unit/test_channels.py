@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
+from diagnosis.fitting.channels import CHANNELS, misfit
 from diagnosis.fitting.spectra import resonance
-from docs.studies.channels import CHANNELS, misfit
 from tests.unit.gap_campaigns import campaign, nominal
 
 

@@ -11,6 +11,7 @@ from diagnosis.attribution import grow as growth
 from diagnosis.attribution.decide import weigh
 from diagnosis.attribution.grow import exchange, grow, prune, without
 from diagnosis.attribution.hypothesis import Hypothesis, with_forms
+from diagnosis.fitting.channels import Misfit, misfit
 from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.problem import Point
 from diagnosis.fitting.spectra import resonance
@@ -99,8 +100,7 @@ def test_a_set_of_three_is_found(of_three):
         assert abs(three.fit.value(key) - value) < 4.0 * three.fit.std(key)
     assert max(len(h.effects) for h in ranked) == 3 < MOST_CAUSES
     assert any(line.count(" + ") == 2 for line in steps)
-    shares = [(h.effects, max(h.fit.excess, 0.0) / base.excess) for h in ranked]
-    assert weigh(shares, base.chance, base.excess)[0].effects == three.names
+    assert weigh([h.fitted_set(base) for h in ranked], misfit(base))[0].effects == three.names
 
 
 def test_growth_ends_where_a_further_effect_closes_nothing():
@@ -113,29 +113,27 @@ def test_growth_ends_where_a_further_effect_closes_nothing():
     assert max(line.count(" + ") for line in steps) == 1
 
 
-def left(*effects, excess):
-    """A set whose fit leaves an excess; nothing else is read of it."""
-    data = SimpleNamespace(normalised=False, runs=())
-    problem = SimpleNamespace(effects=(), free_forms=(), first_phase=2, data=data)
-    point = Point(np.zeros(0), np.zeros((0, 2)))
-    return Hypothesis(
-        effects,
-        SimpleNamespace(problem=problem, point=point, excess=excess, gap=excess, count=1, chance=0.001),
+def left(*effects, damping):
+    """A set that leaves χ² in the damping; nothing else is read of it."""
+    return SimpleNamespace(
+        effects=effects, excess=np.array([damping, 0.0, 0.0, 0.0, 0.0, 0.0]), further_numbers=0
     )
 
 
+GAP = Misfit(np.array([1e6, *[100.0] * 5]), np.full(6, 100.0), 1e7)
+
+
 def test_a_set_goes_on_from_its_own_parent_though_the_best_set_is_a_dead_end():
-    nothing = left(excess=100.0)
-    parents = [left("a", excess=20.0), left("b", excess=30.0)]
-    children = [left("a", "c", excess=19.0), left("b", "d", excess=20.0)]
-    assert [h.effects for h in growth.going_on(children, parents, nothing.fit)] == [("b", "d")]
-    assert growth.going_on(children[:1], parents, nothing.fit) == []
+    parents = [left("a", damping=2e5), left("b", damping=3e5)]
+    children = [left("a", "c", damping=1.95e5), left("b", "d", damping=2e5)]
+    assert [h.effects for h in growth.going_on(children, parents, GAP)] == [("b", "d")]
+    assert growth.going_on(children[:1], parents, GAP) == []
 
 
 def test_growth_ends_where_the_best_set_leaves_nothing_to_gain():
-    nothing, parents = left(excess=100.0), [left("a", excess=20.0)]
-    assert growth.going_on([left("a", "c", excess=0.0)], parents, nothing.fit) == []
-    assert growth.going_on([left("a", "c", excess=5.0)], parents, nothing.fit) != []
+    parents = [left("a", damping=2e5)]
+    assert growth.going_on([left("a", "c", damping=0.0)], parents, GAP) == []
+    assert growth.going_on([left("a", "c", damping=5e4)], parents, GAP) != []
 
 
 def test_pruning_fits_the_smaller_sets_that_are_missing(of_three):

@@ -1,37 +1,49 @@
 """The weights are those of the formula in decision 0007, written out here with its numbers."""
 
+from math import exp, log
+
+import numpy as np
 import pytest
 
-from diagnosis.attribution.decide import weigh
+from diagnosis.attribution.decide import FittedSet, weigh
+from diagnosis.fitting.channels import Misfit
 
-TEXTBOOK, EXACT = ("quadratic_damping",), ("spring_miscalibration",)
-PAIR = ("free_play", "quadratic_damping")
+COUNT = np.array([100.0, 100.0, 10.0, 10.0, 110.0, 10_000.0])
+MOTION = 4e7
+GAP = np.array([3e5, 1e3, 2e3, 50.0, 4e4, 1e4])
+SETS = {
+    ("a",): (np.array([2e3, 100.0, 40.0, -5.0, 4e4, 200.0]), 0),
+    ("a", "b"): (np.array([1e3, 80.0, 30.0, -6.0, 300.0, -80.0]), 0),
+    ("b", "c"): (np.array([500.0, 80.0, 30.0, 4.0, 100.0, 100.0]), 2),
+}
 
 
-def weight(share, misfit, excess, chance, effects=1, forms=0):
-    """Of a set, ``chance`` being what chance makes of its share."""
-    delta = misfit * min(1.0, 300.0 / excess) + chance
-    beyond = ((0.2 + delta) / (max(share, 0.2) + delta)) ** 6
-    return delta**2 * (share + delta) ** -3 * beyond * 0.44 ** (3 * (effects - 1)) * 0.8 ** (3 * forms)
+def misfit(left, scales):
+    """Sum of logarithms over the channels, with the leak from the others."""
+    above = [max(x, 0.0) for x in left]
+    return sum(log(1.0 + (x + 0.05 * (sum(above) - x)) / s) for x, s in zip(above, scales, strict=True))
 
 
-@pytest.mark.parametrize("excess", [5.0, 4000.0])
-@pytest.mark.parametrize("share", [-0.01, 0.0, 0.1, 0.5])
-def test_the_probabilities_are_those_of_the_decision(share, excess):
-    count = 20_000
-    chance, needless = (2.0 / count) ** 0.5 / excess, 20.0 / (count * excess)
-    sets = {TEXTBOOK: (share, 0.005, 1, 0), EXACT: (0.3, 0.001, 1, 0), PAIR: (0.05, 0.005, 2, 2)}
-    found = weigh([(names, left) for names, (left, *_) in sets.items()], chance, excess, numbers={PAIR: 2})
+def test_the_probabilities_are_those_of_the_decision():
+    least = [min(0.0, *(left[c] for left, _ in SETS.values())) for c in range(6)]
+    scale = [20.0 + 1e-3**2 * MOTION] * 6
     weights = {
-        names: weight(left - min(share, 0.0), misfit, excess, needless, *numbers)
-        for names, (left, misfit, *numbers) in sets.items()
+        key: exp(-1.25 * misfit(left - least, scale) - 3.0 * (len(key) - 1) - 1.0 * numbers)
+        for key, (left, numbers) in SETS.items()
     }
-    odds = sum(
-        weight(max(left, 0.0), misfit, excess, 2.0 * chance, effects, forms)
-        / weight(0.2 * 0.7 ** (effects - 1), 0.005, excess, 2.0 * chance, effects)
-        for left, misfit, effects, forms in sets.values()
-    )
-    share_known = odds / (1.0 + odds) / sum(weights.values())
-    expected = {names: 0.97 * share_known * value + 0.03 / 4 for names, value in weights.items()}
-    expected[("unknown",)] = 0.97 / (1.0 + odds) + 0.03 / 4
+    by_chance = [2.0 * (2.0 * n) ** 0.5 + 1e-3**2 * MOTION for n in COUNT]
+    gap = misfit(GAP, by_chance)
+    odds = {}
+    for key, (left, _) in SETS.items():
+        remains = misfit(left, by_chance)
+        closed = log(max(1.0 - remains / gap, 0.0) + 0.02)
+        odds[key] = exp(-0.7 + 0.2 * gap - 1.7 * log(1.0 + remains) + 1.9 * closed)
+    total = sum(weights.values())
+    against = sum(weights[key] * odds[key] for key in SETS) / total
+    expected = {
+        key: 0.97 * against / (1.0 + against) * weight / total + 0.03 / 4 for key, weight in weights.items()
+    }
+    expected[("unknown",)] = 0.97 / (1.0 + against) + 0.03 / 4
+    sets = [FittedSet(key, 0.1, left, numbers) for key, (left, numbers) in SETS.items()]
+    found = weigh(sets, Misfit(COUNT + GAP, COUNT, MOTION))
     assert {answer.effects: answer.probability for answer in found} == pytest.approx(expected)
