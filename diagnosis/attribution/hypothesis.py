@@ -52,11 +52,15 @@ class Hypothesis:
 
     @property
     def further_numbers(self) -> int:
-        """How many form parameters were freed, less two where gravity leaves the rig no need of a spring.
+        """Freed form parameters and instants in a run, less two where gravity leaves no need of a spring.
 
-        A spring would have to soften by chance, and as much as gravity does.
+        An instant follows any slow error of the phase as a form does. A spring would have to soften by chance, and
+        as much as gravity does.
         """
-        return self.forms - 2 * _needs_no_spring(self.fit)
+        problem, width = self.fit.problem, self.fit.point.release.shape[1]
+        places = problem.own_places(width)
+        instants = sum(places[k.name].stop - places[k.name].start for k in problem.effects if k.skips)
+        return self.forms + instants - 2 * _needs_no_spring(self.fit)
 
     def share_left(self, nominal: Fit) -> float:
         """Share of the nominal gap that the set leaves open; below 0 by chance.
