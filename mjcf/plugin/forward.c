@@ -2,28 +2,7 @@
 
 #include <math.h>
 
-typedef struct {
-  double angle, rate, twist, twist_rate;
-} Motion;
-
-// Weights of the lag's advance over the two lengths that a step of the Runge-Kutta method uses.
-typedef struct {
-  double z[2], w[2][4];
-  int last;
-} LagWeights;
-
-// The quantities that are constant during a step: the law, the run, and the step's start for lag and friction.
-typedef struct {
-  const vwt_parameters* p;
-  const vwt_run* run;
-  double start;        // time of the step's start, s
-  Motion from;         // motion there
-  double lagged;       // lag state there
-  int slip;            // sign of the slip under Coulomb friction; 0: at rest
-  double range;        // of Dahl's friction, rad; 0: none
-  double deflection;   // Dahl's state at the start, rad
-  LagWeights* weights;
-} Step;
+#include "step.h"
 
 static double wind_at(const vwt_run* run, double time) {
   return fmax(0, vwt_series(run->wind, (int)run->wind_count, run->wind_interval, time));
@@ -44,9 +23,9 @@ static const double* lag_weights(LagWeights* known, double z) {
   return known->w[known->last];
 }
 
-static double lagged_at(const Step* s, double time, const Motion* y) {
-  const double lag = vwt_lag_time(s->p, wind_at(s->run, 0.5 * (s->start + time)));
-  const double duration = time - s->start;
+// The lag's state `duration` s after the step's start.
+static double lagged_at(const Step* s, double duration, const Motion* y) {
+  const double lag = vwt_lag_time(s->p, wind_at(s->run, s->start + 0.5 * duration));
   if (lag == 0) {
     return body_angle(s->run, y);
   }
@@ -58,13 +37,14 @@ static double lagged_at(const Step* s, double time, const Motion* y) {
                           body_rate(s->run, y));
 }
 
-static double air_at(const Step* s, double time, const Motion* y) {
+static double air_at(const Step* s, double duration, const Motion* y) {
+  const double time = s->start + duration;
   const vwt_air_state air = {
       .time = time,
       .wind_speed = wind_at(s->run, time),
       .angle = body_angle(s->run, y),
       .rate = body_rate(s->run, y),
-      .lagged = s->p->aero_lag != 0 ? lagged_at(s, time, y) : 0,
+      .lagged = s->p->aero_lag != 0 ? lagged_at(s, duration, y) : 0,
       .forcing = s->run->forcing_count > 0 ? vwt_series(s->run->forcing, (int)s->run->forcing_count,
                                                         s->run->forcing_interval, time)
                                            : 0,
@@ -93,17 +73,17 @@ static double other_moment(const Step* s, double air, double time, const Motion*
   return mechanism + (1 + s->run->lead) * air - s->run->rod_stiffness * y->angle;
 }
 
-static double deflection_at(const Step* s, double time, const Motion* y) {
-  return vwt_presliding_advance(s->range, s->deflection, time - s->start, s->from.angle, s->from.rate, y->angle,
+static double deflection_at(const Step* s, double duration, const Motion* y) {
+  return vwt_presliding_advance(s->range, s->deflection, duration, s->from.angle, s->from.rate, y->angle,
                                 y->rate);
 }
 
-// Time derivative of the motion with the step's sign of friction.
-static Motion derivative(const Step* s, double time, const Motion* y) {
+// Time derivative of the motion with the step's sign of friction, `duration` s after the step's start.
+static Motion derivative(const Step* s, double duration, const Motion* y) {
   const vwt_parameters* p = s->p;
-  const double air = air_at(s, time, y);
+  const double time = s->start + duration, air = air_at(s, duration, y);
   const int coulomb = !(s->range > 0);
-  const double friction = (coulomb ? -s->slip : -deflection_at(s, time, y) / s->range) * p->friction_moment;
+  const double friction = (coulomb ? -s->slip : -deflection_at(s, duration, y) / s->range) * p->friction_moment;
   const int stuck = coulomb && p->friction_moment > 0 && s->slip == 0;
   Motion d = {y->rate, 0, y->twist_rate, 0};
   if (s->run->twist_stiffness > 0) {
@@ -127,11 +107,10 @@ static Motion along(const Motion* y, double h, const Motion* d) {
 }
 
 static Motion runge_kutta(const Step* s, double h) {
-  const double t = s->start;
-  const Motion k1 = derivative(s, t, &s->from);
-  const Motion y2 = along(&s->from, h / 2, &k1), k2 = derivative(s, t + h / 2, &y2);
-  const Motion y3 = along(&s->from, h / 2, &k2), k3 = derivative(s, t + h / 2, &y3);
-  const Motion y4 = along(&s->from, h, &k3), k4 = derivative(s, t + h, &y4);
+  const Motion k1 = derivative(s, 0, &s->from);
+  const Motion y2 = along(&s->from, h / 2, &k1), k2 = derivative(s, h / 2, &y2);
+  const Motion y3 = along(&s->from, h / 2, &k2), k3 = derivative(s, h / 2, &y3);
+  const Motion y4 = along(&s->from, h, &k3), k4 = derivative(s, h, &y4);
   const Motion mean = {
       (k1.angle + 2 * (k2.angle + k3.angle) + k4.angle) / 6,
       (k1.rate + 2 * (k2.rate + k3.rate) + k4.rate) / 6,
@@ -143,10 +122,10 @@ static Motion runge_kutta(const Step* s, double h) {
 
 static void move(Step* s, double h, const Motion* to) {
   if (s->p->aero_lag != 0) {
-    s->lagged = lagged_at(s, s->start + h, to);
+    s->lagged = lagged_at(s, h, to);
   }
   if (s->range > 0) {
-    s->deflection = deflection_at(s, s->start + h, to);
+    s->deflection = deflection_at(s, h, to);
   }
   s->from = *to;
   s->start += h;
@@ -154,7 +133,7 @@ static void move(Step* s, double h, const Motion* to) {
 
 // Sign of the slip that starts from rest in the present state; 0 while friction sticks.
 static int slip_from_rest(const Step* s) {
-  const double other = other_moment(s, air_at(s, s->start, &s->from), s->start, &s->from);
+  const double other = other_moment(s, air_at(s, 0, &s->from), s->start, &s->from);
   return fabs(other) <= s->p->friction_moment ? 0 : other > 0 ? 1 : -1;
 }
 
@@ -176,8 +155,7 @@ static double reversal(const Step* s, double h, double end_rate) {
   return high;
 }
 
-// One step with Coulomb friction: it ends early at each reversal, where the body sticks or slips back.
-static void step_with_friction(Step* s, double h) {
+void vwt_step_with_friction(Step* s, double h) {
   double left = h;
   for (int i = 0; i < 8 && left > 0; i++) {
     if (s->from.rate == 0) {
@@ -218,16 +196,32 @@ static void between(const Motion* from, const Motion* to, double h, double u, do
   *rate = (c1 + u * (2 * c2 + u * 3 * c3)) / h;
 }
 
+void vwt_fill(const Motion* from, const Motion* to, double h, int stride, int at, int samples, double* angle,
+              double* rate) {
+  for (int k = 1; k < stride && at + k < samples; k++) {
+    between(from, to, h, k / (double)stride, &angle[at + k], &rate[at + k]);
+  }
+}
+
+Step vwt_release(const vwt_parameters* p, const vwt_run* run, LagWeights* weights) {
+  const Step s = {.p = p,
+                  .run = run,
+                  .from = {run->angle, run->rate, run->twist, run->twist_rate},
+                  .lagged = run->lagged,
+                  .slip = run->rate > 0 ? 1 : run->rate < 0 ? -1 : 0,
+                  .weights = weights};
+  return s;
+}
+
 static int integrate(const vwt_parameters* p, const vwt_run* run, double* angle, double* rate) {
   LagWeights weights = {{0}, {{0}}, 0};
-  Step s = {p, run, 0, {run->angle, run->rate, run->twist, run->twist_rate}, run->lagged, 0, 0, 0, &weights};
+  Step s = vwt_release(p, run, &weights);
   const int samples = (int)run->samples, steps = (int)run->steps;
   const int coulomb = p->friction_moment > 0 && !(p->presliding > 0);
   if (p->presliding > 0) {
     const double share = run->twist_stiffness > 0 ? run->inertia_share : 1;
     s.range = vwt_presliding_range(p, share * p->yaw_inertia, run->step);
   }
-  s.slip = run->rate > 0 ? 1 : run->rate < 0 ? -1 : 0;
   const int stride = run->stride > 1 && steps == 1 ? (int)run->stride : 1;
   const double h = stride * run->step;
   for (int i = 0; i < samples; i += stride) {
@@ -236,16 +230,14 @@ static int integrate(const vwt_parameters* p, const vwt_run* run, double* angle,
     rate[i] = before.rate;
     for (int k = 0; k < steps; k++) {
       if (coulomb) {
-        step_with_friction(&s, h);
+        vwt_step_with_friction(&s, h);
       } else {
         const Motion y = runge_kutta(&s, h);
         move(&s, h, &y);
       }
       s.start = (i * (double)steps + stride * (k + 1)) * run->step;  // no drift of the clock
     }
-    for (int k = 1; k < stride && i + k < samples; k++) {
-      between(&before, &s.from, h, k / (double)stride, &angle[i + k], &rate[i + k]);
-    }
+    vwt_fill(&before, &s.from, h, stride, i, samples, angle, rate);
     if (!(fabs(s.from.angle) < 1e6)) {
       return 1;
     }
@@ -255,10 +247,20 @@ static int integrate(const vwt_parameters* p, const vwt_run* run, double* angle,
 
 int vwt_forward(int count, const vwt_parameters* parameters, const vwt_run* runs, double* const* angle,
                 double* const* rate) {
-  for (int i = 0; i < count; i++) {
-    if (integrate(&parameters[i], &runs[i], angle[i], rate[i])) {
-      return 1 + i;
+  for (int i = 0; i < count;) {
+    int side_by_side = 0;
+    while (side_by_side < VWT_LANES && i + side_by_side < count &&
+           vwt_is_plain(&parameters[i + side_by_side], &runs[i + side_by_side]) &&
+           vwt_alike(&runs[i], &runs[i + side_by_side])) {
+      side_by_side++;
     }
+    const int failed = side_by_side > 0
+                           ? vwt_integrate_lanes(side_by_side, &parameters[i], &runs[i], &angle[i], &rate[i])
+                           : integrate(&parameters[i], &runs[i], angle[i], rate[i]);
+    if (failed) {
+      return i + failed;
+    }
+    i += side_by_side > 0 ? side_by_side : 1;
   }
   return 0;
 }

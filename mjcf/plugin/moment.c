@@ -29,6 +29,12 @@ static double power(double x, double textbook, double exponent, double reference
 static const double kAngleReference = 0.2;  // rad
 static const double kRateReference = 2.0;   // rad/s
 
+double vwt_power_of_angle(double x, double textbook, double exponent) {
+  return power(x, textbook, exponent, kAngleReference);
+}
+
+double vwt_power_of_rate(double x, double exponent) { return power(x, 2, exponent, kRateReference); }
+
 double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
   const double speed = s->wind_speed;
   if (!(speed > 0)) {
@@ -44,10 +50,10 @@ double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
   const double angle = lag > 0 ? s->lagged : lag < 0 ? 2 * s->angle - s->lagged : s->angle;
   double steepening = 1, thickening = 1;
   if (p->moment_cubic != 0) {
-    steepening += p->moment_cubic * power(fabs(s->angle), 2, p->moment_cubic_exponent, kAngleReference);
+    steepening += p->moment_cubic * vwt_power_of_angle(fabs(s->angle), 2, p->moment_cubic_exponent);
   }
   if (p->damping_quadratic != 0) {
-    thickening += p->damping_quadratic * power(fabs(s->angle), 2, p->damping_quadratic_exponent, kAngleReference);
+    thickening += p->damping_quadratic * vwt_power_of_angle(fabs(s->angle), 2, p->damping_quadratic_exponent);
   }
   double moment = stiffness * (angle * steepening + p->flow_angle) + damping * thickening * s->rate;
   if (p->shedding_amplitude != 0 && p->width > 0) {
@@ -61,18 +67,18 @@ double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate) 
   const double spring = p->spring_stiffness;
   double moment = 0;
   if (p->quadratic_damping != 0) {
-    const double square = power(fabs(rate), 2, p->quadratic_damping_exponent, kRateReference);
+    const double square = vwt_power_of_rate(fabs(rate), p->quadratic_damping_exponent);
     moment -= p->quadratic_damping * copysign(square, rate);
   }
   if (p->loss_factor != 0) {
     moment -= p->loss_factor * sqrt(spring * p->yaw_inertia) * rate;  // eta Kr/wn, wn of the rig at rest
   }
   if (p->stiffness_cubic != 0) {
-    const double cube = power(fabs(angle), 3, p->stiffness_cubic_exponent, kAngleReference);
+    const double cube = vwt_power_of_angle(fabs(angle), 3, p->stiffness_cubic_exponent);
     moment -= spring * p->stiffness_cubic * copysign(cube, angle);
   }
   if (p->stiffness_quadratic != 0) {
-    moment -= spring * p->stiffness_quadratic * power(fabs(angle), 2, p->stiffness_quadratic_exponent, kAngleReference);
+    moment -= spring * p->stiffness_quadratic * vwt_power_of_angle(fabs(angle), 2, p->stiffness_quadratic_exponent);
   }
   if (p->free_play > 0) {  // cancels the linear spring inside the dead zone
     const double held = angle > p->free_play ? p->free_play : angle < -p->free_play ? -p->free_play : angle;

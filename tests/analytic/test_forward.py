@@ -13,7 +13,7 @@ from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.physics.forward import backlash, forward_motion, forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
-from tunnel_sim.physics.run_settings import RodTwist, RunSettings
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
 from tunnel_sim.physics.steps import compensated
 
 
@@ -54,6 +54,23 @@ def test_a_batch_of_runs_equals_the_runs_one_by_one() -> None:
         alone = forward_motion(RIG, replace(one, duration=2.0), SAMPLE_RATE)
         assert np.array_equal(angle[i], alone.angle)
         assert np.array_equal(rate[i], alone.rate)
+
+
+def test_runs_side_by_side_have_the_bits_of_runs_with_a_sampled_wind() -> None:
+    # which are integrated one by one, by the functions that the plugin calls
+    settings = [one for case in CASES if (one := case.settings()).rod_twist is None and not one.series]
+    sampled = [replace(one, series={"wind_speed": Series((one.wind_speed,) * 2, 1.0)}) for one in settings]
+    law = np.array([parameter_vector(one.law(RIG)) for one in settings])
+    for stride in (1, 3):
+        found = []
+        for kind in (settings, sampled):
+            prepared = [forward_run(one) for one in kind]
+            runs = np.concatenate([run for run, _ in prepared])
+            runs["step"], runs["stride"] = 4e-3 / stride, stride
+            found.append(integrate(law, runs, 1000))
+        assert found[0][2] == found[1][2] == 0
+        assert np.array_equal(found[0][0], found[1][0])
+        assert np.array_equal(found[0][1], found[1][1])
 
 
 def test_a_run_that_grows_without_bound_is_named() -> None:

@@ -1,0 +1,50 @@
+// The state of one run within a step of the forward integrator, which forward.c and lanes.c share.
+
+#ifndef VWT_STEP_H_
+#define VWT_STEP_H_
+
+#include "forward.h"
+
+typedef struct {
+  double angle, rate, twist, twist_rate;
+} Motion;
+
+// Weights of the lag's advance over the two lengths that a step of the Runge-Kutta method uses.
+typedef struct {
+  double z[2], w[2][4];
+  int last;
+} LagWeights;
+
+// The quantities that are constant during a step: the law, the run, and the step's start for lag and friction.
+typedef struct {
+  const vwt_parameters* p;
+  const vwt_run* run;
+  double start;        // time of the step's start, s
+  Motion from;         // motion there
+  double lagged;       // lag state there
+  int slip;            // sign of the slip under Coulomb friction; 0: at rest
+  double range;        // of Dahl's friction, rad; 0: none
+  double deflection;   // Dahl's state at the start, rad
+  LagWeights* weights;
+} Step;
+
+// The run at its start.
+Step vwt_release(const vwt_parameters* p, const vwt_run* run, LagWeights* weights);
+
+// One step with Coulomb friction: it ends early at each reversal, where the body sticks or slips back.
+void vwt_step_with_friction(Step* s, double h);
+
+// Samples within a step of length h that covers `stride` of them, from sample `at` on; cubic (Hermite).
+void vwt_fill(const Motion* from, const Motion* to, double h, int stride, int at, int samples, double* angle,
+              double* rate);
+
+// Runs that `vwt_forward` may integrate side by side: constant wind, rigid rod, no imposed moment, no presliding.
+enum { VWT_LANES = 4 };
+int vwt_is_plain(const vwt_parameters* p, const vwt_run* run);
+int vwt_alike(const vwt_run* one, const vwt_run* other);
+
+// Integrates up to `VWT_LANES` plain runs that are alike. Returns as `vwt_forward`.
+int vwt_integrate_lanes(int count, const vwt_parameters* parameters, const vwt_run* runs, double* const* angle,
+                        double* const* rate);
+
+#endif  // VWT_STEP_H_
