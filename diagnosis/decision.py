@@ -19,7 +19,7 @@ class Decision:
     """What the probabilities of the answers allow to be said.
 
     Args:
-        decided: whether the most probable answer has at least one half of the probability.
+        decided: whether the answer has at least one half of the probability.
         credible: the fewest answers that together have nine tenths, with their probabilities, most probable first.
         effects: effects that nine tenths of the probability have among the causes, with their probabilities.
         channels: channels on which nine tenths of the probability act, likewise.
@@ -43,11 +43,11 @@ def decision(answers: Answers) -> Decision:
     """Judge the answers by their probabilities.
 
     Args:
-        answers: names joined by plus signs, ``none`` or ``unknown``, and probabilities, which sum to 1; most
-            probable first.
+        answers: names joined by plus signs, ``none`` or ``unknown``, and probabilities, which sum to 1; the answer
+            first.
     """
     credible, together = [], 0.0
-    for answer in answers:
+    for answer in sorted(answers, key=lambda given: -given[1]):
         credible.append(answer)
         together += answer[1]
         if together >= CREDIBLE:

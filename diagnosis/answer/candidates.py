@@ -28,7 +28,8 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         base: what an excess is measured against.
 
     Returns:
-        Answers, ``none`` and ``unknown`` among them, most probable first; their probabilities sum to 1.
+        Answers, ``none`` and ``unknown`` among them: the answer, then the most probable ones. Their probabilities
+        sum to 1.
     """
     found = []
     if not study.causes:
@@ -86,10 +87,10 @@ def inclusion(answers: Sequence[Candidate], read_off: Sequence[str]) -> dict[str
 
 
 def _normalised(found: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Most probable first, their probabilities summing to 1."""
+    """The first one first, then the most probable ones, their probabilities summing to 1."""
     total = sum(candidate.probability for candidate in found)
-    shared = [replace(candidate, probability=candidate.probability / total) for candidate in found]
-    return tuple(sorted(shared, key=lambda c: -c.probability))
+    answer, *others = (replace(c, probability=c.probability / total) for c in found)
+    return (answer, *sorted(others, key=lambda c: -c.probability))
 
 
 def _block(study: Study) -> int:

@@ -86,7 +86,8 @@ def weigh(sets: Sequence[FittedSet], nominal: Misfit) -> list[Weighed]:
         nominal: what the nominal model leaves.
 
     Returns:
-        All answers, ``unknown`` among them, most probable first.
+        All answers, ``unknown`` among them: the answer first, then the most probable ones. ``unknown`` says something
+        of all sets, and is the answer only where it is more probable than all of them together.
     """
     best: dict[tuple[str, ...], FittedSet] = {}
     for given in sets:
@@ -105,8 +106,13 @@ def weigh(sets: Sequence[FittedSet], nominal: Misfit) -> list[Weighed]:
         Weighed(key, max(given.share, 0.0), float(probability) + even)
         for (key, given), probability in zip(best.items(), known, strict=True)
     ]
-    found.append(Weighed(UNKNOWN, 1.0, (1.0 - EVEN_SHARE) / (1.0 + odds) + even))
-    return sorted(found, key=lambda w: -w.probability)
+    unknown = Weighed(UNKNOWN, 1.0, (1.0 - EVEN_SHARE) / (1.0 + odds) + even)
+    if unknown.probability < 0.5:
+        first = max(found, key=lambda w: w.probability)
+        rest = [unknown, *(w for w in found if w is not first)]
+    else:
+        first, rest = unknown, found
+    return [first, *sorted(rest, key=lambda w: -w.probability)]
 
 
 def least_excess(excesses: Sequence[Array]) -> Array:
