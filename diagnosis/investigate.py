@@ -18,7 +18,7 @@ from diagnosis.detection.gap import judge
 from diagnosis.detection.mains import Hum, find_hum, refine_frequency, remove_hum
 from diagnosis.detection.refusal import refuse_indefinite
 from diagnosis.detection.sensor_noise import Noise, campaign_noise, noise_trend, reading_step
-from diagnosis.fitting.channels import misfit
+from diagnosis.fitting.channels import CHANNELS, misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.fitting.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.fitting.problem import Problem
@@ -224,6 +224,11 @@ def _weighed(found: Study, base: Fit) -> list[Weighed]:
     nominal = misfit(base)
     sets = [h.fitted_set(base) for h in found.hypotheses]
     sets += [FittedSet(r.effects, r.share, r.share * nominal.excess) for r in found.random]
+    if found.hum is not None:  # it may be the only cause, and is part of the gap
+        sets.append(FittedSet((), 1.0, nominal.excess))
+        removed = np.zeros(len(CHANNELS))
+        removed[CHANNELS.index("harmonics")] = found.hum.excess * base.count
+        nominal = replace(nominal, chi2=nominal.chi2 + removed)
     return weigh(sets, nominal)
 
 

@@ -5,7 +5,7 @@ significant. So sets are weighed by what they leave relative to a scale, and not
 has an unknown scale of its own in every channel c of the residuals (`diagnosis.fitting.channels`), with an
 inverse-gamma prior. Integrated over these scales, a set of k effects has the weight
 
-    ln w = −γ Σ_c ln(1 + x_c/φ_c) − SET_PRICE (k − 1) − FORM_PRICE numbers
+    ln w = −γ Σ_c ln(1 + x_c/φ_c) − SET_PRICE k − FORM_PRICE numbers
 
 where x_c is the χ² beyond noise that it leaves in the channel, with a small part of what it leaves in the others,
 because an error of the phase leaks into the amplitude. φ_c is the misfit that needs no cause: what chance does, and
@@ -145,7 +145,7 @@ def log_weight(left: Array, scale: Array, effects: int, numbers: int) -> float:
         effects: how many it has, a count.
         numbers: how many it has beside their own, a count.
     """
-    price = SET_PRICE * max(effects - 1, 0) + FORM_PRICE * numbers
+    price = SET_PRICE * effects + FORM_PRICE * numbers
     return -STEEPNESS * log_misfit(left, scale) - price
 
 

@@ -28,7 +28,7 @@ def test_the_probabilities_are_those_of_the_decision():
     least = [min(0.0, *(left[c] for left, _ in SETS.values())) for c in range(6)]
     scale = [20.0 + 1e-3**2 * MOTION] * 6
     weights = {
-        key: exp(-1.25 * misfit(left - least, scale) - 3.0 * (len(key) - 1) - 1.0 * numbers)
+        key: exp(-1.25 * misfit(left - least, scale) - 3.0 * len(key) - 1.0 * numbers)
         for key, (left, numbers) in SETS.items()
     }
     by_chance = [2.0 * (2.0 * n) ** 0.5 + 1e-3**2 * MOTION for n in COUNT]
