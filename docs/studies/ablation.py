@@ -1,15 +1,15 @@
 """What is lost without a constant of the diagnosis? On campaigns whose truth is open.
 
-Every number that decides is moved by a factor of two either way, or switched off, and the campaigns are answered again:
+Every number that decides is moved by a factor of two either way, or switched off, and campaigns are answered again:
 
 - the constants of the weighing (decision 0007) on the fits that are there: the sets are only weighed again;
 - any other constant of `diagnosis.policy` by whole diagnoses, which takes as long as they do.
 
     python -m docs.studies.ablation SET [--count N] [--rerun NAME ...]
 
-SET is made by ``tunnel blind make``; its key is opened, so that it is no blind test any more. The table says how many answers
-are exact, how many causes named are false, the mean logarithm of the probability of the truth, and how often a wrong set
-is stated where one true effect is withheld, by deleting the sets that hold it.
+SET is made by ``tunnel blind make``; its key is opened, so that it is no blind test any more. The table says how many
+answers are exact, how many causes named are false, the mean logarithm of the probability of the truth, and how often a
+wrong set is stated where one true effect is withheld, by deleting the sets that hold it.
 """
 
 from __future__ import annotations
@@ -174,22 +174,22 @@ def read_case(folder: Path, truth: Sequence[str], small: Sequence[str]) -> Case:
         small: names of those that act and need not be found.
     """
     seen: list[tuple[Sequence[FittedSet], Misfit]] = []
-    weigh = investigation.weigh
+    weigh = decide.weigh
 
     def kept(sets: Sequence[FittedSet], nominal: Misfit) -> list[Weighed]:
         seen.append((sets, nominal))
         return weigh(sets, nominal)
 
     given = Case(tuple(sorted(truth)), frozenset(small))
-    investigation.weigh = kept  # type: ignore[assignment]
+    investigation.weigh = kept  # type: ignore[attr-defined]
     try:
         found = diagnose(read_campaign(folder))
     except TunnelError:
         return replace(given, causes=("refused",))
     finally:
-        investigation.weigh = weigh
+        investigation.weigh = weigh  # type: ignore[attr-defined]
     read_off = tuple(set(found.causes) & {"mains_hum", "sensor_quantisation"})
-    if not seen or found.causes == UNKNOWN and found.candidates[0].probability > 0.99:
+    if not seen or (found.causes == UNKNOWN and found.candidates[0].probability > 0.99):
         return replace(given, causes=tuple(found.causes), read_off=read_off)
     sets, nominal = seen[-1]
     return replace(given, read_off=read_off, sets=tuple(sets), nominal=nominal)
