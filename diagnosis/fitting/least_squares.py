@@ -161,14 +161,15 @@ class _State:
 
     def __init__(self, problem: Problem, point: Point) -> None:
         self.problem, self.point = problem, point
-        self.residuals = scaled_residuals(problem, point)
+        self.prediction = problem.predict([point])[0]
+        self.residuals = _scaled(problem, self.prediction)
         self.cost = _cost(self.residuals)
         self.damping = 1e-6
         self.jacobian: list[tuple[Array, Array]] = []
 
     def linearise(self, base: Fit | None) -> None:
         """Compute sensitivities, those of a smaller fit borrowed where given."""
-        self.jacobian = sensitivities(self.problem, self.point, base)
+        self.jacobian = sensitivities(self.problem, self.point, base, self.prediction)
         if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in self.jacobian):
             raise FitError("the model's sensitivities are not finite")
 
@@ -179,11 +180,12 @@ class _State:
                 self.problem,
                 damped_step(self.problem, self.point, self.residuals, self.jacobian, self.damping),
             )
-            residuals = scaled_residuals(self.problem, trial)
+            prediction = self.problem.predict([trial])[0]
+            residuals = _scaled(self.problem, prediction)
             cost = _cost(residuals)
             if cost < self.cost:
                 gain = self.cost - cost
-                self.point, self.residuals, self.cost = trial, residuals, cost
+                self.point, self.prediction, self.residuals, self.cost = trial, prediction, residuals, cost
                 self.damping = max(self.damping * 0.2, 1e-9)
                 return gain
             self.damping = max(self.damping * 10.0, 1e-4)
@@ -278,11 +280,14 @@ def difference_steps(problem: Problem, common: Array) -> Array:
     return steps
 
 
-def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> list[tuple[Array, Array]]:
+def sensitivities(
+    problem: Problem, point: Point, base: Fit | None = None, prediction: list[Array] | None = None
+) -> list[tuple[Array, Array]]:
     """Derivatives of the scaled prediction by finite differences.
 
     Args:
         base: a fit of the same runs; its derivatives are reused for the parameters it has.
+        prediction: at the point, by run, where it is known.
 
     Returns:
         By run: with respect to the common parameters, shape (n, common), and the run's own, shape (n, own).
@@ -290,7 +295,7 @@ def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> li
     known = 0 if base is None else len(base.problem.names)
     known_own = 0 if base is None else base.point.release.shape[1]
     steps = difference_steps(problem, point.common)
-    points = [point]
+    points = []
     for i in range(known, steps.size):
         moved = point.common.copy()
         moved[i] += steps[i]
@@ -302,11 +307,14 @@ def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> li
         release = point.release.copy()
         release[:, j] += release_steps[j]
         points.append(Point(point.common, release))
-    predictions = problem.predict(points)
+    if prediction is None:
+        prediction, *predictions = problem.predict([point, *points])
+    else:
+        predictions = problem.predict(points)
     result = []
     for r, run in enumerate(problem.data.runs):
         with np.errstate(invalid="ignore"):  # a run that grew without bound; the caller looks for it
-            changes = [run.scaled(moved[r] - predictions[0][r]) for moved in predictions[1:]]
+            changes = [run.scaled(moved[r] - prediction[r]) for moved in predictions]
         common = [c / steps[known + i] for i, c in enumerate(changes[: steps.size - known])]
         ends = [c / release_steps[known_own + j][r] for j, c in enumerate(changes[steps.size - known :])]
         if base is None:
