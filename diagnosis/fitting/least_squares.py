@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from diagnosis.fitting.normal_equations import damped_step, normal_equations
+from diagnosis.fitting.normal_equations import Products, damped_step, normal_equations
 from diagnosis.fitting.problem import Point, Problem
 from tunnel_sim.vocabulary.record import Array
 
@@ -46,6 +47,11 @@ class Fit:
     covariance: Array
     jacobian: list[tuple[Array, Array]] = field(repr=False)
     converged: bool
+
+    @cached_property
+    def products(self) -> Products:
+        """Products of the sensitivities."""
+        return Products.of(self.jacobian)
 
     @property
     def total(self) -> float:
@@ -166,20 +172,20 @@ class _State:
         self.cost = _cost(self.residuals)
         self.damping = 1e-6
         self.jacobian: list[tuple[Array, Array]] = []
+        self.products: Products | None = None
 
     def linearise(self, base: Fit | None) -> None:
         """Compute sensitivities, those of a smaller fit borrowed where given."""
         self.jacobian = sensitivities(self.problem, self.point, base, self.prediction)
         if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in self.jacobian):
             raise FitError("the model's sensitivities are not finite")
+        self.products = Products.of(self.jacobian)
 
     def improve(self) -> float:
         """Take one damped step; returns the drop of χ², 0 where no step lowers it."""
+        here = self.problem, self.point, self.residuals, self.jacobian
         for _ in range(_TRIES):
-            trial = clip(
-                self.problem,
-                damped_step(self.problem, self.point, self.residuals, self.jacobian, self.damping),
-            )
+            trial = clip(self.problem, damped_step(*here, self.damping, self.products))
             prediction = self.problem.predict([trial])[0]
             residuals = _scaled(self.problem, prediction)
             cost = _cost(residuals)
@@ -198,7 +204,7 @@ class _State:
             self.point,
             self.residuals,
             np.array([float(r @ r) for r in self.residuals]),
-            _covariance(self.jacobian),
+            _covariance(self.jacobian, self.products),
             self.jacobian,
             converged,
         )
@@ -329,8 +335,9 @@ def sensitivities(
     return result
 
 
-def _covariance(jacobian: list[tuple[Array, Array]]) -> Array:
-    matrix, _, _ = normal_equations(jacobian, [np.zeros(c.shape[0]) for c, _ in jacobian])
+def _covariance(jacobian: list[tuple[Array, Array]], products: Products | None) -> Array:
+    none = [np.zeros(c.shape[0]) for c, _ in jacobian]
+    matrix, _, _ = normal_equations(jacobian, none, products=products)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     inverse: Array = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
     return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64)
