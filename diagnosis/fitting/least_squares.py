@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from diagnosis.fitting.normal_equations import damped_step, normal_equations
+from diagnosis.fitting.normal_equations import Products, damped_step, normal_equations
 from diagnosis.fitting.problem import Point, Problem
 from tunnel_sim.vocabulary.record import Array
 
@@ -46,6 +47,11 @@ class Fit:
     covariance: Array
     jacobian: list[tuple[Array, Array]] = field(repr=False)
     converged: bool
+
+    @cached_property
+    def products(self) -> Products:
+        """Products of the sensitivities."""
+        return Products.of(self.jacobian)
 
     @property
     def total(self) -> float:
@@ -161,29 +167,31 @@ class _State:
 
     def __init__(self, problem: Problem, point: Point) -> None:
         self.problem, self.point = problem, point
-        self.residuals = scaled_residuals(problem, point)
+        self.prediction = problem.predict([point])[0]
+        self.residuals = _scaled(problem, self.prediction)
         self.cost = _cost(self.residuals)
         self.damping = 1e-6
         self.jacobian: list[tuple[Array, Array]] = []
+        self.products: Products | None = None
 
     def linearise(self, base: Fit | None) -> None:
         """Compute sensitivities, those of a smaller fit borrowed where given."""
-        self.jacobian = sensitivities(self.problem, self.point, base)
+        self.jacobian = sensitivities(self.problem, self.point, base, self.prediction)
         if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in self.jacobian):
             raise FitError("the model's sensitivities are not finite")
+        self.products = Products.of(self.jacobian)
 
     def improve(self) -> float:
         """Take one damped step; returns the drop of χ², 0 where no step lowers it."""
+        here = self.problem, self.point, self.residuals, self.jacobian
         for _ in range(_TRIES):
-            trial = clip(
-                self.problem,
-                damped_step(self.problem, self.point, self.residuals, self.jacobian, self.damping),
-            )
-            residuals = scaled_residuals(self.problem, trial)
+            trial = clip(self.problem, damped_step(*here, self.damping, self.products))
+            prediction = self.problem.predict([trial])[0]
+            residuals = _scaled(self.problem, prediction)
             cost = _cost(residuals)
             if cost < self.cost:
                 gain = self.cost - cost
-                self.point, self.residuals, self.cost = trial, residuals, cost
+                self.point, self.prediction, self.residuals, self.cost = trial, prediction, residuals, cost
                 self.damping = max(self.damping * 0.2, 1e-9)
                 return gain
             self.damping = max(self.damping * 10.0, 1e-4)
@@ -196,7 +204,7 @@ class _State:
             self.point,
             self.residuals,
             np.array([float(r @ r) for r in self.residuals]),
-            _covariance(self.jacobian),
+            _covariance(self.jacobian, self.products),
             self.jacobian,
             converged,
         )
@@ -278,11 +286,14 @@ def difference_steps(problem: Problem, common: Array) -> Array:
     return steps
 
 
-def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> list[tuple[Array, Array]]:
+def sensitivities(
+    problem: Problem, point: Point, base: Fit | None = None, prediction: list[Array] | None = None
+) -> list[tuple[Array, Array]]:
     """Derivatives of the scaled prediction by finite differences.
 
     Args:
         base: a fit of the same runs; its derivatives are reused for the parameters it has.
+        prediction: at the point, by run, where it is known.
 
     Returns:
         By run: with respect to the common parameters, shape (n, common), and the run's own, shape (n, own).
@@ -290,7 +301,7 @@ def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> li
     known = 0 if base is None else len(base.problem.names)
     known_own = 0 if base is None else base.point.release.shape[1]
     steps = difference_steps(problem, point.common)
-    points = [point]
+    points = []
     for i in range(known, steps.size):
         moved = point.common.copy()
         moved[i] += steps[i]
@@ -302,11 +313,14 @@ def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> li
         release = point.release.copy()
         release[:, j] += release_steps[j]
         points.append(Point(point.common, release))
-    predictions = problem.predict(points)
+    if prediction is None:
+        prediction, *predictions = problem.predict([point, *points])
+    else:
+        predictions = problem.predict(points)
     result = []
     for r, run in enumerate(problem.data.runs):
         with np.errstate(invalid="ignore"):  # a run that grew without bound; the caller looks for it
-            changes = [run.scaled(moved[r] - predictions[0][r]) for moved in predictions[1:]]
+            changes = [run.scaled(moved[r] - prediction[r]) for moved in predictions]
         common = [c / steps[known + i] for i, c in enumerate(changes[: steps.size - known])]
         ends = [c / release_steps[known_own + j][r] for j, c in enumerate(changes[steps.size - known :])]
         if base is None:
@@ -321,8 +335,9 @@ def sensitivities(problem: Problem, point: Point, base: Fit | None = None) -> li
     return result
 
 
-def _covariance(jacobian: list[tuple[Array, Array]]) -> Array:
-    matrix, _, _ = normal_equations(jacobian, [np.zeros(c.shape[0]) for c, _ in jacobian])
+def _covariance(jacobian: list[tuple[Array, Array]], products: Products | None) -> Array:
+    none = [np.zeros(c.shape[0]) for c, _ in jacobian]
+    matrix, _, _ = normal_equations(jacobian, none, products=products)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     inverse: Array = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
     return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64)

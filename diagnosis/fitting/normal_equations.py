@@ -2,38 +2,66 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from diagnosis.fitting.problem import Point, Problem
 from tunnel_sim.vocabulary.record import Array
 
 
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Products of the sensitivities, which every step from one point shares.
+
+    Args:
+        own: of every run's own with themselves, shape (runs, own, own).
+        mixed: of the own with the common, shape (runs, own, common).
+        common: of the common with themselves, by run, shape (runs, common, common).
+    """
+
+    own: Array
+    mixed: Array
+    common: Array
+
+    @classmethod
+    def of(cls, jacobian: list[tuple[Array, Array]]) -> Products:
+        """The products of sensitivities, as `sensitivities` gives them."""
+        return cls(
+            np.stack([release.T @ release for _, release in jacobian]),
+            np.stack([release.T @ common for common, release in jacobian]),
+            np.stack([common.T @ common for common, _ in jacobian]),
+        )
+
+
 def normal_equations(
-    jacobian: list[tuple[Array, Array]], residuals: list[Array], damping: float = 0.0
-) -> tuple[Array, Array, list[Array]]:
+    jacobian: list[tuple[Array, Array]],
+    residuals: list[Array],
+    damping: float = 0.0,
+    products: Products | None = None,
+) -> tuple[Array, Array, Array]:
     """Normal matrix and gradient of the common parameters with every run's release eliminated.
 
     Args:
         jacobian: from `sensitivities`.
         residuals: scaled.
         damping: of the release's own step, as a share of its diagonal.
+        products: of the jacobian, where they are known.
 
     Returns:
-        Matrix (common, common), gradient (common,), and per run the (2, common + 1) solution that gives the
-        release's step: release = solution[:, -1] − solution[:, :-1] @ common step.
+        Matrix (common, common), gradient (common,), and the (runs, own, common + 1) solutions that give the
+        releases' steps: release = solution[:, -1] − solution[:, :-1] @ common step.
     """
-    count = jacobian[0][0].shape[1]
-    matrix, gradient = np.zeros((count, count)), np.zeros(count)
-    solutions = []
-    for (common, release), r in zip(jacobian, residuals, strict=True):
-        inner = release.T @ release
-        cross = np.column_stack([release.T @ common, release.T @ r])
-        size = np.sqrt(np.maximum(np.diag(inner), 1e-300))
-        ridge = inner / np.outer(size, size) + (1e-12 + damping) * np.eye(len(size))
-        solution = np.linalg.solve(ridge, cross / size[:, None]) / size[:, None]
-        matrix += common.T @ common - cross[:, :-1].T @ solution[:, :-1]
-        gradient += common.T @ r - cross[:, :-1].T @ solution[:, -1]
-        solutions.append(solution)
+    known = Products.of(jacobian) if products is None else products
+    columns = list(zip(jacobian, residuals, strict=True))
+    seen = np.stack([release.T @ r for (_, release), r in columns])[:, :, None]
+    cross = np.concatenate([known.mixed, seen], axis=2)
+    size = np.sqrt(np.maximum(np.diagonal(known.own, axis1=1, axis2=2), 1e-300))
+    ridge = known.own / (size[:, :, None] * size[:, None, :]) + (1e-12 + damping) * np.eye(size.shape[1])
+    solutions = np.linalg.solve(ridge, cross / size[:, :, None]) / size[:, :, None]
+    absorbed = np.swapaxes(cross[:, :, :-1], 1, 2) @ solutions
+    matrix = np.sum(known.common - absorbed[:, :, :-1], axis=0)
+    gradient = np.sum(np.stack([common.T @ r for (common, _), r in columns]) - absorbed[:, :, -1], axis=0)
     return matrix, gradient, solutions
 
 
@@ -43,6 +71,7 @@ def damped_step(
     residuals: list[Array],
     jacobian: list[tuple[Array, Array]],
     damping: float,
+    products: Products | None = None,
 ) -> Point:
     """Where a Gauss–Newton step leads.
 
@@ -52,18 +81,19 @@ def damped_step(
         residuals: scaled, by run.
         jacobian: from `sensitivities`, of the same rows as the residuals.
         damping: added to the scaled normal matrix's diagonal, dimensionless.
+        products: of the jacobian, where they are known.
 
     Returns:
         The point, its common parameters inside their bounds.
     """
-    matrix, gradient, solutions = normal_equations(jacobian, residuals, damping)
+    matrix, gradient, solutions = normal_equations(jacobian, residuals, damping, products)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     scaled = matrix / np.outer(scale, scale) + damping * np.eye(len(scale))
     lower, upper = problem.bounds
     step = bounded_step(
         scaled, gradient / scale, (lower - point.common) * scale, (upper - point.common) * scale
     )
-    release = np.stack([s[:, -1] - s[:, :-1] @ (step / scale) for s in solutions])
+    release = solutions[:, :, -1] - solutions[:, :, :-1] @ (step / scale)
     return Point(np.clip(point.common + step / scale, lower, upper), point.release + release)
 
 

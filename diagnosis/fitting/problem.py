@@ -16,7 +16,7 @@ from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
-from tunnel_sim.physics.moment_law import parameter_vector, run_dtype
+from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.motion import Motion
 from tunnel_sim.physics.release import released_by_spring_end
 from tunnel_sim.physics.rod_modes import slow_motion
@@ -29,6 +29,12 @@ from tunnel_sim.vocabulary.rig import Rig
 _THREADS = 2
 _SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
 _POOL = ThreadPoolExecutor(_THREADS)
+#: Parameters of the law that do nothing without wind, and fields of a run that point to samples.
+_AIR = (
+    "air_density", "cn_beta", "cn_r", "moment_cubic", "damping_quadratic", "aero_lag", "flow_angle",
+    "shedding_amplitude",
+)  # fmt: skip
+_POINTERS = ("wind", "forcing", "program")
 
 
 @dataclass(frozen=True)
@@ -223,27 +229,42 @@ class Problem:
             without bound, or a parameter is not finite.
         """
         found = [[np.full(run.reading.size, np.inf) for run in self.data.runs] for _ in points]
-        jobs = {(i, r): job for i, point in enumerate(points) for r, job in self._jobs(point)}
-        places = list(jobs)
-        half = max(1, (len(jobs) + _THREADS - 1) // _THREADS)
-        parts = [[jobs[place] for place in places[i : i + half]] for i in range(0, len(jobs), half)]
-        results = (values for part in _POOL.map(_run_jobs, parts) for values in part)
-        for (i, r), values in zip(places, results, strict=True):
-            found[i][r] = values
+        alike: dict[object, list[tuple[int, int, _Job]]] = {}  # those of one motion, which is integrated once
+        first: dict[object, _Job] = {}
+        for i, point in enumerate(points):
+            for r, job in self._jobs(point, first):
+                alike.setdefault(job.motion, []).append((i, r, job))
+        motions = list(alike.values())
+        half = max(1, (len(motions) + _THREADS - 1) // _THREADS)
+        parts = [
+            [[job for *_, job in motion] for motion in motions[i : i + half]]
+            for i in range(0, len(motions), half)
+        ]
+        results = [values for part in _POOL.map(_run_jobs, parts) for values in part]
+        for motion, readings in zip(motions, results, strict=True):
+            for (i, r, _), values in zip(motion, readings, strict=True):
+                found[i][r] = values
         return found
 
-    def _jobs(self, point: Point) -> Iterator[tuple[int, _Job]]:
-        """What there is to integrate at a point, by run."""
+    def _jobs(self, point: Point, first: dict[object, _Job]) -> Iterator[tuple[int, _Job]]:
+        """What there is to integrate at a point, by run.
+
+        ``first`` holds jobs whose moment law another run may share: the zero and, where no effect knows the time or
+        the release, the release do not matter to it.
+        """
         if not np.all(np.isfinite(point.common)):
             return
         effects = self.effects_at(point.common)
         autonomous = all(kind.autonomous for kind in self.effects)
-        first: dict[object, _Job] = {}  # by the conditions: the stretches of a long record share a moment law
+        matters = [
+            value for name, value in zip(self.names, point.common.tolist(), strict=True) if name != "zero"
+        ]
+        law = tuple(matters)
         for r, run in enumerate(self.data.runs):
             if np.all(np.isfinite(point.release[r])):
-                like = first.get(run.conditions) if autonomous else None
+                like = first.get((law, run.conditions)) if autonomous else None
                 job = _Job(self, point, r, effects) if like is None else like.released(self, point, r)
-                first.setdefault(run.conditions, job)
+                first.setdefault((law, run.conditions), job)
                 yield r, job
 
 
@@ -273,8 +294,18 @@ class _Job:
         stride = 1 if rough else fit_stride(rig, physics, run.interval)
         law = physics.law(rig)
         law, step = compensated(law, run.wind_speed, stride * run.interval / substeps)
+        if physics.wind_speed == 0.0 and not physics.series:
+            law |= dict.fromkeys(_AIR, 0.0)
+        self.steps = substeps, stride
         self.row["step"], self.row["steps"], self.row["stride"] = step / stride, substeps, stride
         self.law = parameter_vector(law)
+
+    @property
+    def motion(self) -> object:
+        """What determines the motion: law, run and samples."""
+        numbers = self.row.copy()
+        numbers[list(_POINTERS)] = 0
+        return self.blocks, self.law.tobytes(), numbers.tobytes(), *(a.tobytes() for a in self.keep_alive)
 
     def released(self, problem: Problem, point: Point, run_index: int) -> _Job:
         """Another run in equal conditions, where no effect knows the time or the release."""
@@ -374,24 +405,24 @@ def _rig(area: float, length: float, width: float) -> Rig:
     return dataclasses.replace(rig, body=body)
 
 
-def _run_jobs(jobs: list[_Job]) -> list[Array]:
-    """Integrate jobs, those of equal length together."""
-    out: list[Array | None] = [None] * len(jobs)
-    lengths = np.array([job.blocks for job in jobs])
-    for length in np.unique(lengths):
-        at = np.flatnonzero(lengths == length)
+def _run_jobs(motions: list[list[_Job]]) -> list[list[Array]]:
+    """Readings of jobs by motion; motions of equal length and steps are integrated together."""
+    out: list[list[Array]] = [[] for _ in motions]
+    alike: dict[tuple[int, int, int], list[int]] = {}
+    for i, (job, *_) in enumerate(motions):
+        alike.setdefault((job.blocks, *job.steps), []).append(i)
+    for (length, _, _), places in alike.items():
+        at = np.array(places)
         while at.size:
-            rows = np.empty(at.size, dtype=run_dtype())
-            for k, i in enumerate(at):
-                rows[k] = jobs[i].row[0]
-            law = np.stack([jobs[i].law for i in at])
-            angle, rate, status = integrate(law, rows, int(length) + 1)
+            rows = np.concatenate([motions[i][0].row for i in at])
+            law = np.stack([motions[i][0].law for i in at])
+            angle, rate, status = integrate(law, rows, length + 1)
             done = at if status == 0 else at[: status - 1]
             for k, i in enumerate(done):
-                out[i] = jobs[i].reading(angle[k], rate[k])
+                out[i] = [job.reading(angle[k], rate[k]) for job in motions[i]]
             if status == 0:
                 break
             failed = at[status - 1]
-            out[failed] = np.full(jobs[failed].run.reading.size, np.inf)
+            out[failed] = [np.full(job.run.reading.size, np.inf) for job in motions[failed]]
             at = at[status:]
-    return [values for values in out if values is not None]
+    return out

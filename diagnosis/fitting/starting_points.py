@@ -323,7 +323,7 @@ def project_out(base: Fit, columns: list[Array]) -> list[Array]:
     Returns:
         The remainder, by run.
     """
-    matrix, gradient, solutions = normal_equations(base.jacobian, columns)
+    matrix, gradient, solutions = normal_equations(base.jacobian, columns, products=base.products)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     step = np.linalg.lstsq(matrix / np.outer(scale, scale), gradient / scale, rcond=1e-12)[0] / scale
     return [

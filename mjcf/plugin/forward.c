@@ -137,20 +137,22 @@ static int slip_from_rest(const Step* s) {
   return fabs(other) <= s->p->friction_moment ? 0 : other > 0 ? 1 : -1;
 }
 
-// Length of the step after which the rate is zero, by regula falsi (Illinois) on repeated steps.
+// Length of the step after which the rate is zero, by Newton's method on repeated steps, kept between a length with
+// the first rate's sign and one with the last's.
 static double reversal(const Step* s, double h, double end_rate) {
-  double low = 0, high = h, low_rate = s->from.rate, high_rate = end_rate;
-  for (int i = 0; i < 30 && high - low > 1e-13; i++) {
-    const double middle = low + (high - low) * low_rate / (low_rate - high_rate);
-    const Motion y = runge_kutta(s, middle);
-    if (fabs(y.rate) < 1e-13) {
-      return middle;
-    }
-    if ((y.rate > 0) == (high_rate > 0)) {
-      high = middle, high_rate = y.rate, low_rate *= 0.5;
+  double low = 0, high = h, at = h * s->from.rate / (s->from.rate - end_rate);
+  for (int i = 0; i < 60 && high - low > 1e-13; i++) {
+    const Motion y = runge_kutta(s, at);
+    if ((y.rate > 0) == (end_rate > 0)) {
+      high = at;
     } else {
-      low = middle, low_rate = y.rate, high_rate *= 0.5;
+      low = at;
     }
+    const double next = at - y.rate / derivative(s, at, &y).rate;
+    if (fabs(next - at) < 1e-7 * h) {  // the error left is that squared
+      return next;
+    }
+    at = next > low && next < high ? next : 0.5 * (low + high);
   }
   return high;
 }

@@ -205,7 +205,7 @@ static inline void runge_kutta(const Coefficients* c, const State* s, int featur
 // A step of one lane that reverses or sticks under Coulomb friction. Where it changes nothing in a steady law, the lane
 // rests for good.
 static void step_alone(const Coefficients* c, State* s, int k, Step* alone) {
-  const double angle = s->angle[k], rate = s->rate[k];
+  const double angle = s->angle[k], rate = s->rate[k], lagged = s->lagged[k];
   alone->start = s->start[k];
   alone->from.angle = s->angle[k];
   alone->from.rate = s->rate[k];
@@ -216,7 +216,8 @@ static void step_alone(const Coefficients* c, State* s, int k, Step* alone) {
   s->rate[k] = alone->from.rate;
   s->lagged[k] = alone->lagged;
   s->slip[k] = alone->slip;
-  s->rests[k] = rate == 0 && s->rate[k] == 0 && s->angle[k] == angle && c->lag[k] == 0 && c->shedding[k] == 0;
+  const int changed = s->rate[k] != 0 || rate != 0 || s->angle[k] != angle || s->lagged[k] != lagged;
+  s->rests[k] = !changed && c->shedding[k] == 0;
 }
 
 static inline void step(const Coefficients* c, State* s, int features, Step* alone) {
