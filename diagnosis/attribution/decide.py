@@ -86,8 +86,8 @@ def weigh(sets: Sequence[FittedSet], nominal: Misfit) -> list[Weighed]:
         nominal: what the nominal model leaves.
 
     Returns:
-        All answers, ``unknown`` among them: the answer first, then the most probable ones. ``unknown`` speaks of all
-        sets, and is the answer only where it is more probable than all of them together.
+        All answers, ``unknown`` among them: the answer first, then the most probable ones. ``unknown`` speaks of
+        all sets, and is the answer only where it is more probable than all of them together.
     """
     best: dict[tuple[str, ...], FittedSet] = {}
     for given in sets:

@@ -7,9 +7,9 @@ Every number that decides is moved by a factor of two either way, or switched of
 
     python -m docs.studies.ablation SET [--count N] [--rerun NAME ...]
 
-SET is made by ``tunnel blind make``; its key is opened, so that it is no blind test any more. The table says how many
-answers are exact, how many causes named are false, the mean logarithm of the probability of the truth, and how often a
-wrong set is stated where one true effect is withheld, by deleting the sets that hold it.
+SET is made by ``tunnel blind make``; its key is opened, so that it is no blind test any more. The table says how
+many answers are exact, how many causes named are false, the mean logarithm of the probability of the truth, and how
+often a wrong set is stated where one true effect is withheld, by deleting the sets that hold it.
 """
 
 from __future__ import annotations
