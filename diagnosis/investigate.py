@@ -223,7 +223,7 @@ def _weighed(found: Study, base: Fit) -> list[Weighed]:
     """The answers with their probabilities, most probable first; shares of the gap that ``base`` leaves."""
     nominal = misfit(base)
     sets = [h.fitted_set(base) for h in found.hypotheses]
-    sets += [FittedSet(r.effects, r.share, r.share * nominal.excess) for r in found.random]
+    sets += [answer.left for answer in found.random]
     if found.hum is not None:  # it may be the only cause, and is part of the gap
         sets.append(FittedSet((), 1.0, nominal.excess))
         removed = np.zeros(len(CHANNELS))

@@ -117,8 +117,6 @@ CHANCE_STDS = 2.0
 #: significance of the gap, falls with the logarithm of what is left, and rises with that of the share closed. A
 #: logistic regression on fits with and without the true effects, of simulated campaigns and measured records.
 UNKNOWN_AT, UNKNOWN_GAP, UNKNOWN_LEFT, UNKNOWN_CLOSED = -0.7, 0.2, 1.7, 1.9
-#: Misfit of form that counts as none, as a share of the gap, and the excess beyond which it no longer grows. Tuned.
-FORM_MISFIT, FORM_MISFIT_UP_TO = 0.005, 300.0
 #: Stiffness of an unstated spring beside gravity, as a share of both, below which the rig needs no spring. The set
 #: then counts as one with a number less: a spring would have to soften by chance as gravity does. Judgement, made
 #: when three simulated pendulums had been given a cubic spring (0018).
@@ -140,22 +138,8 @@ WHITE_INNOVATIONS = 7.0
 BURST_FALSE_ALARM_RATE, BURST = 0.001, 1.5
 #: Rate at which a random moment of all runs is taken for one of a single run. Convention.
 ONE_RUN_FALSE_ALARM_RATE = 1e-3
-#: Excess of the wind-off runs up to which they count as free of a gap: the greatest of so many noise variances and
-#: the misfit of form that counts as none. And the share of the whole excess up to which they do where turbulence is
-#: not part of the noise, so that its motion has misled the fit. Judgement.
-WIND_OFF_LEAST, WIND_OFF_SHARE = 0.1, 0.05
-#: Excess of the wind-off runs, in that of all runs, below which sets are grown anew with turbulence as noise.
-#: Judgement: time against coverage.
-LEFT_IN_THE_WIND = 0.5
-#: Single effects beside which a random moment is tried. Judgement: time against coverage.
-RANDOM_PARTNERS = 3
-#: −2 ln L by which every effect beside the random moment must improve it. Judgement: a parameter fitted by least
-#: squares to a random motion gains about ten for nothing, and a few effects are tried.
-BESIDE_EVIDENCE = 30.0
-#: The same of every instant or phase of a run's own. Judgement: it is the best of many that were tried.
+#: χ² that every instant or phase of a run's own may gain by chance. Judgement: it is the best of many tried.
 OWN_EVIDENCE = 10.0
-#: −2 ln L beyond which a likelier kind of random moment rules another out. Convention: odds of e^10.
-RIVAL_EVIDENCE = 20.0
 
 # ---- Where the gap is -----------------------------------------------------------------------------------------
 

@@ -27,8 +27,6 @@ from diagnosis.fitting.channels import Misfit
 from diagnosis.policy import (
     CHANCE_STDS,
     EVEN_SHARE,
-    FORM_MISFIT,
-    FORM_MISFIT_UP_TO,
     FORM_PRICE,
     LEAK,
     MODEL_ERROR,
@@ -167,15 +165,6 @@ def _log_odds(excess: Array, nominal: Misfit) -> float:
     closed = max(1.0 - left / gap, 0.0) if gap > 0.0 else 0.0
     against = UNKNOWN_LEFT * np.log1p(left) - UNKNOWN_CLOSED * np.log(closed + _LEAST_CLOSED)
     return float(UNKNOWN_AT + UNKNOWN_GAP * gap - against)
-
-
-def form_floor(excess: float) -> float:
-    """Share of the gap that a misfit of form may leave.
-
-    Args:
-        excess: of the nominal model's block means, above 0.
-    """
-    return FORM_MISFIT * min(1.0, FORM_MISFIT_UP_TO / excess)
 
 
 def main_effect(effects: Sequence[str], shares: Mapping[tuple[str, ...], float]) -> str:

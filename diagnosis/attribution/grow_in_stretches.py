@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.attribution.decide import form_floor
 from diagnosis.attribution.grow import Progress, going_on, sets_with_one_more
 from diagnosis.attribution.hypothesis import Hypothesis, with_forms
 from diagnosis.fitting.channels import misfit
@@ -16,7 +15,7 @@ from diagnosis.fitting.least_squares import Fit, FitError
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.starting_points import is_gross
 from diagnosis.fitting.stretches import Stretches, fit_longer, in_stretches, long_stretch, spread_out
-from diagnosis.policy import FREED_FROM, GROWN_FROM, LENGTHENED
+from diagnosis.policy import FREED_FROM, GROWN_FROM, LENGTHENED, MODEL_ERROR
 from tunnel_sim.effects import Effect
 
 
@@ -83,7 +82,7 @@ def grow_in_stretches(
     able, gap = [kind for kind in kinds if kind.autonomous], misfit(nominal)
     while level:
         grown = _longer_sets(level, short, data, able, progress)
-        least = min(FREED_FROM * level[0].long.fit.excess, form_floor(nominal.gap) * nominal.gap)
+        least = min(FREED_FROM * level[0].long.fit.excess, MODEL_ERROR**2 * gap.motion / nominal.count)
         children = with_forms([child.long for child in grown.values()], least)
         found += children
         parents = [g.long for g in level]

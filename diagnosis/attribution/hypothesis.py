@@ -59,7 +59,9 @@ class Hypothesis:
         """
         problem, width = self.fit.problem, self.fit.point.release.shape[1]
         places = problem.own_places(width)
-        instants = sum(int(places[k.name].stop) - int(places[k.name].start) for k in problem.effects if k.skips)
+        instants = sum(
+            int(places[k.name].stop) - int(places[k.name].start) for k in problem.effects if k.skips
+        )
         return self.forms + instants - 2 * _needs_no_spring(self.fit)
 
     def share_left(self, nominal: Fit) -> float:

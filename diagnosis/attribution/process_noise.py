@@ -8,7 +8,7 @@ doi 10.1080/00207177808922455.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,6 +84,24 @@ class _Channel:
     reduced: float  # V/width, Hz
 
 
+def random_moments(fit: Fit, spectra: Collection[str] = ("broad_band", "narrow_band")) -> list[ProcessNoise]:
+    """The random moments that may explain the residuals of a fit.
+
+    Args:
+        fit: with residuals in the sensor's noise alone.
+        spectra: of the effects that may act (`tunnel_sim.effects.Effect.random`).
+
+    Returns:
+        The best fit of each kind; empty without wind-on runs or where the model is not stable.
+    """
+    tried: list[ProcessNoise | None] = []
+    if "broad_band" in spectra:
+        tried += [fit_turbulence(fit), fit_turbulence(fit, centred=True)]
+    if "narrow_band" in spectra:
+        tried.append(fit_wandering_shedding(fit))
+    return [one for one in tried if one is not None]
+
+
 def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
     """Explain the residuals of the wind-on runs by turbulence of common coefficient.
 
@@ -137,7 +155,9 @@ def _fit(
     def cost(x: Array) -> float:
         return sum(c for c, _ in _filtered(channels, spectrum(np.exp(x).tolist())))
 
-    start = np.log(min(grid, key=lambda x: cost(np.log(np.array(x)))))
+    every = [spectrum(x) for x in grid for _ in channels]
+    by_run = np.array([c for c, _ in _filtered(channels * len(grid), every)]).reshape(len(grid), -1)
+    start = np.log(grid[int(np.argmin(by_run.sum(axis=1)))])
     found = minimize(
         cost,
         start,
@@ -169,7 +189,7 @@ def _fit(
 
 def _predicted(channels: Sequence[_Channel], spectrum: Spectrum) -> Array:
     """Power of the response at the end of each run that began at rest, in units of the noise's, shape (runs,)."""
-    transition, disturbance = _discrete(channels, spectrum)
+    transition, disturbance = _discrete(channels, [spectrum] * len(channels))
     power = []
     for channel, a, q in zip(channels, transition, disturbance, strict=True):
         for _ in range(int(np.log2(channel.residual.size))):
@@ -239,12 +259,18 @@ def _skip(channel: _Channel) -> int:
     return min(channel.residual.size // 4, round(_SETTLE / channel.interval))
 
 
-def _filtered(channels: Sequence[_Channel], spectrum: Spectrum) -> list[tuple[float, Array]]:
-    """−2 ln L (without constants) and scaled innovations of the steady filter, by run."""
+def _filtered(
+    channels: Sequence[_Channel], spectra: Spectrum | Sequence[Spectrum]
+) -> list[tuple[float, Array]]:
+    """−2 ln L (without constants) and scaled innovations of the steady filter, by run.
+
+    Args:
+        spectra: of all runs, or one for each.
+    """
     from scipy.signal import lfilter  # only here: slow to load
 
     results = []
-    for channel, (numerator, denominator, spread) in zip(channels, _filters(channels, spectrum), strict=True):
+    for channel, (numerator, denominator, spread) in zip(channels, _filters(channels, spectra), strict=True):
         if not (np.isfinite(spread) and spread > 0.0):
             results.append((np.inf, np.zeros(0)))
             continue
@@ -254,35 +280,49 @@ def _filtered(channels: Sequence[_Channel], spectrum: Spectrum) -> list[tuple[fl
     return results
 
 
-def _filters(channels: Sequence[_Channel], spectrum: Spectrum) -> list[tuple[Array, Array, float]]:
+def _filters(
+    channels: Sequence[_Channel], spectra: Spectrum | Sequence[Spectrum]
+) -> list[tuple[Array, Array, float]]:
     """The filter from residuals to innovations, numerator and denominator, and their variance, rad², by run."""
-    transition, disturbance = _discrete(channels, spectrum)
+    each = [spectra] * len(channels) if isinstance(spectra, Spectrum) else spectra
+    transition, disturbance = _discrete(channels, each)
     variance = np.array([c.variance for c in channels])
     covariance = _steady_covariance(transition, disturbance, variance)
     spread = covariance[:, 0, 0] + variance
     gain = np.einsum("rij,rj->ri", transition, covariance[:, :, 0]) / spread[:, None]
     closed = transition.copy()
     closed[:, :, 0] -= gain
-    finite = np.isfinite(spread)
+    numerators, denominators = _characteristic(transition), _characteristic(closed)
     return [
-        (np.real(np.poly(transition[i])), np.real(np.poly(closed[i])), float(spread[i]))
-        if finite[i]
+        (numerators[i], denominators[i], float(spread[i]))
+        if np.isfinite(spread[i])
         else (np.ones(1), np.ones(1), np.inf)
         for i in range(len(channels))
     ]
 
 
-def _discrete(channels: Sequence[_Channel], spectrum: Spectrum) -> tuple[Array, Array]:
-    """Transition and disturbance over one interval, shape (runs, n, n) each.
+def _characteristic(matrices: Array) -> Array:
+    """Coefficients of the characteristic polynomials, shape (runs, n + 1), by Faddeev and Le Verrier."""
+    runs, size, _ = matrices.shape
+    found, power = np.ones((runs, size + 1)), np.broadcast_to(np.eye(size), matrices.shape)
+    for k in range(1, size + 1):
+        product = matrices @ power
+        found[:, k] = -np.trace(product, axis1=1, axis2=2) / k
+        power = product + found[:, k, None, None] * np.eye(size)
+    return found
+
+
+def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tuple[Array, Array]:
+    """Transition and disturbance over one interval, shape (runs, n, n) each; all spectra have a centre, or none.
 
     States: angle, rate, moment coefficient; about a centre, the coefficient's quadrature too. By one exponential:
     Van Loan, IEEE Trans. Autom. Control 23 (1978) 395, doi 10.1109/TAC.1978.1101743.
     """
-    corner = 2.0 * np.pi * spectrum.bandwidth
-    centred = spectrum.centre > 0.0 or spectrum.strouhal_number > 0.0
+    centred = spectra[0].centre > 0.0 or spectra[0].strouhal_number > 0.0
     size = 4 if centred else 3
     blocks = np.zeros((len(channels), 2 * size, 2 * size))
-    for block, channel in zip(blocks, channels, strict=True):
+    for block, channel, spectrum in zip(blocks, channels, spectra, strict=True):
+        corner = 2.0 * np.pi * spectrum.bandwidth
         dynamics = np.zeros((size, size))
         dynamics[:2, :2] = channel.oscillator
         dynamics[1, 2] = channel.moment

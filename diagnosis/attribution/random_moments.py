@@ -1,35 +1,34 @@
-"""Random moments, weighed last: they absorb almost any gap, so they must pass tests of their own."""
+"""Random moments: a layer of noise under every set of causes, and itself a cause.
+
+A strong random motion misleads least squares: the residuals of the wind-on runs are far from white, so that
+instants and weak effects are missed in them. Here sets are grown and fitted to rows in whose noise the rig's
+response to the random moment is part. The random moment is estimated from what the best of them leaves, until both
+agree.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
-from diagnosis.attribution.decide import form_floor
-from diagnosis.attribution.grow_beside_random import grow_beside_random
-from diagnosis.attribution.hypothesis import Hypothesis, own_gain
+from diagnosis.attribution.decide import FittedSet, log_weight
+from diagnosis.attribution.grow import Scale, grow, sets_with_one_more
+from diagnosis.attribution.hypothesis import Hypothesis, restricted
 from diagnosis.attribution.innovation_tests import is_steady_noise
-from diagnosis.attribution.process_noise import (
-    ProcessNoise,
-    Spectrum,
-    fit_turbulence,
-    fit_wandering_shedding,
-    with_response,
-)
-from diagnosis.fitting.least_squares import Fit, FitError, fit
-from diagnosis.policy import (
-    BESIDE_EVIDENCE,
-    LEFT_IN_THE_WIND,
-    RANDOM_PARTNERS,
-    RIVAL_EVIDENCE,
-    WIND_OFF_LEAST,
-    WIND_OFF_SHARE,
-)
-from tunnel_sim.effects import Effect, the_effect
+from diagnosis.attribution.process_noise import ProcessNoise, random_moments, with_response
+from diagnosis.fitting.channels import misfit
+from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_at
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.run_data import Data
+from diagnosis.fitting.starting_points import starting_points
+from diagnosis.policy import MOST_CAUSES, NEEDLESS_CHI2
+from tunnel_sim.effects import Effect
+
+_ROUNDS = 3  # of estimating the random moment from the residuals, and the effects beside it
+_FURTHER = 2  # effects added so that the innovations are white
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +38,20 @@ class RandomAnswer:
     Args:
         kind: of the random moment.
         process: its fit.
-        beside: the fitted effects beside it, or None.
-        share: of the gap left open, a fraction: the innovations' and the wind-off runs' excess over the nominal
-            one's.
+        beside: the fitted effects beside it with residuals in the sensor's noise alone, or None.
+        left: what remains in the noise that the response to the random moment is part of. The share is that of the
+            innovations' and the wind-off runs' excess in the nominal one's.
     """
 
     kind: type[Effect]
     process: ProcessNoise
     beside: Hypothesis | None
-    share: float
+    left: FittedSet
+
+    @property
+    def share(self) -> float:
+        """Of the gap left open, a fraction."""
+        return self.left.share
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -60,115 +64,57 @@ def weigh_random_moments(
     hypotheses: Sequence[Hypothesis],
     kinds: Sequence[type[Effect]],
 ) -> list[RandomAnswer]:
-    """Try turbulence, and vortices with a wandering phase, alone and beside effects.
+    """Try turbulence, and vortices with a wandering phase, under all sets of effects.
 
     Args:
-        hypotheses: fitted sets of effects, best first.
+        nominal: fitted with the sensor's noise alone.
+        hypotheses: sets of effects fitted likewise.
         kinds: the vocabulary to answer in.
 
     Returns:
-        The most likely answer of each kind that passes, with as few effects beside it as the evidence asks for.
-        To pass, the random moment must be steady noise, alike in all runs in the wind, and the wind-off runs must
-        be free of a gap once the response is part of the noise. Empty where none passes, or where deterministic
-        effects close the gap.
-
-        A strong random motion misleads the fit of the effects beside it. Where most of what is left is in the wind,
-        sets are therefore grown once more, with the response to the random moment as noise, and only these count.
+        The random moment with the best set of effects beside it. It must lower −2 ln L beside the same set by more
+        than a needless effect may, and be steady noise, alike in all runs in the wind. Empty where none passes, or
+        where no random moment in the wind could leave little enough of the gap.
     """
-    allowed = {kind.name for kind in kinds}
-    if any(
-        max(hypothesis.fit.excess, 0.0) < form_floor(nominal.gap) * nominal.gap for hypothesis in hypotheses
-    ):
+    allowed = {kind.random: kind for kind in kinds if kind.random}
+    scale = Scale.of(hypotheses, misfit(nominal))
+    best = max([Hypothesis((), nominal), *hypotheses], key=scale.weight)
+    if not allowed or not _may_act(best, scale):
         return []
-    fitted = [kind for kind in kinds if kind.fitted]
-    grown: list[Hypothesis] = []
-    if fitted and _left_in_the_wind([nominal, *(hypothesis.fit for hypothesis in hypotheses)]):
-        grown = grow_beside_random(nominal, fitted)
-    answers = _passing(nominal, grown or hypotheses, allowed)
-    least = min((answer.process.cost for answer in answers), default=0.0)
-    return [answer for answer in answers if answer.process.cost < least + RIVAL_EVIDENCE]
+    top = _settled(best, nominal, [kind for kind in kinds if kind.fitted], allowed)
+    for seen in _until_steady(top, nominal.problem.data, [kind for kind in kinds if kind.fitted]):
+        process = _likeliest([one for one in random_moments(seen.fit, allowed) if is_steady_noise(one)])
+        if process is not None:
+            kind = allowed["narrow_band" if process.spectrum.strouhal_number > 0.0 else "broad_band"]
+            share = (abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)) / nominal.gap
+            left = FittedSet(
+                (kind.name, *seen.effects), share, share * misfit(nominal).excess, seen.further_numbers
+            )
+            return [RandomAnswer(kind, process, seen if seen.effects else None, left)]
+    return []
 
 
-def _in_its_noise(known: Fit, spectrum: Spectrum) -> Fit:
-    """A fit made again with the response to a random moment as noise.
+def _until_steady(top: Hypothesis, data: Data, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
+    """The set, and those with a further effect or two, with residuals in the sensor's noise alone.
 
-    Where the filter forgets too slowly or the fit fails, the fit is the one given: the limit is then hard on it.
+    A small effect that no gap shows may keep the innovations from being white.
     """
-    with suppress(FitError, np.linalg.LinAlgError):
-        noisy = with_response(known, spectrum)
-        return known if noisy is None else fit(replace(known.problem, data=noisy), known.point)
-    return known
+    yield _seen_in(top, data)
+    for _ in range(_FURTHER):
+        larger = sets_with_one_more([top], [kind for kind in kinds if not kind.line], None)
+        best = min(larger, key=lambda h: h.fit.total, default=top)
+        if top.fit.total - best.fit.total < NEEDLESS_CHI2 or len(top.effects) >= MOST_CAUSES:
+            return
+        top = best
+        yield _seen_in(top, data)
 
 
-def _left_in_the_wind(fits: Sequence[Fit]) -> bool:
-    """Whether most of what the best fit leaves is in the runs in the wind."""
-    best = min(fits, key=lambda one: one.total)
-    return wind_off_excess(best) < LEFT_IN_THE_WIND * best.excess
-
-
-def _cost(answer: RandomAnswer) -> float:
-    """−2 ln L, with what further freedom gains by chance."""
-    found = answer.process.cost + BESIDE_EVIDENCE * len(answer.effects)
-    if answer.process.spectrum.centre > 0.0:
-        found += RIVAL_EVIDENCE
-    if answer.beside is not None:
-        found += own_gain(answer.beside.fit.problem, answer.beside.fit.point)
-    return found
-
-
-def _passing(nominal: Fit, hypotheses: Sequence[Hypothesis], allowed: Collection[str]) -> list[RandomAnswer]:
-    """The most likely answer of each kind that passes."""
-    kinds: tuple[tuple[str, tuple[_Kind, ...]], ...] = (
-        ("broad_band", (fit_turbulence, partial(fit_turbulence, centred=True))),
-        ("narrow_band", (fit_wandering_shedding,)),
-    )
-    known = [(the_effect(random=random), fits) for random, fits in kinds]
-    tried = [_likeliest(kind, fits, nominal, hypotheses) for kind, fits in known if kind.name in allowed]
-    return [answer for answer in tried if answer is not None]
-
-
-_Kind = Callable[[Fit], ProcessNoise | None]
-
-
-def _likeliest(
-    kind: type[Effect], fits: Sequence[_Kind], nominal: Fit, hypotheses: Sequence[Hypothesis]
-) -> RandomAnswer | None:
-    sets = [(nominal, None), *((h.fit, h) for h in _partners(kind, hypotheses))]
-    tried = [_try(kind, explain, one, beside, nominal) for one, beside in sets for explain in fits]
-    return min((answer for answer in tried if answer is not None), key=_cost, default=None)
-
-
-def _partners(kind: type[Effect], hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The best single effects, and the best set of every larger size."""
-    able = [h for h in hypotheses if kind.name not in h.effects]
-    sizes = sorted({len(h.effects) for h in able} - {1})
-    larger = [next(h for h in able if len(h.effects) == size) for size in sizes]
-    return [*[h for h in able if len(h.effects) == 1][:RANDOM_PARTNERS], *larger]
-
-
-def _try(
-    kind: type[Effect], explain: _Kind, fit: Fit, beside: Hypothesis | None, nominal: Fit
-) -> RandomAnswer | None:
-    if _still_open(fit, nominal):
-        return None
-    process = explain(fit)
-    if process is None or process.drop <= 0.0 or not is_steady_noise(process):
-        return None
-    if wind_off_excess(_in_its_noise(fit, process.spectrum)) > _no_gap(nominal):
-        return None
-    share = (abs(process.excess) + max(wind_off_excess(fit), 0.0)) / nominal.gap
-    return RandomAnswer(kind, process, beside, share)
-
-
-def _still_open(fit: Fit, nominal: Fit) -> bool:
-    """Whether the wind-off runs show a gap, which no random moment of the wind explains."""
-    return wind_off_excess(fit) > max(WIND_OFF_SHARE * fit.excess, _no_gap(nominal))
-
-
-def _no_gap(nominal: Fit) -> float:
-    """Excess of the wind-off runs that is no gap."""
-    still = max(wind_off_excess(nominal), 0.0)
-    return max(form_floor(nominal.gap) * still, WIND_OFF_LEAST)
+def _may_act(best: Hypothesis, scale: Scale) -> bool:
+    """Whether a random moment that leaves nothing in the wind would weigh more than the best set alone."""
+    runs = zip(best.fit.problem.data.runs, best.fit.residuals, strict=True)
+    still = misfit(best.fit, [np.zeros_like(r) if run.wind_on else r for run, r in runs]).excess
+    with_it = log_weight(still, scale.misfit, len(best.effects) + 1, best.further_numbers)
+    return any(run.wind_on for run in best.fit.problem.data.runs) and with_it > scale.weight(best)
 
 
 def wind_off_excess(fit: Fit) -> float:
@@ -179,3 +125,94 @@ def wind_off_excess(fit: Fit) -> float:
         if not run.wind_on
     ]
     return float(np.mean(off)) if off else 0.0
+
+
+def _likeliest(tried: Sequence[ProcessNoise]) -> ProcessNoise | None:
+    """The random moment that explains residuals best; None where white noise explains them as well."""
+    acting = [one for one in tried if one.drop > NEEDLESS_CHI2]
+    return min(acting, key=lambda p: p.cost + NEEDLESS_CHI2 * (p.spectrum.centre > 0.0), default=None)
+
+
+def _settled(
+    best: Hypothesis, nominal: Fit, kinds: Sequence[type[Effect]], spectra: Collection[str]
+) -> Hypothesis:
+    """The best set of effects on rows in whose noise the response to the random moment is part.
+
+    Args:
+        best: the set from whose residuals the random moment is estimated first.
+        kinds: effects to try.
+        spectra: of random moments that may act.
+
+    Returns:
+        The set given where no random moment acts, or its filter does not settle. The random moment is estimated
+        from what the best set leaves when it is fitted with the sensor's noise alone: the fit with the response as
+        noise lets the motion wander as the response does, and its own residuals overstate it. The rounds end where
+        the best set is the one that the random moment was estimated beside.
+    """
+    data, known, top = nominal.problem.data, best.fit, best
+    with suppress(FitError, np.linalg.LinAlgError):
+        for _ in range(_ROUNDS):
+            process = _likeliest(random_moments(known, spectra))
+            noisy = None if process is None else with_response(known, process.spectrum)
+            if noisy is None:
+                break
+            base = fit(Problem(noisy), nominal.point)
+            sets = [Hypothesis((), base), *grow(base, kinds)]
+            found = max(sets, key=Scale.of(sets, misfit(base)).weight)
+            *_, top = _with_more_of_the_wind(_sought_again(found), kinds)
+            if top.names == best.names:
+                break
+            best = _seen_in(top, data)
+            known = fit(best.fit.problem, best.fit.point)
+    return top
+
+
+def _with_more_of_the_wind(top: Hypothesis, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
+    """The set, and those with one, two, … more effects of the wind, as long as each is evident in the noise.
+
+    A random moment leaves little of a gap in the wind for the shares of effects to be compared there.
+    """
+    windy = [kind for kind in kinds if kind.condition == "wind_on" and not kind.line]
+    while True:
+        yield top
+        larger = sets_with_one_more([top], windy, None)
+        best = min(larger, key=lambda h: h.fit.total, default=top)
+        if top.fit.total - best.fit.total < NEEDLESS_CHI2:
+            return
+        top = best
+
+
+def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
+    """The set with instants and phases sought once more; each run keeps those that leave less.
+
+    They were found before the other effects were known.
+    """
+    known = hypothesis.fit
+    for kind in known.problem.effects:
+        if kind.skips or kind.line:
+            known = _better_in_each_run(known, kind)
+    return replace(hypothesis, fit=known)
+
+
+def _better_in_each_run(known: Fit, kind: type[Effect]) -> Fit:
+    """The fit with the instants or phases of one effect sought once more."""
+    others = restricted(known, {other.name for other in known.problem.effects} - {kind.name})
+    starts = starting_points(fit_at(others.problem, others.point), kind)
+    if not starts:
+        return known
+    sought = fit(starts[0].problem, starts[0].point)
+    width = known.point.release.shape[1]
+    if sought.point.release.shape[1] != width:  # another number of instants
+        return min(known, sought, key=lambda f: f.total)
+    release = sought.point.release.copy()
+    kept = known.chi2 < sought.chi2
+    old, new = (f.problem.own_places(width)[kind.name] for f in (known, sought))
+    release[kept, new] = known.point.release[kept, old]
+    merged = fit(sought.problem, Point(sought.point.common, release))
+    return min(known, sought, merged, key=lambda f: f.total)
+
+
+def _seen_in(hypothesis: Hypothesis, data: Data) -> Hypothesis:
+    """The hypothesis as it stands, with residuals in the noise of other data."""
+    problem = replace(hypothesis.fit.problem, data=data)
+    return replace(hypothesis, fit=fit_at(problem, hypothesis.fit.point), textbook=None)

@@ -154,7 +154,7 @@ def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth
     (start, *_) = starting_points(base, type(strong))
     spring = Hypothesis(("cubic_stiffness",), fit(start.problem, start.point, base=base))
     assert 0.005 < spring.fit.excess / base.excess < 0.015
-    (answer,) = weigh_random_moments(base, [spring], BUFFETING)
+    (answer,) = weigh_random_moments(base, [spring], (*BUFFETING, type(strong)))
     assert answer.effects == ("buffeting", "cubic_stiffness")
 
 
@@ -199,7 +199,7 @@ def test_an_effect_of_the_wind_that_is_weak_beside_turbulence_is_found():
 
 
 def test_sets_are_not_grown_anew_for_a_gap_that_is_in_still_air_too(monkeypatch):
-    monkeypatch.setattr(random_moments, "grow_beside_random", None)
+    monkeypatch.setattr(random_moments, "_settled", None)
     base = nominal(campaign(effect_from("cubic_stiffness", {"coefficient": -0.2})))
     assert weigh_random_moments(base, [], (*BUFFETING, effect_class("coulomb_friction"))) == []
 

@@ -6,10 +6,11 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from diagnosis.answer.reported import excess_base
-from diagnosis.attribution.decide import UNKNOWN, Weighed
+from diagnosis.attribution.decide import UNKNOWN, FittedSet, Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.random_moments import RandomAnswer
 from diagnosis.detection.mains import Hum
@@ -21,6 +22,10 @@ from tunnel_sim.effects import effect_class, effect_from
 if TYPE_CHECKING:
     from diagnosis.fitting.least_squares import Fit
     from diagnosis.study import Study
+
+
+def left(share: float) -> FittedSet:
+    return FittedSet(("vortex_shedding",), share, np.zeros(6))
 
 
 def _with_excess(fitted: Fit, excess: float) -> Fit:
@@ -41,7 +46,7 @@ def study() -> Study:
 def test_a_random_moment_answers_where_it_leaves_less_than_the_steady_one(
     study: Study, share: float, is_random: bool
 ) -> None:
-    moment = RandomAnswer(effect_class("vortex_shedding"), None, None, share)  # type: ignore[arg-type]
+    moment = RandomAnswer(effect_class("vortex_shedding"), None, None, left(share))  # type: ignore[arg-type]
     asked = replace(study, random=(moment,)).random_answer(("vortex_shedding",))
     assert (asked is moment) == is_random
 
@@ -52,7 +57,7 @@ def test_the_answer_is_polished_unless_a_random_moment_gives_it(
 ) -> None:
     polished = replace(study.hypotheses[0], textbook=study.nominal)
     monkeypatch.setattr("diagnosis.investigate.polish", lambda _: polished)
-    moment = RandomAnswer(effect_class("vortex_shedding"), None, None, 0.4)  # type: ignore[arg-type]
+    moment = RandomAnswer(effect_class("vortex_shedding"), None, None, left(0.4))  # type: ignore[arg-type]
     found = _polished(study.hypotheses, Weighed(("vortex_shedding",), 0.5, 0.9), (moment,) if random else ())
     assert found == (study.hypotheses if random else (polished,))
 

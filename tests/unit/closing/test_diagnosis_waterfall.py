@@ -14,7 +14,7 @@ from diagnosis.answer.held_out_stretches import predict_stretches, turns_of
 from diagnosis.answer.reported import Base
 from diagnosis.answer.subsets import Subsets
 from diagnosis.answer.waterfall import waterfall
-from diagnosis.attribution.decide import Weighed
+from diagnosis.attribution.decide import FittedSet, Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.process_noise import ProcessNoise, Spectrum
 from diagnosis.attribution.random_moments import RandomAnswer
@@ -148,7 +148,9 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
     kind = effect_class("buffeting")
     best = added(base, IDLE)
     process = ProcessNoise(Spectrum(0.01, 5.0), 10.0, np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012)
-    random = RandomAnswer(kind, process, Hypothesis((IDLE,), best), 0.01)
+    random = RandomAnswer(
+        kind, process, Hypothesis((IDLE,), best), FittedSet((kind.name, IDLE), 0.01, np.zeros(6))
+    )
     study = studied(data, base, (kind.name, IDLE, HUM))
     study = replace(study, random=(random,), weighed=(Weighed((kind.name, IDLE), 0.01, 0.9),))
     found = waterfall(study, replace(NO_BASE, hum=2.0), {})
