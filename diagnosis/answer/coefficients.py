@@ -40,7 +40,7 @@ class Possible:
     """An answer with its fit.
 
     Args:
-        probability: of the answer; those of all answers need not sum to 1.
+        probability: of the answer, a fraction; those of all answers need not sum to 1.
         fit: of its effects; of the nominal model where it names none.
         textbook: the same effects in textbook form, where the fit freed their forms.
         small: the small causes that may act beside them; None: neither these nor a misfit are considered.
@@ -58,7 +58,7 @@ class Answers:
 
     Args:
         possible: those with a fit, the chosen one first.
-        unknown: probability of ``unknown`` where an answer with names is the chosen one.
+        unknown: probability (a fraction) of ``unknown`` where an answer with names is the chosen one.
         nominal: the fit of the nominal model.
     """
 

@@ -19,12 +19,16 @@ from diagnosis.answer.coefficients import (
     possible_answers,
 )
 from diagnosis.answer.mixture import Mixture
+from diagnosis.answer.own_units import own_estimate
 from diagnosis.answer.small_causes import beside
 from diagnosis.attribution.decide import Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.similarity import Similarity
 from diagnosis.fitting.starting_points import starting_points
 from diagnosis.policy import EVEN_SHARE, FORM_CHANGE_STD
+from diagnosis.result import ParameterEstimate
+from identification.printing.numbers import estimated
 from tests.unit.gap_campaigns import CN_BETA, CN_R, campaign, nominal, studied
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 
@@ -196,3 +200,20 @@ def test_what_is_left_moves_the_coefficients(data, base):
     found = only(base, precise(data), small=beside(base, ()))["cn_r"]
     assert found.shares["misfit"] > 0.9
     assert abs(found.value - CN_R) < 3.0 * found.std
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "interval", "text"),
+    [
+        (0.4951, 0.0012, (0.49388, 0.4986), "0.4951 ± 0.0012 (0.4939 to 0.4986)"),
+        (1.234e-5, 5.6e-7, (1.2e-5, 1.41e-5), "(1.234 ± 0.056)e-05 (1.200e-05 to 1.410e-05)"),
+        (0.4951, 0.0012, None, "0.4951 ± 0.0012"),
+    ],
+)
+def test_a_skewed_interval_is_printed(value, std, interval, text):
+    assert estimated({"value": value, "std": std, "unit": "1", "interval": interval}) == text
+
+
+def test_an_interval_has_the_units_of_the_measured_campaign():
+    found = own_estimate(ParameterEstimate(10.0, 1.0, "rad/s", interval=(9.0, 13.0)), Similarity(time=4.0))
+    assert found.interval == pytest.approx((0.9 * found.value, 1.3 * found.value))
