@@ -105,7 +105,8 @@ def _diagnose(
     if campaign.law is not None and campaign.law.slide:
         left_out = (*left_out, SLIDE)
     try:
-        study = investigate(campaign, () if found.limit_cycles else kinds, progress)
+        known = () if found.limit_cycles else kinds
+        study = investigate(campaign, known, progress)
     except TunnelError as error:
         if not found.limit_cycles:
             raise
@@ -115,7 +116,7 @@ def _diagnose(
     where, maps = localise(study)
     remarks = (*found.remarks, *noise_remarks(study.noise, study.trend))
     patched, unpatched = (None, ()) if model is None else _patched(study, model)
-    assembled = assemble(study, where, maps, (*left_out, *unpatched), patched)
+    assembled = assemble(study, where, maps, (*left_out, *unpatched), patched, known)
     answer = in_own_units(replace(assembled, remarks=remarks), study.similarity)
     if found.limit_cycles:
         return limit_cycle_answer(answer, found.remarks)

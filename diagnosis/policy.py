@@ -191,11 +191,9 @@ LISTED_PROBABILITY = 0.01
 #: MuJoCo and the fits' integrator may differ by this share of a block mean's noise, root mean square over a run.
 #: Judgement: a hundredth of the noise's power.
 CONFIRMATION_TOLERANCE = 0.1
-#: Excess of block means beyond which residuals are not white and the scatter of the runs sets the interval.
-#: Judgement.
-COLOURED_EXCESS = 0.03
-#: Share of a coefficient's change on freeing the forms that counts as its standard deviation. Judgement, made when
-#: a blind test had shown Cnβ's intervals too narrow, and tested on campaigns drawn afterwards.
+#: Share of a coefficient's change that counts as its standard deviation where another form may change it as much:
+#: on freeing the forms, by a small cause that is not named, and by the answer where its cause is unknown (0028).
+#: Judgement, made when a blind test had shown Cnβ's intervals too narrow, and tested on campaigns drawn afterwards.
 FORM_CHANGE_STD = 0.5
 #: What remains is material where it moves a coefficient by this share, or by more than its standard deviation.
 #: Convention: derivatives are quoted to a per cent.

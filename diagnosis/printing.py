@@ -169,7 +169,8 @@ def coefficients_table(document: Document) -> TextTable:
     """The coefficients of the nominal model before and after the causes are added.
 
     Returns:
-        A table with one standard deviation and the change; without rows where there are none.
+        A table with one standard deviation, the central 95 % where that is not ± 1.96 of them, and the change;
+        without rows where there are none.
     """
     rows = []
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
@@ -185,9 +186,9 @@ def coefficients_table(document: Document) -> TextTable:
                 f"{change:+.2g} %" if known else "–",
             )
             rows.append(row)
-    return TextTable(
-        "Coefficients ± one standard deviation", ("", "before", "after", "change"), tuple(rows), ("change",)
-    )
+    skewed = any(given.get("interval") for given in after.values())
+    title = "Coefficients ± one standard deviation" + " (central 95 %)" * skewed
+    return TextTable(title, ("", "before", "after", "change"), tuple(rows), ("change",))
 
 
 def where_line(document: Document) -> str:

@@ -39,6 +39,7 @@ class ParameterEstimate:
         bound: ``lower`` or ``upper`` where the fit stopped at that end of the range allowed; ``std`` is then None.
         determined: whether the runs determine it; where not, ``value`` means nothing and ``std`` is None.
         shares: of ``std`` squared by source, fractions; empty where they are not known.
+        interval: ends of the central interval of 0.95, in that unit, where it is not value ± 1.96 std; else None.
     """
 
     value: float
@@ -47,13 +48,16 @@ class ParameterEstimate:
     bound: str | None = None
     determined: bool = True
     shares: Mapping[str, float] = field(default_factory=dict)
+    interval: tuple[float, float] | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Value, std and unit; the bound and the shares where there are any, ``determined`` where it is false."""
+        """Value, std, unit; bound, shares and interval where there are any, ``determined`` where it is false."""
         data: dict[str, Any] = {"value": self.value, "std": self.std, "unit": self.unit}
         bound = {} if self.bound is None else {"bound": self.bound}
         if self.shares and self.std is not None:
             data["shares"] = dict(self.shares)
+        if self.interval is not None and self.std is not None:
+            data["interval"] = list(self.interval)
         return data | bound | ({} if self.determined else {"determined": False})
 
 

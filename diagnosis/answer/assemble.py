@@ -12,8 +12,8 @@ import numpy as np
 
 from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.cautions import cautions
-from diagnosis.answer.coefficients import coefficients, rival_fits
-from diagnosis.answer.held_out import HeldOut, predict_held_out
+from diagnosis.answer.coefficients import before_the_causes, coefficients, possible_answers
+from diagnosis.answer.held_out import predict_held_out
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.own_units import own_estimate
 from diagnosis.answer.pulls import coefficient_move
@@ -37,6 +37,7 @@ from diagnosis.result import (
     Where,
 )
 from diagnosis.study import Study
+from tunnel_sim.effects import Effect
 
 _CUT_RECORDS = (
     "The nominal model misses the motion grossly, so each record is used only from its second passage through the "
@@ -47,6 +48,10 @@ _RESTED = (
     "The body is at rest at the end of {}. The fits leave that part out: the place where friction stops a body "
     "says little about its motion."
 )
+_AS_IDENTIFIED = (
+    "With no cause these are the values of identify, whose standard deviations allow neither for the rounding of "
+    "the stated air density nor for the spectrum of the noise."
+)
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
 
@@ -56,6 +61,7 @@ def assemble(
     maps: Maps,
     left_out: Sequence[str] = (),
     patched: PatchedModel | None = None,
+    kinds: Sequence[type[Effect]] = (),
 ) -> Diagnosis:
     """Compose the answer.
 
@@ -64,6 +70,7 @@ def assemble(
         maps: data of the figures.
         left_out: sentences on runs that were left out.
         patched: the model given with the causes written into it; the share closed is then its own.
+        kinds: the effects that may act unnamed beside those of an answer.
     """
     base = excess_base(study)
     chosen = study.chosen
@@ -82,7 +89,9 @@ def assemble(
         on = f"{patched.closure.on}, simulated with the patched model"
         gap = replace(gap, closed=patched.closure.native_closed, closed_on=on)
     seconds["waterfall"] = time.perf_counter() - begun
-    found = _coefficients(study, chosen, nominal_out, chosen_out)
+    begun = time.perf_counter()
+    found = _coefficients(study, kinds)
+    seconds["coefficients"] = time.perf_counter() - begun
     left = rest(study, *_in_own_units(study, found.after, chosen), steps.steps[-1].excess)
     return Diagnosis(
         campaign=study.campaign.name,
@@ -144,13 +153,16 @@ def _in_own_units(
     }
 
 
-def _coefficients(study: Study, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Coefficients:
+def _coefficients(study: Study, kinds: Sequence[type[Effect]]) -> Coefficients:
     campaign = study.campaign
-    before = coefficients(study.nominal, nominal_out, campaign, [(chosen, 1.0)] if study.causes else ())
-    rivals = rival_fits(study.weighed, study.hypotheses, chosen)
-    textbook = next((h.textbook for h in study.hypotheses if h.fit is chosen), None)
-    after = coefficients(chosen, chosen_out, campaign, rivals, textbook)
-    notes = (cnr_note(study.causes), size_note(campaign.rig, windy="cn_beta" in before))
+    after = coefficients(possible_answers(study, kinds), campaign)
+    before = before_the_causes(study.nominal, after) if study.causes else after
+    windy = "cn_beta" in before
+    notes = (
+        cnr_note(study.causes),
+        _AS_IDENTIFIED if windy and not study.causes else "",
+        size_note(campaign.rig, windy=windy),
+    )
     return Coefficients(
         before=sized_coefficients(before, campaign.rig),
         after=sized_coefficients(after, campaign.rig),

@@ -1,85 +1,213 @@
-"""Coefficients before and after the causes are added, with intervals that hold under model error."""
+"""Coefficients before and after the causes are added: averages over the answers, with their intervals."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from decimal import Decimal
 
 import numpy as np
+from scipy.special import ndtri
 
 from diagnosis.answer.determined import meant_coefficient
-from diagnosis.answer.held_out import HeldOut
+from diagnosis.answer.mixture import Mixture
 from diagnosis.answer.pulls import coefficient_move
+from diagnosis.answer.small_causes import Beside, alone, beside
 from diagnosis.answer.small_swings import (
     JOINT_UNITS,
-    coefficient_gradient,
     coefficient_names,
     coefficient_value,
     stiffness_names,
 )
-from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.hypothesis import Hypothesis
+from diagnosis.answer.wind_on_runs import wind_on_runs
+from diagnosis.attribution.decide import UNKNOWN
 from diagnosis.fitting.least_squares import Fit
-from diagnosis.fitting.spectra import linear_coefficients
-from diagnosis.policy import COLOURED_EXCESS, EVEN_SHARE, FORM_CHANGE_STD
+from diagnosis.policy import EVEN_SHARE, FORM_CHANGE_STD, RIVAL_PROBABILITY
 from diagnosis.result import ParameterEstimate
-from identification.statistics.widening import scatter_of_runs
-from tunnel_sim.effects.fitting import WindOnRun
+from diagnosis.study import Study
+from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 
 _UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1", **JOINT_UNITS}
+_SOURCES = ("noise", "misfit", "small causes", "air density", "unseen form", "freed form", "rivals")
+_INTERVAL = 0.95
+_SKEWED = 0.1  # standard deviations by which an end of the interval differs from value ± 1.96 std
 
 
-def coefficients(
-    fit: Fit,
-    held_out: HeldOut,
-    campaign: Campaign,
-    rivals: Sequence[tuple[Fit, float]] = (),
-    textbook: Fit | None = None,
-) -> dict[str, ParameterEstimate]:
-    """The coefficients of a fit.
+@dataclass(frozen=True, eq=False)
+class Possible:
+    """An answer with its fit.
 
     Args:
-        fit: nominal, or with causes added.
-        held_out: the same without groups of runs.
-        campaign: gives the digits to which the air density is stated.
-        rivals: other fits and their probabilities.
+        probability: of the answer, a fraction; those of all answers need not sum to 1.
+        fit: of its effects; of the nominal model where it names none.
         textbook: the same effects in textbook form, where the fit freed their forms.
+        small: the small causes that may act beside them; None: neither these nor a misfit are considered.
+    """
+
+    probability: float
+    fit: Fit
+    textbook: Fit | None = None
+    small: Beside | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """The answers that coefficients are averaged over.
+
+    Args:
+        possible: those with a fit, the chosen one first.
+        unknown: probability (a fraction) of ``unknown`` where an answer with names is the chosen one.
+        nominal: the fit of the nominal model.
+    """
+
+    possible: tuple[Possible, ...]
+    unknown: float
+    nominal: Fit
+
+
+def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
+    """The answers of a study, without the part of `EVEN_SHARE` in their probabilities.
+
+    That stands for causes not considered, not for an answer that the runs refute.
+
+    Args:
+        kinds: the effects that may act unnamed. They are considered beside the chosen answer and every answer of
+            `RIVAL_PROBABILITY`, and only where there is a gap.
+    """
+    chosen = study.chosen
+    even = EVEN_SHARE / max(len(study.weighed), 1)
+    textbook = {id(h.fit): h.textbook for h in study.hypotheses}
+    others, own, unknown = [], 1.0, 0.0
+    for place, answer in enumerate(study.weighed):
+        probability, fit = max(answer.probability - even, 0.0), _fit_of(study, answer.effects)
+        if place == 0:
+            own = probability
+        elif answer.effects == UNKNOWN:
+            unknown = probability
+        elif fit is not None and probability > 0.0:
+            small = beside(fit, kinds) if probability >= RIVAL_PROBABILITY else None
+            others.append(Possible(probability, fit, textbook.get(id(fit)), small))
+    small = beside(chosen, kinds) if study.causes else None
+    first = Possible(own, chosen, textbook.get(id(chosen)), small)
+    return Answers((first, *others), unknown, study.nominal)
+
+
+def _fit_of(study: Study, effects: tuple[str, ...]) -> Fit | None:
+    """The fit of an answer; the nominal one for a random moment alone."""
+    random, hypothesis = study.random_answer(effects), study.hypothesis(effects)
+    if random is None:
+        return None if hypothesis is None else hypothesis.fit
+    return study.nominal if random.beside is None else random.beside.fit
+
+
+def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEstimate]:
+    """The coefficients averaged over the answers.
+
+    Args:
+        campaign: gives the digits to which the air density is stated.
 
     Returns:
-        By the names of `coefficient_names`; ``omega_n`` and ``zeta`` are those of small swings. The variance is
-        that of the fit scaled by its excess, or where the residuals are coloured the greatest of that, the
-        delete-a-group jackknife (Kott, J. Off. Stat. 17 (2001) 521), the scatter of the runs and half the
-        difference between two halves of the data (`diagnosis.answer.pulls`); plus the rounding of the air density,
-        plus the part of a cause's form that no free decay shows, plus half the change made by freeing the forms
-        (another family of forms may change as much), plus the spread over rivals. No standard deviation is given
-        at a bound and where the runs do not determine the coefficient.
+        By the names of `coefficient_names`; ``omega_n`` and ``zeta`` are those of small swings. The value is the
+        mean over the answers and over the sets of small causes beside them (`diagnosis.answer.small_causes`), with
+        their probabilities. The variance is that within and that between them (the law of total variance). Within,
+        it is the fit's own, what is left (the scatter of the runs where it is beyond chance, or half the difference
+        between two halves of the data, `diagnosis.answer.pulls`, if that is greater), the rounding of the air
+        density, the part of the causes' forms that no free decay shows, and half the change made by freeing the
+        forms: another family of forms may change as much. By the same rule ``unknown`` adds half the change from
+        the nominal model. The central interval of 0.95 is given where it is not that of a normal distribution. No
+        standard deviation is given at a bound and where the runs do not determine the coefficient.
     """
-    result = {}
-    for name in coefficient_names(fit.problem):
-        value, std = _value(fit, held_out, name)
-        if value is None:
+    fit = answers.possible[0].fit
+    return {name: _averaged(answers, campaign, name) for name in coefficient_names(fit.problem)}
+
+
+def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
+    """The coefficients of the nominal model.
+
+    Args:
+        after: the averages over the answers.
+
+    Returns:
+        The variance adds the squared difference from the average to the variance of that.
+    """
+    found = {}
+    for place, name in enumerate(coefficient_names(nominal.problem)):
+        value, given = _value(nominal, name), after.get(name)
+        if value is None or given is None:
             continue
-        spread = sum(
-            p * (other - value) ** 2 for f, p in rivals if (other := _value_only(f, name)) is not None
-        )
-        rounding = abs(value) * _density_rounding(campaign) if name.startswith("cn_") else 0.0
-        unseen = _unseen_form(fit, name) if name.startswith("cn_") else 0.0
-        unfreed = None if textbook is None else _value_only(textbook, name)
-        moved = 0.0 if unfreed is None else FORM_CHANGE_STD * (value - unfreed)
-        noise = min(_formal_std(fit, name), std)
-        parts = {
-            "noise": noise**2,
-            "misfit": (std - noise) * (std + noise),
-            "air density": rounding**2,
-            "unseen form": unseen**2,
-            "freed form": moved**2,
-            "rivals": spread,
-        }
-        variance = std**2 + rounding**2 + unseen**2 + moved**2 + spread
-        result[name] = _estimate(fit, name, value, math.sqrt(variance), parts)
-    return result
+        parts = {"causes": (value - given.value) ** 2} if given.value != value else {}
+        if given.std is None:
+            parts["noise"] = float(alone(nominal).noise[0, place])
+        else:
+            parts |= {source: share * given.std**2 for source, share in given.shares.items()}
+        found[name] = _estimate(nominal, name, value, math.sqrt(sum(parts.values())), parts)
+    return found
+
+
+def _averaged(answers: Answers, campaign: Campaign, name: str) -> ParameterEstimate:
+    """One coefficient averaged over the answers."""
+    each = [found for one in answers.possible if (found := _of_answer(one, campaign, name)) is not None]
+    first, parts = each[0][1], each[0][2]
+    change = FORM_CHANGE_STD * (first.mean - (_value(answers.nominal, name) or first.mean))
+    if answers.unknown > 0.0:
+        doubted = Mixture(first.weights, first.means, first.variances + change**2)
+        each.append((answers.unknown, doubted, {**parts, "rivals": change**2}))
+    probability = np.array([p for p, _, _ in each])
+    probability /= probability.sum()
+    whole = Mixture(
+        np.concatenate([p * m.weights for p, (_, m, _) in zip(probability, each, strict=True)]),
+        np.concatenate([m.means for _, m, _ in each]),
+        np.concatenate([m.variances for _, m, _ in each]),
+    )
+    sources = {source for _, _, found in each for source in found}
+    shares = {
+        s: float(probability @ [found.get(s, 0.0) for _, _, found in each]) for s in _SOURCES if s in sources
+    }
+    shares["rivals"] = shares.get("rivals", 0.0) + float(
+        probability @ [(m.mean - whole.mean) ** 2 for _, m, _ in each]
+    )
+    estimate = _estimate(answers.possible[0].fit, name, whole.mean, whole.std, shares)
+    return estimate if estimate.std is None else replace(estimate, interval=_interval(whole))
+
+
+def _interval(whole: Mixture) -> tuple[float, float] | None:
+    """The central interval; None where it is that of a normal distribution."""
+    tail = 0.5 * (1.0 - _INTERVAL)
+    low, high = whole.quantile(tail), whole.quantile(1.0 - tail)
+    reach = float(ndtri(1.0 - tail)) * whole.std
+    away = max(abs(low - whole.mean + reach), abs(high - whole.mean - reach))
+    return (low, high) if away > _SKEWED * whole.std else None
+
+
+def _of_answer(
+    answer: Possible, campaign: Campaign, name: str
+) -> tuple[float, Mixture, dict[str, float]] | None:
+    """Probability, distribution and variances by source of a coefficient, if an answer is right."""
+    fit, value = answer.fit, _value(answer.fit, name)
+    if value is None:
+        return None
+    small = alone(fit) if answer.small is None else answer.small
+    place = coefficient_names(fit.problem).index(name)
+    left = float(small.scatter[place])
+    if answer.small is not None:
+        left = max(left, coefficient_move(replace(fit, residuals=small.left), name))
+    windy = name.startswith("cn_")
+    unfreed = None if answer.textbook is None else _value(answer.textbook, name)
+    common = {
+        "misfit": left**2,
+        "air density": (value * _density_rounding(campaign)) ** 2 if windy else 0.0,
+        "unseen form": _unseen_form(fit, name) ** 2 if windy else 0.0,
+        "freed form": 0.0 if unfreed is None else (FORM_CHANGE_STD * (value - unfreed)) ** 2,
+    }
+    own, forms = small.noise[:, place], small.forms[:, place]
+    found = Mixture(small.weights, value + small.moves[:, place], own + forms + sum(common.values()))
+    within = {
+        "noise": float(small.weights @ own),
+        "small causes": float(small.weights @ forms) + found.between,
+    }
+    return answer.probability, found, within | common
 
 
 def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str, float]) -> ParameterEstimate:
@@ -95,94 +223,14 @@ def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str,
 
 def _unseen_form(fit: Fit, name: str) -> float:
     """Standard deviation of Cnβ or Cnr, 1/rad, from the part of the causes' forms that no free decay shows."""
-    runs = _wind_on_runs(fit)
+    runs = wind_on_runs(fit)
     place = 0 if name == "cn_beta" else 1
     effects = fit.problem.effects_at(fit.point.common)
     return math.hypot(*(effect.unseen_form(fit.value("cn_beta"), runs)[place] for effect in effects))
 
 
-def _wind_on_runs(fit: Fit) -> list[WindOnRun]:
-    data = fit.problem.data
-    found = []
-    for i, run in enumerate(data.runs):
-        if not run.wind_on:
-            continue
-        inertia, _, stiffness = linear_coefficients(fit, i)
-        spring = fit.problem.stated(fit.point.common, fit.point.release[i], run).spring_stiffness
-        if stiffness <= 0.0 or spring <= 0.0:
-            continue
-        load = 0.5 * run.air_density * run.wind_speed * data.frontal_area * data.reference_length**2
-        omega, still = math.sqrt(stiffness / inertia), math.sqrt(spring / inertia)
-        pressure = load * run.wind_speed / data.reference_length
-        found.append(WindOnRun(spring, omega, still, pressure, load))
-    return found
-
-
-def rival_fits(
-    weighed: Sequence[Weighed], hypotheses: Sequence[Hypothesis], chosen: Fit
-) -> list[tuple[Fit, float]]:
-    """Fits of the answers that were not chosen, with their probabilities.
-
-    Args:
-        weighed: answers.
-        hypotheses: their fits.
-        chosen: the fit of the answer.
-
-    Returns:
-        Fit and probability of each fitted rival, without its part of `EVEN_SHARE`: that stands for causes not
-        considered, not for a rival that the runs refute.
-    """
-    found = []
-    even = EVEN_SHARE / max(len(weighed), 1)
-    for answer in weighed:
-        for hypothesis in hypotheses:
-            if hypothesis.names == answer.effects and hypothesis.fit is not chosen:
-                found.append((hypothesis.fit, max(answer.probability - even, 0.0)))
-    return found
-
-
-def _value(fit: Fit, held_out: HeldOut, name: str) -> tuple[float | None, float]:
-    value = _value_only(fit, name)
-    if value is None:
-        return None, 0.0
-    scale = math.sqrt(1.0 + max(fit.excess, 0.0))
-    std = _formal_std(fit, name) * scale
-    if fit.excess > COLOURED_EXCESS and len(held_out.common) > 1:
-        values = [coefficient_value(held_out.names, row, name) for row in held_out.common]
-        count = len(values)
-        jackknife = math.sqrt((count - 1.0) / count * sum((v - value) ** 2 for v in values if v is not None))
-        std = max(std, jackknife)
-    if fit.excess > COLOURED_EXCESS:
-        std = max(std, coefficient_move(fit, name))
-    if fit.excess > COLOURED_EXCESS and name in fit.problem.names:
-        std = max(std, _scatter_of_runs(fit, name))
-    return value, std
-
-
-def _scatter_of_runs(fit: Fit, name: str) -> float:
-    """Standard deviation of a common parameter from the scatter of the runs."""
-    count = len(fit.problem.names)
-    information, scores = np.zeros((count, count)), []
-    for (common, release), residual in zip(fit.jacobian, fit.residuals, strict=True):
-        left = common - release @ np.linalg.lstsq(release, common, rcond=1e-10)[0]
-        information += left.T @ left
-        scores.append(left.T @ residual)
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12, hermitian=True)
-    influences = np.array(scores) / scale @ inverse / scale
-    place = fit.problem.names.index(name)
-    speaking = sum(run.wind_on or not name.startswith("cn_") for run in fit.problem.data.runs)
-    return float(scatter_of_runs(influences[:, place : place + 1], np.array([speaking]))[0])
-
-
-def _value_only(fit: Fit, name: str) -> float | None:
+def _value(fit: Fit, name: str) -> float | None:
     return coefficient_value(fit.problem.names, fit.point.common, name)
-
-
-def _formal_std(fit: Fit, name: str) -> float:
-    """Standard deviation from the fit's covariance, to first order."""
-    gradient = coefficient_gradient(fit.problem.names, fit.point.common, name)
-    return math.sqrt(max(float(gradient @ fit.covariance @ gradient), 0.0))
 
 
 def _density_rounding(campaign: Campaign) -> float:

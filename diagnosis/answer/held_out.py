@@ -30,14 +30,10 @@ class HeldOut:
         residuals: by run id: reading minus prediction in noise standard deviations, only the run's own
             parameters refitted.
         points: by run id: the common parameters found without it, and its own.
-        common: the common parameters found without each fold, shape (folds, common).
-        names: of the common parameters.
     """
 
     residuals: dict[str, Array]
     points: dict[str, tuple[Array, Array]]
-    common: Array
-    names: tuple[str, ...]
 
     @property
     def excess(self) -> dict[str, float]:
@@ -91,7 +87,6 @@ def predict_held_out(whole: Fit) -> HeldOut:
     data = whole.problem.data
     residuals: dict[str, Array] = {}
     points: dict[str, tuple[Array, Array]] = {}
-    found = []
     ids = [run.id for run in data.runs]
     for group in folds(data):
         out = [i for i, run_id in enumerate(ids) if run_id in group]
@@ -105,12 +100,10 @@ def predict_held_out(whole: Fit) -> HeldOut:
             )
         except (FitError, np.linalg.LinAlgError):
             continue
-        found.append(common)
         for k, i in enumerate(out):
             residuals[ids[i]] = left[k]
             points[ids[i]] = (released.common, released.release[k])
-    common = np.array(found) if found else np.zeros((0, len(whole.problem.names)))
-    return HeldOut(residuals, points, common, whole.problem.names)
+    return HeldOut(residuals, points)
 
 
 def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple[Point, list[Array]]:

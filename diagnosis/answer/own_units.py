@@ -83,11 +83,16 @@ def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> Paramet
     Returns:
         The same quantity, its value and standard deviation changed alike.
     """
-    std = estimate.std
+
+    def own(value: float) -> float:
+        return similarity.own(value, estimate.unit)
+
+    std, ends = estimate.std, estimate.interval
     return replace(
         estimate,
-        value=similarity.own(estimate.value, estimate.unit),
-        std=None if std is None else similarity.own(std, estimate.unit),
+        value=own(estimate.value),
+        std=None if std is None else own(std),
+        interval=None if ends is None else (own(ends[0]), own(ends[1])),
     )
 
 

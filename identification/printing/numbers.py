@@ -189,17 +189,31 @@ def estimated(given: Mapping[str, Any], mark: str = "") -> str:
     """An estimate of a document.
 
     Args:
-        given: value, std and unit; ``bound`` where it stopped at the end of its range, and ``determined`` where it
-            is false. A std of zero means that the value was given, not fitted.
+        given: value, std and unit; ``bound`` where it stopped at the end of its range, ``determined`` where it is
+            false, and ``interval`` where that is not value ± 1.96 std. A std of zero means that the value was
+            given, not fitted.
         mark: of the unit, where it is to be shown.
 
     Returns:
-        Text such as ``0.4951 ± 0.0012`` or ``not determined by these runs``.
+        Text such as ``0.4951 ± 0.0012``, with an interval ``0.4951 ± 0.0012 (0.4939 to 0.4986)``, or
+        ``not determined by these runs``.
     """
     if not given.get("determined", True):
         return UNDETERMINED
     value = with_std(given["value"], given["std"]) if given["std"] else significant(given["value"])
-    return f"{value} {mark}".rstrip() + at_bound(given)
+    return f"{value} {mark}".rstrip() + at_bound(given) + _ends(given)
+
+
+def _ends(given: Mapping[str, Any]) -> str:
+    """The interval with as many digits as the value; empty where there is none."""
+    if not given.get("interval") or not given["std"]:
+        return ""
+    texts = [with_std(end, given["std"]) for end in given["interval"]]
+    powers = [text.rpartition(")")[2] if text.startswith("(") else "" for text in texts]
+    low, high = (
+        text.partition(" ± ")[0].removeprefix("(") + power for text, power in zip(texts, powers, strict=True)
+    )
+    return f" ({low} to {high})"
 
 
 UNDETERMINED = "not determined by these runs"

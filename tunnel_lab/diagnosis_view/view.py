@@ -216,7 +216,7 @@ def _interval95(values: Document) -> str:
     reach = 1.96 * values["std"]
     width = with_std(values["value"], reach).partition("± ")[2]
     places = len(width.partition(".")[2])
-    ends = (values["value"] - reach, values["value"] + reach)
+    ends = values.get("interval") or (values["value"] - reach, values["value"] + reach)
     texts = [
         significant(end) if not width.replace(".", "").isdigit() else f"{end:.{places}f}" for end in ends
     ]

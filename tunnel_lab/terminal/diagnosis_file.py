@@ -27,6 +27,9 @@ class _Estimate(Part):
     unit: OneLine
     bound: OneLine | None = None
     determined: bool = True
+    interval: tuple[float, float] | None = Field(
+        default=None, description="ends of the central interval of 0.95, where it is not value ± 1.96 std"
+    )
 
 
 class _Gap(Part):

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.answer.coefficients import _wind_on_runs, coefficients
+from diagnosis.answer.coefficients import Answers, Possible, coefficients
 from diagnosis.answer.determined import meant_coefficient, meant_parameter
-from diagnosis.answer.held_out import predict_held_out
 from diagnosis.answer.pulls import coefficient_move
 from diagnosis.answer.rest import rest
 from diagnosis.answer.small_swings import coefficient_gradient, coefficient_value
+from diagnosis.answer.wind_on_runs import wind_on_runs
 from diagnosis.attribution.decide import Weighed
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Point, Problem
@@ -179,7 +179,7 @@ def test_the_limit_is_the_stiffness_or_the_critical_damping_in_the_fastest_wind(
 
 def test_causes_are_told_of_the_wind_on_runs_in_si(base):
     """1 %: the campaign has a gap, which moves the inertia a little."""
-    found = _wind_on_runs(base)
+    found = wind_on_runs(base)
     for run, (spring, speed) in zip(found, WINDY, strict=True):
         moment, rate = loads(speed)
         assert (run.per_cn_beta, run.per_cn_r) == pytest.approx((moment, rate))
@@ -220,11 +220,15 @@ def test_small_swings_have_the_stiffness_of_spring_and_gravity(name):
         assert gradient[i] == pytest.approx((up - down) / 2e-6, abs=1e-8)
 
 
+def only(fitted, data):
+    return coefficients(Answers((Possible(1.0, fitted),), 0.0, fitted), data)
+
+
 def test_a_spring_at_its_bound_does_not_matter_where_gravity_holds_the_body(data):
     runs = tuple(replace(run, spring_stiffness=None) for run in data.runs[:1])
     base = nominal(replace(data, runs=runs))
     least = Point(np.array([0.0, 0.0, *base.point.common[2:]]), base.point.release)
-    alone = coefficients(replace(base, point=least), predict_held_out(base), data)
+    alone = only(replace(base, point=least), data)
     assert [alone[name].bound for name in ("omega_n", "zeta")] == ["lower", "lower"]
     assert alone["zeta"].std is None
     problem = Problem(base.problem.data, (effect_class("gravity_stiffness"),))
@@ -232,6 +236,6 @@ def test_a_spring_at_its_bound_does_not_matter_where_gravity_holds_the_body(data
     values["gravity_stiffness.stiffness"] = base.value("stiffness")
     common = np.array([values.get(name, 0.0) for name in problem.names])
     held = fit(problem, Point(common, base.point.release), max_iterations=1)
-    found = coefficients(held, predict_held_out(held), data)["omega_n"]
+    found = only(held, data)["omega_n"]
     assert found.bound is None
     assert found.value == pytest.approx(np.sqrt(base.value("stiffness")), rel=0.01)
