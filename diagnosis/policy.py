@@ -116,7 +116,7 @@ CHANCE_STDS = 2.0
 #: Logarithm of the odds that the effects of a set are the causes: a number, and by how much it rises with the
 #: significance of the gap, falls with the logarithm of what is left, and rises with that of the share closed. A
 #: logistic regression on fits with and without the true effects, of simulated campaigns and measured records.
-UNKNOWN_AT, UNKNOWN_GAP, UNKNOWN_LEFT, UNKNOWN_CLOSED = -0.7, 0.2, 1.7, 1.9
+UNKNOWN_AT, UNKNOWN_GAP, UNKNOWN_LEFT, UNKNOWN_CLOSED = -0.3, 0.21, 2.0, 2.0
 #: Stiffness of an unstated spring beside gravity, as a share of both, below which the rig needs no spring. The set
 #: then counts as one with a number less: a spring would have to soften by chance as gravity does. Judgement, made
 #: when three simulated pendulums had been given a cubic spring (0018).

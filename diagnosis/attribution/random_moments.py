@@ -79,7 +79,7 @@ def weigh_random_moments(
     allowed = {kind.random: kind for kind in kinds if kind.random}
     scale = Scale.of(hypotheses, misfit(nominal))
     best = max([Hypothesis((), nominal), *hypotheses], key=scale.weight)
-    if not allowed or not _may_act(best, scale):
+    if not allowed or not _may_act(best, scale, allowed):
         return []
     top = _settled(best, nominal, [kind for kind in kinds if kind.fitted], allowed)
     for seen in _until_steady(top, nominal.problem.data, [kind for kind in kinds if kind.fitted]):
@@ -109,12 +109,20 @@ def _until_steady(top: Hypothesis, data: Data, kinds: Sequence[type[Effect]]) ->
         yield _seen_in(top, data)
 
 
-def _may_act(best: Hypothesis, scale: Scale) -> bool:
-    """Whether a random moment that leaves nothing in the wind would weigh more than the best set alone."""
-    runs = zip(best.fit.problem.data.runs, best.fit.residuals, strict=True)
+def _may_act(best: Hypothesis, scale: Scale, spectra: Collection[str]) -> bool:
+    """Whether a random moment may be what the best set leaves.
+
+    With one that left nothing in the wind the set would weigh more, or what is left is steady noise: a strong random
+    motion misleads the fit of the wind-off runs too.
+    """
+    runs = list(zip(best.fit.problem.data.runs, best.fit.residuals, strict=True))
+    if not any(run.wind_on for run, _ in runs) or scale.greatest(best) <= scale.weight(best):
+        return False
     still = misfit(best.fit, [np.zeros_like(r) if run.wind_on else r for run, r in runs]).excess
-    with_it = log_weight(still, scale.misfit, len(best.effects) + 1, best.further_numbers)
-    return any(run.wind_on for run in best.fit.problem.data.runs) and with_it > scale.weight(best)
+    if log_weight(still, scale.misfit, len(best.effects) + 1, best.further_numbers) > scale.weight(best):
+        return True
+    process = _likeliest(random_moments(best.fit, spectra))
+    return process is not None and is_steady_noise(process)
 
 
 def wind_off_excess(fit: Fit) -> float:
@@ -168,18 +176,20 @@ def _settled(
 
 
 def _with_more_of_the_wind(top: Hypothesis, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
-    """The set, and those with one, two, … more effects of the wind, as long as each is evident in the noise.
+    """The set, and those with one, two, … more effects, as long as one of the wind is evident in the noise.
 
-    A random moment leaves little of a gap in the wind for the shares of effects to be compared there.
+    A random moment leaves little of a gap in the wind for effects to be compared there. Of all effects the one that
+    lowers χ² most is added, so that none of the wind mops up what another leaves.
     """
-    windy = [kind for kind in kinds if kind.condition == "wind_on" and not kind.line]
+    able = [kind for kind in kinds if not kind.line]
+    windy = {kind.name for kind in able if kind.condition == "wind_on"}
     while True:
         yield top
-        larger = sets_with_one_more([top], windy, None)
-        best = min(larger, key=lambda h: h.fit.total, default=top)
-        if top.fit.total - best.fit.total < NEEDLESS_CHI2:
+        larger = sorted(sets_with_one_more([top], able, None), key=lambda h: h.fit.total)
+        evident = [h for h in larger if top.fit.total - h.fit.total > NEEDLESS_CHI2]
+        if len(top.effects) >= MOST_CAUSES or not any(h.effects[-1] in windy for h in evident):
             return
-        top = best
+        top = evident[0]
 
 
 def _sought_again(hypothesis: Hypothesis) -> Hypothesis:

@@ -15,7 +15,7 @@ LEFT = st.tuples(*[st.floats(-50.0, 1e6)] * len(CHANNELS)).map(np.array)
 SETS = st.dictionaries(
     st.sets(st.sampled_from(NAMES), min_size=1, max_size=3).map(lambda s: tuple(sorted(s))), LEFT, max_size=8
 )
-GAP = st.tuples(*[st.floats(0.0, 1e7)] * len(CHANNELS)).map(np.array)
+GAP = st.tuples(*[st.floats(1.0, 1e7)] * len(CHANNELS)).map(np.array)
 
 
 def nominal(excess, motion=1e8):
@@ -37,7 +37,7 @@ def channels(**values):
     return np.array([values.get(name.replace(" ", "_"), 0.0) for name in CHANNELS])
 
 
-@given(SETS, GAP.filter(lambda gap: gap.sum() > 0.0))
+@given(SETS, GAP)
 def test_probabilities_are_probabilities_and_in_order(left, gap):
     found = weigh(fitted(left, gap), nominal(gap))
     assert sum(w.probability for w in found) == pytest.approx(1.0)
@@ -47,7 +47,7 @@ def test_probabilities_are_probabilities_and_in_order(left, gap):
     assert all(w.share >= 0.0 for w in found)
 
 
-@given(SETS.filter(bool), GAP.filter(lambda gap: gap.sum() > 0.0), st.data())
+@given(SETS.filter(bool), GAP, st.data())
 def test_leaving_less_in_a_channel_never_makes_a_set_less_likely_than_another(left, gap, data):
     name = data.draw(st.sampled_from(sorted(left)))
     share = data.draw(st.tuples(*[st.floats(0.0, 1.0)] * len(CHANNELS)).map(np.array))
