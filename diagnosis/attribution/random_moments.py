@@ -76,7 +76,7 @@ def weigh_random_moments(
     """
     allowed = {kind.random: kind for kind in kinds if kind.random}
     best = _best([Hypothesis((), nominal), *hypotheses], nominal)
-    if not allowed or not _may_act(best, nominal):
+    if not allowed or not _may_act(best, nominal, allowed):
         return []
     seen, rows = _settled(best, nominal, [kind for kind in kinds if kind.fitted], allowed)
     process = _likeliest([one for one in random_moments(seen.fit, allowed) if is_steady_noise(one)])
@@ -87,11 +87,20 @@ def weigh_random_moments(
     return [RandomAnswer(kind, process, seen if seen.effects else None, share, rows)]
 
 
-def _may_act(best: Hypothesis, nominal: Fit) -> bool:
-    """Whether a random moment that leaves nothing in the wind would do as much as a further effect has to."""
+def _may_act(best: Hypothesis, nominal: Fit, spectra: Collection[str]) -> bool:
+    """Whether a random moment may be what the best set leaves.
+
+    It would do as much as a further effect has to if it left nothing in the wind, or what is left is steady noise:
+    a strong random motion misleads the fit of the wind-off runs too.
+    """
     floor = form_floor(nominal.gap)
     left, still = (max(excess, 0.0) / nominal.gap for excess in (best.fit.excess, wind_off_excess(best.fit)))
-    return still + floor < PAIR_SHARE * (left + floor)
+    if floor >= PAIR_SHARE * (left + floor):
+        return False
+    if still + floor < PAIR_SHARE * (left + floor):
+        return True
+    process = _likeliest(random_moments(best.fit, spectra))
+    return process is not None and is_steady_noise(process)
 
 
 def wind_off_excess(fit: Fit) -> float:
