@@ -21,6 +21,7 @@ from diagnosis.attribution.process_noise import (
 from diagnosis.attribution.random_moments import weigh_random_moments, wind_off_excess
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.starting_points import starting_points
+from diagnosis.policy import UNKNOWN_SHARE
 from tests.unit.gap_campaigns import (
     CN_BETA,
     CN_R,
@@ -198,10 +199,10 @@ def test_an_effect_of_the_wind_that_is_weak_beside_turbulence_is_found():
     assert answer.beside.fit.value("nonlinear_yaw_moment.coefficient") == pytest.approx(0.6, rel=0.5)
 
 
-def test_sets_are_not_grown_anew_for_a_gap_that_is_in_still_air_too(monkeypatch):
-    monkeypatch.setattr(random_moments, "_settled", None)
+def test_a_random_moment_closes_little_of_a_gap_that_is_in_still_air_too():
     base = nominal(campaign(effect_from("cubic_stiffness", {"coefficient": -0.2})))
-    assert weigh_random_moments(base, [], (*BUFFETING, effect_class("coulomb_friction"))) == []
+    found = weigh_random_moments(base, [], (*BUFFETING, effect_class("coulomb_friction")))
+    assert all(answer.share > UNKNOWN_SHARE for answer in found)
 
 
 def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy, found):
@@ -229,6 +230,21 @@ def test_one_gust_is_no_buffeting():
         ),
     )  # fmt: skip
     assert weigh_random_moments(nominal(struck), [], BOTH) == []
+
+
+def test_turbulence_that_misleads_the_fit_of_still_air_is_tried_where_it_is_steady(monkeypatch, windy):
+    settled = []
+    monkeypatch.setattr(random_moments, "_settled", lambda best, *_: settled.append(best) or (best, ()))
+    runs = windy.problem.data.runs
+    misled = [r if run.wind_on else 30.0 * r for run, r in zip(runs, windy.residuals, strict=True)]
+    fitted = replace(windy, residuals=misled, chi2=np.array([float(r @ r) for r in misled]))
+    weigh_random_moments(fitted, [], BOTH)
+    assert len(settled) == 1
+    drifting = [
+        r * np.linspace(0.2, 1.8, r.size) if run.wind_on else r for run, r in zip(runs, misled, strict=True)
+    ]
+    weigh_random_moments(replace(fitted, residuals=drifting), [], BOTH)
+    assert len(settled) == 1
 
 
 def test_a_gap_in_still_air_is_no_buffeting():
