@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from scipy.linalg import solve_banded
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import RunData
@@ -74,8 +75,6 @@ def _motions(nominal: Fit) -> list[_Motion]:
 
 def _zero_follows_power(motions: list[_Motion]) -> list[list[Array]]:
     """A zero that follows the squared angle with a lag, starting from zero or from a settled value."""
-    from scipy.signal import lfilter  # only here: slow to load
-
     trials = []
     for time, settled in product(_TIMES, (False, True)):
         columns = []
@@ -84,9 +83,20 @@ def _zero_follows_power(motions: list[_Motion]) -> list[list[Array]]:
             keep = np.exp(-motion.run.interval / time)
             # at rest before the release, or held at the release angle for long
             start = keep * square[0] if settled else 0.0
-            columns.append(motion.run.scaled(lfilter([1.0 - keep], [1.0, -keep], square, zi=[start])[0]))
+            columns.append(motion.run.scaled(_lagged(square, keep, start)))
         trials.append(columns)
     return trials
+
+
+def _lagged(values: Array, keep: float, start: float) -> Array:
+    """The recursion y = keep · (y before) + (1 − keep) · value, its first ``keep · (y before)`` given as ``start``.
+
+    As a system of equations: `scipy.signal` takes a second to load.
+    """
+    right = (1.0 - keep) * values
+    right[0] += start
+    bands = np.stack([np.ones(values.size), np.full(values.size, -keep)])
+    return np.asarray(solve_banded((1, 0), bands, right, check_finite=False), np.float64)
 
 
 _OUTSIDERS: tuple[tuple[str, Callable[[list[_Motion]], list[list[Array]]]], ...] = (
