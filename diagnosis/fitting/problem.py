@@ -16,7 +16,6 @@ from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
-from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.motion import Motion
 from tunnel_sim.physics.release import released_by_spring_end
 from tunnel_sim.physics.rod_modes import slow_motion
@@ -27,6 +26,7 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
 _THREADS = 2
+_TOGETHER = 4  # motions that the integrator takes side by side
 _SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
 _POOL = ThreadPoolExecutor(_THREADS)
 #: Parameters of the law that do nothing without wind, and fields of a run that point to samples.
@@ -235,7 +235,8 @@ class Problem:
             for r, job in self._jobs(point, first):
                 alike.setdefault(job.motion, []).append((i, r, job))
         motions = list(alike.values())
-        half = max(1, (len(motions) + _THREADS - 1) // _THREADS)
+        groups = -(-len(motions) // _TOGETHER)
+        half = max(1, -(-groups // _THREADS)) * _TOGETHER
         parts = [
             [[job for *_, job in motion] for motion in motions[i : i + half]]
             for i in range(0, len(motions), half)
@@ -298,7 +299,7 @@ class _Job:
             law |= dict.fromkeys(_AIR, 0.0)
         self.steps = substeps, stride
         self.row["step"], self.row["steps"], self.row["stride"] = step / stride, substeps, stride
-        self.law = parameter_vector(law)
+        self.law = np.array(list(law.values()), np.float64)  # which is in the law's order
 
     @property
     def motion(self) -> object:

@@ -339,4 +339,4 @@ def with_law(run: RunSettings, **values: float) -> RunSettings:
         run: the run's physics.
         **values: parameters of the law by name.
     """
-    return dataclasses.replace(run, parameters={**run.parameters, **values})
+    return run.with_parameters(values)

@@ -61,8 +61,8 @@ class DroppedSamples(Effect):
             return time_s
         instants = self._instants(drawn) * stated.duration
         interval = time_s[1] - time_s[0]
-        after = np.clip((time_s[:, None] - instants) / interval + 0.5, 0.0, 1.0)
-        return np.asarray(time_s + self.lost_time * after.mean(axis=1), np.float64)
+        after = sum(np.clip((time_s - instant) / interval + 0.5, 0.0, 1.0) for instant in instants)
+        return np.asarray(time_s + self.lost_time * (after / instants.size), np.float64)
 
     def _instants(self, drawn: Drawn) -> Array:
         """Shares of the run, shape (n,)."""

@@ -18,6 +18,8 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
+_NONE: Array = np.zeros(0)
+
 
 def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, Array, int]:
     """Integrate runs of equal length.
@@ -78,30 +80,39 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
         Array of shape (1,) and `run_dtype`, at the release (see ``Model.release_state``), and the arrays it
         points to, which the caller must keep alive.
     """
-    run = np.zeros(1, dtype=run_dtype())
     wind = settings.series.get("wind_speed")
     forcing = settings.series.get("forcing")
     values = np.array(wind.values if wind is not None else [settings.wind_speed], dtype=np.float64)
-    imposed = np.array(forcing.values if forcing is not None else [], dtype=np.float64)
-    run["wind"], run["wind_count"] = values.ctypes.data, values.size
-    run["wind_interval"] = wind.interval if wind is not None else 0.0
-    run["forcing"], run["forcing_count"] = imposed.ctypes.data, imposed.size
-    run["forcing_interval"] = forcing.interval if forcing is not None else 0.0
-    program = np.array(settings.program, dtype=np.float64)
-    run["program"], run["program_count"] = program.ctypes.data, program.size
-    run["angle"], run["rate"], run["lagged"] = (
-        settings.release_angle,
-        settings.release_rate,
-        settings.release_angle,
-    )
-    run["step"], run["steps"] = settings.timestep, 1
+    imposed = _NONE if forcing is None else np.array(forcing.values, dtype=np.float64)
+    program = np.array(settings.program, dtype=np.float64) if settings.program else _NONE
+    fields = {
+        "wind": values.ctypes.data,
+        "wind_count": values.size,
+        "wind_interval": wind.interval if wind is not None else 0.0,
+        "forcing": imposed.ctypes.data,
+        "forcing_count": imposed.size,
+        "forcing_interval": forcing.interval if forcing is not None else 0.0,
+        "program": program.ctypes.data,
+        "program_count": program.size,
+        "angle": settings.release_angle,
+        "rate": settings.release_rate,
+        "lagged": settings.release_angle,
+        "step": settings.timestep,
+        "steps": 1,
+    }
     if settings.rod_twist is not None:
         twist, end = settings.rod_twist, spring_end_angle(settings)
-        run["angle"], run["twist"] = end, settings.release_angle - end
-        run["twist_stiffness"] = 1.0 / twist.compliance
-        run["twist_damping"] = twist.damping(settings.yaw_inertia)
-        run["inertia_share"] = twist.inertia_share
-    return run, (values, imposed, program)
+        fields |= {
+            "angle": end,
+            "twist": settings.release_angle - end,
+            "twist_stiffness": 1.0 / twist.compliance,
+            "twist_damping": twist.damping(settings.yaw_inertia),
+            "inertia_share": twist.inertia_share,
+        }
+    names = run_dtype().names
+    assert names is not None
+    row = tuple(fields.get(name, 0) for name in names)  # in one go: setting fields one by one is slow
+    return np.array([row], dtype=run_dtype()), (values, imposed, program)
 
 
 def backlash(angle: Array, half_width: float, start: float) -> Array:

@@ -31,6 +31,8 @@ def released_by_spring_end(run: RunSettings) -> RunSettings:
     Returns:
         The same run, its release angle that of the body.
     """
+    if run.rod_twist is None:
+        return run
     return dataclasses.replace(run, release_angle=run.release_angle * _body_per_end(run))
 
 

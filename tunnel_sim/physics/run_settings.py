@@ -184,6 +184,22 @@ class RunSettings:
         add = (float(operation_names().index("add")),) if self.program else ()
         return replace(self, program=(*self.program, *program, *add))
 
+    def with_parameters(self, values: Mapping[str, float]) -> RunSettings:
+        """A copy with parameters of the moment law added or replaced.
+
+        Args:
+            values: by name.
+
+        Raises:
+            TunnelError: when a name is unknown or belongs to a field.
+        """
+        parameters = {**self.parameters, **values}
+        if not values.keys() <= _further():
+            return replace(self, parameters=parameters)  # which says what is wrong
+        copy = object.__new__(RunSettings)  # its other fields were checked
+        copy.__dict__.update(self.__dict__, parameters=parameters)
+        return copy
+
     def layout(self) -> tuple[object, ...]:
         """What runs must have in common to share one compiled model.
 
