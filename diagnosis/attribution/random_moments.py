@@ -112,8 +112,8 @@ def _until_steady(top: Hypothesis, data: Data, kinds: Sequence[type[Effect]]) ->
 def _may_act(best: Hypothesis, scale: Scale, spectra: Collection[str]) -> bool:
     """Whether a random moment may be what the best set leaves.
 
-    With one that left nothing in the wind the set would weigh more, or what is left is steady noise: a strong random
-    motion misleads the fit of the wind-off runs too.
+    With one that left nothing in the wind the set would weigh more, or what is left is steady noise: a strong
+    random motion misleads the fit of the wind-off runs too.
     """
     runs = list(zip(best.fit.problem.data.runs, best.fit.residuals, strict=True))
     if not any(run.wind_on for run, _ in runs) or scale.greatest(best) <= scale.weight(best):
