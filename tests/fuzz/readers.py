@@ -164,8 +164,7 @@ def spring_table(folder: Path, rng: Rng) -> None:
     """A table of springs changed, and fitted and shown where it is accepted."""
     import typer
 
-    from tunnel_lab.commands.springs import show
-    from tunnel_lab.terminal.spring_table import read_spring_table
+    from tunnel_lab.commands.springs import read_spring_table, show
 
     table = read_spring_table(_written(folder / "springs.csv", changed_csv(seeds.springs_csv(), rng), rng))
     try:
@@ -176,7 +175,7 @@ def spring_table(folder: Path, rng: Rng) -> None:
 
 def effect_option(_folder: Path, rng: Rng) -> None:
     """The value of ``--effect`` changed, and the effect made."""
-    from tunnel_lab.terminal.effect_option import parse_effect
+    from tunnel_lab.terminal.inputs import parse_effect
     from tunnel_sim.effects import effect_from
 
     setting = parse_effect(changed_line(seeds.EFFECT, rng))
@@ -252,7 +251,7 @@ def estimate(_folder: Path, rng: Rng) -> None:
 def blind_answers(folder: Path, rng: Rng) -> None:
     """Truth, answer, key or seal of a blind set changed; the hashes mostly agree."""
     from diagnosis.blind import score_set
-    from tunnel_lab.diagnosis_view import blind_page
+    from tunnel_lab.report import blind
 
     changed = ("truth", "answer", "seal")[rng.choice(3, p=(0.4, 0.4, 0.2))]
     (folder / "c1").mkdir()
@@ -266,7 +265,7 @@ def blind_answers(folder: Path, rng: Rng) -> None:
     _answer(folder, changed, rng)
     found = score_set(folder)
     found.to_json_dict()
-    blind_page.markdown(found, "set")
+    blind.markdown(found, "set")
 
 
 def _digest(content: bytes) -> str:

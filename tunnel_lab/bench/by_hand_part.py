@@ -92,7 +92,7 @@ class ByHandPart:
 
 def show_closure(found: Closure) -> None:
     """The closure with causes chosen by hand."""
-    from tunnel_lab.diagnosis_view.view import estimate, excess, percent
+    from tunnel_lab.report.view import estimate, excess, percent
 
     with ui.element("div").classes("facts"):
         for value, label in (

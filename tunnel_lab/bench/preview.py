@@ -171,7 +171,7 @@ def points(time: Array, reading: Array) -> tuple[list[float], list[float | None]
     Returns:
         Times and readings, few enough to draw; None within a gap.
     """
-    from tunnel_lab.plotting.import_figure import thinned
+    from tunnel_lab.plotting.runs import thinned
 
     when, values = thinned(time, reading)
     return when.tolist(), [None if isnan(value) else value for value in values.tolist()]

@@ -36,7 +36,7 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
     address = f"{first}?token={token}"
     core.app.add_middleware(Guard, port=port, token=token)
     static = resources.files("tunnel_lab")
-    for name, place in (("bench", "bench/static"), ("uplot", "diagnosis_view/vendor")):
+    for name, place in (("bench", "bench/static"), ("uplot", "report/vendor")):
         app.add_static_files(f"/static/{name}", str(static.joinpath(place)))
     add_pages(folder)
     words = f"The bench: http://{HOST}:{port}{address}\nCampaigns: {folder.resolve()}\nCtrl-C ends it."

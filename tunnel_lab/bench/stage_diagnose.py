@@ -131,7 +131,7 @@ class _Answer:
     """The answer: in words, in figures, and by hand."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
-        from tunnel_lab.diagnosis_view import view
+        from tunnel_lab.report import view
 
         answer, kind = view.headline(document)
         with ui.element("section").classes(f"verdict {kind}").props("aria-label=Verdict"):
@@ -171,10 +171,10 @@ class _Answer:
 
 def figures(document: dict[str, Any]) -> list[str]:
     """The report's figures of the summary, as elements of a page."""
-    from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
-    from tunnel_lab.diagnosis_view.figures_where import runs_figure
-    from tunnel_lab.diagnosis_view.page import DESCRIPTIONS
-    from tunnel_lab.diagnosis_view.svg import inline_svg
+    from tunnel_lab.report.drawing import inline_svg
+    from tunnel_lab.report.figures import waterfall_figure
+    from tunnel_lab.report.page import DESCRIPTIONS
+    from tunnel_lab.report.where import runs_figure
 
     found = {"waterfall": waterfall_figure(document)}
     if document.get("maps"):

@@ -17,7 +17,7 @@ from tunnel_lab.bench.estimates_view import side_by_side
 from tunnel_lab.bench.parts import Fault, Frame, button, show_command, show_parts
 from tunnel_lab.bench.stages import ESTIMATOR, is_current, read_result
 from tunnel_lab.bench.workspace import Session
-from tunnel_lab.terminal.budget_table import budget_lines, budget_table
+from tunnel_lab.terminal.outputs import budget_lines, budget_table
 from tunnel_sim.files.toml_input import load_toml
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -19,7 +19,7 @@ _NO_SPRING = "no run can be planned without a stated spring"
 def build(session: Session, frame: Frame) -> None:
     """Build the page."""
     from diagnosis.printing import rival_lines
-    from tunnel_lab.diagnosis_view.view import next_steps
+    from tunnel_lab.report.view import next_steps
 
     document = read_result(session.diagnosis)
     assert document is not None  # else the stage is closed

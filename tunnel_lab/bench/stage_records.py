@@ -201,7 +201,7 @@ def _marks(one: preview.Drawn) -> list[dict[str, Any]]:
 
 def _show(imported: Imported) -> None:
     """What was read, as ``tunnel import`` prints it."""
-    from tunnel_lab.terminal.import_output import parts_table
+    from tunnel_lab.terminal.outputs import parts_table
 
     show_parts([parts_table(imported)])
     with ui.element("ul").classes("notes"):
@@ -217,7 +217,7 @@ def write(session: Session, imported: Imported) -> None:
         TunnelError: when the folder cannot be written.
     """
     from tunnel_lab.bench import conditions
-    from tunnel_lab.plotting.import_figure import import_picture
+    from tunnel_lab.plotting.runs import import_picture
     from tunnel_sim.files.importing.writing import write_imported
 
     before = conditions.stated(session) if session.imported else None

@@ -74,7 +74,7 @@ def write(session: Session, author: str, notes: str) -> None:
         TunnelError: when it cannot be written.
     """
     from diagnosis.detection.limit_cycles import diagnosable
-    from tunnel_lab.diagnosis_view import Byline, write_report
+    from tunnel_lab.report import Byline, write_report
     from tunnel_sim.files.campaign_io import read_campaign
 
     document = read_result(session.diagnosis)

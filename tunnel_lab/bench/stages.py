@@ -85,7 +85,7 @@ def is_current(session: Session, result: Path) -> bool:
 @lru_cache(maxsize=16)
 def _hashes(session: Session, state: object) -> dict[str, str]:
     """SHA-256 of the campaign's files; they are read again only when ``state`` has changed."""
-    from tunnel_lab.terminal.given_campaign import file_hashes
+    from tunnel_lab.terminal.inputs import file_hashes
 
     del state
     return file_hashes(session.campaign)

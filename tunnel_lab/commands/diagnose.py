@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tunnel_lab.terminal.given_campaign import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.options import EffectsFileOption
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def run(
       written completely or not at all.
     """
     from diagnosis import read_model, vocabulary
-    from tunnel_lab.terminal.given_campaign import file_hashes, given_campaign
+    from tunnel_lab.terminal.inputs import file_hashes, given_campaign
     from tunnel_lab.terminal.options import refuse_unwritable_files, split_names
     from tunnel_lab.terminal.tables import say, say_written
     from tunnel_sim.files.json_text import json_text
@@ -160,7 +160,7 @@ def run(
         write_patch(answer, patch)
     if report is not None:
         from diagnosis.detection.limit_cycles import diagnosable
-        from tunnel_lab.diagnosis_view import Byline, write_report
+        from tunnel_lab.report import Byline, write_report
 
         today = datetime.now().astimezone().date().isoformat()
         byline = Byline(today, author, notes, "" if patch is None else patch.name)

@@ -190,7 +190,7 @@ def _rows(grid: Grid, names: tuple[str, ...], jobs: int, out: Path | None) -> li
 def _keep(out: Path, results: Results) -> list[Path]:
     import shutil
 
-    from tunnel_lab.plotting.plots import save_both
+    from tunnel_lab.plotting.style import save_both
     from tunnel_lab.scoring.figures import score_figure
     from tunnel_lab.scoring.results import parquet, scores_frame, write_trials
     from tunnel_sim.files.writing import write_whole
@@ -235,7 +235,7 @@ def _refuse_of_the_grid(given: dict[str, object]) -> None:
 def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, trials: int | None) -> None:
     import shutil
 
-    from tunnel_lab.plotting.plots import save_both
+    from tunnel_lab.plotting.style import save_both
     from tunnel_lab.scoring import breakdown as work
     from tunnel_lab.scoring import breakdown_view as view
     from tunnel_lab.scoring.results import parquet

@@ -152,7 +152,7 @@ def show_summary(folder: Path) -> None:
     """
     import polars as pl
 
-    from tunnel_lab.plotting import plots
+    from tunnel_lab.plotting import style
     from tunnel_lab.sweep import figures
     from tunnel_lab.sweep.store import open_store
     from tunnel_lab.sweep.summary import paces, summarise
@@ -169,7 +169,7 @@ def show_summary(folder: Path) -> None:
     for name, part in grouped.items():
         drawn = figures.error_figure(part)
         if drawn is not None:
-            written += plots.save_both(drawn, target / f"{name}.png")
+            written += style.save_both(drawn, target / f"{name}.png")
     done, shards = len(store.finished()), store.sweep.shards
     if done < shards:
         say(f"Finished: {done} of {shards} shards; run the same command again for the rest\n")

@@ -60,7 +60,7 @@ def picture(known: Knowledge, targets: tuple[float, float], probability: float) 
 
 
 def _draw_record(axes: Axes, known: Knowledge) -> None:
-    from tunnel_lab.plotting.plots import WIND_OFF, WIND_ON
+    from tunnel_lab.plotting.runs import WIND_OFF, WIND_ON
 
     axes.set_xlabel("time [s]")
     axes.set_ylabel("angle β [rad]")
@@ -74,7 +74,7 @@ def _draw_record(axes: Axes, known: Knowledge) -> None:
 
 
 def _draw_spread(axes: Axes, known: Knowledge, targets: tuple[float, float]) -> None:
-    from tunnel_lab.plotting.plots import COLOURS
+    from tunnel_lab.plotting.style import COLOURS
 
     history = known.beliefs
     for place, (name, target) in enumerate(zip(("cn_beta", "cn_r"), targets, strict=True)):
@@ -89,7 +89,7 @@ def _draw_spread(axes: Axes, known: Knowledge, targets: tuple[float, float]) -> 
 
 
 def _draw_probabilities(axes: Axes, known: Knowledge, probability: float) -> None:
-    from tunnel_lab.plotting.plots import COLOURS
+    from tunnel_lab.plotting.style import COLOURS
 
     names = [name.replace("_", "\n") for name in answers(known.conditions.effects)]
     axes.bar(names, probabilities(known), color=COLOURS[0])

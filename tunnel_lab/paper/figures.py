@@ -11,8 +11,7 @@ from identification.campaign.springs import SpringFit
 from identification.datasets import SpringRow
 from identification.decay.damped_oscillation import Decay, free_decay
 from tunnel_lab.paper.equations import printed_transfer_function
-from tunnel_lab.plotting.common import WIDTH, figure, grid, styled
-from tunnel_lab.plotting.plots import BLUE, COLOURS, VERMILION
+from tunnel_lab.plotting.style import BLUE, COLOURS, VERMILION, WIDTH, figure, grid, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -24,7 +24,7 @@ from tunnel_lab.paper.network_study import (
     paper_run_plan,
 )
 from tunnel_lab.paper.section import Picture, Section, signed
-from tunnel_lab.plotting.plots import save_both
+from tunnel_lab.plotting.style import save_both
 
 _SEED = 1
 _SPEED = 10.0  # m/s, assumed

@@ -9,8 +9,7 @@ import numpy as np
 
 from identification.estimate import Estimate, WindowEstimate
 from tunnel_lab.paper.network_study import HeldOutErrors, regenerated
-from tunnel_lab.plotting.common import WIDTH, figure, grid, log_axis, styled
-from tunnel_lab.plotting.plots import BLUE, COLOURS, MARKERS, VERMILION
+from tunnel_lab.plotting.style import BLUE, COLOURS, MARKERS, VERMILION, WIDTH, figure, grid, log_axis, styled
 from tunnel_sim.vocabulary.campaign import Run
 
 if TYPE_CHECKING:

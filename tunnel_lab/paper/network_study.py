@@ -14,7 +14,7 @@ from identification.estimate import Estimate
 from identification.neural.networks import Networks
 from identification.neural.shape import cycles_time, network_inputs
 from identification.neural.training_set import held_out_points
-from tunnel_lab.terminal.effect_option import parse_effect
+from tunnel_lab.terminal.inputs import parse_effect
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness

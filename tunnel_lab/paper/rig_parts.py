@@ -13,7 +13,7 @@ from identification.printing.numbers import concise, with_std
 from tunnel_lab.paper import figures
 from tunnel_lab.paper.equations import eq7, eq8, known_run, printed_transfer_function
 from tunnel_lab.paper.section import Picture, Section, scaled, signed
-from tunnel_lab.plotting.plots import save_both
+from tunnel_lab.plotting.style import save_both
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -9,7 +9,7 @@ import numpy as np
 from rich.text import Text
 
 from identification.printing.numbers import significant
-from tunnel_lab.plotting.common import figure, styled
+from tunnel_lab.plotting.style import figure, styled
 from tunnel_lab.scoring.breakdown import Bias
 from tunnel_lab.scoring.tables import NAMES
 from tunnel_lab.terminal.tables import table

@@ -14,7 +14,7 @@ from zlib import crc32
 import numpy as np
 
 from tunnel_lab.scoring.grid import NO_EFFECT, Cell
-from tunnel_lab.terminal.effect_option import parse_effect
+from tunnel_lab.terminal.inputs import parse_effect
 from tunnel_sim.effects import Effect, EffectChain, effect_from
 from tunnel_sim.engine.sensor import read_motion
 from tunnel_sim.files.rig_file import load_rig

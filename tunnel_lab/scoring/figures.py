@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.scoring.accuracy import INTERVAL, NOMINAL_COVERAGE, Score, score
-from tunnel_lab.plotting.common import figure, grid, log_axis, styled
-from tunnel_lab.plotting.plots import COLOURS, MARKERS
+from tunnel_lab.plotting.style import COLOURS, MARKERS, figure, grid, log_axis, styled
 from tunnel_lab.scoring.grid import NO_EFFECT, Cell
 from tunnel_lab.scoring.results import Results
 from tunnel_lab.scoring.tables import NAMES

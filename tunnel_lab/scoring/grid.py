@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
-from tunnel_lab.terminal.effect_option import parse_effect
+from tunnel_lab.terminal.inputs import parse_effect
 from tunnel_sim.effects import effect_from
 from tunnel_sim.files.plan_schema import check_size, first_twice
 from tunnel_sim.files.reading import as_described, check_count, check_shape

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.terminal.effect_option import parse_effect
+from tunnel_lab.terminal.inputs import parse_effect
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings

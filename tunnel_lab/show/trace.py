@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_lab.plotting.common import with_breaks
+from tunnel_lab.plotting.style import with_breaks
 from tunnel_sim.vocabulary.record import Array, Record
 
 Image = NDArray[np.uint8]

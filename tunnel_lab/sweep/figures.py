@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from identification.printing.numbers import SYMBOLS, concise, significant, unit
-from tunnel_lab.plotting.common import WIDTH, figure, grid, log_axis, styled
-from tunnel_lab.plotting.plots import COLOURS, MARKERS
+from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.sweep.summary import AXES, OVERALL, SEVERITY, Line, Pace
 from tunnel_lab.terminal.tables import table
 

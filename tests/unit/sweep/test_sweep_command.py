@@ -18,7 +18,7 @@ import pytest
 from tests.unit.gone_reader import unheard
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
-from tunnel_lab.plotting.common import styled
+from tunnel_lab.plotting.style import styled
 from tunnel_lab.sweep import cluster, figures
 from tunnel_lab.sweep.engine import run_sweep
 from tunnel_lab.sweep.product import Sweep

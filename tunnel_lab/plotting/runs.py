@@ -6,16 +6,29 @@ Okabe and Ito (2008), which colour-blind readers can distinguish.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
-from math import ceil
-from pathlib import Path
-from typing import TYPE_CHECKING
+from math import ceil, sqrt
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from identification.estimate import Quantity
 from identification.printing.numbers import SYMBOLS
-from tunnel_lab.plotting.common import WIDTH, figure, figure_text, grid, log_axis, styled, with_breaks
-from tunnel_sim.files.writing import write_encoded
+from tunnel_lab.plotting.style import (
+    BLUE,
+    COLOURS,
+    MARKERS,
+    VERMILION,
+    WIDTH,
+    figure,
+    figure_text,
+    grid,
+    limit_to_known,
+    log_axis,
+    styled,
+    with_breaks,
+)
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
 
@@ -23,15 +36,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from identification.estimate import Estimate
+    from identification.estimate import Estimate, RunEstimate
+    from tunnel_sim.files.importing.records import Imported, Part
 
-COLOURS = (
-    "#0072b2", "#d55e00", "#009e73", "#b0529b", "#9a6f00", "#2f8fb0", "#b5484f", "#6f8200", "#7a63c7", "#77808a",
-    "#c88090", "#207060", "#7090f0", "#989860", "#b878d8", "#805870",
-)  # fmt: skip
-"""Of `figures.mplstyle`."""
-BLUE, VERMILION = COLOURS[:2]
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
+
 WIND_OFF, WIND_ON = BLUE, VERMILION
 PANELS_PER_PAGE = 12
 BINS_PER_DECADE = 60
@@ -40,33 +48,13 @@ LEAKING = 2
 INTERVAL = 1.96
 RUNS_PER_PLOT = 6
 """More lines than colours cannot be distinguished in one plot."""
-
-
-@styled
-def save(figure: Figure, path: Path) -> Path:
-    """Write a figure, completely or not at all; the same figure gives the same file.
-
-    Args:
-        path: the file, ``.png`` or ``.pdf``; replaced when it exists.
-
-    Raises:
-        TunnelError: when the file cannot be written.
-    """
-    form = path.suffix[1:]
-    dates = {"CreationDate": None} if form == "pdf" else None
-    return write_encoded(path, lambda stream: figure.savefig(stream, format=form, metadata=dates))
-
-
-def save_both(figure: Figure, path: Path) -> tuple[Path, Path]:
-    """Write a figure as a picture, and as a vector graphic beside it.
-
-    Args:
-        path: the picture, ``.png``.
-
-    Returns:
-        The picture and the PDF.
-    """
-    return save(figure, path), save(figure, path.with_suffix(".pdf"))
+ONE_RIG = 1.5
+"""Frequencies within this factor share one plot in absolute units."""
+_INTERVAL = 1.96
+MOST_PANELS = 24
+_COLUMNS = 3
+_POINTS = 2000  # least and greatest readings of as many stretches are drawn
+_GREY = "0.6"
 
 
 def run_label(run: Run) -> str:
@@ -226,3 +214,151 @@ def _log_averaged(frequency: Array, density: Array, first: int) -> tuple[Array, 
     starts = np.unique(edges.astype(int) - first)[:-1]
     counts = np.diff(np.append(starts, frequency.size))
     return np.add.reduceat(frequency, starts) / counts, np.add.reduceat(density, starts) / counts
+
+
+@styled
+def windows_figure(estimate: Estimate) -> Figure:
+    """ζ and ωn of the windows of each run against the amplitude, with 95 % intervals.
+
+    A linear rig gives horizontal lines; a slope shows an effect that the linear model lacks.
+
+    Args:
+        estimate: of any campaign; runs past the sixth and those with fewer than two windows are left out.
+
+    Returns:
+        A figure of two panels. Where the runs differ in frequency, each quantity is shown as its deviation from
+        the weighted mean of its run, so that only its change with the amplitude is seen.
+    """
+    runs = [run for run in estimate.runs if len(run.windows) > 1][:RUNS_PER_PLOT]
+    centres = [window.omega_n.value for run in runs for window in run.windows]
+    one_rig = bool(centres) and max(centres) < ONE_RIG * min(centres)
+    fig = figure(WIDTH, 3.6)
+    panels = fig.subplots(1, 2)
+    for axes, name in zip(panels, ("zeta", "omega_n"), strict=True):
+        shown = [_shown(run, name, absolute=one_rig) for run in runs]
+        for index, (run, quantities) in enumerate(zip(runs, shown, strict=True)):
+            amplitude = [window.amplitude.value for window in run.windows]
+            _intervals(axes, amplitude, quantities, index, figure_text(run.id))
+        if runs:
+            drawn = [quantity for quantities in shown for quantity in quantities]
+            limit_to_known(axes, np.array([q.value for q in drawn]), np.array([q.std for q in drawn]))
+            log_axis(axes, "x")
+        if not one_rig:
+            axes.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
+        axes.set_xlabel("mean amplitude of the window [rad]")
+        grid(axes)
+    if one_rig:
+        labels = ("damping ratio ζ [1]", "natural frequency ωn [rad/s]")
+    else:
+        labels = ("ζ − weighted mean of the run [10⁻³]", "ωn − weighted mean of the run [%]")
+    for axes, label in zip(panels, labels, strict=True):
+        axes.set_ylabel(label)
+    if runs:
+        handles, names = panels[0].get_legend_handles_labels()
+        fig.legend(handles, names, loc="outside upper center", ncols=3)
+    return fig
+
+
+def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
+    """Each value less the weighted mean of all.
+
+    Args:
+        quantities: independent, of one unit.
+
+    Returns:
+        The deviations. Their variance is that of the value less that of the mean, which has the value in it.
+    """
+    stds = np.array([quantity.std for quantity in quantities])
+    least = 1e-6 * float(np.min(stds[stds > 0.0], initial=np.inf))
+    weights = np.maximum(stds, least if np.isfinite(least) else 1.0) ** -2.0  # a value may be exact
+    mean = float(weights @ [quantity.value for quantity in quantities] / weights.sum())
+    left = 1.0 / float(weights.sum())
+    return [Quantity(q.value - mean, sqrt(max(q.std**2 - left, 0.0)), q.unit) for q in quantities]
+
+
+def _shown(run: RunEstimate, name: str, *, absolute: bool) -> list[Quantity]:
+    """One quantity of the windows as it is drawn."""
+    given: list[Quantity] = [getattr(window, name) for window in run.windows]
+    if absolute:
+        return given
+    found = deviations(given)
+    mean = given[0].value - found[0].value
+    scale, unit = (1e3, "10⁻³") if name == "zeta" else (100.0 / mean, "%")
+    return [Quantity(scale * q.value, scale * q.std, unit) for q in found]
+
+
+def _intervals(
+    axes: Axes, x: Sequence[float], quantities: Sequence[Quantity], index: int, label: str
+) -> None:
+    """Points with 95 % intervals."""
+    style: dict[str, Any] = {"color": COLOURS[index], "marker": MARKERS[index], "label": label}
+    spans = [_INTERVAL * q.std for q in quantities]
+    axes.errorbar(x, [q.value for q in quantities], yerr=spans, linewidth=0.8, markersize=3.5, **style)
+
+
+@styled
+def import_picture(imported: Imported) -> bytes:
+    """Draw what was read.
+
+    Returns:
+        A PNG. Samples that are left out are grey; a vertical line marks where a run begins.
+    """
+    from matplotlib.figure import Figure
+
+    raws = {id(part.raw): part.raw for part in imported.parts}
+    shown = list(raws)[:MOST_PANELS]
+    columns = min(_COLUMNS, len(shown))
+    rows = -(-len(shown) // columns)
+    figure = Figure(figsize=(max(4.5 * columns, 8.0), 2.2 * rows + 0.8), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for key, axes in zip(shown, panels, strict=False):
+        _draw(axes, [part for part in imported.parts if id(part.raw) == key], imported.campaign.sensor.unit)
+    for axes in panels[len(shown) :]:
+        axes.remove()
+    more = f" (the first {MOST_PANELS} of {len(raws)} records)" if len(raws) > MOST_PANELS else ""
+    figure.suptitle(
+        figure_text(f"{imported.campaign.name}\nruns in colour, samples that are left out in grey{more}"),
+        fontsize=9,
+    )
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=120)
+    return stream.getvalue()
+
+
+def _draw(axes: Axes, parts: list[Part], unit: str) -> None:
+    """One record with its runs."""
+    raw = parts[0].raw
+    time, reading = raw.cleaned.time_s, raw.cleaned.reading
+    axes.plot(*thinned(time, reading), color=_GREY, linewidth=0.7)
+    for number, part in enumerate(parts):
+        if part.run is None:
+            continue
+        piece = slice(part.piece.first, part.piece.last)
+        colour = COLOURS[number % len(COLOURS)] if len(parts) > 1 else BLUE
+        axes.plot(*thinned(time[piece], reading[piece]), color=colour, linewidth=0.7)
+        axes.axvline(time[part.piece.first], color=VERMILION, linewidth=0.8, linestyle="--")
+    kept = sum(part.run is not None for part in parts)
+    about = raw.id if kept == 1 else f"{raw.id}: {kept} runs"
+    axes.set_title(figure_text(about), fontsize=9, loc="left")
+    axes.set_xlabel("time [s]", fontsize=8)
+    axes.set_ylabel(f"reading [{unit}]", fontsize=8)
+    axes.tick_params(labelsize=7)
+
+
+def thinned(time: Array, reading: Array) -> tuple[Array, Array]:
+    """A curve with few points that looks the same, and that breaks where samples are missing.
+
+    Args:
+        time: shape (n,), s.
+        reading: shape (n,).
+
+    Returns:
+        Times and readings, shape (m,): the least and the greatest reading of each stretch; NaN within a gap.
+    """
+    size = time.size // _POINTS
+    if size > 1:
+        starts = np.arange(0, time.size, size)
+        ends = np.stack([np.minimum.reduceat(reading, starts), np.maximum.reduceat(reading, starts)], axis=1)
+        time, reading = np.repeat(time[starts], 2), ends.ravel()
+    when, values = with_breaks(time, reading)
+    return when, values

@@ -1,4 +1,4 @@
-"""What ``tunnel compare`` reads of the JSON document of a diagnosis."""
+"""The JSON document of a diagnosis: what ``tunnel compare`` reads of it, and its schema."""
 
 from __future__ import annotations
 
@@ -87,3 +87,50 @@ def read_diagnosis(path: Path) -> dict[str, Any]:
     document = read_json(path, remedy=REMEDY)
     check_version(document, path)
     return validate(Document, document, path).model_dump()
+
+
+class DiagnosisDocument(Document):
+    """What ``tunnel diagnose --json`` writes; excesses are in noise variances of a sample."""
+
+    credible: Annotated[
+        list[dict[str, Any]],
+        Field(description="effect and probability of the fewest answers that have 0.9 together"),
+    ]
+    common: Annotated[
+        dict[str, dict[str, float]],
+        Field(description="effects and channels that answers of 0.9 together have in common"),
+    ]
+    verdict: Annotated[str, Field(description="the answer in plain words")]
+    where: Annotated[
+        dict[str, Any],
+        Field(description="channel, condition, runs, time_s, amplitude_rad, frequency_hz, words"),
+    ]
+    inclusion: Annotated[
+        dict[str, float], Field(description="by effect, the probability that it is among the causes")
+    ]
+    waterfall: Annotated[
+        list[dict[str, Any]], Field(description="effect and excess, as the causes are added one by one")
+    ]
+    waterfall_on: Annotated[str, Field(description="what was held out of the fits for it")]
+    without: Annotated[dict[str, float], Field(description="by cause, the excess when it alone is taken out")]
+    rest: Annotated[dict[str, Any] | None, Field(description="what remains after the causes")]
+    closable: Annotated[
+        dict[str, Any] | None, Field(description="how much of what remains could be closed, and by what")
+    ]
+    model: Annotated[dict[str, Any] | None, Field(description="the patched model, with --model")]
+    next_run: Annotated[
+        dict[str, Any] | None,
+        Field(description="the run that would distinguish the causes from their rivals"),
+    ]
+    confirmation: Annotated[
+        dict[str, Any], Field(description="how far MuJoCo and the fits' integrator agree")
+    ]
+    noise: Annotated[dict[str, Any], Field(description="std and stated_std in rad, source, reason")]
+    blind_spots: Annotated[list[str], Field(description="what these runs cannot show")]
+    cautions: Annotated[list[str], Field(description="caveats")]
+    remarks: Annotated[
+        list[dict[str, Any]],
+        Field(description="of the examination: outcome, runs, what, remedy"),
+    ]
+    seconds: Annotated[dict[str, float], Field(description="wall time by step, s")]
+    provenance: Annotated[dict[str, Any], Field(description="versions, and SHA-256 of the records")]

@@ -6,16 +6,28 @@ from collections.abc import Callable
 from functools import wraps
 from importlib import resources
 from math import log10
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
 
 import numpy as np
 
+from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.record import Array, gaps
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+
 
 WIDTH = 7.2
 """Width of a figure that fills a page, inches."""
@@ -23,6 +35,19 @@ _FEW_DECADES = 2.5
 _WIDE = 5.0  # times the median standard deviation
 P = ParamSpec("P")
 R = TypeVar("R")
+
+
+COLOURS = (
+    "#0072b2", "#d55e00", "#009e73", "#b0529b", "#9a6f00", "#2f8fb0", "#b5484f", "#6f8200", "#7a63c7", "#77808a",
+    "#c88090", "#207060", "#7090f0", "#989860", "#b878d8", "#805870",
+)  # fmt: skip
+"""Of `figures.mplstyle`."""
+
+
+BLUE, VERMILION = COLOURS[:2]
+
+
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
@@ -132,3 +157,30 @@ def figure_text(text: str) -> str:
         The text with its dollar signs escaped, and with a blank before a leading underscore.
     """
     return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
+
+
+@styled
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure, completely or not at all; the same figure gives the same file.
+
+    Args:
+        path: the file, ``.png`` or ``.pdf``; replaced when it exists.
+
+    Raises:
+        TunnelError: when the file cannot be written.
+    """
+    form = path.suffix[1:]
+    dates = {"CreationDate": None} if form == "pdf" else None
+    return write_encoded(path, lambda stream: figure.savefig(stream, format=form, metadata=dates))
+
+
+def save_both(figure: Figure, path: Path) -> tuple[Path, Path]:
+    """Write a figure as a picture, and as a vector graphic beside it.
+
+    Args:
+        path: the picture, ``.png``.
+
+    Returns:
+        The picture and the PDF.
+    """
+    return save(figure, path), save(figure, path.with_suffix(".pdf"))

@@ -7,12 +7,17 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tunnel_sim.vocabulary.errors import TunnelError
+
 if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
+    from tunnel_sim.vocabulary.plan import EffectSetting
+
 
 HELP = (
     "Folder of the campaign: campaign.toml and its runs. Or one file of a data logger, as for tunnel import."
 )
+_FORM = "write NAME:PARAMETER=VALUE, with a comma before each further PARAMETER=VALUE; see tunnel effects"
 
 
 def given_campaign(path: Path) -> Campaign:
@@ -74,3 +79,35 @@ def file_hashes(path: Path) -> dict[str, str]:
 def _sha256(path: Path) -> str:
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def parse_effect(text: str) -> EffectSetting:
+    """Read the value of ``--effect``.
+
+    Args:
+        text: such as ``coulomb_friction:friction_moment=0.004``.
+
+    Returns:
+        Name and parameters; the registry checks whether they exist and are in range.
+
+    Raises:
+        TunnelError: when it does not have that form, or a value is not a number.
+    """
+    from tunnel_sim.vocabulary.plan import EffectSetting
+
+    where = f"--effect {text}"
+    name, _, rest = text.partition(":")
+    values: dict[str, float] = {}
+    for part in rest.split(",") if rest else []:
+        parameter, equals, value = (piece.strip() for piece in part.partition("="))
+        if not (parameter and equals and value):
+            raise TunnelError(f"{part!r} is not PARAMETER=VALUE", where=where, remedy=_FORM)
+        if parameter in values:
+            raise TunnelError(f"{parameter} is given twice", where=where, remedy="give it once")
+        try:
+            values[parameter] = float(value)
+        except ValueError:
+            raise TunnelError(f"{value!r} is not a number", where=where, remedy=_FORM) from None
+    if not name.strip():
+        raise TunnelError("no effect is named", where=where, remedy=_FORM)
+    return EffectSetting(name.strip(), values)
