@@ -32,8 +32,8 @@ ENGINE_ROOMS = (
     "diagnosis.answer.patched_model",
     "tunnel_lab.envs.",
     "tunnel_lab.show.live",
-    "tunnel_lab.show.overlay",
-    "tunnel_lab.show.stepper",
+    "tunnel_lab.show.web",
+    "tunnel_lab.show.live",
     "tunnel_lab.show.web",
     "tunnel_lab.show.window",
 )

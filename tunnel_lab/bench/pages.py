@@ -6,12 +6,18 @@ from importlib import import_module
 from pathlib import Path
 
 from fastapi.responses import FileResponse
-from nicegui import app, ui
+from nicegui import app, events, ui
 
-from tunnel_lab.bench import start
-from tunnel_lab.bench.parts import Frame, address
-from tunnel_lab.bench.stages import STAGES, closed
-from tunnel_lab.bench.workspace import open_session
+from tunnel_lab.bench.parts import Fault, Frame, address, drop_zone, keep
+from tunnel_lab.bench.workspace import (
+    STAGES,
+    Session,
+    Stage,
+    closed,
+    new_session,
+    open_session,
+    sessions,
+)
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -22,7 +28,7 @@ def add_pages(folder: Path) -> None:
     def first() -> None:
         frame = Frame("From a logger's files to a report")
         with frame.main:
-            start.build(folder)
+            build_start(folder)
 
     @ui.page("/try")
     def rig() -> None:
@@ -48,8 +54,46 @@ def add_pages(folder: Path) -> None:
                     ui.link("Back to the records", address(session, "records")).classes("button")
                 else:
                     # Only here: the first page need not wait for what the stages load.
-                    module = f"tunnel_lab.bench.stage_{found.key.replace('-', '_')}"
+                    module = f"tunnel_lab.bench.{found.key.replace('-', '_')}"
                     import_module(module).build(session, frame)
         except TunnelError as error:
             ui.label(f"tunnel: {error}").classes("fault")
             ui.link("All campaigns", "/")
+
+
+def build_start(folder: Path) -> None:
+    """Build the page."""
+    ui.label("Drop the files of a data logger. Every step writes the files that the commands write.").classes(
+        "lede"
+    )
+    fault = Fault()
+
+    async def dropped(given: events.MultiUploadEventArguments) -> None:
+        with fault.around():
+            session = new_session(folder, given.files[0].name)
+            await keep(session, given)
+            ui.navigate.to(address(session, "records"))
+
+    drop_zone(dropped, fault)
+    place = folder if folder.name else folder.resolve()
+    ui.label(f"Dropped files are kept in {place}, in a folder of their own beside the campaign.").classes(
+        "soft"
+    )
+    found = sessions(folder)
+    if found:
+        with ui.element("h2"):
+            ui.html("Campaigns here", sanitize=False, tag="span")
+        with ui.element("ul").classes("sessions"):
+            for session in found:
+                with ui.element("li"):
+                    stage = _furthest(session)
+                    ui.link(session.name, address(session, stage.key))
+                    ui.label(f"open up to {stage.title}").classes("soft")
+
+
+def _furthest(session: Session) -> Stage:
+    """The last stage that is open."""
+    try:
+        return [stage for stage in STAGES if not closed(session, stage.key)][-1]
+    except TunnelError:
+        return STAGES[0]

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html import escape
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from nicegui import ui
+from nicegui import events, ui
 
 from identification.printing.table import TextTable, as_html
-from tunnel_lab.bench.stages import STAGES, closed
-from tunnel_lab.bench.workspace import Session
+from tunnel_lab.bench.workspace import (
+    STAGES,
+    Session,
+    closed,
+    safe_name,
+)
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 
 _THEME = "bench-theme"
 _HEAD = """
@@ -168,3 +178,103 @@ def button(text: str, action: Callable[[], object], *, main: bool = False) -> ui
     with found:
         ui.html(escape(text), sanitize=False, tag="span")
     return found.on("click", action)
+
+
+class Chart(ui.element, component="static/chart.js"):
+    """The chart.
+
+    Args:
+        title: what it shows, for a screen reader too.
+        x: label of the abscissa, with its unit.
+        y: label of the ordinate, with its unit.
+        series: labels of the curves and the names of their colours (``before``, ``after``, ``soft``, …).
+        data: abscissas and the ordinates of every curve; None is a gap.
+        moved: called with the id of a mark and where it was moved, in the unit of its axis; may be awaitable.
+    """
+
+    def __init__(
+        self,
+        title: str,
+        x: str,
+        y: str,
+        series: Sequence[tuple[str, str]],
+        data: Sequence[Sequence[float | None]],
+        moved: Callable[[str, float], Any] | None = None,
+    ) -> None:
+        super().__init__()
+        self._props.update(title=title, x=x, y=y, series=[list(one) for one in series], data=data)
+        self._props.update(marks=[])
+        self.classes("chart")
+        if moved is not None:
+            self.on("moved", lambda event: moved(*_mark(event)))
+
+    def show(self, data: Sequence[Sequence[float | None]]) -> None:
+        """Show other curves of the same labels."""
+        self._props["data"] = data
+        self.update()
+
+    def show_marks(self, marks: Sequence[Mapping[str, Any]]) -> None:
+        """Show marks.
+
+        Args:
+            marks: ``id``, ``label``, ``kind``, ``at`` and its ``unit`` of each. A ``start`` or an ``end`` is on the
+                abscissa. A ``rest`` is on the ordinate, drawn from ``from`` to ``to`` with the words ``about``.
+        """
+        self._props.update(marks=[dict(one) for one in marks])
+        self.update()
+
+
+def _mark(event: events.GenericEventArguments) -> tuple[str, float]:
+    return str(event.args["id"]), float(event.args["at"])
+
+
+def too_large(size: int) -> str:
+    """Why an upload is refused.
+
+    Args:
+        size: of it, bytes.
+    """
+    return (
+        f"{size / 1e6:.0f} MB are more than the {UPLOAD_BYTES / 1e6:.0f} MB of an upload; "
+        "use tunnel import, or drop fewer files at a time"
+    )
+
+
+def drop_zone(dropped: events.Handler[events.MultiUploadEventArguments], fault: Fault) -> None:
+    """A place to drop files on, or to choose them with.
+
+    Args:
+        dropped: called with the files of a drop together.
+        fault: where a refusal is shown.
+    """
+    limit = f"at most {UPLOAD_BYTES / 1e6:.0f} MB"
+    zone = ui.upload(
+        label=f"Drop files here, or press + to choose ({limit})",
+        multiple=True,
+        auto_upload=True,
+        max_total_size=UPLOAD_BYTES - 1_000_000,  # less the frame of the request
+        on_multi_upload=dropped,
+    )
+    zone.classes("drop").props('flat bordered aria-label="Files of a data logger"')
+    # The browser knows the size before it sends anything.
+    zone.on(
+        "rejected",
+        lambda event: fault.show(too_large(int(event.args))),
+        js_handler="(found) => emit(found.reduce((sum, one) => sum + one.file.size, 0))",
+    )
+
+
+async def keep(session: Session, given: events.MultiUploadEventArguments) -> None:
+    """Keep dropped files under safe names; a file of the same name is replaced.
+
+    Args:
+        given: the drop.
+    """
+    from tunnel_sim.files.writing import output_folder, write_whole
+
+    target = output_folder(session.uploads)
+    names = [safe_name(file.name) for file in given.files]
+    if len(set(names)) < len(names):
+        raise TunnelError("two files of one name were dropped", remedy="rename one, or drop them separately")
+    for name, file in zip(names, given.files, strict=True):
+        write_whole(target / name, await file.read())

@@ -3,21 +3,35 @@
 from __future__ import annotations
 
 import asyncio
+import hmac
+import re
 import secrets
 import socket
 from contextlib import suppress
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import parse_qsl, quote, urlencode
 
 from nicegui import app, background_tasks, core, ui
 
-from tunnel_lab.bench import hand, work
-from tunnel_lab.bench.guard import Guard
+from tunnel_lab.bench import work
 from tunnel_lab.bench.pages import add_pages
+from tunnel_lab.bench.parts import too_large
 from tunnel_lab.terminal.tables import say
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from starlette.types import ASGIApp, Receive, Scope, Send
+
 
 HOST = "127.0.0.1"
+_LENGTH = re.compile(r"[0-9]{1,20}")
+_HEADERS = [(b"content-type", b"text/plain; charset=utf-8"), (b"cache-control", b"no-store")]
 
 
 def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
@@ -59,7 +73,7 @@ async def _say_when_open(port: int, words: str) -> None:
 
 async def _end() -> None:
     """End what was started: the user has ended the bench, it has not crashed."""
-    hand.end()
+    work.end_fits()
     await asyncio.to_thread(work.stop_all)
 
 
@@ -97,3 +111,95 @@ def _free_port(port: int) -> int:
                 remedy="name another one, or leave it out",
             ) from error
         return int(trial.getsockname()[1])
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a request is not answered.
+
+    Args:
+        status: of HTTP (count).
+        words: one line.
+    """
+
+    status: int
+    words: str
+
+
+class Guard:
+    """Lets only the bench's own pages through.
+
+    Args:
+        app: what is guarded.
+        port: of the server (count).
+        token: secret of this start of the server.
+    """
+
+    def __init__(self, app: ASGIApp, port: int, token: str) -> None:
+        self._app = app
+        self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
+        self._token = token
+        self._cookie = f"tunnel-bench-{port}"  # cookies do not distinguish ports
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+        query = dict(parse_qsl(scope.get("query_string", b"").decode("latin-1")))
+        refusal = self._refusal(headers, query)
+        if refusal is not None:
+            await _refuse(scope, send, refusal)
+        elif "token" in query and scope["type"] == "http" and scope["method"] == "GET":
+            await self._welcome(scope, query, send)
+        else:
+            await self._app(scope, receive, send)
+
+    def _refusal(self, headers: Mapping[str, str], query: Mapping[str, str]) -> Refusal | None:
+        host, origin = headers.get("host", ""), headers.get("origin")
+        if host not in self._hosts:
+            return Refusal(
+                421, "This is the bench of another address; use the one that tunnel bench printed."
+            )
+        if origin is not None and origin != f"http://{host}":
+            return Refusal(403, "The request comes from another page; use the bench itself.")
+        given = query.get("token") or _cookies(headers.get("cookie", "")).get(self._cookie, "")
+        if not hmac.compare_digest(given.encode(), self._token.encode()):
+            return Refusal(
+                403, "The token is missing or old; use the whole address that tunnel bench printed."
+            )
+        length = headers.get("content-length", "0")
+        if "transfer-encoding" in headers or not _LENGTH.fullmatch(length):
+            return Refusal(411, "The length of the request is not stated.")
+        if int(length) > UPLOAD_BYTES:
+            return Refusal(413, too_large(int(length)))
+        return None
+
+    async def _welcome(self, scope: Scope, query: dict[str, str], send: Send) -> None:
+        """Move the token from the address into a cookie, so that it is in no history or bookmark."""
+        rest = urlencode({name: value for name, value in query.items() if name != "token"})
+        place = _same_site(scope["path"]) + (f"?{rest}" if rest else "")
+        cookie = f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+        found = [*_HEADERS, (b"location", place.encode()), (b"set-cookie", cookie.encode())]
+        await send({"type": "http.response.start", "status": 303, "headers": found})
+        await send({"type": "http.response.body", "body": b""})
+
+
+def _same_site(path: str) -> str:
+    """A path for a Location header: it cannot name another host or end the header."""
+    return "/" + quote(path.lstrip("/\\"), errors="replace")
+
+
+def _cookies(header: str) -> dict[str, str]:
+    pairs = (part.strip().partition("=") for part in header.split(";"))
+    return {name: value for name, _, value in pairs}
+
+
+async def _refuse(scope: Scope, send: Send, refusal: Refusal) -> None:
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": 1008, "reason": refusal.words[:120]})
+        return
+    headers = [*_HEADERS, (b"connection", b"close")]  # what is left of the request is not read
+    await send({"type": "http.response.start", "status": refusal.status, "headers": headers})
+    await send({"type": "http.response.body", "body": f"{refusal.words}\n".encode()})

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,6 +10,7 @@ import typer
 
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.options import EffectsFileOption
+from tunnel_lab.terminal.progress import step_display
 
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
@@ -21,18 +19,6 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 NAME = "diagnose"
-STEPS = {
-    "noise": "estimating the noise",
-    "nominal fit": "fitting the nominal model",
-    "where": "locating the gap",
-    "effects": "fitting sets of effects",
-    "random moments": "fitting random moments",
-    "pruning": "fitting the answer without each effect",
-    "polishing": "fitting the answer to convergence",
-    "how far it closes": "predicting held-out runs",
-    "what no effect explains": "estimating what no effect explains",
-}
-"""Steps of the study in words; any other progress message is a set of effects."""
 
 
 def run(
@@ -222,36 +208,6 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
         said = next((one.rstrip(".") for one in answer.cautions if one.startswith(UNPATCHED)), UNPATCHED)
         raise TunnelError(said, where="--patch", remedy="leave out --patch for the answer alone")
     answer.model.write(path)
-
-
-@contextmanager
-def step_display() -> Iterator[Callable[[str], None]]:
-    """A spinner with the step, the effect tried and the time; one line per step where no terminal shows it.
-
-    Yields:
-        The function to call with each step.
-    """
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    from tunnel_lab.terminal.tables import console
-
-    terminal = console(stderr=True)
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-    with Progress(*columns, console=terminal, disable=not terminal.is_terminal, transient=True) as progress:
-        task = progress.add_task("starting", total=None)
-        step, begun = "", time.perf_counter()
-
-        def show_step(text: str) -> None:
-            nonlocal step
-            if text in STEPS:
-                step = STEPS[text]
-                progress.update(task, description=step)
-                if not terminal.is_terminal:
-                    terminal.print(f"{time.perf_counter() - begun:.1f} s: {step}", markup=False)
-            else:
-                progress.update(task, description=f"{step}: {text}")
-
-        yield show_step
 
 
 def show(document: dict[str, Any]) -> None:

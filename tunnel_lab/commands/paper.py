@@ -35,7 +35,7 @@ def run(
     [bold]Exit status[/bold]
       0 written, 2 bad input, 130 interrupted (finished parts are kept).
     """
-    from tunnel_lab.paper.work import parts, write_paper
+    from tunnel_lab.paper.page import parts, write_paper
     from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import say_written, show_tables, table
     from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean

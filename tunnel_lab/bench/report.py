@@ -9,8 +9,7 @@ from datetime import datetime
 from nicegui import ui
 
 from tunnel_lab.bench.parts import Fault, Frame, address, button, show_command
-from tunnel_lab.bench.stages import read_result
-from tunnel_lab.bench.workspace import Session
+from tunnel_lab.bench.workspace import Session, read_result
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
 

@@ -26,18 +26,18 @@ _REMEDY = "delete it, and the part is computed again"
 
 def parts() -> dict[str, Part]:
     """The parts by name, in the order of the page."""
-    from tunnel_lab.paper import network_parts, rig_parts
+    from tunnel_lab.paper import networks, rig
 
     return {
-        "table-1": rig_parts.table_1,
-        "table-2": rig_parts.table_2,
-        "equations": rig_parts.equations,
-        "figure-1": rig_parts.figure_1,
-        "figure-2": rig_parts.figure_2,
-        "figure-3": network_parts.figure_3,
-        "table-3": network_parts.table_3,
-        "table-4": network_parts.table_4,
-        "figures-4-to-6": network_parts.figures_4_to_6,
+        "table-1": rig.table_1,
+        "table-2": rig.table_2,
+        "equations": rig.equations,
+        "figure-1": rig.figure_1,
+        "figure-2": rig.figure_2,
+        "figure-3": networks.figure_3,
+        "table-3": networks.table_3,
+        "table-4": networks.table_4,
+        "figures-4-to-6": networks.figures_4_to_6,
     }
 
 

@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from math import pi
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf, log, pi, sqrt
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from identification import identify
-from identification.campaign.springs import fit_springs
-from identification.datasets import paper_springs
+from identification.campaign.springs import SpringFit, fit_springs
+from identification.datasets import SpringRow, paper_springs
+from identification.decay.damped_oscillation import Decay, free_decay
 from identification.printing.numbers import concise, with_std
-from tunnel_lab.paper import figures
-from tunnel_lab.paper.equations import eq7, eq8, known_run, printed_transfer_function
+from tunnel_lab.paper.networks import paper_run_plan
 from tunnel_lab.paper.section import Picture, Section, scaled, signed
-from tunnel_lab.plotting.style import save_both
+from tunnel_lab.plotting.style import BLUE, COLOURS, VERMILION, WIDTH, figure, grid, save_both, styled
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import CampaignPlan
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 TABLE_I = (
     ("width", "m", 0.225), ("height", "m", 0.160), ("length", "m", 0.625), ("ground clearance", "m", 0.040),
@@ -25,6 +34,9 @@ TABLE_I = (
 )  # fmt: skip
 TABLE_I_INERTIA = 0.11  # kg m²
 _DURATION = 40.0  # s: twenty cycles of the softest spring
+_DRAWN_ZETA = (0.01, 0.05, 0.1, 0.35)
+_PRINTED_ZETA = 0.1
+LN2 = log(2.0)
 
 
 def table_1(_: Path) -> Section:
@@ -72,7 +84,7 @@ def table_2(folder: Path) -> Section:
         )
         for spring, own, residual, flag in zip(springs, found, theirs.residual_percent, theirs.flagged, strict=True)
     )  # fmt: skip
-    save_both(figures.springs_figure(springs, theirs, TABLE_I_INERTIA), folder / "springs.png")
+    save_both(springs_figure(springs, theirs, TABLE_I_INERTIA), folder / "springs.png")
     off = ", ".join(str(spring.number) for spring, flag in zip(springs, theirs.flagged, strict=True) if flag)
     return Section(
         title="Table II",
@@ -183,7 +195,7 @@ def figure_1(folder: Path) -> Section:
 
 def figure_2(folder: Path) -> Section:
     """Impulse responses."""
-    save_both(figures.impulse_figure(), folder / "impulse.png")
+    save_both(impulse_figure(), folder / "impulse.png")
     return Section(
         title="Fig. 2",
         about="impulse response over ωn t, and the three cycles that the first network gets",
@@ -197,3 +209,154 @@ def figure_2(folder: Path) -> Section:
         ),
         pictures=(Picture(file="impulse.png", caption="Impulse responses, scaled to a largest value of 1."),),
     )
+
+
+@styled
+def springs_figure(springs: Sequence[SpringRow], fit: SpringFit, stated: float) -> Figure:
+    """The springs and their line, and how far each is from it.
+
+    Args:
+        springs: of Table II.
+        fit: of the same springs.
+        stated: inertia of Table I, kg m².
+    """
+    fig = figure(WIDTH, 2.9)
+    left, right = fig.subplots(1, 2)
+    square = np.array([(2.0 * np.pi * spring.frequency_hz) ** 2 for spring in springs])
+    stiffness = np.array([spring.stiffness_n_m_per_rad for spring in springs])
+    ends = np.array([0.0, 1.03 * square.max()])
+    left.plot(square, stiffness, "o", color=BLUE, ms=4, label="Table II")
+    left.plot(
+        ends,
+        fit.inertia.value * ends + fit.intercept.value,
+        color=BLUE,
+        label=f"gradient {fit.inertia.value:.4f} kg m²",
+    )
+    left.plot(ends, stated * ends, "--", color=VERMILION, label=f"Table I: {stated:g} kg m²")
+    left.set(xlabel="ωn² [rad²/s²]", ylabel="stiffness Kr [N m/rad]", xlim=(0.0, ends[1]), ylim=(0.0, None))
+    left.legend(loc="upper left")
+    numbers = [spring.number for spring in springs]
+    right.axhline(0.0, color="0.4", lw=0.8)
+    right.vlines(numbers, 0.0, fit.residual_percent, color=BLUE, lw=0.8)
+    right.plot(numbers, fit.residual_percent, "o", color=BLUE, ms=4)
+    right.set(xlabel="spring", ylabel="stiffness against the line [%]")
+    right.set_xticks(numbers)
+    for axes in (left, right):
+        grid(axes)
+    return fig
+
+
+@styled
+def impulse_figure() -> Figure:
+    """Fig. 2: impulse responses over ωn t, the largest value 1; and eq. 12 as printed for one of them."""
+    fig = figure(WIDTH, 3.0)
+    axes = fig.add_subplot()
+    time = np.linspace(0.0, 6.6 * np.pi, 1200)
+    for zeta, colour in zip(_DRAWN_ZETA, COLOURS, strict=False):
+        response = free_decay(time, Decay.from_modal(1.0, zeta), 0.0, 1.0)
+        axes.plot(time, response / response.max(), color=colour, label=f"ζ = {zeta:g}")
+    wrong = np.sin(printed_transfer_function(_PRINTED_ZETA, 1.0).omega_n * time)
+    axes.plot(time, wrong, ":", color="black", lw=1.0, label=f"eq. 12 as printed, ζ = {_PRINTED_ZETA:g}")
+    axes.axvspan(0.0, 6.0 * np.pi, color="#e6e9ec", lw=0, zorder=0)
+    axes.set(
+        xlabel="ωn t [rad]; shaded: three cycles",
+        ylabel="response over its largest value",
+        xlim=(0.0, time[-1]),
+    )
+    axes.set_xticks(2.0 * np.pi * np.arange(4), ["0", "2π", "4π", "6π"])
+    fig.legend(loc="outside upper center", ncols=5)
+    grid(axes)
+    return fig
+
+
+@dataclass(frozen=True)
+class Oscillation:
+    """A damped oscillation.
+
+    Args:
+        omega_n: natural frequency, rad/s.
+        rate: decay rate σ, 1/s.
+    """
+
+    omega_n: float
+    rate: float
+
+    @property
+    def frequency(self) -> float:
+        """Damped, Hz."""
+        return sqrt(self.omega_n**2 - self.rate**2) / (2.0 * pi)
+
+    @property
+    def half_time(self) -> float:
+        """Time to half amplitude, s."""
+        return LN2 / self.rate if self.rate else inf
+
+
+@dataclass(frozen=True)
+class KnownRun:
+    """A run whose truth is known, with the wind off and on.
+
+    Args:
+        inertia: Izz, kg m².
+        stiffness_load: Ka over Cnβ, N m.
+        damping_load: Ca over Cnr, N m s.
+        cn_beta: Cnβ, 1/rad.
+        cn_r: Cnr, 1/rad.
+    """
+
+    inertia: float
+    stiffness_load: float
+    damping_load: float
+    cn_beta: float
+    cn_r: float
+    off: Oscillation
+    on: Oscillation
+
+    def cn_r_of(self, normalised: float) -> float:
+        """Cnr of eq. 18, 1/rad, from N̂r in 1/s."""
+        return normalised * self.inertia / self.damping_load
+
+    def cn_beta_of(self, normalised: float) -> float:
+        """Cnβ of eq. 17, 1/rad, from N̂β in 1/s²."""
+        return normalised * self.inertia / self.stiffness_load
+
+
+def known_run() -> KnownRun:
+    """Spring 5 at 10 m/s with the paper's coefficients: the run that Table III may be of, an inference."""
+    plan, rig = paper_run_plan(1), load_rig()
+    truth, on = plan.truth, plan.conditions[1]
+    air = rig.body.flow(rig.air.density, on.wind_speed)
+    stiffness = float(on.spring_stiffness or 0.0)
+    inertia, damping = truth.yaw_inertia, truth.mechanical_damping
+    ka, ca = aerodynamic_stiffness(truth.cn_beta, **air), aerodynamic_damping(truth.cn_r, **air)
+    return KnownRun(
+        inertia, ka / truth.cn_beta, ca / truth.cn_r, truth.cn_beta, truth.cn_r,
+        Oscillation(sqrt(stiffness / inertia), damping / (2.0 * inertia)),
+        Oscillation(sqrt((stiffness - ka) / inertia), (damping - ca) / (2.0 * inertia)),
+    )  # fmt: skip
+
+
+def eq7(on: Oscillation, off: Oscillation) -> float:
+    """N̂β as printed, 1/s²."""
+    change = 4.0 * pi**2 * (on.frequency**2 - off.frequency**2)
+    return -(change + LN2**2 * (on.half_time**-2 - off.half_time**-2))
+
+
+def eq8(on: Oscillation, off: Oscillation, *, printed: bool) -> float:
+    """N̂r, 1/s; as printed its first term is squared, which is not of that unit."""
+    first = on.half_time**-2 if printed else 1.0 / on.half_time
+    return -2.0 * LN2 * (first - 1.0 / off.half_time)
+
+
+def printed_transfer_function(zeta: float, omega_n: float) -> Oscillation:
+    """The oscillation of eqs 12 and 16 as printed, with ``2ζωn`` for ``2ζωn s``.
+
+    Args:
+        zeta: damping ratio.
+        omega_n: natural frequency, rad/s.
+
+    Returns:
+        An oscillation without damping, because the denominator has no term in s. Its ωn² (1/s²) and 2ζωn (1/s) are
+        added as numbers in SI.
+    """
+    return Oscillation(sqrt(omega_n**2 + 2.0 * zeta * omega_n), 0.0)

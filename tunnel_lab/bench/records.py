@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Any
 from nicegui import events, ui
 
 from tunnel_lab.bench import preview
-from tunnel_lab.bench.chart import Chart
-from tunnel_lab.bench.choices_part import ChoicesPart
-from tunnel_lab.bench.parts import Fault, Frame, address, button, show_parts
-from tunnel_lab.bench.start import drop_zone, keep
+from tunnel_lab.bench.parts import Chart, Fault, Frame, address, button, drop_zone, keep, show_parts
+from tunnel_lab.bench.preview import ChoicesPart
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.records import Imported
+
 
 _TIME = "time [s], from the record's first sample"
 _KINDS = {"start": "release", "end": "end", "rest": "rest"}

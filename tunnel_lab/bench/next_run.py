@@ -7,10 +7,9 @@ from typing import Any
 
 from nicegui import ui
 
-from tunnel_lab.bench import hand
+from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Fault, Frame, button, show_parts
-from tunnel_lab.bench.stages import read_result
-from tunnel_lab.bench.workspace import Session
+from tunnel_lab.bench.workspace import Session, read_result
 from tunnel_sim.vocabulary.errors import TunnelError
 
 _NO_SPRING = "no run can be planned without a stated spring"
@@ -71,7 +70,7 @@ class _Rivals:
             with self._place:
                 ui.label("Simulating runs …").classes("soft")
             try:
-                found = await hand.next_run(self._session, first, second)
+                found = await work.next_run(self._session.campaign, self._session.state(), first, second)
             finally:
                 if not self._place.is_deleted:
                     self._place.clear()
