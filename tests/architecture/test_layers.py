@@ -32,10 +32,10 @@ ENGINE_ROOMS = (
     "diagnosis.answer.patched_model",
     "tunnel_lab.envs.",
     "tunnel_lab.show.live",
-    "tunnel_lab.show.web",
     "tunnel_lab.show.live",
-    "tunnel_lab.show.web",
-    "tunnel_lab.show.window",
+    "tunnel_lab.show.live",
+    "tunnel_lab.show.live",
+    "tunnel_lab.show.live",
 )
 
 

@@ -293,8 +293,8 @@ def _answer(folder: Path, changed: str, rng: Rng) -> None:
 
 def sweep_file(folder: Path, rng: Rng) -> None:
     """A sweep file changed, and its folder begun where it is accepted."""
-    from tunnel_lab.sweep.reading import read_sweep
-    from tunnel_lab.sweep.store import begin
+    from tunnel_lab.experiments.sweep_file import read_sweep
+    from tunnel_lab.experiments.sweep_store import begin
 
     sweep = read_sweep(_written(folder / "sweep.toml", _toml(seeds.SMALL.encode(), rng), rng))
     begin(sweep, folder / "out")
@@ -302,9 +302,8 @@ def sweep_file(folder: Path, rng: Rng) -> None:
 
 def sweep_folder(folder: Path, rng: Rng) -> None:
     """``sweep.json`` or a part of the results changed, as a sweep that goes on or is summed up meets it."""
-    from tunnel_lab.sweep.figures import overall_table, pace_table
-    from tunnel_lab.sweep.store import open_store
-    from tunnel_lab.sweep.summary import paces, summarise
+    from tunnel_lab.experiments.sweep_store import open_store
+    from tunnel_lab.experiments.sweep_summary import overall_table, pace_table, paces, summarise
 
     files = dict(seeds.sweep_folder())
     names = [name for name in files if name.startswith(("results", "timings"))]
@@ -327,7 +326,7 @@ def sweep_folder(folder: Path, rng: Rng) -> None:
 
 def score_grid(folder: Path, rng: Rng) -> None:
     """A score grid changed."""
-    from tunnel_lab.scoring.grid import load_grid
+    from tunnel_lab.experiments.score_grid import load_grid
 
     load_grid(
         _written(folder / "grid.toml", _toml(seeds.regression("score-grid.toml").read_bytes(), rng), rng)
@@ -338,8 +337,8 @@ def score_baseline(folder: Path, rng: Rng) -> None:
     """A baseline's table, or the grid in it, changed; where it is accepted, it is compared with itself."""
     import polars as pl
 
-    from tunnel_lab.scoring.check import check
-    from tunnel_lab.scoring.results import read_trials
+    from tunnel_lab.experiments.score_trials import read_trials
+    from tunnel_lab.experiments.score_view import check
 
     frame = seeds.baseline_frame()
     if rng.random() < 0.5:

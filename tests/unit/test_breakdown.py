@@ -6,8 +6,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from tunnel_lab.scoring import breakdown as work
-from tunnel_lab.scoring import breakdown_view as view
+from tunnel_lab.experiments import breakdown as view
+from tunnel_lab.experiments import breakdown as work
 
 NAMES = ("matrix_pencil", "conventional")
 EFFECTS = ("coulomb_friction", "sensor_drift")

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from tunnel_lab.paper import page, rig
+from tunnel_lab.paper.page import Picture, Section, signed
 from tunnel_lab.paper.rig import Oscillation, eq7, eq8, known_run, printed_transfer_function
-from tunnel_lab.paper.section import Picture, Section, signed
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -70,73 +70,80 @@ def section(title: str, *files: str) -> Section:
     )
 
 
-@pytest.fixture
-def called(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The parts that were computed; the second draws a picture, the third is interrupted at first."""
-    seen: list[str] = []
+class Parts(dict[str, page.Part]):
+    """Three parts, and which were computed; the second draws a picture, the third is interrupted at first."""
 
-    def second(folder: Path) -> Section:
+    def __init__(self) -> None:
+        super().__init__(one=self._one, two=self._two, three=self._three)
+        self.called: list[str] = []
+
+    def _one(self, _: Path) -> Section:
+        self.called.append("one")
+        return section("One")
+
+    def _two(self, folder: Path) -> Section:
         (folder / "b.png").write_bytes(b"x")
-        seen.append("two")
+        self.called.append("two")
         return section("Two", "b.png")
 
-    def third(_: Path) -> Section:
-        seen.append("three")
-        if seen.count("three") == 1:
+    def _three(self, _: Path) -> Section:
+        self.called.append("three")
+        if self.called.count("three") == 1:
             raise KeyboardInterrupt
         return section("Three")
 
-    found = {"one": lambda _: seen.append("one") or section("One"), "two": second, "three": third}
-    monkeypatch.setattr(page, "parts", lambda: found)
-    return seen
+
+@pytest.fixture
+def parts() -> Parts:
+    return Parts()
 
 
 NAMES = ("one", "two", "three")
 
 
-def test_an_interrupted_page_goes_on_where_it_stopped(tmp_path: Path, called: list[str]) -> None:
+def test_an_interrupted_page_goes_on_where_it_stopped(tmp_path: Path, parts: Parts) -> None:
     with pytest.raises(KeyboardInterrupt):
-        page.write_paper(tmp_path, NAMES)
+        page.write_paper(tmp_path, parts, NAMES)
     assert not (tmp_path / page.PAGE).exists()
-    written, sections = page.write_paper(tmp_path, NAMES)
-    assert called == ["one", "two", "three", "three"]
+    written, sections = page.write_paper(tmp_path, parts, NAMES)
+    assert parts.called == ["one", "two", "three", "three"]
     assert list(sections) == list(NAMES)
     text = written.read_text(encoding="utf-8")
     assert "&lt;1&gt;" in text
     assert "<b>" not in text
     (tmp_path / "b.png").unlink()
-    page.write_paper(tmp_path, NAMES)
-    assert called[4:] == ["two"]  # only the part whose picture is gone
+    page.write_paper(tmp_path, parts, NAMES)
+    assert parts.called[4:] == ["two"]  # only the part whose picture is gone
 
 
-def test_a_part_of_another_version_is_computed_again(tmp_path: Path, called: list[str]) -> None:
-    page.write_paper(tmp_path, ("one",))
+def test_a_part_of_another_version_is_computed_again(tmp_path: Path, parts: Parts) -> None:
+    page.write_paper(tmp_path, parts, ("one",))
     kept = tmp_path / "parts" / "one.json"
     kept.write_text(json.dumps(json.loads(kept.read_text()) | {"version": "0.0.0"}))
-    _, sections = page.write_paper(tmp_path, ("one",))
-    assert called == ["one", "one"]
+    _, sections = page.write_paper(tmp_path, parts, ("one",))
+    assert parts.called == ["one", "one"]
     assert list(sections) == ["one"]
 
 
 @pytest.mark.parametrize("damage", ["{", '{"version": 1}', None])
-def test_a_damaged_part_is_one_line(tmp_path: Path, called: list[str], damage: str | None) -> None:
-    page.write_paper(tmp_path, ("one",))
+def test_a_damaged_part_is_one_line(tmp_path: Path, parts: Parts, damage: str | None) -> None:
+    page.write_paper(tmp_path, parts, ("one",))
     kept = tmp_path / "parts" / "one.json"
     document = json.loads(kept.read_text())
     document["section"]["outcome"] = "splendid"
     kept.write_text(damage or json.dumps(document))
     if damage == '{"version": 1}':
-        page.write_paper(tmp_path, ("one",))
-        assert called == ["one", "one"]
+        page.write_paper(tmp_path, parts, ("one",))
+        assert parts.called == ["one", "one"]
         return
     with pytest.raises(TunnelError, match=r"one\.json"):
-        page.write_paper(tmp_path, ("one",))
+        page.write_paper(tmp_path, parts, ("one",))
 
 
-def test_a_picture_stays_in_its_folder(tmp_path: Path, called: list[str]) -> None:
-    page.write_paper(tmp_path, ("two",))
+def test_a_picture_stays_in_its_folder(tmp_path: Path, parts: Parts) -> None:
+    page.write_paper(tmp_path, parts, ("two",))
     kept = tmp_path / "parts" / "two.json"
     kept.write_text(kept.read_text().replace("b.png", "../b.png"))
     with pytest.raises(TunnelError, match="pattern"):
-        page.write_paper(tmp_path, ("two",))
-    assert called == ["two"]
+        page.write_paper(tmp_path, parts, ("two",))
+    assert parts.called == ["two"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.scoring.accuracy import Trials, score
-from tunnel_lab.scoring.tables import _cell, _summary
+from tunnel_lab.experiments.score_view import _cell, _summary
 
 
 def trials(errors: list[float], failures: int = 0, *, bound: bool = True) -> Trials:

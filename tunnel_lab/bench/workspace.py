@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -157,19 +158,21 @@ class Stage:
     Args:
         key: in addresses.
         title: of the page.
+        builder: module of this package and its function that builds the page.
     """
 
     key: str
     title: str
+    builder: str
 
 
 STAGES = (
-    Stage("records", "Records"),
-    Stage("conditions", "Conditions"),
-    Stage("identify", "Identify"),
-    Stage("diagnose", "Diagnose"),
-    Stage("next-run", "Next run"),
-    Stage("report", "Report"),
+    Stage("records", "Records", "records.build"),
+    Stage("conditions", "Conditions", "conditions.build"),
+    Stage("identify", "Identify", "identify.build"),
+    Stage("diagnose", "Diagnose", "diagnosis.build_diagnose"),
+    Stage("next-run", "Next run", "diagnosis.build_next_run"),
+    Stage("report", "Report", "diagnosis.build_report"),
 )
 
 
@@ -180,16 +183,14 @@ def closed(session: Session, key: str) -> str:
         What to do first, in one line; empty where the stage is open.
     """
     place = [stage.key for stage in STAGES].index(key)
-    checks = (_recorded, _stated, _identified, _diagnosed, lambda _: "")
+    checks: tuple[Callable[[Session], str], ...] = (
+        lambda session: "" if session.imported else "Write the campaign on the page Records first.",
+        lambda session: "Correct the conditions that are marked first." if session.draft.is_file() else "",
+        _identified,
+        _diagnosed,
+        lambda _: "",
+    )
     return next((why for check in checks[:place] if (why := check(session))), "")
-
-
-def _recorded(session: Session) -> str:
-    return "" if session.imported else "Write the campaign on the page Records first."
-
-
-def _stated(session: Session) -> str:
-    return "Correct the conditions that are marked first." if session.draft.is_file() else ""
 
 
 def _identified(session: Session) -> str:

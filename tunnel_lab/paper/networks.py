@@ -19,7 +19,7 @@ from identification.neural.networks import Networks
 from identification.neural.shape import cycles_time, network_inputs
 from identification.neural.training_set import held_out_points
 from identification.printing.numbers import concise, significant
-from tunnel_lab.paper.section import Picture, Section, signed
+from tunnel_lab.paper.page import Picture, Section, signed
 from tunnel_lab.plotting.style import (
     BLUE,
     COLOURS,

@@ -16,7 +16,7 @@ from identification.datasets import SpringRow, paper_springs
 from identification.decay.damped_oscillation import Decay, free_decay
 from identification.printing.numbers import concise, with_std
 from tunnel_lab.paper.networks import paper_run_plan
-from tunnel_lab.paper.section import Picture, Section, scaled, signed
+from tunnel_lab.paper.page import Picture, Section, scaled, signed
 from tunnel_lab.plotting.style import BLUE, COLOURS, VERMILION, WIDTH, figure, grid, save_both, styled
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig

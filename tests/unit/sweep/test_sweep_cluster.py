@@ -14,10 +14,10 @@ import pytest
 
 from tests.unit.sweep.small_sweep import contents
 from tunnel_lab.cli import main
-from tunnel_lab.sweep import cluster
-from tunnel_lab.sweep.cluster import on_cluster
-from tunnel_lab.sweep.engine import run_sweep
-from tunnel_lab.sweep.product import Sweep
+from tunnel_lab.experiments import cluster
+from tunnel_lab.experiments.cluster import on_cluster
+from tunnel_lab.experiments.sweep_cases import Sweep
+from tunnel_lab.experiments.sweep_store import run_sweep
 
 ROOT = Path(__file__).parents[3]
 WORKERS = 3

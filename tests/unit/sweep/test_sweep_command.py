@@ -18,13 +18,13 @@ import pytest
 from tests.unit.gone_reader import unheard
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
+from tunnel_lab.experiments import cluster, sweep_summary
+from tunnel_lab.experiments.sweep_cases import Sweep
+from tunnel_lab.experiments.sweep_file import read_sweep
+from tunnel_lab.experiments.sweep_shards import RESULT_COLUMNS
+from tunnel_lab.experiments.sweep_store import run_sweep
+from tunnel_lab.experiments.sweep_summary import Line, _lines, summarise
 from tunnel_lab.plotting.style import styled
-from tunnel_lab.sweep import cluster, figures
-from tunnel_lab.sweep.engine import run_sweep
-from tunnel_lab.sweep.product import Sweep
-from tunnel_lab.sweep.reading import read_sweep
-from tunnel_lab.sweep.rows import RESULT_COLUMNS
-from tunnel_lab.sweep.summary import Line, _lines, summarise
 from tunnel_sim.vocabulary.errors import TunnelError
 
 EFFECT = 'name = "coulomb_friction"\nparameters = { friction_moment = [0.002, 0.02] }'
@@ -201,7 +201,7 @@ def test_a_figure_has_a_column_of_panels_for_each_quantity() -> None:
     values = {"zeta": [2.02, 1.98, 2.2, 2.2], "omega_n": [2.0, 2.02, 2.04, 2.08]}
     lines = [line for name, some in values.items() for line in _lines(hand_made(some), "e", name)]
     along = [line for line in lines if line.axis == "noise_std"]
-    drawn = figures.error_figure(along)
+    drawn = sweep_summary.error_figure(along)
     assert drawn is not None
     panels = [[line.get_ydata().tolist() for line in axes.get_lines()[:1]] for axes in drawn.axes]
     wanted = [[quantity, figure] for quantity in ("omega_n", "zeta") for figure in ("rmse", "bias")]
@@ -220,7 +220,9 @@ def test_labels_of_the_axes_do_not_touch(noise: tuple[float, ...]) -> None:
     rows = pl.concat(
         [hand_made([2.02, 1.98, 2.2, 2.3]).with_columns(noise_std=at) for at in map(pl.lit, noise)]
     )
-    drawn = figures.error_figure([line for line in _lines(rows, "e", "zeta") if line.axis == "noise_std"])
+    drawn = sweep_summary.error_figure(
+        [line for line in _lines(rows, "e", "zeta") if line.axis == "noise_std"]
+    )
     assert drawn is not None
     shown = []
     drawn.draw_without_rendering()
@@ -312,13 +314,13 @@ def unwrapped(capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_a_figure_without_quantities_to_draw_is_none() -> None:
     lines: list[Line] = [*_lines(hand_made([1.0, 2.0, 3.0, 4.0]), "e", "yaw_inertia")]
-    assert figures.error_figure(lines[1:]) is None
+    assert sweep_summary.error_figure(lines[1:]) is None
     assert "noise_std" in RESULT_COLUMNS
 
 
 def test_the_sweep_package_loads_nothing_heavy() -> None:
     code = (
-        "import sys, tunnel_lab.commands.sweep, tunnel_lab.sweep.processes\n"
+        "import sys, tunnel_lab.commands.sweep, tunnel_lab.experiments.runner\n"
         "print(sorted({'mujoco', 'numpy', 'polars', 'dask', 'distributed'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -1,7 +1,7 @@
-"""Shards in parallel on a Dask cluster: on other machines, or on workers that are started here.
+"""Workers of a Dask cluster: on other machines, or started here.
 
-Dask repeats the tasks of a lost worker elsewhere. A shard is a pure function of sweep and number, and only this
-process writes: a shard that is done twice is stored once. Dask is imported inside the functions, never at import.
+Dask repeats the tasks of a lost worker elsewhere. The work is a pure function of its task, and only this process
+keeps results: a task that is done twice is stored once. Dask is imported inside the functions, never at import.
 """
 
 from __future__ import annotations
@@ -9,11 +9,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic
 
-from tunnel_lab.sweep.processes import Said
+from tunnel_lab.experiments.runner import ResultT, Say, TaskT, Workers
 from tunnel_sim.files.toml_input import one_line
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.extras import library
@@ -21,7 +20,6 @@ from tunnel_sim.vocabulary.extras import library
 if TYPE_CHECKING:
     from distributed import Client
 
-    from tunnel_lab.sweep.shard import Finished
 
 LOCAL = "local"
 ATTEMPTS = 3
@@ -33,33 +31,26 @@ CONNECT_S = 10.0
 _FEWEST_IN_FLIGHT = 8
 
 
-def on_cluster(
-    address: str, workers: int, say: Said, *, poll_s: float = POLL_S
-) -> Callable[[str, Sequence[int]], Iterator[Finished]]:
-    """Work by a Dask cluster.
+def on_cluster(address: str, workers: int, say: Say, *, poll_s: float = POLL_S) -> Workers:
+    """Workers of a Dask cluster.
 
     Args:
         address: of a scheduler, such as ``tcp://host:8786``, or ``local`` for a cluster that is started here.
         workers: number of workers of a local cluster.
         say: called with each line for the user.
         poll_s: how long to wait for a shard before the workers are counted, s.
-
-    Returns:
-        A function that does shards: given the sweep as JSON and the shards' numbers, it yields them as they finish.
     """
-    return partial(_work, address, workers, say, poll_s)
 
+    def crew(work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]) -> Iterator[tuple[TaskT, ResultT]]:
+        distributed = library("distributed", "--scheduler", "cluster")
+        gone = distributed.CancelledError, distributed.comm.core.CommClosedError
+        with _client(address, workers) as client:
+            try:
+                yield from _Crew(client, work, say, poll_s).work(tasks)
+            except gone:
+                raise _gone() from None
 
-def _work(
-    address: str, workers: int, say: Said, poll_s: float, sweep: str, shards: Sequence[int]
-) -> Iterator[Finished]:
-    distributed = library("distributed", "--scheduler", "cluster")
-    gone = distributed.CancelledError, distributed.comm.core.CommClosedError
-    with _client(address, workers) as client:
-        try:
-            yield from _Crew(client, sweep, say, poll_s).work(shards)
-        except gone:
-            raise _gone() from None
+    return crew
 
 
 @contextmanager
@@ -91,28 +82,28 @@ def _client(address: str, workers: int) -> Iterator[Client]:
         yield client
 
 
-class _Crew:
-    """The workers of a cluster at one sweep."""
+class _Crew(Generic[TaskT, ResultT]):
+    """The workers of a cluster at one kind of work."""
 
-    def __init__(self, client: Any, sweep: str, say: Said, poll_s: float) -> None:
+    def __init__(self, client: Any, work: Callable[[TaskT], ResultT], say: Say, poll_s: float) -> None:
         self._client = client
-        self._sweep = sweep
+        self._work = work
         self._say = say
         self._poll_s = poll_s
-        self._attempts: dict[int, int] = {}
+        self._attempts: dict[TaskT, int] = {}
         self._alone = False
 
-    def work(self, shards: Sequence[int]) -> Iterator[Finished]:
-        """Shards as they finish, few in flight at a time."""
+    def work(self, tasks: Sequence[TaskT]) -> Iterator[tuple[TaskT, ResultT]]:
+        """Tasks with their results as they finish, few in flight at a time."""
         import distributed
 
         wait: Any = distributed.wait
-        waiting = iter(shards)
-        flying: dict[Any, int] = {}
+        waiting = iter(tasks)
+        flying: dict[Any, TaskT] = {}
         self._workers()
         while True:
-            for index in islice(waiting, max(0, self._room() - len(flying))):
-                flying[self._submit(index)] = index
+            for task in islice(waiting, max(0, self._room() - len(flying))):
+                flying[self._submit(task)] = task
             if not flying:
                 return
             try:
@@ -121,44 +112,40 @@ class _Crew:
                 self._workers()
                 continue
             for future in landed:
-                index = flying.pop(future)
-                done = self._result(future, index)
-                if done is None:
-                    flying[self._submit(index)] = index
+                task = flying.pop(future)
+                result = self._result(future, task)
+                if result is None:
+                    flying[self._submit(task)] = task
                 else:
                     self._alone = False
-                    yield done
+                    yield task, result
 
-    def _submit(self, index: int) -> Any:
-        from tunnel_lab.sweep.shard import run_shard
+    def _submit(self, task: TaskT) -> Any:
+        attempt = self._attempts.setdefault(task, 1)
+        return self._client.submit(self._work, task, key=f"shard-{task}-{attempt}-{id(self)}", pure=False)
 
-        attempt = self._attempts.setdefault(index, 1)
-        return self._client.submit(
-            run_shard, self._sweep, index, key=f"shard-{index}-{attempt}-{id(self)}", pure=False
-        )
-
-    def _result(self, future: Any, index: int) -> Finished | None:
-        """A finished shard; None where its workers were lost and it must be submitted again."""
+    def _result(self, future: Any, task: TaskT) -> ResultT | None:
+        """The result of a task; None where its workers were lost and it must be submitted again."""
         from distributed import KilledWorker
 
         try:
-            found: Finished = future.result()
+            result: ResultT = future.result()
         except (ImportError, RuntimeError) as error:
             raise TunnelError(
                 f"a worker cannot do a shard ({one_line(error)})",
                 remedy="give scheduler and workers the same environment as here",
             ) from None
         except KilledWorker:
-            self._attempts[index] += 1
-            if self._attempts[index] > ATTEMPTS:
+            self._attempts[task] += 1
+            if self._attempts[task] > ATTEMPTS:
                 raise TunnelError(
-                    f"shard {index} lost every worker it was given to",
+                    f"shard {task} lost every worker it was given to",
                     remedy="check the memory of the workers; finished shards are kept",
                 ) from None
             return None
         finally:
             future.release()
-        return found
+        return result
 
     def _workers(self) -> None:
         """Report when no worker is connected, once each time."""

@@ -1,17 +1,21 @@
-"""The stage Diagnose: the command in a process of its own, its answer, and causes switched on and off by hand."""
+"""The stages of the diagnosis: Diagnose, Next run and Report, with causes switched on and off by hand."""
 
 from __future__ import annotations
 
 import asyncio
+import time
 from datetime import datetime
+from math import degrees
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
 from tunnel_lab.bench import work
-from tunnel_lab.bench.parts import Fault, Frame, button, show_command, show_parts
+from tunnel_lab.bench.parts import Fault, Frame, address, button, show_command, show_parts
 from tunnel_lab.bench.workspace import Session, is_current, read_result
 from tunnel_lab.terminal.progress import STEPS
+from tunnel_sim.files.reading import read_json
+from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -28,9 +32,10 @@ _ABOUT = (
     "stretches of time, held out of the fit. The diagnosis itself does not change; it also frees the forms."
 )
 _CONVERGE = "Free the forms, and fit to convergence (up to a minute)"
+_NO_SPRING = "no run can be planned without a stated spring"
 
 
-def build(session: Session, frame: Frame) -> None:
+def build_diagnose(session: Session, frame: Frame) -> None:
     """Build the page."""
     _Diagnose(session, frame)
 
@@ -280,3 +285,161 @@ def show_closure(found: Closure) -> None:
             with ui.element("li"):
                 words = name.replace("_", " ").replace(".", ": ")
                 ui.label(f"{words} = {estimate(given.to_json_dict())}")
+
+
+
+
+def build_next_run(session: Session, frame: Frame) -> None:
+    """Build the page."""
+    from diagnosis.printing import rival_lines
+    from tunnel_lab.report.view import next_steps
+
+    document = read_result(session.diagnosis)
+    assert document is not None  # else the stage is closed
+    ui.html("What to do next", sanitize=False, tag="h2")
+    with ui.element("ol"):
+        for step in next_steps(document):
+            with ui.element("li"):
+                ui.label(step)
+    show_parts(rival_lines(document))
+    if document["next_run"] is not None:
+        show_run(document["next_run"])
+    _Rivals(session, document)
+    with ui.element("p").classes("buttons"):
+        frame.way_on()
+
+
+class _Rivals:
+    """Two answers to choose, and the run that would distinguish them."""
+
+    def __init__(self, session: Session, document: dict[str, Any]) -> None:
+        from tunnel_sim.effects import known_effects
+
+        self._session = session
+        fitted = {kind.name: kind.name.replace("_", " ") for kind in known_effects() if kind.fitted}
+        answers = [
+            [name for name in one["effect"].split(" + ") if name in fitted] for one in document["candidates"]
+        ]
+        answers = [answer for answer in answers if answer] or [[next(iter(fitted))]]
+        ui.html("Which run would distinguish two answers?", sanitize=False, tag="h2")
+        with ui.element("div").classes("fields"):
+            self._first, self._second = (
+                ui.select(fitted, label=label, value=answer, multiple=True).props("dense use-chips")
+                for label, answer in (
+                    ("This answer", answers[0]),
+                    ("or that one", answers[min(1, len(answers) - 1)]),
+                )
+            )
+        self._fault = Fault()
+        with ui.element("p").classes("buttons"):
+            button("Find the run", self._find)
+        self._place = ui.element("div").props("role=status aria-live=polite")
+
+    async def _find(self) -> None:
+        self._place.clear()
+        with self._fault.around():
+            first, second = sorted(self._first.value), sorted(self._second.value)
+            if first == second:
+                raise TunnelError("both answers are the same", remedy="choose different causes")
+            with self._place:
+                ui.label("Simulating runs …").classes("soft")
+            try:
+                found = await work.next_run(self._session.campaign, self._session.state(), first, second)
+            finally:
+                if not self._place.is_deleted:
+                    self._place.clear()
+            if self._place.is_deleted:  # the page was left
+                return
+            if found is None:
+                raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
+            with self._place:
+                show_run(found)
+
+
+def show_run(run: dict[str, float]) -> None:
+    """A run to make.
+
+    Args:
+        run: spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and separation.
+    """
+    wind = "off" if run["wind_speed"] == 0.0 else f"{run['wind_speed']:g} m/s"
+    with ui.element("div").classes("facts"):
+        for value, label in (
+            (f"{run['spring_stiffness']:.4g} N m/rad", "spring"),
+            (wind, "wind"),
+            (f"{run['release_angle']:.2g} rad ({degrees(run['release_angle']):.0f}°)", "release"),
+            (f"{run['duration']:.3g} s", "length of the record"),
+            (f"{run['separation']:.0f} standard deviations", "expected difference, in the noise's"),
+        ):
+            with ui.element("div"):
+                ui.label(value).classes("value")
+                ui.label(label).classes("soft")
+
+
+def build_report(session: Session, frame: Frame) -> None:
+    """Build the page."""
+    del frame
+    _Report(session)
+
+
+class _Report:
+    """The page: the report is written anew when author or notes change."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        stated = {"author": "", "notes": ""}
+        if session.byline.is_file():
+            stated |= read_json(session.byline, remedy="delete it")
+        with ui.element("div").classes("fields wide"):
+            self._author = ui.input("Author", value=str(stated["author"])).props("dense")
+            self._notes = ui.textarea(
+                "Notes, shown at the head of the report", value=str(stated["notes"])
+            ).props("dense autogrow")
+        self._author.on("change", self._write)
+        self._notes.on("change", self._write)
+        self._fault = Fault()
+        with ui.element("p").classes("buttons"):
+            button("Download the report", self._download, main=True)
+            ui.link("Open in a tab", address(session, "report.html"), new_tab=True).classes("button")
+        ui.label(f"Written: {session.report}").classes("soft")
+        show_command(
+            f"tunnel diagnose {session.campaign} --report {session.report} --author NAME --notes TEXT"
+        )
+        self._place = ui.element("div").classes("preview")
+        ui.timer(0.0, self._write, once=True)
+
+    async def _write(self) -> None:
+        author, notes = str(self._author.value or ""), str(self._notes.value or "")
+        with self._fault.around():
+            write_json(self._session.byline, {"author": author, "notes": notes})
+            await asyncio.to_thread(write_session_report, self._session, author, notes)
+            if self._place.is_deleted:  # the page was left
+                return
+            self._place.clear()
+            source = f"{address(self._session, 'report.html')}?{time.time_ns()}"
+            with self._place:
+                ui.element("iframe").props(f'src="{source}" title="Preview of the report"')
+
+    async def _download(self) -> None:
+        ui.download(self._session.report, f"{self._session.name}-report.html")
+
+
+def write_session_report(session: Session, author: str, notes: str) -> None:
+    """Write the report of the session's diagnosis, as ``tunnel diagnose --report`` does.
+
+    Args:
+        author: who made it; may be empty.
+        notes: for the head of the page; may be empty.
+
+    Raises:
+        TunnelError: when it cannot be written.
+    """
+    from diagnosis.detection.limit_cycles import diagnosable
+    from tunnel_lab.report import Byline, write_report
+    from tunnel_sim.files.campaign_io import read_campaign
+
+    document = read_result(session.diagnosis)
+    assert document is not None  # else the stage is closed
+    made = datetime.fromtimestamp(session.diagnosis.stat().st_mtime).astimezone().date().isoformat()
+    campaign = diagnosable(read_campaign(session.campaign)).campaign
+    write_report(document, campaign, session.report, Byline(made, author, notes))

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from identification.estimators import ALL_ESTIMATORS
-from tunnel_lab.sweep.product import NO_EFFECT, Case, Sweep, check_sweep_size
-from tunnel_lab.sweep.schema import SweepDocument
+from tunnel_lab.experiments.sweep_cases import NO_EFFECT, Case, Sweep, SweepDocument, check_sweep_size
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.plan_schema import check_conditions, first_twice
 from tunnel_sim.files.rig_file import parse_rig, rig_document

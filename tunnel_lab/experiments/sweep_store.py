@@ -1,4 +1,4 @@
-"""The folder of a sweep, with its finished shards.
+"""A sweep in its folder: finished shards are kept, and the others are done.
 
 ``sweep.json`` describes the sweep. Every shard is a file in ``results``, and one in ``records`` where these are
 stored. Files are written under a temporary name and renamed, results last: the shard is then finished.
@@ -12,10 +12,12 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tunnel_lab.sweep.product import Sweep
+from tunnel_lab.experiments.runner import Progress, Workers, run_tasks
+from tunnel_lab.experiments.sweep_cases import Sweep
 from tunnel_sim.files.leftovers import clear_leftovers
 from tunnel_sim.files.reading import as_described, frame_schema, read_frame, read_json, read_regular
 from tunnel_sim.files.toml_input import shown
@@ -26,7 +28,8 @@ from tunnel_sim.vocabulary.errors import TunnelError
 if TYPE_CHECKING:
     import polars as pl
 
-    from tunnel_lab.sweep.shard import Finished
+    from tunnel_lab.experiments.sweep_shards import Finished
+
 
 SCHEMA_VERSION = 1
 MANIFEST = "sweep.json"
@@ -90,7 +93,7 @@ class Store:
         """
         import polars as pl
 
-        from tunnel_lab.sweep.rows import TIMING_COLUMNS
+        from tunnel_lab.experiments.sweep_shards import TIMING_COLUMNS
 
         paths = [self._part(TIMINGS, index) for index in self.finished()]
         used = {name: TIMING_COLUMNS[name] for name in _TIMING_COLUMNS}
@@ -155,7 +158,7 @@ def begin(sweep: Sweep, folder: Path) -> Store:
     Raises:
         TunnelError: when the folder holds another sweep or something else, or cannot be written.
     """
-    from tunnel_lab.sweep.shard import made_with
+    from tunnel_lab.experiments.sweep_shards import made_with
 
     if (folder / MANIFEST).is_file():
         store = open_store(folder)
@@ -241,3 +244,52 @@ def _check_same(store: Store, sweep: Sweep, versions: Mapping[str, str]) -> None
 
 def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     return next((key for key in {**old, **new} if old.get(key) != new.get(key)), "")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The outcome of a sweep.
+
+    Args:
+        found: number of shards that were finished already.
+        crashes: number of estimates that raised an exception, in the shards done now.
+    """
+
+    store: Store
+    found: int
+    crashes: int
+
+
+def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress | None = None) -> Outcome:
+    """Do the rest of a sweep.
+
+    Args:
+        progress: called with the number of finished cases and of all cases, at the start and after each shard.
+
+    Returns:
+        The outcome; all results are then complete.
+
+    Raises:
+        TunnelError: when the folder belongs to another sweep, or the work cannot be done.
+    """
+    from tunnel_lab.experiments.sweep_shards import run_shard
+
+    store = begin(sweep, folder)
+    finished = set(store.finished())
+    crashes = []
+
+    def keep(_: int, shard: Finished) -> None:
+        store.keep(shard)
+        crashes.append(shard.crashes)
+
+    found = run_tasks(
+        partial(run_shard, sweep.to_json()),
+        range(sweep.shards),
+        workers,
+        finished=finished.__contains__,
+        keep=keep,
+        size=lambda index: min(sweep.cases_per_shard, sweep.size - index * sweep.cases_per_shard),
+        progress=progress,
+    )
+    store.tidy()
+    return Outcome(store, found, sum(crashes))

@@ -1,0 +1,409 @@
+"""Comparison of a score with its baseline: which estimators are worse beyond sampling error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.text import Text
+
+from identification.policy import DIFFERENCE_RATE
+from identification.printing.numbers import SYMBOLS, concise, significant
+from identification.scoring.accuracy import (
+    INTERVAL,
+    NOMINAL_COVERAGE,
+    Score,
+    Trials,
+    mean_figure,
+    overall,
+    score,
+)
+from identification.scoring.comparison import Change, changes, holm
+from identification.statistics.proportion import Proportion
+from tunnel_lab.experiments.score_grid import NO_EFFECT, Cell
+from tunnel_lab.experiments.score_trials import Key, Results, groups_of
+from tunnel_lab.plotting.style import COLOURS, MARKERS, figure, grid, log_axis, styled
+from tunnel_lab.terminal.tables import table
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+    from rich.table import Table
+
+    from identification.estimate import Quantity
+
+NAMES = {**SYMBOLS, "zeta": "ζ", "omega_n": "ωn"}
+"""How the quantities of a score are written."""
+ABOUT = (
+    "Bound: Cramér–Rao's, of the nominal model. Worst: of the cells. In brackets: the standard error in the last "
+    "digits; after shares: their 95 % interval."
+)
+_SHOWN_WORSE = 12
+_SHOWN = ("zeta", "omega_n", "cn_beta", "cn_r")
+_TITLES = {"decay": "Single decays", "campaign": "Campaigns"}
+_PANEL, _LABELS, _ROW, _HEAD = 0.95, 1.7, 0.2, 0.85  # inches
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One aspect of one estimator in the baseline and now.
+
+    Args:
+        worse: whether it is worse beyond chance, corrected for the number of findings.
+    """
+
+    estimator: str
+    where: str
+    quantity: str
+    change: Change
+    worse: bool
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a check found.
+
+    Args:
+        false_alarm_rate: probability that any finding of unchanged estimators is called worse.
+        identical: whether all estimates are the baseline's to the last bit.
+        added: estimators that are not in the baseline; they were not checked.
+    """
+
+    findings: tuple[Finding, ...]
+    false_alarm_rate: float
+    identical: bool
+    added: tuple[str, ...] = ()
+
+    @property
+    def worse(self) -> tuple[Finding, ...]:
+        """The findings that are worse, the most significant first."""
+        found = [finding for finding in self.findings if finding.worse]
+        return tuple(sorted(found, key=lambda finding: finding.change.p_value))
+
+    @property
+    def passed(self) -> bool:
+        """Whether no estimator got worse."""
+        return not self.worse
+
+
+def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> Verdict:
+    """Compare a score with its baseline, cell by cell and over all cells of a kind together.
+
+    Args:
+        now: trials of the same cells, with the same seed or another.
+        rate: false-alarm probability of all tests together.
+
+    Raises:
+        TunnelError: when the baseline has cells that were not scored now, or has none of the estimators.
+    """
+    estimators = [name for name in baseline.estimators if name in now.estimators]
+    places = _places(baseline, now)
+    if not estimators:
+        raise TunnelError(
+            "the baseline has none of the estimators",
+            where="--check",
+            remedy=f"score one of {', '.join(baseline.estimators)}",
+        )
+    before, after = baseline.trials(), now.trials()
+    tested: list[tuple[str, str, str, Change]] = []
+    for name in estimators:
+        for group, cells in groups_of(baseline.grid).items():
+            for quantity in baseline.grid.cells[cells[0]].quantities:
+                old = [before[name, cell, quantity] for cell in cells]
+                new = [after[name, places[cell], quantity] for cell in cells]
+                tested += [(name, *rest) for rest in _tests(baseline, cells, group, quantity, old, new)]
+    verdicts = holm([change.p_value for *_, change in tested], rate)
+    return Verdict(
+        findings=tuple(Finding(*one, worse) for one, worse in zip(tested, verdicts, strict=True)),
+        false_alarm_rate=rate,
+        identical=_estimates(baseline, estimators) == _estimates(now, estimators),
+        added=tuple(name for name in now.estimators if name not in baseline.estimators),
+    )
+
+
+def _tests(
+    baseline: Results,
+    cells: Sequence[int],
+    group: str,
+    quantity: str,
+    old: Sequence[Trials],
+    new: Sequence[Trials],
+) -> list[tuple[str, str, Change]]:
+    found = []
+    for cell, one, other in zip(cells, old, new, strict=True):
+        found += [(baseline.grid.cells[cell].label, quantity, c) for c in changes([one], [other])]
+    if len(cells) > 1:
+        found += [(f"all {len(cells)} {group}", quantity, change) for change in changes(old, new)]
+    return found
+
+
+def _places(baseline: Results, now: Results) -> list[int]:
+    """Index of each of the baseline's cells in the present grid."""
+    places = []
+    for cell in baseline.grid.cells:
+        if cell not in now.grid.cells:
+            raise TunnelError(
+                f"the baseline's cell {cell.label!r} is not in the grid",
+                where="--check",
+                remedy="leave the grid out: the baseline's own grid is then used",
+            )
+        places.append(now.grid.cells.index(cell))
+    return places
+
+
+def _estimates(results: Results, estimators: Sequence[str]) -> dict[tuple[Key, int], object]:
+    return {
+        ((row["estimator"], row["cell"], row["quantity"]), row["trial"]): (row["value"], row["std"])
+        for row in results.rows
+        if row["estimator"] in estimators
+    }
+
+
+def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
+    """One table for each kind of cell, with all cells of that kind pooled.
+
+    Returns:
+        Tables with a section for each estimator and a row for each quantity.
+    """
+    found = []
+    trials = results.trials()
+    for group, cells in groups_of(results.grid).items():
+        many = f"{len(cells)} cells" if len(cells) > 1 else "1 cell"
+        one = table(
+            f"{group[0].upper()}{group[1:]} ({many})",
+            *("", "RMSE/\nbound", "worst", "bias/\nbound", "95 % covers\n[%]", "failed\n[%]"),
+            right=("worst",),
+        )
+        for name in results.estimators:
+            _section(one, results, name, cells, times=times)
+            for quantity in results.grid.cells[cells[0]].quantities:
+                one.add_row(
+                    f"  {NAMES[quantity]}", *_summary([trials[name, cell, quantity] for cell in cells])
+                )
+        found.append(one)
+    return found
+
+
+def _section(one: Table, results: Results, name: str, cells: Sequence[int], *, times: bool = True) -> None:
+    """The estimator's name and time."""
+    if one.row_count:
+        one.add_section()
+    one.columns[0].no_wrap = True
+    one.add_row(Text(name, style="bold"))
+    if times:
+        one.add_row("  ms/record", significant(results.milliseconds(name, cells), 2))
+
+
+def _summary(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
+    scores = [score(trials) for trials in every]
+    worst = [s.rmse_over_bound.value for s in scores if s.rmse_over_bound is not None]
+    scaled = [float(value) for trials in every if trials.bound is not None for value in trials.scaled]
+
+    bias = mean_figure(np.array(scaled), "1") if len(scaled) > 1 else None
+    identified = sum(trials.error.size for trials in every)
+    covered = Proportion(sum(trials.covered for trials in every), identified) if identified else None
+    failed = Proportion(sum(t.failures for t in every), sum(t.count for t in every))
+    return (
+        _figure(overall(scores)),
+        significant(max(worst), 3) if worst else "–",
+        _figure(bias),
+        _share(covered),
+        _share(failed) if failed.count else "0",
+    )
+
+
+def cell_tables(results: Results) -> list[Table]:
+    """One table for each cell.
+
+    Returns:
+        Tables with a section for each estimator and a row for each quantity.
+    """
+    trials = results.trials()
+    found = []
+    for index, cell in enumerate(results.grid.cells):
+        one = table(cell.label, "", "RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
+        for name in results.estimators:
+            _section(one, results, name, [index])
+            for quantity in cell.quantities:
+                one.add_row(f"  {NAMES[quantity]}", *_cell(score(trials[name, index, quantity])))
+        found.append(one)
+    return found
+
+
+def _cell(judged: Score) -> tuple[str, ...]:
+    return (
+        _figure(judged.rmse_over_bound),
+        _figure(judged.relative_bias),
+        _figure(judged.bias_in_stds),
+        _share(judged.coverage),
+        _share(judged.failures) if judged.failures.count else "0",
+    )
+
+
+def _figure(quantity: Quantity | None) -> str:
+    return "–" if quantity is None else concise(quantity.value, quantity.std)
+
+
+def _share(share: Proportion | None) -> str:
+    if share is None:
+        return "–"
+    low, high = share.interval
+    return f"{100 * share.value:.3g} ({100 * low:.0f}–{100 * high:.0f})"
+
+
+def worse_table(verdict: Verdict) -> Table:
+    """The findings that are worse, the most significant first.
+
+    Returns:
+        A table; without rows where none is worse.
+    """
+    result = table(
+        "Worse than the baseline",
+        *("estimator", "", "aspect", "before", "now", "p", "where"),
+        right=("before", "now", "p"),
+    )
+    for finding in verdict.worse[:_SHOWN_WORSE]:
+        before, now = _before_and_now(finding)
+        result.add_row(
+            Text(finding.estimator),
+            NAMES[finding.quantity],
+            finding.change.aspect,
+            before,
+            now,
+            f"{finding.change.p_value:.1g}",
+            Text(finding.where),
+        )
+    return result
+
+
+def _before_and_now(finding: Finding) -> tuple[str, str]:
+    change = finding.change
+    if change.aspect in ("bias", "spread"):
+        return significant(change.before, 3), significant(change.now, 3)
+    return f"{100 * change.before:.1f} %", f"{100 * change.now:.1f} %"
+
+
+def verdict_lines(verdict: Verdict) -> list[str]:
+    """The result of a check in words."""
+    tests = f"{len(verdict.findings)} tests, false-alarm rate {100 * verdict.false_alarm_rate:g} % of all together"
+    worse = verdict.worse
+    if worse:
+        names = ", ".join(sorted({finding.estimator for finding in worse}))
+        lines = [f"Worse than the baseline: {names} ({len(worse)} of {tests})"]
+        if len(worse) > _SHOWN_WORSE:
+            lines.append(f"The {_SHOWN_WORSE} most significant are shown.")
+        lines.append(
+            "bias (size of the mean error) and spread (root mean square error) are in units of the bound"
+        )
+    elif verdict.identical:
+        lines = ["No estimator is worse: all estimates equal the baseline to the last bit."]
+    else:
+        lines = [f"No estimator is worse beyond sampling error ({tests})."]
+    if verdict.added:
+        lines.append(f"Not in the baseline, so not checked: {', '.join(verdict.added)}")
+    return lines
+
+
+@styled
+def score_figure(results: Results) -> Figure:
+    """RMSE over the bound and coverage of 95 % intervals, with the sampling errors' 95 % intervals.
+
+    Returns:
+        For each kind of cell two rows of panels, one panel for each estimator. Cells are in rows, in the grid's
+        order, so that reading across compares the estimators; quantities differ in colour and marker.
+    """
+    kinds = [cell.kind for cell in results.grid.cells]
+    groups = {
+        title: [index for index, kind in enumerate(kinds) if kind == wanted]
+        for wanted, title in _TITLES.items()
+        if wanted in kinds
+    }
+    heights = [_HEAD + _ROW * len(cells) for cells in groups.values() for _ in range(2)]
+    fig = figure(_LABELS + _PANEL * len(results.estimators), sum(heights))
+    parts = iter(fig.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0])
+    for name, cells in groups.items():
+        _block(next(parts), results, name, cells, covered=False)
+        _block(next(parts), results, name, cells, covered=True)
+    return fig
+
+
+def _block(part: SubFigure, results: Results, group: str, cells: Sequence[int], *, covered: bool) -> None:
+    """One row of panels."""
+    labels, common = cell_labels([results.grid.cells[index] for index in cells])
+    trials = results.trials()
+    quantities = [name for name in _SHOWN if name in results.grid.cells[cells[0]].quantities]
+    panels = part.subplots(1, len(results.estimators), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, name in zip(panels, results.estimators, strict=True):
+        axes.axvline(100 * NOMINAL_COVERAGE if covered else 1.0, color="0.4", linewidth=0.8, zorder=1)
+        for place, quantity in enumerate(quantities):
+            scores = [score(trials[name, cell, quantity]) for cell in cells]
+            shift = 0.36 * ((place + 0.5) / len(quantities) - 0.5)
+            draw = _coverage if covered else _errors
+            style = {"color": COLOURS[place], "marker": MARKERS[place], "label": NAMES[quantity]}
+            draw(axes, scores, shift, style)
+        axes.set_title(name.replace("_", " "), loc="center", fontsize=8)
+        axes.tick_params(axis="y", length=0)
+        grid(axes, "x")
+    panels[0].set_yticks(range(len(cells)), labels)
+    panels[0].set_ylim(len(cells) - 0.5, -0.5)
+    if covered:
+        panels[0].set_xlim(-4.0, 104.0)
+        panels[0].set_xticks([0, 50, 100])
+    else:
+        log_axis(panels[0], "x")
+    quantity = "95 % intervals that contain the truth [%]" if covered else "RMSE over the Cramér–Rao bound"
+    part.supxlabel(quantity, fontsize=9)
+    part.suptitle(f"{group}{', ' if common else ''}{common}", x=0.01, ha="left", fontsize=9)
+    handles, names = panels[0].get_legend_handles_labels()
+    part.legend(handles, names, loc="upper right", ncols=len(names), borderaxespad=0.0)
+
+
+def _errors(axes: Axes, scores: Sequence[Score], shift: float, style: dict[str, Any]) -> None:
+    points = [(row, s.rmse_over_bound) for row, s in enumerate(scores) if s.rmse_over_bound is not None]
+    axes.errorbar(
+        [found.value for _, found in points],
+        [row + shift for row, _ in points],
+        xerr=[min(INTERVAL * found.std, 0.9 * found.value) for _, found in points],
+        linestyle="none", markersize=3.0, elinewidth=0.8, **style,
+    )  # fmt: skip
+
+
+def _coverage(axes: Axes, scores: Sequence[Score], shift: float, style: dict[str, Any]) -> None:
+    points = [(row, s.coverage) for row, s in enumerate(scores) if s.coverage is not None]
+    value = np.array([100 * share.value for _, share in points])
+    ends = 100 * np.array([share.interval for _, share in points]).reshape(-1, 2)
+    spans = np.maximum(np.stack((value - ends[:, 0], ends[:, 1] - value)), 0.0)
+    axes.errorbar(
+        value,
+        [row + shift for row, _ in points],
+        xerr=spans,
+        linestyle="none", markersize=3.0, elinewidth=0.8, **style,
+    )  # fmt: skip
+
+
+def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
+    """The conditions of cells of one kind in a few words.
+
+    Returns:
+        What distinguishes each cell from the others; and what is common to all.
+    """
+    parts = [_parts(cell) for cell in cells]
+    if len(parts) == 1:
+        return [", ".join(filter(None, parts[0]))], ""
+    varied = [len(set(column)) > 1 for column in zip(*parts, strict=True)]
+    common = [text for text, varies in zip(parts[0], varied, strict=True) if text and not varies]
+    labels = [
+        ", ".join(text for text, varies in zip(own, varied, strict=True) if text and varies) for own in parts
+    ]
+    return labels, ", ".join(common)
+
+
+def _parts(cell: Cell) -> tuple[str, ...]:
+    noise, duration = f"noise {100 * cell.noise:g} %", f"{cell.duration:g} s"
+    if cell.kind == "decay":
+        return (f"ζ {cell.zeta:g}", f"{cell.frequency:g} Hz", noise, duration)
+    effect = "" if cell.effect == NO_EFFECT else cell.effect.partition(":")[0].replace("_", " ")
+    return (f"{cell.wind_speed:g} m/s", noise, duration, effect)
