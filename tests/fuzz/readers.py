@@ -293,8 +293,7 @@ def _answer(folder: Path, changed: str, rng: Rng) -> None:
 
 def sweep_file(folder: Path, rng: Rng) -> None:
     """A sweep file changed, and its folder begun where it is accepted."""
-    from tunnel_lab.experiments.sweep_file import read_sweep
-    from tunnel_lab.experiments.sweep_store import begin
+    from tunnel_lab.experiments.sweep import begin, read_sweep
 
     sweep = read_sweep(_written(folder / "sweep.toml", _toml(seeds.SMALL.encode(), rng), rng))
     begin(sweep, folder / "out")
@@ -302,7 +301,7 @@ def sweep_file(folder: Path, rng: Rng) -> None:
 
 def sweep_folder(folder: Path, rng: Rng) -> None:
     """``sweep.json`` or a part of the results changed, as a sweep that goes on or is summed up meets it."""
-    from tunnel_lab.experiments.sweep_store import open_store
+    from tunnel_lab.experiments.sweep import open_store
     from tunnel_lab.experiments.sweep_summary import overall_table, pace_table, paces, summarise
 
     files = dict(seeds.sweep_folder())

@@ -19,8 +19,7 @@ from identification.uncertainty.input_uncertainty import load_uncertainties
 from tunnel_lab.commands.springs import read_spring_table
 from tunnel_lab.experiments.score_grid import load_grid
 from tunnel_lab.experiments.score_trials import read_trials
-from tunnel_lab.experiments.sweep_file import read_sweep
-from tunnel_lab.experiments.sweep_store import open_store
+from tunnel_lab.experiments.sweep import open_store, read_sweep
 from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.reading import check_count, parse_json, read_json, read_regular

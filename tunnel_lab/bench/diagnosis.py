@@ -287,8 +287,6 @@ def show_closure(found: Closure) -> None:
                 ui.label(f"{words} = {estimate(given.to_json_dict())}")
 
 
-
-
 def build_next_run(session: Session, frame: Frame) -> None:
     """Build the page."""
     from diagnosis.printing import rival_lines

@@ -97,10 +97,8 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
     Raises:
         TunnelError: for bad input.
     """
-    from tunnel_lab.experiments.cluster import on_cluster
-    from tunnel_lab.experiments.runner import available_processors, lasting_processes
-    from tunnel_lab.experiments.sweep_file import read_sweep
-    from tunnel_lab.experiments.sweep_store import run_sweep
+    from tunnel_lab.experiments.runner import available_processors, lasting_processes, on_cluster
+    from tunnel_lab.experiments.sweep import read_sweep, run_sweep
     from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.vocabulary.errors import TunnelError
@@ -141,7 +139,7 @@ def show_summary(folder: Path) -> None:
     import polars as pl
 
     from tunnel_lab.experiments import sweep_summary
-    from tunnel_lab.experiments.sweep_store import open_store
+    from tunnel_lab.experiments.sweep import open_store
     from tunnel_lab.experiments.sweep_summary import paces, summarise
     from tunnel_lab.plotting import style
     from tunnel_lab.terminal.tables import say, show_tables

@@ -16,8 +16,8 @@ import numpy as np
 from identification.printing.numbers import SYMBOLS, concise, significant, unit
 from identification.scoring.accuracy import Score, Trials, score
 from identification.statistics.proportion import Proportion
+from tunnel_lab.experiments.sweep import TIMINGS, Store
 from tunnel_lab.experiments.sweep_cases import NO_EFFECT
-from tunnel_lab.experiments.sweep_store import TIMINGS, Store
 from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.terminal.tables import table
 from tunnel_sim.effects import effect_class

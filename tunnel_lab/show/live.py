@@ -194,8 +194,6 @@ def puppet_master(live: LiveRun) -> Any:
     return _PuppetMaster(live)
 
 
-
-
 def missing_display() -> str:
     """Why no window can be opened; empty where the environment shows no reason."""
     if sys.platform.startswith("linux") and not (
@@ -324,10 +322,6 @@ def _figure(history: History) -> Any:
     figure.linepnt[0] = len(points)
     figure.linedata[0][: 2 * len(points)] = points.ravel()
     return figure
-
-
-
-
 
 
 def view_in_browser(

@@ -18,11 +18,10 @@ import pytest
 from tests.unit.gone_reader import unheard
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
-from tunnel_lab.experiments import cluster, sweep_summary
+from tunnel_lab.experiments import runner, sweep_summary
+from tunnel_lab.experiments.sweep import read_sweep, run_sweep
 from tunnel_lab.experiments.sweep_cases import Sweep
-from tunnel_lab.experiments.sweep_file import read_sweep
 from tunnel_lab.experiments.sweep_shards import RESULT_COLUMNS
-from tunnel_lab.experiments.sweep_store import run_sweep
 from tunnel_lab.experiments.sweep_summary import Line, _lines, summarise
 from tunnel_lab.plotting.style import styled
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -96,7 +95,7 @@ def test_bad_words_are_one_line(
     words: list[str],
     said: str,
 ) -> None:
-    monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
+    monkeypatch.setattr(runner, "CONNECT_S", 0.5)
     (tmp_path / "taken").mkdir()
     (tmp_path / "taken" / "thesis.txt").write_text("")
     places = {"FILE": small, "OUT": tmp_path / "out", "TAKEN": tmp_path / "taken"}
