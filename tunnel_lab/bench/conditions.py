@@ -103,7 +103,7 @@ def faults(cells: Cells, *, plausible: bool = True) -> dict[tuple[str, str], str
     Returns:
         One line for each cell, as a command would print it; empty where the campaign can be read.
     """
-    found = {}
+    faults_by_cell = {}
     for row, texts in cells.items():
         where = f"run '{row}'" if row else "the rig"
         for key, text in texts.items():
@@ -113,17 +113,17 @@ def faults(cells: Cells, *, plausible: bool = True) -> dict[tuple[str, str], str
                     validate(Conditions, {key: value}, Path(where))
                     plausible_values({key: value} if plausible else {}, where)
             except TunnelError as error:
-                found[row, key] = str(error)
-        if not row or texts["air_density"].strip() or (row, "wind_speed") in found:
+                faults_by_cell[row, key] = str(error)
+        if not row or texts["air_density"].strip() or (row, "wind_speed") in faults_by_cell:
             continue
         scales = (texts["spring_stiffness"], cells[RIG]["frontal_area"], cells[RIG]["reference_length"])
         speed = number(texts["wind_speed"], where) or 0.0
         if needs_density(speed, *(1.0 if text.strip() else None for text in scales)):
             remedy = "give it in kg/m3 (about 1.2 for air)"
-            found[row, "air_density"] = str(
+            faults_by_cell[row, "air_density"] = str(
                 TunnelError("wind-on without air_density", where=where, remedy=remedy)
             )
-    return found
+    return faults_by_cell
 
 
 def number(text: str, where: str) -> float | None:
@@ -341,9 +341,13 @@ class _Conditions:
     def _pasted(self, event: events.GenericEventArguments) -> None:
         row, key = self._runs[event.args["row"]], event.args["key"]
         if key in RUN_KEYS:
-            found = pasted(self._cells, list(RUN_KEYS), row, key, event.args["text"])
-            changed = {(run, one): text for run, texts in found.items() for one, text in texts.items()}
-            self._put({(run, one): t for (run, one), t in changed.items() if self._cells[run][one] != t})
+            texts_by_run = pasted(self._cells, list(RUN_KEYS), row, key, event.args["text"])
+            changed = {
+                (run, column): text for run, texts in texts_by_run.items() for column, text in texts.items()
+            }
+            self._put(
+                {(run, column): t for (run, column), t in changed.items() if self._cells[run][column] != t}
+            )
 
     def _all_runs(self) -> None:
         """Fill a column at once."""
@@ -363,15 +367,14 @@ class _Conditions:
             value.on("change", fill)
 
     def _sizes(self) -> dict[str, ui.input]:
-        found = {}
+        sizes = {}
         with ui.element("h2"):
             ui.html("The rig", sanitize=False, tag="span")
         with ui.element("div").classes("fields"):
             for key, text in self._cells[RIG].items():
                 field = ui.input(f"{WORDS[key]} [{UNITS[key]}]", value=text).props("dense bottom-slots")
-
-                found[key] = field.on("change", partial(self._resize, key, field))
-        return found
+                sizes[key] = field.on("change", partial(self._resize, key, field))
+        return sizes
 
     def _resize(self, key: str, field: ui.input) -> None:
         self._put({(RIG, key): str(field.value or "")})

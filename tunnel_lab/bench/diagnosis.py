@@ -58,40 +58,40 @@ class _Diagnose:
         ui.timer(_POLL_S, self._look)
 
     def _look(self) -> None:
-        one = work.work_of(self._log)
+        state = work.work_of(self._log)
         result = self._session.diagnosis
-        written = result.stat().st_mtime_ns if result.is_file() and not one.running else 0
-        if (one, written) == self._shown:
-            self._show_clock(one)
+        written = result.stat().st_mtime_ns if result.is_file() and not state.running else 0
+        if (state, written) == self._shown:
+            self._show_clock(state)
             return
-        self._shown = (one, written)
-        self._show_buttons(one)
-        self._show_clock(one)
-        self._show_progress(one)
-        if one.error:
-            self._fault.show(f"{one.error}{_AFTER_STOP if one.status == STOPPED else ''}")
-        self._show_result(one)
+        self._shown = (state, written)
+        self._show_buttons(state)
+        self._show_clock(state)
+        self._show_progress(state)
+        if state.error:
+            self._fault.show(f"{state.error}{_AFTER_STOP if state.status == STOPPED else ''}")
+        self._show_result(state)
 
-    def _show_buttons(self, one: work.Work) -> None:
+    def _show_buttons(self, state: work.Work) -> None:
         self._buttons.clear()
         with self._buttons:
-            if not one.running:
+            if not state.running:
                 button(
                     "Diagnose again" if self._session.diagnosis.is_file() else "Diagnose",
                     self._start,
                     main=True,
                 )
                 return
-            if one.paused:
+            if state.paused:
                 button("Go on", lambda: work.go_on(self._log), main=True)
             else:
                 button("Pause", lambda: work.pause(self._log))
             button("Stop", self._stop)
 
-    def _show_clock(self, one: work.Work) -> None:
-        since = f"{_elapsed(one):.0f} s so far. It runs in a process of its own: this page may be closed."
-        words = "Paused; it goes on where it was." if one.paused else since
-        self._clock.set_text(f"{words} {_STOP}" if one.running else "")
+    def _show_clock(self, state: work.Work) -> None:
+        since = f"{_elapsed(state):.0f} s so far. It runs in a process of its own: this page may be closed."
+        words = "Paused; it goes on where it was." if state.paused else since
+        self._clock.set_text(f"{words} {_STOP}" if state.running else "")
 
     async def _start(self) -> None:
         with self._fault.around():
@@ -100,21 +100,21 @@ class _Diagnose:
     async def _stop(self) -> None:
         await asyncio.to_thread(work.stop, self._log)
 
-    def _show_progress(self, one: work.Work) -> None:
+    def _show_progress(self, state: work.Work) -> None:
         self._progress.clear()
-        if not one.running:
+        if not state.running:
             return
-        done = [line.partition(" s: ") for line in one.lines if line.partition(" s: ")[2] in STEPS.values()]
+        done = [line.partition(" s: ") for line in state.lines if line.partition(" s: ")[2] in STEPS.values()]
         with self._progress:
             for place, (seconds, _, words) in enumerate(done):
                 last = place == len(done) - 1
                 with ui.element("li").classes("now" if last else "done"):
                     ui.label(f"{words} … since {seconds} s" if last else f"{words}, from {seconds} s on")
 
-    def _show_result(self, one: work.Work) -> None:
+    def _show_result(self, state: work.Work) -> None:
         self._result.clear()
         self._on.clear()
-        if one.running:
+        if state.running:
             return
         with self._result:
             document = read_result(self._session.diagnosis)
@@ -129,11 +129,11 @@ class _Diagnose:
             self._frame.way_on()
 
 
-def _elapsed(one: work.Work) -> float:
+def _elapsed(state: work.Work) -> float:
     """Time since a command was started, s."""
-    if not one.started:
+    if not state.started:
         return 0.0
-    return (datetime.now().astimezone() - datetime.fromisoformat(one.started)).total_seconds()
+    return (datetime.now().astimezone() - datetime.fromisoformat(state.started)).total_seconds()
 
 
 def _words(session: Session) -> list[str]:
@@ -189,10 +189,12 @@ def figures(document: dict[str, Any]) -> list[str]:
     from tunnel_lab.report.page import DESCRIPTIONS
     from tunnel_lab.report.where import runs_figure
 
-    found = {"waterfall": waterfall_figure(document)}
+    drawn = {"waterfall": waterfall_figure(document)}
     if document.get("maps"):
-        found["where-runs"] = runs_figure(document)
-    return [inline_svg(one, name, DESCRIPTIONS[name]) for name, one in found.items() if one is not None]
+        drawn["where-runs"] = runs_figure(document)
+    return [
+        inline_svg(figure, name, DESCRIPTIONS[name]) for name, figure in drawn.items() if figure is not None
+    ]
 
 
 class ByHandPart:
@@ -209,7 +211,7 @@ class ByHandPart:
         self._waiting = self._converged = False
         ui.html("By hand", sanitize=False, tag="h2")
         ui.label(_ABOUT).classes("soft")
-        listed = [name for one in document["candidates"] for name in one["effect"].split(" + ")]
+        listed = [name for candidate in document["candidates"] for name in candidate["effect"].split(" + ")]
         known = [kind for kind in known_effects() if kind.fitted]
         known.sort(key=lambda kind: listed.index(kind.name) if kind.name in listed else len(listed))
         self._boxes = {}
@@ -244,44 +246,44 @@ class ByHandPart:
         self._place.classes(add="waiting")
         while shown != (now := self._chosen()):
             shown = now
-            found = await self._closure(*now)
+            closure = await self._closure(*now)
             if self._place.is_deleted:  # the page was left
                 return
             self._place.clear()
             with self._place:
-                if found is not None:
-                    show_closure(found)
+                if closure is not None:
+                    show_closure(closure)
         self._waiting = False
         self._place.classes(remove="waiting")
 
     async def _closure(self, effects: list[str], converged: bool) -> Closure | None:
         try:
-            found = await work.closure(
+            closure = await work.closure(
                 self._session.campaign, self._session.state(), effects, converged=converged
             )
         except TunnelError as error:
             self._fault.show(error)
             return None
         self._fault.clear()
-        return found
+        return closure
 
 
-def show_closure(found: Closure) -> None:
+def show_closure(closure: Closure) -> None:
     """The closure with causes chosen by hand."""
     from tunnel_lab.report.view import estimate, excess, percent
 
     with ui.element("div").classes("facts"):
         for value, label in (
-            (percent(found.closed), f"share closed, {found.held_out}"),
-            (f"{excess(found.after)} noise variances", "left of the gap"),
-            (f"{excess(found.before)} noise variances", "with the nominal model"),
+            (percent(closure.closed), f"share closed, {closure.held_out}"),
+            (f"{excess(closure.after)} noise variances", "left of the gap"),
+            (f"{excess(closure.before)} noise variances", "with the nominal model"),
         ):
             with ui.element("div"):
                 ui.label(value).classes("value")
                 ui.label(label).classes("soft")
-    ui.linear_progress(found.closed, show_value=False).props('aria-label="share of the gap closed"')
+    ui.linear_progress(closure.closed, show_value=False).props('aria-label="share of the gap closed"')
     with ui.element("ul").classes("notes"):
-        for name, given in found.parameters.items():
+        for name, given in closure.parameters.items():
             with ui.element("li"):
                 words = name.replace("_", " ").replace(".", ": ")
                 ui.label(f"{words} = {estimate(given.to_json_dict())}")
@@ -316,7 +318,8 @@ class _Rivals:
         self._session = session
         fitted = {kind.name: kind.name.replace("_", " ") for kind in known_effects() if kind.fitted}
         answers = [
-            [name for name in one["effect"].split(" + ") if name in fitted] for one in document["candidates"]
+            [name for name in candidate["effect"].split(" + ") if name in fitted]
+            for candidate in document["candidates"]
         ]
         answers = [answer for answer in answers if answer] or [[next(iter(fitted))]]
         ui.html("Which run would distinguish two answers?", sanitize=False, tag="h2")
@@ -342,16 +345,16 @@ class _Rivals:
             with self._place:
                 ui.label("Simulating runs …").classes("soft")
             try:
-                found = await work.next_run(self._session.campaign, self._session.state(), first, second)
+                run = await work.next_run(self._session.campaign, self._session.state(), first, second)
             finally:
                 if not self._place.is_deleted:
                     self._place.clear()
             if self._place.is_deleted:  # the page was left
                 return
-            if found is None:
+            if run is None:
                 raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
             with self._place:
-                show_run(found)
+                show_run(run)
 
 
 def show_run(run: dict[str, float]) -> None:

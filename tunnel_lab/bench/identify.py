@@ -122,15 +122,15 @@ class _Identify:
 
     def _look(self) -> None:
         works = {name: work.work_of(self._session.log(name)) for name in (*ALL_ESTIMATORS, _BUDGET)}
-        found = [self._session.estimate(name) for name in (*ALL_ESTIMATORS, _BUDGET)]
-        state = (works, [path.stat().st_mtime_ns for path in found if path.is_file()])
+        estimates = [self._session.estimate(name) for name in (*ALL_ESTIMATORS, _BUDGET)]
+        state = (works, [path.stat().st_mtime_ns for path in estimates if path.is_file()])
         if state == self._shown:
             return
         self._shown = state
         self._progress.clear()
         with self._progress:
-            for name, one in works.items():
-                _progress(name, one)
+            for name, progress in works.items():
+                _progress(name, progress)
         with self._fault.around():
             self._show()
         self._frame.refresh()
@@ -155,12 +155,12 @@ class _Identify:
                 show_parts([budget_table(budget["budget"]), *budget_lines(budget["budget"])])
 
 
-def _progress(name: str, one: work.Work) -> None:
-    if not one.running and not one.error:
+def _progress(name: str, state: work.Work) -> None:
+    if not state.running and not state.error:
         return
     with ui.element("li"):
-        ui.label(f"{name}: {'running …' if one.running else one.error}").classes(
-            "" if one.running else "fault"
+        ui.label(f"{name}: {'running …' if state.running else state.error}").classes(
+            "" if state.running else "fault"
         )
 
 
@@ -218,9 +218,9 @@ def side_by_side(documents: Sequence[Document]) -> list[str | TextTable]:
 
 
 def _runs(title: str, key: str, documents: Sequence[Document], names: tuple[str, ...]) -> TextTable:
-    found = [{run["id"]: run[key] for run in document["runs"]} for document in documents]
-    ids = list(dict.fromkeys(name for runs in found for name in runs))[:_MOST_RUNS]
-    rows = tuple((name, *(_cell(runs.get(name)) for runs in found)) for name in ids)
+    by_run = [{run["id"]: run[key] for run in document["runs"]} for document in documents]
+    ids = list(dict.fromkeys(name for runs in by_run for name in runs))[:_MOST_RUNS]
+    rows = tuple((name, *(_cell(runs.get(name)) for runs in by_run)) for name in ids)
     return TextTable(title, ("run", *names), rows)
 
 
@@ -232,5 +232,5 @@ def _notes(document: Document) -> list[str]:
     from identification.printing.estimate_tables import status_lines
     from identification.remark import Remark
 
-    said = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
-    return [*said, *status_lines(document)]
+    notes = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
+    return [*notes, *status_lines(document)]

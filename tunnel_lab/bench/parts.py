@@ -72,7 +72,15 @@ class Frame:
         self.steps.clear()
         with self.steps, ui.element("ol"):
             for number, stage in enumerate(STAGES, 1):
-                _step(self._session, stage.key, f"{number} {stage.title}", here=stage.key == self._stage)
+                text = f"{number} {stage.title}"
+                why = _closed(self._session, stage.key)
+                with ui.element("li"):
+                    if stage.key == self._stage:
+                        ui.link(text, address(self._session, stage.key)).props("aria-current=step")
+                    elif why:
+                        ui.html(text, sanitize=False, tag="span").props("aria-disabled=true").tooltip(why)
+                    else:
+                        ui.link(text, address(self._session, stage.key))
 
     def way_on(self) -> None:
         """A link to the next stage, where it is open."""
@@ -90,17 +98,6 @@ def _closed(session: Session, key: str) -> str:
         return closed(session, key)
     except TunnelError as error:
         return str(error)
-
-
-def _step(session: Session, key: str, text: str, *, here: bool) -> None:
-    why = _closed(session, key)
-    with ui.element("li"):
-        if here:
-            ui.link(text, address(session, key)).props("aria-current=step")
-        elif why:
-            ui.html(text, sanitize=False, tag="span").props("aria-disabled=true").tooltip(why)
-        else:
-            ui.link(text, address(session, key))
 
 
 def _theme_button() -> None:
@@ -174,10 +171,10 @@ def button(text: str, action: Callable[[], object], *, main: bool = False) -> ui
     Args:
         main: whether it is the way on.
     """
-    found = ui.element("button").props("type=button").classes("button go" if main else "button")
-    with found:
+    element = ui.element("button").props("type=button").classes("button go" if main else "button")
+    with element:
         ui.html(escape(text), sanitize=False, tag="span")
-    return found.on("click", action)
+    return element.on("click", action)
 
 
 class Chart(ui.element, component="static/chart.js"):
@@ -202,7 +199,7 @@ class Chart(ui.element, component="static/chart.js"):
         moved: Callable[[str, float], Any] | None = None,
     ) -> None:
         super().__init__()
-        self._props.update(title=title, x=x, y=y, series=[list(one) for one in series], data=data)
+        self._props.update(title=title, x=x, y=y, series=[list(curve) for curve in series], data=data)
         self._props.update(marks=[])
         self.classes("chart")
         if moved is not None:
@@ -220,7 +217,7 @@ class Chart(ui.element, component="static/chart.js"):
             marks: ``id``, ``label``, ``kind``, ``at`` and its ``unit`` of each. A ``start`` or an ``end`` is on the
                 abscissa. A ``rest`` is on the ordinate, drawn from ``from`` to ``to`` with the words ``about``.
         """
-        self._props.update(marks=[dict(one) for one in marks])
+        self._props.update(marks=[dict(mark) for mark in marks])
         self.update()
 
 

@@ -112,7 +112,9 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
     """
     choices = choices_of(session)
     now = choices.stretch_of(mark.file, mark.run)
-    others = [one for one in choices.stretches if (one.file, one.run) != (mark.file, mark.run)]
+    others = [
+        stretch for stretch in choices.stretches if (stretch.file, stretch.run) != (mark.file, mark.run)
+    ]
     stated = now.model_dump() | dict(places)
     first = mark.start if stated["start"] is None else stated["start"]
     last = mark.end if stated["end"] is None else stated["end"]
@@ -122,7 +124,7 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
             where=f"run '{mark.run}'",
             remedy="move one of them",
         )
-    state(session, {"stretches": [*(one.model_dump() for one in others), stated]})
+    state(session, {"stretches": [*(stretch.model_dump() for stretch in others), stated]})
 
 
 def read(session: Session) -> Imported:
@@ -246,7 +248,10 @@ class ChoicesPart:
     def _select(self, key: str, label: str, options: list[str], *, several: bool = False) -> None:
         now = getattr(self._now, key)
         value = list(now) if several else now
-        shown = [*options, *(one for one in (value if several else [value]) if one and one not in options)]
+        shown = [
+            *options,
+            *(choice for choice in (value if several else [value]) if choice and choice not in options),
+        ]
 
         async def change(event: events.ValueChangeEventArguments[Any]) -> None:
             await self._changed(key, event.value or (() if several else None))

@@ -112,7 +112,13 @@ class _Records:
         with self._drawn:
             self._draw(imported)
         with self._table:
-            _show(imported)
+            from tunnel_lab.terminal.outputs import parts_table
+
+            show_parts([parts_table(imported)])
+            with ui.element("ul").classes("notes"):
+                for line in imported.remarks():
+                    with ui.element("li"):
+                        ui.label(line)
         return True
 
     def _show_files(self) -> None:
@@ -138,15 +144,17 @@ class _Records:
             self._charts = []
             ui.label(_HELP).classes("soft")
             with ui.element("div").classes("charts"):
-                self._charts = [self._chart(one) for one in records]
-            left = len({id(part.raw) for part in imported.parts}) - len(records)
-            if left > 0:
-                ui.label(f"{left} more records are not drawn.").classes("soft")
+                self._charts = [self._chart(record) for record in records]
+            hidden = len({id(part.raw) for part in imported.parts}) - len(records)
+            if hidden > 0:
+                ui.label(f"{hidden} more records are not drawn.").classes("soft")
             with ui.expansion("Resting angles as numbers"), ui.element("div").classes("fields"):
-                self._rests = [self._rest(mark, one.unit) for one in records for mark in one.marks]
-        for chart, one in zip(self._charts, records, strict=True):
-            chart.show_marks(_marks(one))
-        for field, mark in zip(self._rests, (mark for one in records for mark in one.marks), strict=True):
+                self._rests = [self._rest(mark, record.unit) for record in records for mark in record.marks]
+        for chart, record in zip(self._charts, records, strict=True):
+            chart.show_marks(_marks(record))
+        for field, mark in zip(
+            self._rests, (mark for record in records for mark in record.marks), strict=True
+        ):
             field.set_value(float(f"{mark.rest:.6g}"))
             field.props["hint"] = mark.about
             field.update()
@@ -160,15 +168,15 @@ class _Records:
         field = ui.number(f"Rest of {mark.run}, to be subtracted [{unit}]").props("dense step=any")
         return field.on("change", change)
 
-    def _chart(self, one: preview.Drawn) -> Chart:
-        marks = {f"{mark.run} {kind}": (mark, kind) for mark in one.marks for kind in _KINDS}
-        label = f"reading [{one.unit}]"
+    def _chart(self, record: preview.Drawn) -> Chart:
+        marks = {f"{mark.run} {kind}": (mark, kind) for mark in record.marks for kind in _KINDS}
+        label = f"reading [{record.unit}]"
         return Chart(
-            one.title,
+            record.title,
             _TIME,
             label,
             [("reading", "after")],
-            [one.time, one.reading],
+            [record.time, record.reading],
             lambda name, at: self._moved(*marks[name], at),
         )
 
@@ -180,7 +188,7 @@ class _Records:
             ui.navigate.to(address(self._session, "conditions"))
 
 
-def _marks(one: preview.Drawn) -> list[dict[str, Any]]:
+def _marks(record: preview.Drawn) -> list[dict[str, Any]]:
     """The runs of a record as marks of its chart."""
     return [
         {
@@ -188,25 +196,14 @@ def _marks(one: preview.Drawn) -> list[dict[str, Any]]:
             "at": getattr(mark, kind),
             "kind": kind,
             "label": f"{words} of {mark.run}",
-            "unit": one.unit if kind == "rest" else "s",
+            "unit": record.unit if kind == "rest" else "s",
             "from": mark.start,
             "to": mark.end,
             "about": f"rest {mark.about}",
         }
-        for mark in one.marks
+        for mark in record.marks
         for kind, words in _KINDS.items()
     ]
-
-
-def _show(imported: Imported) -> None:
-    """What was read, as ``tunnel import`` prints it."""
-    from tunnel_lab.terminal.outputs import parts_table
-
-    show_parts([parts_table(imported)])
-    with ui.element("ul").classes("notes"):
-        for line in imported.remarks():
-            with ui.element("li"):
-                ui.label(line)
 
 
 def write(session: Session, imported: Imported) -> None:
@@ -239,9 +236,9 @@ def _as_it_is(session: Session) -> None:
             if place.is_deleted:  # the page was left
                 return
             with place.classes("charts"):
-                for one in campaign.runs[: preview.MOST_RECORDS]:
+                for run in campaign.runs[: preview.MOST_RECORDS]:
                     label = f"reading [{campaign.sensor.unit}]"
-                    curve = preview.points(one.record.time_s, one.record.yaw_rad)
-                    Chart(one.id, "time [s]", label, [("reading", "after")], curve)
+                    curve = preview.points(run.record.time_s, run.record.yaw_rad)
+                    Chart(run.id, "time [s]", label, [("reading", "after")], curve)
 
     ui.timer(0.0, show, once=True)

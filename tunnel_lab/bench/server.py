@@ -58,7 +58,20 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
     app.on_startup(lambda: background_tasks.create(_say_when_open(port, words)))
     app.on_shutdown(_end)
     with suppress(KeyboardInterrupt):  # the usual end
-        _run(port, address if browser else "")
+        icon = resources.files("tunnel_lab").joinpath("bench/static/favicon.svg")
+        ui.run(
+            host=HOST,
+            port=port,
+            title="Bench of the virtual wind tunnel",
+            favicon=icon.read_text("utf-8"),
+            dark=None,
+            reload=False,
+            show=address if browser else False,
+            show_welcome_message=False,
+            tailwind=False,
+            storage_secret=None,
+            language="en-GB",
+        )
 
 
 async def _say_when_open(port: int, words: str) -> None:
@@ -76,23 +89,6 @@ async def _end() -> None:
     """End what was started: the user has ended the bench, it has not crashed."""
     work.end_fits()
     await asyncio.to_thread(work.stop_all)
-
-
-def _run(port: int, shown: str) -> None:
-    icon = resources.files("tunnel_lab").joinpath("bench/static/favicon.svg")
-    ui.run(
-        host=HOST,
-        port=port,
-        title="Bench of the virtual wind tunnel",
-        favicon=icon.read_text("utf-8"),
-        dark=None,
-        reload=False,
-        show=shown or False,
-        show_welcome_message=False,
-        tailwind=False,
-        storage_secret=None,
-        language="en-GB",
-    )
 
 
 def _free_port(port: int) -> int:
@@ -180,16 +176,13 @@ class Guard:
     async def _welcome(self, scope: Scope, query: dict[str, str], send: Send) -> None:
         """Move the token from the address into a cookie, so that it is in no history or bookmark."""
         rest = urlencode({name: value for name, value in query.items() if name != "token"})
-        place = _same_site(scope["path"]) + (f"?{rest}" if rest else "")
+        # The path cannot name another host or end the header.
+        path = "/" + quote(scope["path"].lstrip("/\\"), errors="replace")
+        place = path + (f"?{rest}" if rest else "")
         cookie = f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
-        found = [*_HEADERS, (b"location", place.encode()), (b"set-cookie", cookie.encode())]
-        await send({"type": "http.response.start", "status": 303, "headers": found})
+        headers = [*_HEADERS, (b"location", place.encode()), (b"set-cookie", cookie.encode())]
+        await send({"type": "http.response.start", "status": 303, "headers": headers})
         await send({"type": "http.response.body", "body": b""})
-
-
-def _same_site(path: str) -> str:
-    """A path for a Location header: it cannot name another host or end the header."""
-    return "/" + quote(path.lstrip("/\\"), errors="replace")
 
 
 def _cookies(header: str) -> dict[str, str]:
@@ -230,16 +223,16 @@ def add_pages(folder: Path) -> None:
     def stage(name: str, stage: str) -> None:
         try:
             session = open_session(folder, name)
-            found = {one.key: one for one in STAGES}.get(stage, STAGES[0])
-            frame = Frame(found.title, session, found.key)
+            opened = {each.key: each for each in STAGES}.get(stage, STAGES[0])
+            frame = Frame(opened.title, session, opened.key)
             with frame.main:
-                why = closed(session, found.key)
+                why = closed(session, opened.key)
                 if why:
                     ui.label(why).classes("fault")
                     ui.link("Back to the records", address(session, "records")).classes("button")
                 else:
                     # Only here: the first page need not wait for what the stages load.
-                    module, _, build = found.builder.partition(".")
+                    module, _, build = opened.builder.partition(".")
                     getattr(import_module(f"tunnel_lab.bench.{module}"), build)(session, frame)
         except TunnelError as error:
             ui.label(f"tunnel: {error}").classes("fault")
@@ -264,12 +257,12 @@ def build_start(folder: Path) -> None:
     ui.label(f"Dropped files are kept in {place}, in a folder of their own beside the campaign.").classes(
         "soft"
     )
-    found = sessions(folder)
-    if found:
+    campaigns = sessions(folder)
+    if campaigns:
         with ui.element("h2"):
             ui.html("Campaigns here", sanitize=False, tag="span")
         with ui.element("ul").classes("sessions"):
-            for session in found:
+            for session in campaigns:
                 with ui.element("li"):
                     stage = _furthest(session)
                     ui.link(session.name, address(session, stage.key))

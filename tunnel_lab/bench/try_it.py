@@ -157,10 +157,10 @@ class _TryIt:
                 write_whole(plan, plan_text(self._trial, session.name).encode())
                 words = ("simulate", str(plan), "--out", str(session.campaign), *effect_words(self._trial))
                 await asyncio.to_thread(work.start, words, log)
-                while (one := work.work_of(log)).running:
+                while (state := work.work_of(log)).running:
                     await asyncio.sleep(0.2)
-                if one.error:
-                    raise TunnelError(one.error)
+                if state.error:
+                    raise TunnelError(state.error)
                 ui.navigate.to(address(session, "records"))
 
         with ui.element("p").classes("buttons"):

@@ -69,8 +69,8 @@ class Work:
             return (
                 "" if self.running or not self.command or self.status == 0 else "It was ended from outside."
             )
-        said = [line.removeprefix("tunnel: ") for line in self.lines if line.startswith("tunnel: ")]
-        return said[-1] if said else f"It ended with exit status {self.status}."
+        errors = [line.removeprefix("tunnel: ") for line in self.lines if line.startswith("tunnel: ")]
+        return errors[-1] if errors else f"It ended with exit status {self.status}."
 
 
 def work_of(log: Path) -> Work:

@@ -91,13 +91,13 @@ class Session:
 
 def sessions(folder: Path) -> list[Session]:
     """The sessions of a workspace, by name: campaigns, and dropped files that are not one yet."""
-    found = set()
+    names = set()
     for path in folder.iterdir():
         if (path / CAMPAIGN_FILE).is_file():
-            found.add(path.name)
+            names.add(path.name)
         elif path.name.endswith(".uploads") and path.is_dir():
-            found.add(path.name.removesuffix(".uploads"))
-    return [Session(folder, name) for name in sorted(found) if name == safe_name(name)]
+            names.add(path.name.removesuffix(".uploads"))
+    return [Session(folder, name) for name in sorted(names) if name == safe_name(name)]
 
 
 def open_session(folder: Path, name: str) -> Session:
@@ -109,14 +109,14 @@ def open_session(folder: Path, name: str) -> Session:
     Raises:
         TunnelError: when there is no such session.
     """
-    found = {session.name: session for session in sessions(folder)}
-    if name not in found:
+    by_name = {session.name: session for session in sessions(folder)}
+    if name not in by_name:
         raise TunnelError(
             f"there is no campaign '{one_line(name, 60)}'",
             where=str(folder),
             remedy="choose one on the first page",
         )
-    return found[name]
+    return by_name[name]
 
 
 def new_session(folder: Path, file_name: str) -> Session:

@@ -43,9 +43,9 @@ def run(
 
     if len(documents) < 2:
         raise TunnelError("only one diagnosis", where=shown(documents[0]), remedy="name two files or more")
-    found = [read_diagnosis(path) for path in documents]
-    names = _names(documents, found)
-    show_tables(*(rich_table(table) for table in comparison_tables(names, found)))
+    diagnoses = [read_diagnosis(path) for path in documents]
+    names = _names(documents, diagnoses)
+    show_tables(*(rich_table(table) for table in comparison_tables(names, diagnoses)))
 
 
 def _names(paths: Sequence[Path], documents: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -68,20 +68,9 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
     Returns:
         Gap and answer, parameters of the answers, coefficients, and the coefficients' differences from the first.
     """
-    one, two = ("quantity",), ("effect", "parameter")
-    change = f"Coefficients with the causes: difference from {names[0]}"
-    return [
-        TextTable("Gap and answer", (*one, *names), _answer_rows(documents)),
-        TextTable("Parameters ± one standard deviation", (*two, *names), _parameter_rows(documents)),
-        TextTable("Coefficients ± one standard deviation", (*one, *names), _coefficient_rows(documents)),
-        TextTable(change, (*one, *names[1:]), _differences(documents)),
-    ]
-
-
-def _answer_rows(documents: Sequence[Document]) -> Rows:
     from diagnosis.printing import probability, share
 
-    return (
+    answers: Rows = (
         ("gap [noise powers]", *(_excess(d, "excess_before") for d in documents)),
         ("left [noise powers]", *(_excess(d, "excess_after") if _explained(d) else _NONE for d in documents)),
         ("share closed", *(share(d["gap"]["closed"]) if _explained(d) else _NONE for d in documents)),
@@ -90,6 +79,19 @@ def _answer_rows(documents: Sequence[Document]) -> Rows:
         ("or", *(",\n".join(d["ambiguous_with"]) or _NONE for d in documents)),
         ("probability", *(probability(d["candidates"][0]["probability"]) for d in documents)),
     )
+    coefficients: Rows = tuple(
+        (f"{label} {key}", *(_estimate(document, key, name) for document in documents))
+        for name, label in _labels(documents).items()
+        for key in ("before", "after")
+    )
+    quantity, parameter = ("quantity",), ("effect", "parameter")
+    change = f"Coefficients with the causes: difference from {names[0]}"
+    return [
+        TextTable("Gap and answer", (*quantity, *names), answers),
+        TextTable("Parameters ± one standard deviation", (*parameter, *names), _parameter_rows(documents)),
+        TextTable("Coefficients ± one standard deviation", (*quantity, *names), coefficients),
+        TextTable(change, (*quantity, *names[1:]), _differences(documents)),
+    ]
 
 
 def _explained(document: Document) -> bool:
@@ -105,27 +107,19 @@ def _excess(document: Document, key: str) -> str:
 
 
 def _parameter_rows(documents: Sequence[Document]) -> Rows:
-    found = [_parameters(document) for document in documents]
-    names = dict.fromkeys(name for parameters in found for name in parameters)
-    return tuple((*name, *(parameters.get(name, _NONE) for parameters in found)) for name in names)
+    by_document = [_parameters(document) for document in documents]
+    names = dict.fromkeys(name for parameters in by_document for name in parameters)
+    return tuple((*name, *(parameters.get(name, _NONE) for parameters in by_document)) for name in names)
 
 
 def _parameters(document: Document) -> dict[tuple[str, str], str]:
     """The answer's parameters by effect and name."""
-    answer, found = document["candidates"][0], {}
+    answer, texts = document["candidates"][0], {}
     for full, given in answer["parameters"].items():
         owner, _, name = full.rpartition(".")
         mark = "" if given["unit"] == "1" else unit_mark(given["unit"])
-        found[owner or answer["effect"], name] = estimated(given, mark)
-    return found
-
-
-def _coefficient_rows(documents: Sequence[Document]) -> Rows:
-    return tuple(
-        (f"{label} {key}", *(_estimate(document, key, name) for document in documents))
-        for name, label in _labels(documents).items()
-        for key in ("before", "after")
-    )
+        texts[owner or answer["effect"], name] = estimated(given, mark)
+    return texts
 
 
 def _estimate(document: Document, key: str, name: str) -> str:
@@ -150,9 +144,15 @@ def _differences(documents: Sequence[Document]) -> Rows:
     )
 
 
-def _difference(one: Document | None, two: Document | None) -> str:
+def _difference(first: Document | None, second: Document | None) -> str:
     """The second estimate minus the first, taken as independent of each other."""
-    if one is None or two is None or one["std"] is None or two["std"] is None or one["unit"] != two["unit"]:
+    if (
+        first is None
+        or second is None
+        or first["std"] is None
+        or second["std"] is None
+        or first["unit"] != second["unit"]
+    ):
         return _NONE
-    change, std = two["value"] - one["value"], math.hypot(one["std"], two["std"])
+    change, std = second["value"] - first["value"], math.hypot(first["std"], second["std"])
     return f"{with_std(change, std)} ({in_stds(change, std)})"

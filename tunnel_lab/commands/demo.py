@@ -90,17 +90,17 @@ def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
         A clause for each; the distance is checked for the maximum-likelihood estimator only, whose
         standard deviations should be exact.
     """
-    found = [f"{e.estimator}: {e.status.value}" for e in estimates if e.status.failed]
+    lines = [f"{e.estimator}: {e.status.value}" for e in estimates if e.status.failed]
     for estimate in estimates:
         if estimate.estimator != CHECKED_ESTIMATOR or estimate.status.failed:
             continue
         for name, value in truth_of(plan).items():
             quantity = getattr(estimate, name)
             if quantity is None:
-                found.append(f"{estimate.estimator}: no {name}")
+                lines.append(f"{estimate.estimator}: no {name}")
             elif abs(quantity.value - value) > CHECK_STDS * quantity.std:
-                found.append(f"{estimate.estimator}: {name} misses the truth by more than {CHECK_STDS:g} std")
-    return found
+                lines.append(f"{estimate.estimator}: {name} misses the truth by more than {CHECK_STDS:g} std")
+    return lines
 
 
 def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Estimate, ...]]:

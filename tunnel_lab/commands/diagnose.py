@@ -129,14 +129,14 @@ def run(
         )
     data = given_campaign(campaign)
     hashes = file_hashes(campaign)
-    own = None
+    own_model = None
     if model is not None and joint is not None:
-        own = read_model(model, joint, data, split_names(free) or None, asset_dir)
-    if own is not None and patch is not None:
+        own_model = read_model(model, joint, data, split_names(free) or None, asset_dir)
+    if own_model is not None and patch is not None:
         from diagnosis.answer.patched_model import refuse_unpatchable
 
-        refuse_unpatchable(own, data, patch)
-    answer = diagnose_with_progress(data, kinds, own)
+        refuse_unpatchable(own_model, data, patch)
+    answer = diagnose_with_progress(data, kinds, own_model)
     document = answer.to_json_dict()
     document["provenance"]["sha256"] = hashes
     # Files first: the reader of a pipe may close it early.
@@ -205,8 +205,10 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
     from tunnel_sim.vocabulary.errors import TunnelError
 
     if answer.model is None:
-        said = next((one.rstrip(".") for one in answer.cautions if one.startswith(UNPATCHED)), UNPATCHED)
-        raise TunnelError(said, where="--patch", remedy="leave out --patch for the answer alone")
+        reason = next(
+            (caution.rstrip(".") for caution in answer.cautions if caution.startswith(UNPATCHED)), UNPATCHED
+        )
+        raise TunnelError(reason, where="--patch", remedy="leave out --patch for the answer alone")
     answer.model.write(path)
 
 

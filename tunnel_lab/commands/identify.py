@@ -180,7 +180,7 @@ def budgeted(
     }
     terminal = console(stderr=True)
     with terminal.status("uncertainty budget") as status:
-        found = make_budget(
+        budget = make_budget(
             campaign,
             estimate,
             partial(identify, estimator=chosen, throw=False),
@@ -188,7 +188,7 @@ def budgeted(
             others=others,
             progress=lambda what: status.update(Text(f"uncertainty budget: {what}")),
         )
-    return with_budget(estimate, found), found
+    return with_budget(estimate, budget), budget
 
 
 def show_budget(budget: dict[str, Any]) -> None:

@@ -48,7 +48,7 @@ def run(
     drawn = {f"traces-{number}": page for number, page in enumerate(runs.trace_pages(data), 1)}
     drawn["spectrum"] = runs.spectrum_figure(spread(data))
     estimate = identify(data, "output_error", throw=False)
-    if any(found.windows for found in estimate.runs):
+    if any(run.windows for run in estimate.runs):
         drawn["windows"] = windows_figure(estimate)
     written = [style.save_both(figure, folder / f"{name}.png") for name, figure in drawn.items()]
     say_written(*(path for pair in written for path in pair))

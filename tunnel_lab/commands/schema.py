@@ -90,8 +90,8 @@ def schema(name: str) -> dict[str, Any]:
     Returns:
         The schema. Titles that only repeat a field's name are left out: an editor shows the description.
     """
-    found = {"$schema": DIALECT, **SCHEMAS[name](), "title": f"tunnel {name}"}
-    return {key: _plain(value) if key != "title" else value for key, value in found.items()}
+    document = {"$schema": DIALECT, **SCHEMAS[name](), "title": f"tunnel {name}"}
+    return {key: _plain(value) if key != "title" else value for key, value in document.items()}
 
 
 def _plain(value: Any) -> Any:

@@ -248,15 +248,15 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
     parts = None if out is None else out / "parts"
     with bar("scoring") as progress:
         rows = work.break_down(cases, names, seed, jobs=jobs, parts=parts, progress=progress)
-    found = work.biases(rows)
+    biases = work.biases(rows)
     written = []
     if out is not None:
-        frame = work.breakdown_frame(found)
+        frame = work.breakdown_frame(biases)
         written.append(write_whole(out / "breakdown.parquet", parquet(frame)))
         for quantity in view.SHOWN:
             path = out / f"breakdown-{quantity.replace('_', '-')}.png"
             written += save_both(view.breakdown_figure(frame, quantity), path)
         shutil.rmtree(out / "parts", ignore_errors=True)
-    show_tables(*(one for quantity in view.SHOWN for one in view.breakdown_tables(found, quantity)))
+    show_tables(*(shown for quantity in view.SHOWN for shown in view.breakdown_tables(biases, quantity)))
     say(view.ABOUT)
     say_written(*written)

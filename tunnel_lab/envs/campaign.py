@@ -305,11 +305,11 @@ def line_of(known: Knowledge) -> str:
     if known.last is None:
         return "new campaign"
     belief = known.belief
-    found = ", ".join(
+    words = ", ".join(
         f"{SYMBOLS[name]} = {value:.4g} ± {belief.std(name):.2g} 1/rad"
         for name, value in zip(("cn_beta", "cn_r"), belief.values, strict=False)
     )
-    text = f"run {len(known.choices)}: {known.last.words}; {found}; rig time {known.rig_time / 60.0:.1f} min"
+    text = f"run {len(known.choices)}: {known.last.words}; {words}; rig time {known.rig_time / 60.0:.1f} min"
     if known.conditions.effects:
         chances = probabilities(known)
         best = int(np.argmax(chances))
@@ -330,14 +330,22 @@ def picture(known: Knowledge, targets: tuple[float, float], probability: float) 
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    from tunnel_lab.plotting.style import COLOURS
+
     figure = Figure(figsize=(WIDTH / _DPI, HEIGHT / _DPI), dpi=_DPI, layout="constrained")
     canvas: Any = FigureCanvasAgg(figure)  # matplotlib types it in parts only
-    left, right = figure.subplots(1, 2)
-    _draw_record(left, known)
+    angles, bars = figure.subplots(1, 2)
+    _draw_record(angles, known)
     if known.conditions.effects:
-        _draw_probabilities(right, known, probability)
+        names = [name.replace("_", "\n") for name in answers(known.conditions.effects)]
+        bars.bar(names, probabilities(known), color=COLOURS[0])
+        bars.axhline(probability, color=COLOURS[1], linestyle="--", linewidth=1)
+        bars.set_ylim(0.0, 1.0)
+        bars.set_ylabel("probability")
+        bars.tick_params(axis="x", labelsize=7)
+        bars.set_title(f"{known.rig_time / 60.0:.0f} min of rig time; dashed: the goal", fontsize=10)
     else:
-        _draw_spread(right, known, targets)
+        _draw_spread(bars, known, targets)
     canvas.draw()
     return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3], dtype=np.uint8)
 
@@ -368,16 +376,4 @@ def _draw_spread(axes: Axes, known: Knowledge, targets: tuple[float, float]) -> 
     axes.set_ylabel("standard deviation [%]")
     axes.set_xticks(range(0, len(history), 1 + len(history) // 10))
     axes.legend(loc="upper right")
-    axes.set_title(f"{known.rig_time / 60.0:.0f} min of rig time; dashed: the goal", fontsize=10)
-
-
-def _draw_probabilities(axes: Axes, known: Knowledge, probability: float) -> None:
-    from tunnel_lab.plotting.style import COLOURS
-
-    names = [name.replace("_", "\n") for name in answers(known.conditions.effects)]
-    axes.bar(names, probabilities(known), color=COLOURS[0])
-    axes.axhline(probability, color=COLOURS[1], linestyle="--", linewidth=1)
-    axes.set_ylim(0.0, 1.0)
-    axes.set_ylabel("probability")
-    axes.tick_params(axis="x", labelsize=7)
     axes.set_title(f"{known.rig_time / 60.0:.0f} min of rig time; dashed: the goal", fontsize=10)

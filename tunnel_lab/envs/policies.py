@@ -46,7 +46,12 @@ def scripted(known: Knowledge) -> Action:
     springs, speeds, _, _ = known.conditions.menu.shape
     by_speed = np.argsort(known.conditions.menu.wind_speeds, kind="stable")
     place = len(known.choices) % (springs * speeds)
-    return place // speeds, int(by_speed[place % speeds]), _largest_angle(known), _longest(known)
+    return (
+        place // speeds,
+        int(by_speed[place % speeds]),
+        int(np.argmax(known.conditions.menu.release_angles)),
+        int(np.argmax(known.conditions.menu.durations)),
+    )
 
 
 def greedy(known: Knowledge) -> Action:
@@ -101,7 +106,15 @@ def separating(known: Knowledge) -> Action:
     best, chosen = 0.0, None
     for action in known.conditions.menu.actions():
         choice = known.conditions.menu.choice(action)
-        apart = _apart(known, rivals, choice)
+        run = planned_run(
+            rivals[0],
+            spring_stiffness=choice.spring_stiffness,
+            wind_speed=choice.wind_speed,
+            air_density=known.conditions.rig.air.density,
+            duration=choice.duration,
+        )
+        distance = separation(*rivals, run, choice.release_angle)
+        apart = 0.0 if distance is None or not np.isfinite(distance) else distance
         value = 0.5 * apart**2 / known.cost(choice)
         if value > best:
             best, chosen = value, action
@@ -114,7 +127,7 @@ def best_rivals(study: Study) -> tuple[Fit, Fit] | None:
     Returns:
         None while no effect is fitted.
     """
-    fits = [found for answer in study.weighed if (found := _fit_of(study, answer)) is not None]
+    fits = [fit for answer in study.weighed if (fit := _fit_of(study, answer)) is not None]
     if not fits:
         return None
     return (fits[0], fits[1]) if len(fits) > 1 else (fits[0], study.nominal)
@@ -123,26 +136,6 @@ def best_rivals(study: Study) -> tuple[Fit, Fit] | None:
 def _fit_of(study: Study, answer: Weighed) -> Fit | None:
     hypothesis = study.hypothesis(answer.effects)
     return None if hypothesis is None else hypothesis.fit
-
-
-def _apart(known: Knowledge, rivals: tuple[Fit, Fit], choice: Choice) -> float:
-    run = planned_run(
-        rivals[0],
-        spring_stiffness=choice.spring_stiffness,
-        wind_speed=choice.wind_speed,
-        air_density=known.conditions.rig.air.density,
-        duration=choice.duration,
-    )
-    found = separation(*rivals, run, choice.release_angle)
-    return 0.0 if found is None or not np.isfinite(found) else found
-
-
-def _largest_angle(known: Knowledge) -> int:
-    return int(np.argmax(known.conditions.menu.release_angles))
-
-
-def _longest(known: Knowledge) -> int:
-    return int(np.argmax(known.conditions.menu.durations))
 
 
 def run_campaign(

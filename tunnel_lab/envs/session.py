@@ -152,15 +152,15 @@ class Knowledge:
         run = (0.0,) * 4 if last is None else (
             last.spring_stiffness, last.wind_speed, last.release_angle, last.duration
         )  # fmt: skip
-        found = {
+        observed = {
             "estimate": np.clip(self.belief.values, -LARGE, LARGE),
             "covariance": np.clip(self.belief.covariance.ravel(), -LARGE, LARGE),
             "last_run": np.array(run),
             "progress": np.array([float(len(self.choices)), self.rig_time]),
         }
         if self.conditions.effects:
-            found["probabilities"] = probabilities(self)
-        return found
+            observed["probabilities"] = probabilities(self)
+        return observed
 
 
 def first_knowledge(conditions: Conditions) -> Knowledge:
@@ -282,16 +282,16 @@ def probabilities(known: Knowledge) -> Array:
         ``none`` has all but the false-alarm rate.
     """
     names = answers(known.conditions.effects)
-    found = np.zeros(len(names))
+    shares = np.zeros(len(names))
     if known.study is None:
         return np.full(len(names), 1.0 / len(names))
     if not known.study.weighed:
-        found[0], found[-1] = 1.0 - GAP_FALSE_ALARM_RATE, GAP_FALSE_ALARM_RATE
-        return found
+        shares[0], shares[-1] = 1.0 - GAP_FALSE_ALARM_RATE, GAP_FALSE_ALARM_RATE
+        return shares
     for answer in known.study.weighed:
         name = answer.effects[0] if len(answer.effects) == 1 else "several"
-        found[names.index(name)] += answer.probability
-    return np.asarray(found / found.sum())
+        shares[names.index(name)] += answer.probability
+    return np.asarray(shares / shares.sum())
 
 
 def diagnostic_information(known: Knowledge) -> float:
@@ -302,9 +302,9 @@ def diagnostic_information(known: Knowledge) -> float:
     """
     if known.study is None or not known.study.weighed:
         return 0.0
-    found = probabilities(known)
-    positive = found[found > 0.0]
-    return float(np.log(found.size) + np.sum(positive * np.log(positive)))
+    shares = probabilities(known)
+    positive = shares[shares > 0.0]
+    return float(np.log(shares.size) + np.sum(positive * np.log(positive)))
 
 
 @dataclass(frozen=True)

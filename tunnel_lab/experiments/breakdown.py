@@ -264,7 +264,7 @@ def biases(rows: Sequence[Row]) -> list[Bias]:
     ]  # fmt: skip
 
 
-def breakdown_frame(found: Sequence[Bias]) -> pl.DataFrame:
+def breakdown_frame(biases: Sequence[Bias]) -> pl.DataFrame:
     """The map as a table.
 
     Returns:
@@ -272,18 +272,18 @@ def breakdown_frame(found: Sequence[Bias]) -> pl.DataFrame:
     """
     import polars as pl
 
-    return pl.DataFrame([_record(one) for one in found], infer_schema_length=None)
+    return pl.DataFrame([_record(bias) for bias in biases], infer_schema_length=None)
 
 
-def _record(one: Bias) -> dict[str, Any]:
-    judged = one.score
+def _record(bias: Bias) -> dict[str, Any]:
+    judged = bias.score
     relative, in_stds = judged.relative_bias, judged.bias_in_stds
     return {
-        "effect": one.effect,
-        "severity_noise_powers": one.severity,
-        "reached_noise_powers": one.reached,
-        "estimator": one.estimator,
-        "quantity": one.quantity,
+        "effect": bias.effect,
+        "severity_noise_powers": bias.severity,
+        "reached_noise_powers": bias.reached,
+        "estimator": bias.estimator,
+        "quantity": bias.quantity,
         "realisations": judged.count,
         "failures": judged.failures.count,
         "bias_percent": None if relative is None else relative.value,
@@ -292,31 +292,31 @@ def _record(one: Bias) -> dict[str, Any]:
         "bias_in_stds_std_error": None if in_stds is None else in_stds.std,
         "rmse_over_bound": None if judged.rmse_over_bound is None else judged.rmse_over_bound.value,
         "covered": None if judged.coverage is None else judged.coverage.count,
-        "model_departs_share": one.departs,
+        "model_departs_share": bias.departs,
     }
 
 
-def breakdown_tables(found: Sequence[Bias], quantity: str) -> list[Table]:
+def breakdown_tables(biases: Sequence[Bias], quantity: str) -> list[Table]:
     """The bias of one quantity, with effects in rows and estimators in columns, three to a table."""
-    mine = [one for one in found if one.quantity == quantity]
-    estimators = list(dict.fromkeys(one.estimator for one in mine))
-    cells = {(one.effect, one.severity, one.estimator): _cell(one) for one in mine}
+    mine = [bias for bias in biases if bias.quantity == quantity]
+    estimators = list(dict.fromkeys(bias.estimator for bias in mine))
+    cells = {(bias.effect, bias.severity, bias.estimator): _cell(bias) for bias in mine}
     tables = []
     for first in range(0, len(estimators), _SIDE_BY_SIDE):
         some = estimators[first : first + _SIDE_BY_SIDE]
         one_table = table(f"Bias of {NAMES[quantity]} [%]", "effect", "×", *some, right=("×", *some))
         one_table.columns[0].no_wrap = True
-        for effect, severity in dict.fromkeys((one.effect, one.severity) for one in mine):
+        for effect, severity in dict.fromkeys((bias.effect, bias.severity) for bias in mine):
             row = [cells[effect, severity, name] for name in some]
             one_table.add_row(Text(effect), f"{severity:g}" if severity else "", *row)
         tables.append(one_table)
     return tables
 
 
-def _cell(one: Bias) -> str:
-    relative, in_stds = one.score.relative_bias, one.score.bias_in_stds
+def _cell(bias: Bias) -> str:
+    relative, in_stds = bias.score.relative_bias, bias.score.bias_in_stds
     if relative is None:
-        return "failed" if one.score.failures.count else "–"
+        return "failed" if bias.score.failures.count else "–"
     deviations = "–" if in_stds is None else _compact(in_stds.value)
     return f"{_compact(relative.value)} ({deviations}σ)"
 
@@ -392,9 +392,9 @@ def exceeding(frame: pl.DataFrame, quantity: str) -> dict[tuple[str, float, str]
         By effect, severity in noise powers (a ratio) and estimator: the bias in % of the truth and in reported
         standard deviations (a ratio).
     """
-    found = {}
+    cells = {}
     for row in frame.filter(frame["quantity"] == quantity).iter_rows(named=True):
         percent, stds = row["bias_percent"], row["bias_in_stds"]
         if percent is not None and stds is not None and abs(stds) > 1.0:
-            found[row["effect"], row["severity_noise_powers"], row["estimator"]] = (percent, stds)
-    return found
+            cells[row["effect"], row["severity_noise_powers"], row["estimator"]] = (percent, stds)
+    return cells

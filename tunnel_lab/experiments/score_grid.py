@@ -247,7 +247,13 @@ def load_grid(path: Path) -> Grid:
     twice = first_twice(cells)
     if twice is not None:
         raise TunnelError(f"the cell {twice.label!r} occurs twice", where=where, remedy="remove one")
-    _check_names(document, where)
+    from identification.estimators import ALL_ESTIMATORS
+    from tunnel_sim.vocabulary.errors import did_you_mean
+
+    for name in document.trials_of:
+        if name not in ALL_ESTIMATORS:
+            remedy = did_you_mean(name, ALL_ESTIMATORS)
+            raise TunnelError(f"no estimator {name!r}", where=f"{where}, [trials_of]", remedy=remedy)
     trials_of = tuple(document.trials_of.items())
     return Grid(document.name, document.seed, document.trials, trials_of, tuple(cells))
 
@@ -258,25 +264,15 @@ def packaged_grid() -> Grid:
         return load_grid(path)
 
 
-def _check_names(document: GridDocument, where: str) -> None:
-    from identification.estimators import ALL_ESTIMATORS
-    from tunnel_sim.vocabulary.errors import did_you_mean
-
-    for name in document.trials_of:
-        if name not in ALL_ESTIMATORS:
-            remedy = did_you_mean(name, ALL_ESTIMATORS)
-            raise TunnelError(f"no estimator {name!r}", where=f"{where}, [trials_of]", remedy=remedy)
-
-
 def _check_sizes(document: GridDocument, where: str) -> None:
     """Count cells, runs and samples from the lengths of the lists, before any cell is made."""
     cells = 0
     for decay in document.decays:
         cells += len(decay.zeta) * len(decay.frequency) * len(decay.noise) * len(decay.duration)
         check_size(1, max(decay.duration), decay.sample_rate, f"{where}, decays")
-    for one in document.campaigns:
-        cells += len(one.wind_speeds) * len(one.noise) * len(one.duration) * len(one.effects)
-        check_size(2 * len(one.springs), max(one.duration), one.sample_rate, f"{where}, campaigns")
+    for table in document.campaigns:
+        cells += len(table.wind_speeds) * len(table.noise) * len(table.duration) * len(table.effects)
+        check_size(2 * len(table.springs), max(table.duration), table.sample_rate, f"{where}, campaigns")
     check_count(cells, limits.SCORE_CELLS, "cells", where, "shorten a list")
 
 

@@ -134,14 +134,16 @@ def estimate_rows(
 
     begun = time.perf_counter()
     try:
-        found: Estimate | None = identify(campaign, estimator, throw=False)
-        status = "" if found is None else found.status.name.lower()
+        estimate: Estimate | None = identify(campaign, estimator, throw=False)
+        status = "" if estimate is None else estimate.status.name.lower()
     except Exception as error:  # any exception of an estimator is counted and shown
-        found, status = None, f"raised {type(error).__name__}"
+        estimate, status = None, f"raised {type(error).__name__}"
     milliseconds = 1000.0 * (time.perf_counter() - begun) / len(campaign.runs)
     rows = []
     for quantity, value in truth.items():
-        source = None if found is None else found.runs[0] if quantity in ("zeta", "omega_n") else found
+        source = (
+            None if estimate is None else estimate.runs[0] if quantity in ("zeta", "omega_n") else estimate
+        )
         answer = getattr(source, quantity, None)
         rows.append(
             {
@@ -162,8 +164,8 @@ def estimate_rows(
 
 def outcome(row: Row) -> Outcome:
     """A row as it is scored."""
-    found = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
-    return Outcome(row["truth"], found, row["bound"])
+    quantity = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
+    return Outcome(row["truth"], quantity, row["bound"])
 
 
 def unit_of(quantity: str) -> str:
@@ -347,19 +349,19 @@ class Results:
 
     def raised(self) -> dict[str, list[str]]:
         """Exceptions by estimator; empty where there were none."""
-        found: dict[str, set[str]] = {}
+        by_estimator: dict[str, set[str]] = {}
         for row in self.rows:
             if row["status"].startswith("raised "):
-                found.setdefault(row["estimator"], set()).add(row["status"].removeprefix("raised "))
-        return {name: sorted(kinds) for name, kinds in found.items()}
+                by_estimator.setdefault(row["estimator"], set()).add(row["status"].removeprefix("raised "))
+        return {name: sorted(kinds) for name, kinds in by_estimator.items()}
 
 
 def groups_of(grid: Grid) -> dict[str, list[int]]:
     """Cells that are pooled: decays, campaigns, and campaigns with each effect."""
-    found: dict[str, list[int]] = {}
+    groups: dict[str, list[int]] = {}
     for index, cell in enumerate(grid.cells):
-        found.setdefault(_group(cell), []).append(index)
-    return found
+        groups.setdefault(_group(cell), []).append(index)
+    return groups
 
 
 def _group(cell: Cell) -> str:
@@ -435,9 +437,9 @@ def packaged_breakdown() -> pl.DataFrame:
 def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
     """Refuse incomplete rows: each estimator must have all cells, and each estimate all values."""
     wanted = {(at, quantity) for at, cell in enumerate(grid.cells) for quantity in cell.quantities}
-    found: dict[str, set[tuple[int, str]]] = {}
+    scored: dict[str, set[tuple[int, str]]] = {}
     for row in rows:
-        found.setdefault(row["estimator"], set()).add((row["cell"], row["quantity"]))
+        scored.setdefault(row["estimator"], set()).add((row["cell"], row["quantity"]))
         if None in [row[name] for name in ("trial", "estimator", "unit", "truth", "status")]:
             raise ValueError("a row without its truth or status")
         if row["unit"] != unit_of(row["quantity"]):
@@ -446,7 +448,7 @@ def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
             raise ValueError("a value without its standard deviation")
         if not _can_be_scored(row):
             raise ValueError("a number out of all range")
-    if not found or any(cells != wanted for cells in found.values()):
+    if not scored or any(cells != wanted for cells in scored.values()):
         raise ValueError("cells that are not those of the grid")
 
 

@@ -80,8 +80,8 @@ class Verdict:
     @property
     def worse(self) -> tuple[Finding, ...]:
         """The findings that are worse, the most significant first."""
-        found = [finding for finding in self.findings if finding.worse]
-        return tuple(sorted(found, key=lambda finding: finding.change.p_value))
+        worse = [finding for finding in self.findings if finding.worse]
+        return tuple(sorted(worse, key=lambda finding: finding.change.p_value))
 
     @property
     def passed(self) -> bool:
@@ -117,7 +117,7 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
                 tested += [(name, *rest) for rest in _tests(baseline, cells, group, quantity, old, new)]
     verdicts = holm([change.p_value for *_, change in tested], rate)
     return Verdict(
-        findings=tuple(Finding(*one, worse) for one, worse in zip(tested, verdicts, strict=True)),
+        findings=tuple(Finding(*test, worse) for test, worse in zip(tested, verdicts, strict=True)),
         false_alarm_rate=rate,
         identical=_estimates(baseline, estimators) == _estimates(now, estimators),
         added=tuple(name for name in now.estimators if name not in baseline.estimators),
@@ -132,12 +132,12 @@ def _tests(
     old: Sequence[Trials],
     new: Sequence[Trials],
 ) -> list[tuple[str, str, Change]]:
-    found = []
-    for cell, one, other in zip(cells, old, new, strict=True):
-        found += [(baseline.grid.cells[cell].label, quantity, c) for c in changes([one], [other])]
+    tests = []
+    for cell, before, after in zip(cells, old, new, strict=True):
+        tests += [(baseline.grid.cells[cell].label, quantity, c) for c in changes([before], [after])]
     if len(cells) > 1:
-        found += [(f"all {len(cells)} {group}", quantity, change) for change in changes(old, new)]
-    return found
+        tests += [(f"all {len(cells)} {group}", quantity, change) for change in changes(old, new)]
+    return tests
 
 
 def _places(baseline: Results, now: Results) -> list[int]:
@@ -168,33 +168,33 @@ def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
     Returns:
         Tables with a section for each estimator and a row for each quantity.
     """
-    found = []
+    tables = []
     trials = results.trials()
     for group, cells in groups_of(results.grid).items():
         many = f"{len(cells)} cells" if len(cells) > 1 else "1 cell"
-        one = table(
+        result = table(
             f"{group[0].upper()}{group[1:]} ({many})",
             *("", "RMSE/\nbound", "worst", "bias/\nbound", "95 % covers\n[%]", "failed\n[%]"),
             right=("worst",),
         )
         for name in results.estimators:
-            _section(one, results, name, cells, times=times)
+            _section(result, results, name, cells, times=times)
             for quantity in results.grid.cells[cells[0]].quantities:
-                one.add_row(
+                result.add_row(
                     f"  {NAMES[quantity]}", *_summary([trials[name, cell, quantity] for cell in cells])
                 )
-        found.append(one)
-    return found
+        tables.append(result)
+    return tables
 
 
-def _section(one: Table, results: Results, name: str, cells: Sequence[int], *, times: bool = True) -> None:
+def _section(result: Table, results: Results, name: str, cells: Sequence[int], *, times: bool = True) -> None:
     """The estimator's name and time."""
-    if one.row_count:
-        one.add_section()
-    one.columns[0].no_wrap = True
-    one.add_row(Text(name, style="bold"))
+    if result.row_count:
+        result.add_section()
+    result.columns[0].no_wrap = True
+    result.add_row(Text(name, style="bold"))
     if times:
-        one.add_row("  ms/record", significant(results.milliseconds(name, cells), 2))
+        result.add_row("  ms/record", significant(results.milliseconds(name, cells), 2))
 
 
 def _summary(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
@@ -222,15 +222,15 @@ def cell_tables(results: Results) -> list[Table]:
         Tables with a section for each estimator and a row for each quantity.
     """
     trials = results.trials()
-    found = []
+    tables = []
     for index, cell in enumerate(results.grid.cells):
-        one = table(cell.label, "", "RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
+        result = table(cell.label, "", "RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
         for name in results.estimators:
-            _section(one, results, name, [index])
+            _section(result, results, name, [index])
             for quantity in cell.quantities:
-                one.add_row(f"  {NAMES[quantity]}", *_cell(score(trials[name, index, quantity])))
-        found.append(one)
-    return found
+                result.add_row(f"  {NAMES[quantity]}", *_cell(score(trials[name, index, quantity])))
+        tables.append(result)
+    return tables
 
 
 def _cell(judged: Score) -> tuple[str, ...]:
@@ -364,9 +364,9 @@ def _block(part: SubFigure, results: Results, group: str, cells: Sequence[int], 
 def _errors(axes: Axes, scores: Sequence[Score], shift: float, style: dict[str, Any]) -> None:
     points = [(row, s.rmse_over_bound) for row, s in enumerate(scores) if s.rmse_over_bound is not None]
     axes.errorbar(
-        [found.value for _, found in points],
+        [figure.value for _, figure in points],
         [row + shift for row, _ in points],
-        xerr=[min(INTERVAL * found.std, 0.9 * found.value) for _, found in points],
+        xerr=[min(INTERVAL * figure.std, 0.9 * figure.value) for _, figure in points],
         linestyle="none", markersize=3.0, elinewidth=0.8, **style,
     )  # fmt: skip
 
@@ -396,7 +396,8 @@ def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
     varied = [len(set(column)) > 1 for column in zip(*parts, strict=True)]
     common = [text for text, varies in zip(parts[0], varied, strict=True) if text and not varies]
     labels = [
-        ", ".join(text for text, varies in zip(own, varied, strict=True) if text and varies) for own in parts
+        ", ".join(text for text, varies in zip(texts, varied, strict=True) if text and varies)
+        for texts in parts
     ]
     return labels, ", ".join(common)
 

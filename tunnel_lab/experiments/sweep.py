@@ -60,8 +60,8 @@ def read_sweep(path: Path) -> Sweep:
     where = shown(path)
     document = _named(validate(SweepDocument, content, path))
     _check_names(document, where)
-    for one in document.conditions:
-        check_conditions(one, f"{where}, conditions '{one.name}'")
+    for conditions in document.conditions:
+        check_conditions(conditions, f"{where}, conditions '{conditions.name}'")
     check_sweep_size(document, where)
     rigs = tuple(_rig(table.file, table.changes, path.parent) for table in document.rig)
     for table, sections in zip(document.rig, rigs, strict=True):
@@ -76,8 +76,8 @@ def _named(document: SweepDocument) -> SweepDocument:
     """The same, with a name for every table of conditions."""
     many = len(document.conditions) > 1
     conditions = [
-        one.model_copy(update={"name": one.name or (f"conditions-{place}" if many else "conditions")})
-        for place, one in enumerate(document.conditions, 1)
+        table.model_copy(update={"name": table.name or (f"conditions-{place}" if many else "conditions")})
+        for place, table in enumerate(document.conditions, 1)
     ]
     return document.model_copy(update={"conditions": conditions})
 
@@ -102,8 +102,8 @@ def _check_names(document: SweepDocument, where: str) -> None:
         )
     for key, names in (
         ("estimators", document.estimators),
-        ("rig", [one.name for one in document.rig]),
-        ("conditions", [str(one.name) for one in document.conditions]),
+        ("rig", [table.name for table in document.rig]),
+        ("conditions", [str(table.name) for table in document.conditions]),
     ):
         twice = first_twice(names)
         if twice is not None:
@@ -332,8 +332,10 @@ def begin(sweep: Sweep, folder: Path) -> Store:
 
 def _is_begun(path: Path) -> bool:
     """Whether a sweep that was stopped before its ``sweep.json`` was written may have left this."""
-    own = path.name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS) and path.is_dir() and not any(path.iterdir())
-    return own or path.name.startswith(f".{MANIFEST}.")
+    empty_dataset = (
+        path.name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS) and path.is_dir() and not any(path.iterdir())
+    )
+    return empty_dataset or path.name.startswith(f".{MANIFEST}.")
 
 
 def open_store(folder: Path) -> Store:
@@ -369,7 +371,7 @@ def _read_timing(path: Path) -> pl.DataFrame:
 
 def _check_same(store: Store, sweep: Sweep, versions: Mapping[str, str]) -> None:
     where = shown(store.folder)
-    old, new = (json.loads(one.to_json()) for one in (store.sweep, sweep))
+    old, new = (json.loads(each.to_json()) for each in (store.sweep, sweep))
     if old != new:
         key = _first_difference(
             {**old["document"], "rig": old["rigs"]}, {**new["document"], "rig": new["rigs"]}
@@ -428,7 +430,7 @@ def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress |
         store.keep(shard)
         crashes.append(shard.crashes)
 
-    found = run_tasks(
+    kept = run_tasks(
         partial(run_shard, sweep.to_json()),
         range(sweep.shards),
         workers,
@@ -438,4 +440,4 @@ def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress |
         progress=progress,
     )
     store.tidy()
-    return Outcome(store, found, sum(crashes))
+    return Outcome(store, kept, sum(crashes))

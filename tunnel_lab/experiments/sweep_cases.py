@@ -189,9 +189,9 @@ class Sweep:
             TunnelError: when it is not a sweep, or too large.
         """
         where, remedy = "the sweep as JSON", "start the sweep again"
-        found = parse_json(text, where, remedy)
+        document = parse_json(text, where, remedy)
         with as_described("is not a sweep", where, remedy):
-            sweep = cls(SweepDocument.model_validate(found["document"]), tuple(found["rigs"]))
+            sweep = cls(SweepDocument.model_validate(document["document"]), tuple(document["rigs"]))
             check_sweep_size(sweep.document, where)
             if len(sweep._parsed) != len(sweep.document.rig):
                 raise ValueError("rigs")
@@ -203,10 +203,10 @@ class Sweep:
         file = self.document
         return (
             range(len(self.rigs)),
-            [one for table in file.conditions for one in _conditions(table.model_dump())],
-            [one for table in file.sensor for one in _spread(table.model_dump(exclude_none=True))],
-            [one for table in file.truth for one in _spread(table.model_dump(exclude_none=True))],
-            [one for entry in file.effects for one in _effects(entry.model_dump())],
+            [value for table in file.conditions for value in _conditions(table.model_dump())],
+            [value for table in file.sensor for value in _spread(table.model_dump(exclude_none=True))],
+            [value for table in file.truth for value in _spread(table.model_dump(exclude_none=True))],
+            [value for entry in file.effects for value in _effects(entry.model_dump())],
         )
 
     @property
@@ -312,12 +312,15 @@ def _effects(entry: Mapping[str, Any]) -> list[list[dict[str, Any]]]:
     if entry["name"] == NO_EFFECT:
         return [[]]
     others = [dict(other) for other in entry["together_with"]]
-    return [[{"name": entry["name"], "parameters": one}, *others] for one in _spread(entry["parameters"])]
+    return [
+        [{"name": entry["name"], "parameters": parameters}, *others]
+        for parameters in _spread(entry["parameters"])
+    ]
 
 
 def axis_lengths(document: SweepDocument) -> dict[str, int]:
     """Number of values of every axis by its name, counted from the lengths of the lists."""
-    effects = (1 if one.name == NO_EFFECT else _points(one.parameters) for one in document.effects)
+    effects = (1 if effect.name == NO_EFFECT else _points(effect.parameters) for effect in document.effects)
     return {
         "rig": len(document.rig),
         "conditions": sum(len(table.duration) for table in document.conditions),

@@ -128,12 +128,14 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
     clock.lap("simulate")
     answers: list[tuple[Case, str | None, Estimate | Failure | None]] = []
     for name in plan.document.estimators:
-        answers += [(case, name, _estimate(one, name)) for case, one in zip(cases, campaigns, strict=True)]
+        answers += [
+            (case, name, _estimate(campaign, name)) for case, campaign in zip(cases, campaigns, strict=True)
+        ]
         clock.lap(name)
     if not plan.document.estimators:
         answers = [
-            (case, None, one if isinstance(one, Failure) else None)
-            for case, one in zip(cases, campaigns, strict=True)
+            (case, None, campaign if isinstance(campaign, Failure) else None)
+            for case, campaign in zip(cases, campaigns, strict=True)
         ]
     answers.sort(key=lambda answer: answer[0].index)  # the estimators of one case keep their order
     results = _parquet([row for answer in answers for row in estimate_rows(*answer)], RESULT_COLUMNS)
@@ -147,7 +149,9 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
         records=records,
         timings=_parquet(timings, TIMING_COLUMNS),
         made_with={**made_with(), "threads": os.environ.get(ONE_THREAD[0], "several")},
-        crashes=sum(isinstance(one, Failure) and one.status == RAISED for _, _, one in answers),
+        crashes=sum(
+            isinstance(campaign, Failure) and campaign.status == RAISED for _, _, campaign in answers
+        ),
     )
 
 
@@ -259,9 +263,9 @@ def case_values(case: Case) -> tuple[Any, ...]:
         sensor.sample_rate,
         sensor.noise_std,
         sensor.resolution,
-        " + ".join(one.name for one in settings) or NO_EFFECT,
+        " + ".join(setting.name for setting in settings) or NO_EFFECT,
         _severity(settings[0]) if settings else 0.0,
-        " ".join(_word(one) for one in settings),
+        " ".join(_word(setting) for setting in settings),
         truth.cn_beta,
         truth.cn_r,
         truth.yaw_inertia,
@@ -299,17 +303,17 @@ def estimate_rows(
     failure = outcome if isinstance(outcome, Failure) else None
     status, message = (failure.status, failure.message) if failure else (SIMULATED, None)
     for place, condition in enumerate(case.plan.conditions):
-        found = answer.runs[place] if answer else None
+        run = answer.runs[place] if answer else None
         truths = _run_truths(case, condition)
-        said = found.status.name.lower() if found else status
+        shown = run.status.name.lower() if run else status
         for name, unit in RUN_QUANTITIES.items():
             given = (condition.id, condition.spring_stiffness, condition.wind_speed, condition.release_angle)
-            yield (*head, *given, name, unit, truths[name], *_figures(found, name), said, message)
+            yield (*head, *given, name, unit, truths[name], *_figures(run, name), shown, message)
     common = (None, *_common(case.plan.conditions))
     truths = {**vars(case.plan.truth), "sensor_zero": case.plan.sensor.zero}
-    said = answer.status.name.lower() if answer else status
+    shown = answer.status.name.lower() if answer else status
     for name, unit in CAMPAIGN_QUANTITIES.items():
-        yield (*head, *common, name, unit, truths[name], *_figures(answer, name), said, message)
+        yield (*head, *common, name, unit, truths[name], *_figures(answer, name), shown, message)
 
 
 def _figures(owner: Estimate | RunEstimate | None, name: str) -> tuple[float | None, float | None]:
@@ -329,9 +333,9 @@ def _word(setting: EffectSetting) -> str:
 def _common(conditions: tuple[Condition, ...]) -> tuple[float | None, float | None, float | None]:
     """Spring, wind-on speed and release angle of a campaign, each where the campaign has only one."""
     kinds = (
-        {one.spring_stiffness for one in conditions},
-        {one.wind_speed for one in conditions if one.wind_speed > 0.0} or {0.0},
-        {one.release_angle for one in conditions},
+        {condition.spring_stiffness for condition in conditions},
+        {condition.wind_speed for condition in conditions if condition.wind_speed > 0.0} or {0.0},
+        {condition.release_angle for condition in conditions},
     )
     spring, speed, angle = (next(iter(kind)) if len(kind) == 1 else None for kind in kinds)
     return spring, speed, angle

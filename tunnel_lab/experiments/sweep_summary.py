@@ -127,16 +127,16 @@ def summarise(store: Store) -> list[Line]:
         )
     pairs = frame.select("estimator", "quantity").unique(maintain_order=True).collect()
     columns = ("effect", "severity", *AXES, "truth", "value", "std", "status", "unit")
-    found: list[Line] = []
+    lines: list[Line] = []
     for estimator, quantity in pairs.iter_rows():
         mine = (pl.col("estimator") == estimator) & (pl.col("quantity") == quantity)
         asked = pl.col("value").is_not_null() | ~pl.col("status").is_in(NOT_ASKED)
         data = frame.filter(mine & asked & pl.col("truth").is_not_null()).select(columns).collect()
         if len(data):
-            found += _lines(data, estimator, quantity)
+            lines += _lines(data, estimator, quantity)
     order = [OVERALL, *AXES, SEVERITY]
     return sorted(
-        found, key=lambda line: (order.index(line.axis), line.effect if line.axis == SEVERITY else "")
+        lines, key=lambda line: (order.index(line.axis), line.effect if line.axis == SEVERITY else "")
     )
 
 
@@ -225,12 +225,12 @@ def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
     Returns:
         Lines by file name without its suffix, such as ``error-by-noise-std`` or ``error-by-coulomb-friction``.
     """
-    found: dict[str, list[Line]] = {}
+    by_name: dict[str, list[Line]] = {}
     for line in lines:
         if line.axis != OVERALL:
             what = line.effect.replace(" + ", "-and-") if line.axis == SEVERITY else line.axis
-            found.setdefault(f"error-by-{what.replace('_', '-')}", []).append(line)
-    return found
+            by_name.setdefault(f"error-by-{what.replace('_', '-')}", []).append(line)
+    return by_name
 
 
 @styled
@@ -250,15 +250,15 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
     fig = figure(WIDTH, 1.2 + 1.6 * len(quantities))
     panels = fig.subplots(len(quantities), 2, sharex=True, squeeze=False)
     logarithmic = _is_logarithmic(lines)
-    for name, (left, right) in zip(quantities, panels, strict=True):
+    for name, (errors, biases) in zip(quantities, panels, strict=True):
         mine = [line for line in lines if line.quantity == name and line.score.rmse and line.score.bias]
         for place, estimator in enumerate(estimators):
             shown = [line for line in mine if line.estimator == estimator and line.at is not None]
             aside = (place - (len(estimators) - 1) / 2.0) * _ASIDE
             at = _moved(shown, aside, logarithmic=logarithmic)
-            _errorbars(left, at, [line.score.rmse for line in shown], place, estimator)
-            _errorbars(right, at, [line.score.bias for line in shown], place, estimator)
-        _dress(left, right, mine[0], name)
+            _errorbars(errors, at, [line.score.rmse for line in shown], place, estimator)
+            _errorbars(biases, at, [line.score.bias for line in shown], place, estimator)
+        _dress(errors, biases, mine[0], name)
     for axes in panels[-1]:
         if logarithmic:
             log_axis(axes, "x")
@@ -266,9 +266,9 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
             axes.locator_params(axis="x", nbins=_TICKS)
     for column in panels.T:
         fig.align_ylabels(column)
-    one = lines[0]
-    label = one.effect.replace("_", " ") if one.axis == SEVERITY else AXES[one.axis][0]
-    fig.supxlabel(f"{label} [{one.at_unit}]", fontsize=9)
+    first = lines[0]
+    label = first.effect.replace("_", " ") if first.axis == SEVERITY else AXES[first.axis][0]
+    fig.supxlabel(f"{label} [{first.at_unit}]", fontsize=9)
     handles, names = panels[0, 0].get_legend_handles_labels()
     fig.legend(handles, names, loc="outside upper center", ncols=min(4, len(names)))
     return fig
@@ -285,13 +285,13 @@ def _moved(lines: Sequence[Line], aside: float, *, logarithmic: bool) -> list[fl
 def _errorbars(
     axes: Axes, at: Sequence[float], figures: Sequence[Quantity | None], place: int, label: str
 ) -> None:
-    pairs = [(x, found) for x, found in zip(at, figures, strict=True) if found is not None]
+    pairs = [(x, quantity) for x, quantity in zip(at, figures, strict=True) if quantity is not None]
     if not pairs:
         return
     axes.errorbar(
         [x for x, _ in pairs],
-        [found.value for _, found in pairs],
-        yerr=[_INTERVAL * found.std for _, found in pairs],
+        [quantity.value for _, quantity in pairs],
+        yerr=[_INTERVAL * quantity.std for _, quantity in pairs],
         color=COLOURS[place % len(COLOURS)],
         marker=MARKERS[place % len(MARKERS)],
         markersize=4.0,
@@ -300,14 +300,14 @@ def _errorbars(
     )
 
 
-def _dress(left: Axes, right: Axes, one: Line, name: str) -> None:
-    scale = one.score.rmse.unit if one.score.rmse else ""
+def _dress(errors: Axes, biases: Axes, line: Line, name: str) -> None:
+    scale = line.score.rmse.unit if line.score.rmse else ""
     per = "% of truth" if scale == "%" else scale
-    log_axis(left, "y")
-    right.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
-    left.set_ylabel(f"{NAMES[name]}: RMSE [{per}]")
-    right.set_ylabel(f"bias [{per}]")
-    for axes in (left, right):
+    log_axis(errors, "y")
+    biases.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
+    errors.set_ylabel(f"{NAMES[name]}: RMSE [{per}]")
+    biases.set_ylabel(f"bias [{per}]")
+    for axes in (errors, biases):
         grid(axes)
 
 
@@ -319,9 +319,9 @@ def _is_logarithmic(lines: Sequence[Line]) -> bool:
 def overall_table(lines: Iterable[Line]) -> Table:
     """Bias, RMSE, coverage and failures of each estimator and quantity over all cases."""
     kept = [line for line in lines if line.axis == OVERALL]
-    said = "without effects" if all(line.effect == "none" for line in kept) else "effects pooled"
+    pooled = "without effects" if all(line.effect == "none" for line in kept) else "effects pooled"
     result = table(
-        f"All cases, {said}", "estimator", "quantity", "trials", "bias", "RMSE", "in 95 % interval", "failed",
+        f"All cases, {pooled}", "estimator", "quantity", "trials", "bias", "RMSE", "in 95 % interval", "failed",
         right=("trials",),
     )  # fmt: skip
     last = ""
@@ -329,10 +329,10 @@ def overall_table(lines: Iterable[Line]) -> Table:
         if last not in ("", line.estimator):
             result.add_section()
         last = line.estimator
-        one = line.score
+        score = line.score
         result.add_row(
-            line.estimator, NAMES[line.quantity], str(one.count), _figure(one.bias), _figure(one.rmse),
-            _percent(one.coverage), _percent(one.failures),
+            line.estimator, NAMES[line.quantity], str(score.count), _figure(score.bias), _figure(score.rmse),
+            _percent(score.coverage), _percent(score.failures),
         )  # fmt: skip
     return result
 
@@ -343,11 +343,11 @@ def axis_table(lines: Sequence[Line]) -> Table:
     Args:
         lines: of one axis, and of one effect where that is severity.
     """
-    one = lines[0]
-    label = one.effect.replace("_", " ") if one.axis == SEVERITY else AXES[one.axis][0]
+    first = lines[0]
+    label = first.effect.replace("_", " ") if first.axis == SEVERITY else AXES[first.axis][0]
     quantities = [name for name in DRAWN if any(line.quantity == name for line in lines)]
     heads = [f"RMSE {NAMES[name]}" for name in quantities]
-    result = table(f"Error against {label}", f"{label} {unit(one.at_unit)}", "estimator", *heads)
+    result = table(f"Error against {label}", f"{label} {unit(first.at_unit)}", "estimator", *heads)
     cells = {(line.at, line.estimator, line.quantity): line.score.rmse for line in lines}
     for at in sorted({line.at for line in lines if line.at is not None}):
         if result.row_count:
@@ -358,17 +358,17 @@ def axis_table(lines: Sequence[Line]) -> Table:
     return result
 
 
-def pace_table(found: Sequence[Pace]) -> Table:
+def pace_table(paces: Sequence[Pace]) -> Table:
     """Times of the steps."""
     result = table("Time per run", "step", "median [ms]", "quartiles [ms]", right=("median [ms]",))
-    for one in found:
-        middle, low, high = (significant(1e3 * value, 3) for value in (one.middle, one.low, one.high))
-        result.add_row(one.step, middle, f"{low} to {high}")
+    for pace in paces:
+        middle, low, high = (significant(1e3 * value, 3) for value in (pace.middle, pace.low, pace.high))
+        result.add_row(pace.step, middle, f"{low} to {high}")
     return result
 
 
-def _figure(found: Quantity | None) -> str:
-    return "–" if found is None else f"{concise(found.value, found.std)} {found.unit}"
+def _figure(quantity: Quantity | None) -> str:
+    return "–" if quantity is None else f"{concise(quantity.value, quantity.std)} {quantity.unit}"
 
 
 def _percent(share: Proportion | None) -> str:

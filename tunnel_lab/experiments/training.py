@@ -114,14 +114,14 @@ def train(
     )
     parts = {part: read_shards(folder, part, spec.of_part(part)) for part in PARTS}
     networks = {kind: _fitted(kind, spec, parts[PARTS[0]], folder, progress) for kind in KINDS}
-    found = {
+    trained = {
         kind: judged(
             networks[kind], usable(parts[PARTS[0]], _LETTERS[kind]), usable(parts[PARTS[2]], _LETTERS[kind])
         )
         for kind in KINDS
     }
-    weights = to_bytes(found)
-    return Result(weights, _record(spec, found, parts, weights))
+    weights = to_bytes(trained)
+    return Result(weights, _record(spec, trained, parts, weights))
 
 
 def _sizes(seed: int, folder: Path) -> tuple[tuple[str, float], ...]:
@@ -141,12 +141,12 @@ def _fitted(
     kind: str, spec: TrainingSpec, samples: Mapping[str, Array], folder: Path, progress: Progress
 ) -> dict[str, Array]:
     """The weights of one network, from its checkpoint on."""
-    own = usable(samples, _LETTERS[kind])
-    mark = json_line([asdict(spec), sorted((name, list(value.shape)) for name, value in own.items())])
+    mine = usable(samples, _LETTERS[kind])
+    mark = json_line([asdict(spec), sorted((name, list(value.shape)) for name, value in mine.items())])
     path = folder / f"{kind}.part.safetensors"
-    state = _resumed(path, mark) or start_state(own, spec.fit)
+    state = _resumed(path, mark) or start_state(mine, spec.fit)
     while state.step < spec.steps:
-        state = fit(own, spec.fit, state, until=state.step + _KEPT_EVERY)
+        state = fit(mine, spec.fit, state, until=state.step + _KEPT_EVERY)
         tensors = {f"w/{n}": v for n, v in state.weights.items()} | {
             f"m/{n}": v for n, v in state.moments.items()
         }
@@ -168,14 +168,16 @@ def _resumed(path: Path, mark: str) -> State | None:
         step = int(header["step"])
     except (SafetensorError, ValueError, LookupError, TypeError):
         return None
-    own = {letter: {n[2:]: v for n, v in tensors.items() if n.startswith(f"{letter}/")} for letter in "wm"}
-    return State(own["w"], own["m"], step)
+    by_letter = {
+        letter: {n[2:]: v for n, v in tensors.items() if n.startswith(f"{letter}/")} for letter in "wm"
+    }
+    return State(by_letter["w"], by_letter["m"], step)
 
 
 def contexts(weights: Mapping[str, Array], samples: Mapping[str, Array]) -> Array:
     """What the score of unlikeness uses, shape (samples, c)."""
-    found = forward(np, weights, *(samples[name] for name in INPUTS))
-    return np.asarray(found.context, dtype=np.float64)
+    output = forward(np, weights, *(samples[name] for name in INPUTS))
+    return np.asarray(output.context, dtype=np.float64)
 
 
 def judged(weights: dict[str, Array], samples: Mapping[str, Array], apart: Mapping[str, Array]) -> Trained:
@@ -191,26 +193,29 @@ def judged(weights: dict[str, Array], samples: Mapping[str, Array], apart: Mappi
 
 
 def _record(
-    spec: TrainingSpec, found: Mapping[str, Trained], parts: Mapping[str, Mapping[str, Array]], weights: bytes
+    spec: TrainingSpec,
+    trained: Mapping[str, Trained],
+    parts: Mapping[str, Mapping[str, Array]],
+    weights: bytes,
 ) -> dict[str, Any]:
     networks = {}
     for kind, letter in _LETTERS.items():
-        own = {part: usable(samples, letter) for part, samples in parts.items()}
-        rivals, runs = own["training"]["rivals"], own["training"]["runs"]
+        used = {part: usable(samples, letter) for part, samples in parts.items()}
+        rivals, runs = used["training"]["rivals"], used["training"]["runs"]
         networks[kind] = {
             "sizes": {
                 "rivals": rivals.shape[1],
                 "features": rivals.shape[2],
                 "runs": runs.shape[2] - 1,
-                "quantities": own["training"]["target"].shape[1],
+                "quantities": used["training"]["target"].shape[1],
                 "effects": len(FAMILIES),
             },
-            "samples": {part: len(values["target"]) for part, values in own.items()},
+            "samples": {part: len(values["target"]) for part, values in used.items()},
             "loss": {
-                part: [float(one) for one in losses(np, found[kind].weights, values)]
-                for part, values in own.items()
+                part: [float(loss) for loss in losses(np, trained[kind].weights, values)]
+                for part, values in used.items()
             },
-            "threshold": found[kind].threshold,
+            "threshold": trained[kind].threshold,
         }
     return {
         "schema_version": 1,
@@ -256,11 +261,11 @@ class State:
 
 def usable(samples: Mapping[str, Array], kind: str) -> dict[str, Array]:
     """The samples of a kind whose target is not absurdly far from the nominal fit, without the kind's prefix."""
-    own = {name[2:]: values for name, values in samples.items() if name.startswith(f"{kind}.")}
-    if not all(np.all(np.isfinite(values)) for values in own.values()):
+    mine = {name[2:]: values for name, values in samples.items() if name.startswith(f"{kind}.")}
+    if not all(np.all(np.isfinite(values)) for values in mine.values()):
         raise ValueError("internal error: a training sample is not finite")
-    near = np.abs(own["target"]).max(axis=1) < FAR
-    return {name: values[near] for name, values in own.items()}
+    near = np.abs(mine["target"]).max(axis=1) < FAR
+    return {name: values[near] for name, values in mine.items()}
 
 
 def start_state(samples: Mapping[str, Array], spec: FitSpec) -> State:

@@ -72,7 +72,17 @@ def write_shard(spec: ShardSpec, folder: Path) -> Path:
     Returns:
         Its file.
     """
-    return write_whole(folder / spec.name, save(_as_arrays(list(samples_of(spec)))))
+    samples = list(samples_of(spec))
+    names = sorted({name for sample in samples for name in sample})
+    return write_whole(
+        folder / spec.name,
+        save(
+            {
+                name: np.stack([sample[name] for sample in samples if name in sample]).astype(np.float32)
+                for name in names
+            }
+        ),
+    )
 
 
 def read_shards(folder: Path, part: str, count: int) -> dict[str, Array]:
@@ -161,11 +171,15 @@ def reduced(
     """
     labels = np.array([float(name in families) for name in FAMILIES])
     seen = [(run, demodulate(run.record)) for run in campaign.runs]
-    shown = [(run, one) for run, one in seen if isinstance(one, Demodulated)]
+    shown = [(run, motion) for run, motion in seen if isinstance(motion, Demodulated)]
     if not shown:
         return
-    found = record_features([one for _, one in shown])
-    kept = [(run, one, alone) for (run, one), alone in zip(shown, found, strict=True) if alone is not None]
+    features = record_features([motion for _, motion in shown])
+    kept = [
+        (run, motion, alone)
+        for (run, motion), alone in zip(shown, features, strict=True)
+        if alone is not None
+    ]
     if not kept:
         return
     coefficients = np.array(list(truth.values()))
@@ -177,7 +191,10 @@ def reduced(
     if "g" not in design.columns and "d" not in design.columns:
         return
     whole = campaign_features(
-        [run for run, _, _ in kept], [one for _, one, _ in kept], design, [fit for _, _, (_, fit) in kept]
+        [run for run, _, _ in kept],
+        [motion for _, motion, _ in kept],
+        design,
+        [fit for _, _, (_, fit) in kept],
     )
     if whole is not None:
         yield _sample("c", whole, coefficients, labels)
@@ -213,14 +230,6 @@ def _sample(kind: str, features: Features, truth: Array, labels: Array) -> dict[
         f"{kind}.known": features.known,
         f"{kind}.target": np.where(features.known, (truth - features.values) / features.stds, 0.0),
         f"{kind}.labels": labels,
-    }
-
-
-def _as_arrays(samples: list[dict[str, Array]]) -> dict[str, Array]:
-    names = sorted({name for sample in samples for name in sample})
-    return {
-        name: np.stack([sample[name] for sample in samples if name in sample]).astype(np.float32)
-        for name in names
     }
 
 
@@ -296,18 +305,15 @@ def sizes_at_unit_excess(seed: int) -> dict[str, float]:
     for form, child in zip(forms, root.spawn(len(forms)), strict=True):
         rng = np.random.default_rng(child)
         plain = draw_campaign(rng, kind="none", mixture=Mixture(variety=0.0))
-        conditions = _first_runs(at_low_rate(plain.conditions), 9)
+        c = at_low_rate(plain.conditions)
+        by_run = {name: value[:9] for name, value in vars(c).items() if np.shape(value) == (c.runs,)}
+        conditions = replace(c, **by_run)
         extra = {k: float(v) for k, v in form.draw(rng, conditions).items()}
         effect = EffectDraw(form, extra, form.signs[-1], _UNIT, form.start)
         draws.append(replace(plain, conditions=conditions, effects=(effect,)))
     for _ in range(_ROUNDS):
         draws = [_nearer(draw, excess) for draw, excess in zip(draws, _excesses(draws), strict=True)]
     return {label(form): draw.effects[0].value for form, draw in zip(forms, draws, strict=True)}
-
-
-def _first_runs(c: Conditions, number: int) -> Conditions:
-    by_run = {name: value[:number] for name, value in vars(c).items() if np.shape(value) == (c.runs,)}
-    return replace(c, **by_run)
 
 
 def _excesses(draws: Sequence[CampaignDraw]) -> list[float]:
@@ -348,12 +354,14 @@ def motions_of(draws: Sequence[CampaignDraw], substeps: int) -> list[Motion]:
     bound = [bind_effects(draw) for draw in draws]
     rigid = [place for place, (c, _) in enumerate(bound) if c.rod is None]
     terms = [[term for term in bound[place][1] if isinstance(term, Term)] for place in rigid]
-    found: dict[int, Motion] = {}
+    integrated: dict[int, Motion] = {}
     if rigid:
-        found = dict(
+        integrated = dict(
             zip(rigid, integrate([bound[p][0] for p in rigid], terms, substeps=substeps), strict=True)
         )
-    return [found[place] if place in found else flexible_motion(c) for place, (c, _) in enumerate(bound)]
+    return [
+        integrated[place] if place in integrated else flexible_motion(c) for place, (c, _) in enumerate(bound)
+    ]
 
 
 def flexible_motion(c: Conditions) -> Motion:

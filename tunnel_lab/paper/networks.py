@@ -98,9 +98,9 @@ def table_3(folder: Path) -> Section:
     rows = tuple(
         (
             str(row.number), f"{row.zeta:.4f}", f"{row.omega_n_rad_per_s:.4f}",
-            *(concise(value.value, value.std) for w in (one, other) for value in (w.zeta, w.omega_n)),
+            *(concise(value.value, value.std) for w in (linear, softening) for value in (w.zeta, w.omega_n)),
         )
-        for row, one, other in zip(paper_windows(), windows["linear"], windows["softening"], strict=False)
+        for row, linear, softening in zip(paper_windows(), windows["linear"], windows["softening"], strict=False)
     )  # fmt: skip
     return Section(
         title="Table III",
@@ -132,9 +132,9 @@ def table_3(folder: Path) -> Section:
 
 def _inference() -> str:
     parts = [
-        f"spring {one.spring} needs {one.wind_speed:.1f} m/s and Cr {signed(one.mechanical_damping, 4)} N "
-        "m s/rad"
-        for one in infer_springs()[:2]
+        f"spring {springs.spring} needs {springs.wind_speed:.1f} m/s "
+        f"and Cr {signed(springs.mechanical_damping, 4)} N m s/rad"
+        for springs in infer_springs()[:2]
     ]
     return "; ".join(parts) + ", which is impossible, and so are the stiffer ones."
 
@@ -150,7 +150,7 @@ def table_4(_: Path) -> Section:
         for noisy in (False, True)
     }
     campaigns = simulate_campaigns(list(plans.values()))
-    found = {
+    closeness_of = {
         name: closeness(campaign, plan.truth)
         for (name, plan), campaign in zip(plans.items(), campaigns, strict=True)
     }
@@ -161,17 +161,17 @@ def table_4(_: Path) -> Section:
     ours = [
         (
             f"{rig}: {method.replace('_', ' ')}",
-            f"{signed(one.cn_beta, 3)} %",
-            f"{signed(one.cn_r, 3)} %",
-            f"{one.response:.2f} %",
+            f"{signed(network.cn_beta, 3)} %",
+            f"{signed(network.cn_r, 3)} %",
+            f"{network.response:.2f} %",
         )
-        for rig, methods in found.items()
-        for method, one in methods.items()
+        for rig, methods in closeness_of.items()
+        for method, network in methods.items()
     ]
     spring = infer_springs()[0]
     beta = paper_derivatives()[0].cn_beta_per_rad * (spring.wind_speed / _SPEED) ** 2
     again = (f"from Table III's mean ωn, spring {spring.spring} at {_SPEED:g} m/s", f"{beta:.3f}", "–", "–")
-    linear, soft = (_closer(found[name]) for name in ("linear, noise", "softening, noise"))
+    linear, soft = (_closer(closeness_of[name]) for name in ("linear, noise", "softening, noise"))
     return Section(
         title="Table IV",
         about="Cnβ and Cnr of both methods",
@@ -200,8 +200,8 @@ def figures_4_to_6(folder: Path) -> Section:
     (campaign,) = simulate_campaigns([plan])
     estimates = [identify(campaign, method) for method in METHODS]
     save_both(response_figure(campaign.runs[1], estimates, magnified=_MAGNIFIED), folder / "responses.png")
-    found = closeness(campaign, plan.truth)
-    network, conventional = found[NETWORK].response, found[CONVENTIONAL].response
+    distances = closeness(campaign, plan.truth)
+    network, conventional = distances[NETWORK].response, distances[CONVENTIONAL].response
     return Section(
         title="Figs 4 to 6",
         about="the measured response, and those generated from both methods' estimates",
@@ -226,9 +226,11 @@ def figures_4_to_6(folder: Path) -> Section:
     )
 
 
-def _closer(found: Mapping[str, Closeness]) -> str:
+def _closer(distances: Mapping[str, Closeness]) -> str:
     """Which of the paper's two methods has the smaller error of Cnβ."""
-    errors = {method: abs(found[method].cn_beta) for method in (NETWORK, CONVENTIONAL) if method in found}
+    errors = {
+        method: abs(distances[method].cn_beta) for method in (NETWORK, CONVENTIONAL) if method in distances
+    }
     return "network" if min(errors, key=errors.__getitem__) == NETWORK else "conventional method"
 
 
@@ -300,27 +302,27 @@ def response_figure(run: Run, estimates: Sequence[Estimate], *, magnified: tuple
         The figure: the whole record above, the stretch in the middle, what is left of it below.
     """
     fig = figure(WIDTH, 6.4)
-    whole, part, left = fig.subplots(3, 1)
+    whole, part, residual = fig.subplots(3, 1)
     time = run.record.time_s - run.record.time_s[0]
     whole.axvspan(*magnified, color="#e6e9ec", lw=0)
     whole.plot(time, np.degrees(run.record.yaw_rad), color="black", lw=0.8)
     inside = (time >= magnified[0]) & (time <= magnified[1])
     part.plot(time[inside], np.degrees(run.record.yaw_rad[inside]), color="black", lw=2.0, label="record")
     for estimate, colour, dash in zip(estimates, COLOURS, ("--", "-.", ":"), strict=False):
-        found = next(one for one in estimate.runs if one.id == run.id)
-        if found.omega_n is None or found.zeta is None:
+        estimated = next(each for each in estimate.runs if each.id == run.id)
+        if estimated.omega_n is None or estimated.zeta is None:
             continue
-        again = regenerated(run, found.omega_n.value, found.zeta.value)
+        again = regenerated(run, estimated.omega_n.value, estimated.zeta.value)
         label = estimate.estimator.replace("_", " ")
         part.plot(time[inside], np.degrees(again[inside]), color=colour, ls=dash, lw=1.4, label=label)
-        left.plot(time, np.degrees(run.record.yaw_rad - again), color=colour, lw=0.7)
+        residual.plot(time, np.degrees(run.record.yaw_rad - again), color=colour, lw=0.7)
     names = ("angle β [°]", "angle β, shaded part [°]", "record − response [°]")
-    for axes, name in zip((whole, part, left), names, strict=True):
+    for axes, name in zip((whole, part, residual), names, strict=True):
         axes.set_ylabel(name)
         axes.margins(x=0.01)
         grid(axes)
-    fig.align_ylabels((whole, part, left))
-    left.set_xlabel("time since the start of the record [s]")
+    fig.align_ylabels((whole, part, residual))
+    residual.set_xlabel("time since the start of the record [s]")
     fig.legend(*part.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     return fig
 
@@ -345,9 +347,9 @@ class HeldOutErrors:
 def fig3_errors(networks: Networks, rng: np.random.Generator) -> HeldOutErrors:
     """Put responses over the training range through both networks, noise-free."""
     zeta, omega = held_out_points(networks.spec, rng)
-    found = networks.zeta(network_inputs(zeta))
-    omega_found = networks.omega_n(found, cycles_time(zeta, omega))
-    return HeldOutErrors(zeta, omega, 100.0 * (found / zeta - 1.0), 100.0 * (omega_found / omega - 1.0))
+    estimates = networks.zeta(network_inputs(zeta))
+    omega_found = networks.omega_n(estimates, cycles_time(zeta, omega))
+    return HeldOutErrors(zeta, omega, 100.0 * (estimates / zeta - 1.0), 100.0 * (omega_found / omega - 1.0))
 
 
 @dataclass(frozen=True)
@@ -380,7 +382,7 @@ def infer_springs() -> tuple[SpringInference, ...]:
     omega = float(np.mean([row.omega_n_rad_per_s for row in rows]))
     zeta = float(np.mean([row.zeta for row in rows]))
     printed, rig = paper_derivatives()[0], load_rig()
-    found = []
+    springs = []
     for spring in paper_springs():
         stiffness, omega_0 = spring.stiffness_n_m_per_rad, 2.0 * pi * spring.frequency_hz
         if omega_0 <= omega:
@@ -389,8 +391,8 @@ def infer_springs() -> tuple[SpringInference, ...]:
         per_square = aerodynamic_stiffness(printed.cn_beta_per_rad, **rig.body.flow(rig.air.density, 1.0))
         speed = sqrt((stiffness - inertia * omega**2) / per_square)
         lost = aerodynamic_damping(printed.cn_r_per_rad, **rig.body.flow(rig.air.density, speed))
-        found.append(SpringInference(spring.number, speed, 2.0 * zeta * omega * inertia + lost))
-    return tuple(found)
+        springs.append(SpringInference(spring.number, speed, 2.0 * zeta * omega * inertia + lost))
+    return tuple(springs)
 
 
 def paper_run_plan(
@@ -403,7 +405,11 @@ def paper_run_plan(
         wind_speed: of the second run, m/s.
     """
     plan = paper_plan()
-    off = next(one for one in plan.conditions if one.spring_stiffness == 16.12 and one.wind_speed == 0.0)
+    off = next(
+        condition
+        for condition in plan.conditions
+        if condition.spring_stiffness == 16.12 and condition.wind_speed == 0.0
+    )
     damping = _DAMPING_BESIDE_QUADRATIC if effects else _MECHANICAL_DAMPING
     truth = Truth(0.4719, -0.1033, plan.truth.yaw_inertia, damping)
     sensor = SensorModel(zero=0.004) if noisy else SensorModel(noise_std=0.0, resolution=0.0, zero=0.004)
@@ -428,17 +434,24 @@ class Closeness:
 
 def closeness(campaign: Campaign, truth: Truth) -> dict[str, Closeness]:
     """Table IV and Figs 4 to 6 for one campaign of known truth."""
-    found = {}
+    by_method = {}
     for method in METHODS:
         estimate = identify(campaign, method, throw=False)
         if estimate.cn_beta is None or estimate.cn_r is None:
             continue
-        found[method] = Closeness(
+        values = []
+        for run, estimated in zip(campaign.runs, estimate.runs, strict=True):
+            if estimated.omega_n is not None and estimated.zeta is not None:
+                residual = run.record.yaw_rad - regenerated(
+                    run, estimated.omega_n.value, estimated.zeta.value
+                )
+                values.append(float(np.sqrt(np.mean(residual**2))) / abs(run.release_angle or np.nan))
+        by_method[method] = Closeness(
             100.0 * (estimate.cn_beta.value / truth.cn_beta - 1.0),
             100.0 * (estimate.cn_r.value / truth.cn_r - 1.0),
-            100.0 * _mean_misfit(campaign, estimate),
+            100.0 * float(np.mean(values)),
         )
-    return found
+    return by_method
 
 
 def regenerated(run: Run, omega_n: float, zeta: float) -> Array:
@@ -455,12 +468,3 @@ def regenerated(run: Run, omega_n: float, zeta: float) -> Array:
     unit = response_rows(np.array(time), Decay.from_modal(omega_n, zeta))[0]
     columns = np.column_stack((unit, np.ones_like(unit)))
     return np.asarray(columns @ np.linalg.lstsq(columns, run.record.yaw_rad, rcond=None)[0])
-
-
-def _mean_misfit(campaign: Campaign, estimate: Estimate) -> float:
-    values = []
-    for run, one in zip(campaign.runs, estimate.runs, strict=True):
-        if one.omega_n is not None and one.zeta is not None:
-            left = run.record.yaw_rad - regenerated(run, one.omega_n.value, one.zeta.value)
-            values.append(float(np.sqrt(np.mean(left**2))) / abs(run.release_angle or np.nan))
-    return float(np.mean(values))

@@ -123,7 +123,7 @@ def write_paper(
         path = kept / f"{name}.json"
         section = _finished(path, folder)
         if section is None and name in names:
-            progress(len([one for one in names if one in sections]), len(names), name)
+            progress(len([finished for finished in names if finished in sections]), len(names), name)
             section = part(folder)
             write_json(path, {"version": version(_PACKAGE), "section": asdict(section)})
         if section is not None:

@@ -73,16 +73,22 @@ def table_2(folder: Path) -> Section:
     theirs = fit_springs(stiffness, [spring.frequency_hz for spring in springs])
     campaign = simulate_campaign(springs_plan(stiffness))
     runs = identify(campaign, "conventional", throw=False).runs
-    found = [scaled(run.omega_n, 1.0 / (2.0 * pi)) for run in runs]
-    kept = [(own.value, value) for own, value in zip(found, stiffness, strict=True) if own is not None]
-    ours = fit_springs([value for _, value in kept], [own for own, _ in kept])
+    frequencies = [scaled(run.omega_n, 1.0 / (2.0 * pi)) for run in runs]
+    kept = [
+        (frequency.value, value)
+        for frequency, value in zip(frequencies, stiffness, strict=True)
+        if frequency is not None
+    ]
+    ours = fit_springs([value for _, value in kept], [frequency for frequency, _ in kept])
     rows = tuple(
         (
             str(spring.number), f"{spring.stiffness_n_m_per_rad:g}", f"{spring.frequency_hz:g}",
-            "–" if own is None else concise(own.value, own.std), signed(residual, 1),
+            "–" if frequency is None else concise(frequency.value, frequency.std), signed(residual, 1),
             "off the line" if flag else "",
         )
-        for spring, own, residual, flag in zip(springs, found, theirs.residual_percent, theirs.flagged, strict=True)
+        for spring, frequency, residual, flag in zip(
+            springs, frequencies, theirs.residual_percent, theirs.flagged, strict=True
+        )
     )  # fmt: skip
     save_both(springs_figure(springs, theirs, TABLE_I_INERTIA), folder / "springs.png")
     off = ", ".join(str(spring.number) for spring, flag in zip(springs, theirs.flagged, strict=True) if flag)
@@ -122,7 +128,7 @@ def springs_plan(stiffness: list[float]) -> CampaignPlan:
         stiffness: N m/rad.
     """
     plan = paper_plan()
-    off = next(one for one in plan.conditions if one.wind_speed == 0.0)
+    off = next(condition for condition in plan.conditions if condition.wind_speed == 0.0)
     conditions = tuple(
         replace(off, id=f"spring-{number}", spring_stiffness=value, duration=_DURATION)
         for number, value in enumerate(stiffness, 1)

@@ -272,8 +272,8 @@ def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
     least = 1e-6 * float(np.min(stds[stds > 0.0], initial=np.inf))
     weights = np.maximum(stds, least if np.isfinite(least) else 1.0) ** -2.0  # a value may be exact
     mean = float(weights @ [quantity.value for quantity in quantities] / weights.sum())
-    left = 1.0 / float(weights.sum())
-    return [Quantity(q.value - mean, sqrt(max(q.std**2 - left, 0.0)), q.unit) for q in quantities]
+    of_mean = 1.0 / float(weights.sum())
+    return [Quantity(q.value - mean, sqrt(max(q.std**2 - of_mean, 0.0)), q.unit) for q in quantities]
 
 
 def _shown(run: RunEstimate, name: str, *, absolute: bool) -> list[Quantity]:
@@ -281,10 +281,10 @@ def _shown(run: RunEstimate, name: str, *, absolute: bool) -> list[Quantity]:
     given: list[Quantity] = [getattr(window, name) for window in run.windows]
     if absolute:
         return given
-    found = deviations(given)
-    mean = given[0].value - found[0].value
+    shifts = deviations(given)
+    mean = given[0].value - shifts[0].value
     scale, unit = (1e3, "10⁻³") if name == "zeta" else (100.0 / mean, "%")
-    return [Quantity(scale * q.value, scale * q.std, unit) for q in found]
+    return [Quantity(scale * q.value, scale * q.std, unit) for q in shifts]
 
 
 def _intervals(

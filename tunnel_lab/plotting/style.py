@@ -124,10 +124,10 @@ def limit_to_known(axes: Axes, values: Array, stds: Array) -> None:
         values: shape (n,), in the axis' unit; NaN where there is none.
         stds: their standard deviations, shape (n,), in the same unit.
     """
-    found = np.isfinite(values) & np.isfinite(stds)
-    if not found.any():
+    known_at_all = np.isfinite(values) & np.isfinite(stds)
+    if not known_at_all.any():
         return
-    known = found & (stds <= _WIDE * np.median(stds[found]))
+    known = known_at_all & (stds <= _WIDE * np.median(stds[known_at_all]))
     low, high = np.min((values - 2.0 * stds)[known]), np.max((values + 2.0 * stds)[known])
     margin = 0.05 * (high - low) or 0.1 * abs(high) or 1.0
     axes.set_ylim(low - margin, high + margin)

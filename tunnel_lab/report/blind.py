@@ -67,11 +67,11 @@ def sections(score: Score) -> list[Section]:
     Returns:
         Sections; those without rows are left out.
     """
-    found = [
+    every = [
         _exact(score), _found(score), _alarms(score), _calibration(score), _decisions(score), _inclusion(score),
         _closure(score), _coefficients(score), _pairs(score), _answers(score), _time(score),
     ]  # fmt: skip
-    return [section for section in found if section.rows]
+    return [section for section in every if section.rows]
 
 
 def origin_lines(score: Score) -> list[str]:
@@ -145,7 +145,7 @@ def _rows(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _exact(score: Score) -> Section:
-    rows = tuple((KINDS[name], *_share(found)) for name, found in score.exact().items())
+    rows = tuple((KINDS[name], *_share(share)) for name, share in score.exact().items())
     return _section("Causes exactly right", ("campaigns where", "right", "of", "share", "95 %"), rows)
 
 
@@ -155,14 +155,14 @@ def _alarms(score: Score) -> Section:
         "no cause named where one acts": score.missed(),
         "truth named as rival in a wrong answer": score.rivals(),
     }
-    rows = tuple((name, *_share(found)) for name, found in entries.items() if found.total)
+    rows = tuple((name, *_share(share)) for name, share in entries.items() if share.total)
     return _section("Alarms", ("", "number", "of", "share", "95 %"), rows)
 
 
 def _found(score: Score) -> Section:
     rows = tuple(
-        (found.group, *(_brief(share) for share in (found.exact, found.found, found.false)), "")
-        for found in score.found()
+        (group.group, *(_brief(counted) for counted in (group.exact, group.found, group.false)), "")
+        for group in score.found()
     )
     note = (
         "Small causes that act beside others are neither asked for nor false. Fast and slow rigs have periods "
@@ -174,8 +174,8 @@ def _found(score: Score) -> Section:
 
 def _decisions(score: Score) -> Section:
     rows = tuple(
-        (found.group, _brief(found.stated_wrongly), _brief(found.covered), f"{found.credible_size:.2f}")
-        for found in score.found()
+        (group.group, _brief(group.stated_wrongly), _brief(group.covered), f"{group.credible_size:.2f}")
+        for group in score.found()
     )
     note = (
         "An answer below one half is undecided and states no set. The smallest set of answers that together have a "
@@ -186,11 +186,16 @@ def _decisions(score: Score) -> Section:
 
 
 def _inclusion(score: Score) -> Section:
-    found = score.inclusion()
-    if found is None:
+    calibration = score.inclusion()
+    if calibration is None:
         return _section(INCLUSION, (), ())
-    low, high = found.interval
-    row = (f"{found.error:.4f}", f"{low:.4f}–{high:.4f}", str(found.statements), str(found.campaigns))
+    low, high = calibration.interval
+    row = (
+        f"{calibration.error:.4f}",
+        f"{low:.4f}–{high:.4f}",
+        str(calibration.statements),
+        str(calibration.campaigns),
+    )
     note = (
         "Of the probability of every effect that it is among the causes. The kernel is as wide as the error that "
         "it gives (Błasiok and Nakkiran 2023); the interval is by resampling campaigns."
@@ -220,10 +225,10 @@ def _closure(score: Score) -> Section:
 
 
 def _coefficients(score: Score) -> Section:
-    found = {(e.group, e.name, e.when): e for e in score.coefficients()}
+    errors = {(e.group, e.name, e.when): e for e in score.coefficients()}
     rows = []
-    for (group, name, when), after in found.items():
-        before = found.get((group, name, "before"))
+    for (group, name, when), after in errors.items():
+        before = errors.get((group, name, "before"))
         if when == "before" or before is None:
             continue
         low, high = after.within.interval
@@ -246,8 +251,8 @@ def _coefficients(score: Score) -> Section:
 
 
 def _pairs(score: Score) -> Section:
-    found = score.pairs()
-    rows = tuple((name, str(number), "") for name, number in found.items()) if sum(found.values()) else ()
+    counts = score.pairs()
+    rows = tuple((name, str(number), "") for name, number in counts.items()) if sum(counts.values()) else ()
     return _section("Answers to two effects", ("answered", "number", ""), rows)
 
 
@@ -256,8 +261,8 @@ def _answers(score: Score) -> Section:
     right = score.right_by_truth()
     for truth, answers in sorted(score.confusion().items(), key=lambda item: _order(item[0])):
         wrong = sorted(answers.items(), key=lambda item: -item[1])
-        own = {"withheld": "unknown"}.get(truth, truth)
-        others = ", ".join(f"{name} {number}" for name, number in wrong if name != own)
+        right_answer = {"withheld": "unknown"}.get(truth, truth)
+        others = ", ".join(f"{name} {number}" for name, number in wrong if name != right_answer)
         rows.append((truth, str(right[truth].total), str(right[truth].count), others))
     return _section("Answers by truth", ("truth", "number", "right", "answered otherwise"), rows)
 
@@ -270,10 +275,13 @@ def _time(score: Score) -> Section:
 
 def confusion(score: Score) -> tuple[list[str], list[str], NDArray[np.int_]]:
     """True causes in rows, answers in columns, and the counts, shape (rows, columns)."""
-    found = score.confusion()
-    names = sorted({*found, *(name for row in found.values() for name in row)}, key=_order)
-    rows, columns = [name for name in names if name in found], [name for name in names if name != "withheld"]
-    return rows, columns, np.array([[found[row].get(column, 0) for column in columns] for row in rows])
+    by_truth = score.confusion()
+    names = sorted({*by_truth, *(name for row in by_truth.values() for name in row)}, key=_order)
+    rows, columns = (
+        [name for name in names if name in by_truth],
+        [name for name in names if name != "withheld"],
+    )
+    return rows, columns, np.array([[by_truth[row].get(column, 0) for column in columns] for row in rows])
 
 
 def _matrix(score: Score, figure: str) -> list[str]:
@@ -281,8 +289,8 @@ def _matrix(score: Score, figure: str) -> list[str]:
     rows, columns, counts = confusion(score)
     numbers = {name: str(index) for index, name in enumerate(columns, 1)}
     cells = [
-        [name, numbers.get(name, ""), *(str(count or "·") for count in own)]
-        for name, own in zip(rows, counts.tolist(), strict=True)
+        [name, numbers.get(name, ""), *(str(count or "·") for count in numbers_of)]
+        for name, numbers_of in zip(rows, counts.tolist(), strict=True)
     ]
     return [
         "## Confusion matrix", "",
@@ -342,30 +350,43 @@ def calibration_figure(score: Score) -> Figure:
 
 
 def _draw_answers(axes: Axes, bins: tuple[CalibrationBin, ...], error: float) -> None:
-    mean = np.array([one.mean for one in bins])
-    share = np.array([one.right.value for one in bins], np.float64)
-    ends = np.array([one.right.interval for one in bins]).reshape(-1, 2)
+    mean = np.array([bin_of.mean for bin_of in bins])
+    share = np.array([bin_of.right.value for bin_of in bins], np.float64)
+    ends = np.array([bin_of.right.interval for bin_of in bins]).reshape(-1, 2)
     spans = np.maximum([share - ends[:, 0], ends[:, 1] - share], 0.0)
-    number = sum(one.right.total for one in bins)
+    number = sum(bin_of.right.total for bin_of in bins)
     axes.errorbar(
         mean, share, yerr=spans, fmt="o-", color=AFTER, ms=4, lw=0.8, label=f"{number} answers, 95 %"
     )
-    for one, x, y in zip(bins, mean, share, strict=True):
+    for bin_of, x, y in zip(bins, mean, share, strict=True):
         side = -1 if y > x else 1  # below the points that lie high, where the interval is short
         axes.annotate(
-            str(one.right.total), (x, y), (5, 5 * side), textcoords="offset points", fontsize=7, va="center"
+            str(bin_of.right.total),
+            (x, y),
+            (5, 5 * side),
+            textcoords="offset points",
+            fontsize=7,
+            va="center",
         )
     axes.set(xlabel="stated probability of the answer", ylabel="share of answers that are right")
     axes.set_title(f"{number} answers: expected calibration error {error:.3f}")
 
 
-def _draw_inclusion(axes: Axes, found: SmoothCalibration) -> None:
+def _draw_inclusion(axes: Axes, calibration: SmoothCalibration) -> None:
     axes.fill_between(
-        found.stated, found.low, found.high, color=AFTER, alpha=0.2, linewidth=0.0, label="95 %"
+        calibration.stated,
+        calibration.low,
+        calibration.high,
+        color=AFTER,
+        alpha=0.2,
+        linewidth=0.0,
+        label="95 %",
     )
-    axes.plot(found.stated, found.observed, color=AFTER, label=f"{found.statements} statements")
+    axes.plot(
+        calibration.stated, calibration.observed, color=AFTER, label=f"{calibration.statements} statements"
+    )
     axes.set(xlabel="stated probability that an effect acts", ylabel="share of effects that do")
-    axes.set_title(f"{found.statements} effects: smooth calibration error {found.error:.3f}")
+    axes.set_title(f"{calibration.statements} effects: smooth calibration error {calibration.error:.3f}")
 
 
 @styled
@@ -388,22 +409,22 @@ def confusion_figure(score: Score) -> Figure:
         for column, count in enumerate(own_counts):
             if not count:
                 continue
-            own = columns[column] == {"withheld": "unknown"}.get(name, name)
+            is_right = columns[column] == {"withheld": "unknown"}.get(name, name)
             share = count / total
             corner = (column - 0.5, row - 0.5)
             axes.add_patch(
-                Rectangle(corner, 1.0, 1.0, color=AFTER if own else BEFORE, alpha=share, linewidth=0.0)
+                Rectangle(corner, 1.0, 1.0, color=AFTER if is_right else BEFORE, alpha=share, linewidth=0.0)
             )
             axes.text(
                 column, row, str(count), ha="center", va="center", fontsize=6.5,
                 color=PAPER if share > _DARK else INK,
             )  # fmt: skip
-        found = right[name]
-        low, high = (100.0 * end for end in found.interval)
+        right_share = right[name]
+        low, high = (100.0 * end for end in right_share.interval)
         axes.text(
             len(columns),
             row,
-            f"{found.count}/{found.total}  ({low:.0f}–{high:.0f} %)",
+            f"{right_share.count}/{right_share.total}  ({low:.0f}–{high:.0f} %)",
             va="center",
             fontsize=7,
         )

@@ -135,9 +135,9 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
     text = buffer.getvalue()
     for pattern in _NOT_HTML:
         text = pattern.sub("", text)
-    text = _TAG.sub(lambda found: _in_page(found[0], name), text)
-    text = _OPENING.sub(lambda found: _SIZE.sub("", found[0]), text, count=1)
-    label = _escaped(description)
+    text = _TAG.sub(lambda match: _in_page(match[0], name), text)
+    text = _OPENING.sub(lambda match: _SIZE.sub("", match[0]), text, count=1)
+    label = description.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
     return text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
 
 
@@ -145,13 +145,9 @@ def _in_page(tag: str, name: str) -> str:
     """A tag with ids that are unique in the page, and with colours of the theme."""
     tag = _ID.sub(rf'id="{name}-\1"', _NAMES.sub("", tag))
     tag = _REFERENCE.sub(rf"\1{name}-\2", tag)
-    return _COLOUR.sub(lambda found: f"var(--{THEMED[found[0]]})", tag)
+    return _COLOUR.sub(lambda match: f"var(--{THEMED[match[0]]})", tag)
 
 
 def shown_text(svg: str) -> str:
     """The characters that elements of `inline_svg` show, each once, in order."""
     return "".join(sorted(set(unescape(_TAG.sub("", svg)))))
-
-
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")

@@ -71,21 +71,21 @@ def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figur
     Returns:
         Figures by name, in the order of the report.
     """
-    found: dict[str, Figure | None] = {"waterfall": waterfall_figure(document)}
+    figures: dict[str, Figure | None] = {"waterfall": waterfall_figure(document)}
     if document.get("maps"):
-        found["where-runs"] = where.runs_figure(document)
-        found["where-profiles"] = where.profiles_figure(document)
-        found["where-spectrum"] = where.spectrum_figure(document)
-        found["where-backbones"] = backbone_figure(document)
-        found["where-phase-plane"] = where.phase_plane_figure(document)
-        found["where-moment"] = where.moment_figure(document)
-    found["which"] = candidates_figure(document)
-    found["how-far"] = closure_figure(document)
+        figures["where-runs"] = where.runs_figure(document)
+        figures["where-profiles"] = where.profiles_figure(document)
+        figures["where-spectrum"] = where.spectrum_figure(document)
+        figures["where-backbones"] = backbone_figure(document)
+        figures["where-phase-plane"] = where.phase_plane_figure(document)
+        figures["where-moment"] = where.moment_figure(document)
+    figures["which"] = candidates_figure(document)
+    figures["how-far"] = closure_figure(document)
     if document.get("maps"):
-        found["residuals"] = traces_figure(document, campaign)
-    found["law"] = law_figure(document)
-    found["coefficients"] = coefficients_figure(document)
-    return {name: figure for name, figure in found.items() if figure is not None}
+        figures["residuals"] = traces_figure(document, campaign)
+    figures["law"] = law_figure(document)
+    figures["coefficients"] = coefficients_figure(document)
+    return {name: figure for name, figure in figures.items() if figure is not None}
 
 
 @styled
@@ -104,7 +104,9 @@ def candidates_figure(document: Document) -> Figure | None:
     values = [candidate["probability"] for candidate in shown]
     axes.barh(range(len(shown)), values, color=[ACCENT, *[QUIET] * (len(shown) - 1)], height=0.6)
     for index, value in enumerate(values):
-        axes.text(value + 0.01, index, _percent(value), va="center")
+        axes.text(
+            value + 0.01, index, ("> 99.9 %" if value >= 0.9995 else f"{100.0 * value:.1f} %"), va="center"
+        )
     axes.set_yticks(range(len(shown)), names)
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.12)
@@ -112,10 +114,6 @@ def candidates_figure(document: Document) -> Figure | None:
     axes.set_xlabel("probability")
     grid(axes, "x")
     return fig
-
-
-def _percent(value: float) -> str:
-    return "> 99.9 %" if value >= 0.9995 else f"{100.0 * value:.1f} %"
 
 
 @styled
@@ -134,15 +132,15 @@ def closure_figure(document: Document) -> Figure:
     stds = [run["std"] for run in (document.get("maps") or {"runs": []})["runs"]]
     noise = SIGMAS * max(stds) if stds else _LEAST_NOISE
     floor = noise_axis(axes, noise, float(max(before.max(), after.max())))
-    shown, left = np.maximum(before, floor), np.maximum(after, floor)
-    axes.hlines(rows, left, shown, color=LINE, linewidth=2.5)
+    shown, shown_after = np.maximum(before, floor), np.maximum(after, floor)
+    axes.hlines(rows, shown_after, shown, color=LINE, linewidth=2.5)
     axes.plot(shown, rows, "s", color=BEFORE, ms=5, label="nominal model")
     if not np.array_equal(before, after):
         held_out = np.array([run["held_out"] for run in runs])
         for chosen, face, words in ((held_out, AFTER, "held out"), (~held_out, PAPER, "fitted")):
             if chosen.any():
                 label = f"with the causes, run {words}"
-                axes.plot(left[chosen], rows[chosen], "o", color=AFTER, mfc=face, ms=5, label=label)
+                axes.plot(shown_after[chosen], rows[chosen], "o", color=AFTER, mfc=face, ms=5, label=label)
     axes.set_yticks(rows, [figure_text(run["id"]) for run in runs])
     axes.invert_yaxis()
     fig.legend(loc="outside upper left", ncols=4)
@@ -331,17 +329,17 @@ def waterfall_figure(document: Document) -> Figure | None:
     if len(steps) < 2:
         return None
     noise = SIGMAS * (excess_std(document) or _LEAST_STEP_NOISE)
-    left = np.array([step["excess"] for step in steps], np.float64)
+    excesses = np.array([step["excess"] for step in steps], np.float64)
     alone = np.array(list(document.get("without", {}).values()), np.float64)
-    fig = figure(NARROW, 1.2 + 0.4 * (left.size + 1))
+    fig = figure(NARROW, 1.2 + 0.4 * (excesses.size + 1))
     axes = fig.add_subplot()
-    floor = noise_axis(axes, noise, float(np.concatenate([left, alone]).max()))
+    floor = noise_axis(axes, noise, float(np.concatenate([excesses, alone]).max()))
     axes.set_xlim(None, 12.0 * axes.get_xlim()[1])  # room for the numbers
-    _steps(axes, left, floor)
+    _steps(axes, excesses, floor)
     _alone(axes, document, floor)
     names = [textwrap.fill(f"+ {plain(str(step['effect']))}", _STEP_LABEL) for step in steps[1:]]
     axes.set_yticks(
-        range(left.size + 1), ["nominal model", *names, textwrap.fill(_rest_name(document), _STEP_LABEL)]
+        range(excesses.size + 1), ["nominal model", *names, textwrap.fill(_rest_name(document), _STEP_LABEL)]
     )
     axes.invert_yaxis()
     fig.legend(loc="outside upper left", ncols=2)
@@ -349,17 +347,17 @@ def waterfall_figure(document: Document) -> Figure | None:
     return fig
 
 
-def _steps(axes: Axes, left: Array, floor: float) -> None:
+def _steps(axes: Axes, excesses: Array, floor: float) -> None:
     """What each cause closes (or opens) as a bar between two values; the first and the last value as dots."""
-    shown = np.maximum(left, floor)
+    shown = np.maximum(excesses, floor)
     starts, ends = np.minimum(shown[:-1], shown[1:]), np.maximum(shown[:-1], shown[1:])
-    colours = [AFTER if after <= before else BEFORE for before, after in pairwise(left)]
-    rows = np.arange(left.size + 1)
+    colours = [AFTER if after <= before else BEFORE for before, after in pairwise(excesses)]
+    rows = np.arange(excesses.size + 1)
     axes.barh(rows[1:-1], ends - starts, left=starts, color=colours, height=0.55)
     for row, value, colour in ((0, shown[0], BEFORE), (rows[-1], shown[-1], ACCENT)):
         axes.plot(value, row, "o", color=colour, ms=8)
     axes.vlines(shown, rows[:-1], rows[1:], color=QUIET, linewidth=0.8)
-    texts = [held_out_excess(value) for value in left.tolist()]
+    texts = [held_out_excess(value) for value in excesses.tolist()]
     words = [texts[0], *(f"leaves {text}" for text in texts[1:]), texts[-1]]
     for row, (text, end) in enumerate(zip(words, [shown[0], *ends, shown[-1]], strict=True)):
         axes.annotate(text, (float(end), row), (7, 0), textcoords="offset points", va="center")

@@ -116,7 +116,17 @@ def render_report(document: Document, campaign: Campaign, byline: Byline | None 
         lstrip_blocks=True,
         loader=FunctionLoader(_resource),
     )
-    context = _summary(document, byline or Byline()) | _detail(document, campaign)
+    answer, kind = view.headline(document)
+    context = {
+        "document": document,
+        "byline": (byline or Byline()),
+        "answer": answer,
+        "kind": kind,
+        "named": kind in ("open", "found"),
+        "facts": view.facts(document),
+        "coefficients": view.coefficient_rows(document),
+        "next_steps": view.next_steps(document),
+    } | _detail(document, campaign)
     return environment.get_template("page.html.j2").render(context | _parts(document, campaign))
 
 
@@ -140,20 +150,6 @@ def _parts(document: Document, campaign: Campaign) -> dict[str, Any]:
         "library": Markup(_resource("vendor/uPlot.iife.min.js")),
         "script": Markup(_resource("page.js")),
         "charts": charts(document, campaign),
-    }
-
-
-def _summary(document: Document, byline: Byline) -> dict[str, Any]:
-    answer, kind = view.headline(document)
-    return {
-        "document": document,
-        "byline": byline,
-        "answer": answer,
-        "kind": kind,
-        "named": kind in ("open", "found"),
-        "facts": view.facts(document),
-        "coefficients": view.coefficient_rows(document),
-        "next_steps": view.next_steps(document),
     }
 
 
@@ -204,18 +200,23 @@ def budget(document: Document) -> tuple[list[str], list[tuple[str, ...]]]:
         Headings, and a row for each source: its standard deviation and its share of the variance, by coefficient.
         No rows where the document has no shares.
     """
-    found = {
+    coefficients = {
         name: given
         for name, given in document["coefficients"]["after"].items()
         if given["std"] is not None and given.get("shares")
     }
-    heads = [f"{COEFFICIENTS.get(name, name)} [{unit_mark(given['unit'])}]" for name, given in found.items()]
+    heads = [
+        f"{COEFFICIENTS.get(name, name)} [{unit_mark(given['unit'])}]" for name, given in coefficients.items()
+    ]
     rows = [
-        (words, *(_part(given["std"], given["shares"].get(source, 0.0)) for given in found.values()))
+        (words, *(_part(given["std"], given["shares"].get(source, 0.0)) for given in coefficients.values()))
         for source, words in SOURCES.items()
     ]
-    whole = ("combined standard deviation", *(significant(given["std"], 2) for given in found.values()))
-    return heads, [*rows, whole] if found else []
+    whole = (
+        "combined standard deviation",
+        *(significant(given["std"], 2) for given in coefficients.values()),
+    )
+    return heads, [*rows, whole] if coefficients else []
 
 
 def _part(std: float, share: float) -> str:
@@ -236,19 +237,23 @@ def noise_rows(document: Document) -> list[tuple[str, str]]:
     ]
 
 
-def _confirmation_rows(found: Document) -> list[tuple[str, str]]:
+def _confirmation_rows(confirmation: Document) -> list[tuple[str, str]]:
     """The model behind the excesses, and the difference of the integrator used for fitting."""
-    if found["failure"]:
+    if confirmation["failure"]:
         return [
-            ("Excesses computed by", f"the integrator used for fitting; MuJoCo failed: {found['failure']}")
+            (
+                "Excesses computed by",
+                f"the integrator used for fitting; MuJoCo failed: {confirmation['failure']}",
+            )
         ]
-    apart = f"{found['largest_difference_rad']:.1e} rad at most"
-    rms = f"{found['rms_difference_rad']:.1e} rad root mean square in {found['run']}"
+    apart = f"{confirmation['largest_difference_rad']:.1e} rad at most"
+    beside = "within" if confirmation["agrees"] else "beyond"
+    rms = f"{confirmation['rms_difference_rad']:.1e} rad root mean square in {confirmation['run']}"
     return [
         ("Excesses computed by", "the MuJoCo model"),
         (
             "Difference of the integrator used for fitting",
-            f"{apart}; {rms}, {'within' if found['agrees'] else 'beyond'} {found['tolerance_rad']:.1e} rad",
+            f"{apart}; {rms}, {beside} {confirmation['tolerance_rad']:.1e} rad",
         ),
     ]
 

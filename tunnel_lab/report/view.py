@@ -66,20 +66,20 @@ def facts(document: Document) -> list[Fact]:
     gap, where = document["gap"], document["where"]
     decided = document.get("decided", True)
     added = "the causes" if decided else "the most probable answer"
-    found = [Fact("Gap of the nominal model", excess(gap["excess_before"]), "noise variances")]
+    listed = [Fact("Gap of the nominal model", excess(gap["excess_before"]), "noise variances")]
     if document["causes"] and document["causes"] != ["unknown"]:
-        left = Fact(f"With {added} added", excess(gap["excess_after"]), gap["after_on"])
-        found += [left, Fact("Share closed", percent(gap["closed"]), gap["closed_on"])]
+        after = Fact(f"With {added} added", excess(gap["excess_after"]), gap["after_on"])
+        listed += [after, Fact("Share closed", percent(gap["closed"]), gap["closed_on"])]
     if document["causes"]:
-        found += [
+        listed += [
             Fact("Channel", where["channel"] or UNDETERMINED_PLACE),
             Fact("Condition", CONDITIONS.get(where["condition"], str(where["condition"]))),
         ]
     if document["candidates"]:
         first = document["candidates"][0]
         whose = "answer" if decided else "most probable answer"
-        found.append(Fact(f"Probability of the {whose}", percent(first["probability"])))
-    return found
+        listed.append(Fact(f"Probability of the {whose}", percent(first["probability"])))
+    return listed
 
 
 def percent(value: float) -> str:
@@ -131,12 +131,14 @@ def candidate_rows(document: Document) -> list[dict[str, Any]]:
 
 def others(document: Document) -> str:
     """The answers that are not listed, in words; empty where all are."""
-    left = [c["probability"] for c in document["candidates"][_listed(document) :]]
-    if not left:
+    probabilities = [c["probability"] for c in document["candidates"][_listed(document) :]]
+    if not probabilities:
         return ""
-    count = "1 more answer has" if len(left) == 1 else f"{len(left)} more answers have together"
-    each = "" if len(left) == 1 else f", none of them more than {percent(max(left))}"
-    return f"{count} a probability of {percent(sum(left))}{each}. The JSON document lists all."
+    count = (
+        "1 more answer has" if len(probabilities) == 1 else f"{len(probabilities)} more answers have together"
+    )
+    each = "" if len(probabilities) == 1 else f", none of them more than {percent(max(probabilities))}"
+    return f"{count} a probability of {percent(sum(probabilities))}{each}. The JSON document lists all."
 
 
 def _listed(document: Document) -> int:
@@ -173,13 +175,13 @@ def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
     Returns:
         Name, equation, signature, channel, condition and references of each.
     """
-    found = []
+    paragraphs = []
     known = {kind.name for kind in known_effects()}
     for name in [*document["causes"], *document["ambiguous_with"]]:
         if name not in known:
             continue
         kind = effect_class(name)
-        found.append(
+        paragraphs.append(
             {
                 "name": plain(name),
                 "meaning": (kind.__doc__ or "").split("\n")[0],
@@ -189,7 +191,7 @@ def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
                 "references": kind.references,
             }
         )
-    return found
+    return paragraphs
 
 
 def coefficient_rows(document: Document) -> list[dict[str, str]]:
@@ -336,7 +338,7 @@ def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
     gap = {run["id"]: run for run in document["gap"]["runs"]}
     rows = []
     for run in campaign.runs:
-        own = gap.get(run.id)
+        excesses = gap.get(run.id)
         rows.append(
             {
                 "id": run.id,
@@ -344,8 +346,8 @@ def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
                 "wind": f"{run.wind_speed:g}" if run.wind_on else "off",
                 "duration": f"{run.record.duration:.3g}",
                 "rate": f"{run.record.sample_rate:.4g}",
-                "before": "–" if own is None else excess(own["before"]),
-                "after": "–" if own is None else excess(own["after"]),
+                "before": "–" if excesses is None else excess(excesses["before"]),
+                "after": "–" if excesses is None else excess(excesses["after"]),
                 "named": "yes" if run.id in document["where"]["runs"] else "",
             }
         )

@@ -77,16 +77,11 @@ def run_cells(maps: Document) -> tuple[Array, float, float]:
         the scale. In noise variances.
     """
     cells = np.stack([array(row) for row in maps["time"]["by_run"]])
-    floor = SIGMAS * _cell_noise(maps)
-    known = cells[np.isfinite(cells)]
-    return np.where(cells > floor, cells, np.nan), floor, max(float(known.max(initial=0.0)), 2.0 * floor)
-
-
-def _cell_noise(maps: Document) -> float:
-    """Standard deviation of one cell of the map without a gap."""
     times = array(maps["time"]["edges_s"])
     run = min(maps["runs"], key=lambda entry: entry["std"])
-    return float(run["std"] * np.sqrt(times.size - 1))
+    floor = SIGMAS * float(run["std"] * np.sqrt(times.size - 1))
+    known = cells[np.isfinite(cells)]
+    return np.where(cells > floor, cells, np.nan), floor, max(float(known.max(initial=0.0)), 2.0 * floor)
 
 
 @styled
@@ -145,7 +140,7 @@ def spectrum_figure(document: Document) -> Figure:
     values = document["maps"]["frequency"]
     fig = figure(WIDTH, 2.7)
     axes = fig.add_subplot()
-    left, centre = spectrum_axis(values)
+    edges, centre = spectrum_axis(values)
     before, std = array(values["excess"]) + 1.0, array(values["std"])
     known = np.isfinite(before)
     shade(axes, document["where"]["frequency_hz"])
@@ -168,7 +163,7 @@ def spectrum_figure(document: Document) -> Figure:
         )
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlim(float(left[0]), float(left[-1]))
+    axes.set_xlim(float(edges[0]), float(edges[-1]))
     axes.set_xlabel("frequency [Hz]; dark bar: the runs' own frequencies")
     axes.set_ylabel("residual power over noise")
     axes.legend(loc="upper right")
@@ -187,8 +182,8 @@ def spectrum_axis(values: Document) -> tuple[Array, Array]:
         shape (n,), Hz.
     """
     edges = array(values["edges_hz"])
-    left = np.concatenate([[0.5 * edges[1]], edges[1:]])
-    return left, np.sqrt(left[:-1] * left[1:])
+    positive = np.concatenate([[0.5 * edges[1]], edges[1:]])
+    return positive, np.sqrt(positive[:-1] * positive[1:])
 
 
 @styled
@@ -284,12 +279,12 @@ def charts(document: Document, campaign: Campaign) -> dict[str, list[Chart]]:
     maps = document.get("maps")
     if not maps:
         return {}
-    found = {"where-runs": [_runs(maps)], "where-spectrum": [_spectrum(maps)]}
+    by_figure = {"where-runs": [_runs(maps)], "where-spectrum": [_spectrum(maps)]}
     if maps["phase_plane"] is not None:
-        found["where-phase-plane"] = [_plane(maps["phase_plane"])]
+        by_figure["where-phase-plane"] = [_plane(maps["phase_plane"])]
     if traces := _traces(maps, campaign):
-        found["residuals"] = traces
-    return found
+        by_figure["residuals"] = traces
+    return by_figure
 
 
 def _runs(maps: Document) -> Chart:
@@ -330,8 +325,8 @@ def _spectrum(maps: Document) -> Chart:
     excess, std = array(given["excess"]), SIGMAS * array(given["std"])
     after = nothing if given["after"] is None else array(given["after"])
     views = [_filled(_ALL, centre, -std, std, excess, after)]
-    for run, own in zip(maps["runs"], given.get("by_run", []), strict=False):
-        views.append(_filled(run_label(run), centre, nothing, nothing, array(own), nothing, run=run["id"]))
+    for run, by_bin in zip(maps["runs"], given.get("by_run", []), strict=False):
+        views.append(_filled(run_label(run), centre, nothing, nothing, array(by_bin), nothing, run=run["id"]))
     return {
         "kind": "lines",
         "title": "Residual power over noise against frequency",

@@ -28,8 +28,6 @@ from tunnel_sim.vocabulary.record import Array, Record
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from tunnel_sim.engine.model import Model
-
 
 Image = NDArray[np.uint8]
 CAMERAS = ("overview", "above", "side")
@@ -174,8 +172,8 @@ def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, i
         if child.returncode == 0:
             return ""
         errors.seek(0)
-        said = errors.read().strip().splitlines()
-    return (said or [f"ended with status {child.returncode}"])[-1][:80]
+        lines = errors.read().strip().splitlines()
+    return (lines or [f"ended with status {child.returncode}"])[-1][:80]
 
 
 def _follow(child: subprocess.Popen[str], progress: Callable[[int, int], None] | None) -> bool:
@@ -217,11 +215,14 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
     from tunnel_sim.engine.model import build_model
 
     model = build_model(run.rig, run.settings)
-    left = 2 * round(BODY_SHARE * look.width / 2) if look.trace else look.width
-    trace = draw_trace(run.record(), look.width - left, look.height, run.title) if look.trace else None
-    _prepare(model, left, look.height)
+    width = 2 * round(BODY_SHARE * look.width / 2) if look.trace else look.width
+    trace = draw_trace(run.record(), look.width - width, look.height, run.title) if look.trace else None
+    model.mj.vis.global_.offwidth = max(width, model.mj.vis.global_.offwidth)
+    model.mj.vis.global_.offheight = max(look.height, model.mj.vis.global_.offheight)
+    model.mj.vis.quality.shadowsize = _SHADOW
+    model.mj.vis.quality.offsamples = _SAMPLES
     data = model.release_state()
-    with mujoco.Renderer(model.mj, look.height, left) as renderer:
+    with mujoco.Renderer(model.mj, look.height, width) as renderer:
         for time in times:
             steps = round(time / run.settings.timestep) - round(data.time / run.settings.timestep)
             if steps > 0:
@@ -230,13 +231,6 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
             renderer.update_scene(data, camera=look.camera)
             picture = renderer.render()
             yield picture if trace is None else np.concatenate((picture, trace.at(float(time))), axis=1)
-
-
-def _prepare(model: Model, width: int, height: int) -> None:
-    model.mj.vis.global_.offwidth = max(width, model.mj.vis.global_.offwidth)
-    model.mj.vis.global_.offheight = max(height, model.mj.vis.global_.offheight)
-    model.mj.vis.quality.shadowsize = _SHADOW
-    model.mj.vis.quality.offsamples = _SAMPLES
 
 
 def _draw(order: dict[str, Any]) -> None:

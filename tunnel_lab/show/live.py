@@ -294,18 +294,17 @@ def window_loop(
         with handle.lock():
             controls.advance(min(now - last, 0.1) * speed)
         last = now
-        handle.set_figures((_corner(handle.viewport), _figure(live.history)))
+        import mujoco
+
+        width, height = (
+            (handle.viewport.width, handle.viewport.height) if handle.viewport is not None else (1200, 900)
+        )
+        handle.set_figures(
+            (mujoco.MjrRect(width - width // 3, 0, width // 3, height // 4), _figure(live.history))
+        )
         handle.set_texts((None, None, "space\nR", "pause\nrelease again"))
         handle.sync()
         sleep(max(0.0, FRAME_S - (clock() - now)))
-
-
-def _corner(viewport: Any) -> Any:
-    """The lower right part of the window, for the trace."""
-    import mujoco
-
-    width, height = (viewport.width, viewport.height) if viewport is not None else (1200, 900)
-    return mujoco.MjrRect(width - width // 3, 0, width // 3, height // 4)
 
 
 def _figure(history: History) -> Any:

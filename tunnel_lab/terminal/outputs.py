@@ -100,7 +100,9 @@ def budget_table(budget: Document) -> TextTable:
     """
     names = _names(budget)
     headings = tuple(f"{SYMBOLS[name]}\n{unit(UNITS[name])}" for name in names)
-    rows = [(one["name"], *(_cell(one, name) for name in names)) for one in budget["components"]]
+    rows = [
+        (component["name"], *(_cell(component, name) for name in names)) for component in budget["components"]
+    ]
     rows.append(("all together", *(significant(budget["combined_std"][name], 2) for name in names)))
     title = "Uncertainty budget: one standard uncertainty each"
     return TextTable(title, ("source", *headings), tuple(rows), right=headings)
@@ -120,12 +122,12 @@ def _cell(component: Document, name: str) -> str:
 def budget_lines(budget: Document) -> list[str]:
     """The dominant source of each quantity, and the notes of the sources."""
     components = budget["components"]
-    notes = [f"{one['name']}: {one['note']}" for one in components if one["note"]]
+    notes = [f"{component['name']}: {component['note']}" for component in components if component["note"]]
     return [*(_largest(components, name) for name in _names(budget)), *notes]
 
 
 def _largest(components: Sequence[Document], name: str) -> str:
-    variances = [float(one["variance"][name]) for one in components]
+    variances = [float(component["variance"][name]) for component in components]
     largest, total = max(variances), sum(variances)
     share = largest / total if total > 0.0 else 0.0
     verb = "dominates" if share > _DOMINANT else "is the largest source"

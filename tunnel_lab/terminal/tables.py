@@ -73,15 +73,15 @@ def show_tables(*tables: Table) -> None:
         tables: those without rows are left out.
     """
     out = console()
-    for one in tables:
-        if not one.row_count:
+    for table in tables:
+        if not table.row_count:
             continue
-        if chosen.get() is TableFormat.TEXT and is_too_wide(one, out.width):
-            out.print(stacked(one, out.width), soft_wrap=True)
+        if chosen.get() is TableFormat.TEXT and is_too_wide(table, out.width):
+            out.print(stacked(table, out.width), soft_wrap=True)
         elif chosen.get() is TableFormat.TEXT:
-            out.print(keep_whole(one))
+            out.print(keep_whole(table))
         else:
-            out.print(rendered(one, chosen.get()), soft_wrap=True, end="")
+            out.print(rendered(table, chosen.get()), soft_wrap=True, end="")
         if chosen.get() is not TableFormat.JSON:
             out.print()
 
@@ -151,14 +151,14 @@ def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
         *("run", "Kr\n[N m/rad]", "V\n[m/s]", "ωn\n[rad/s]", "ζ\n[1]", "status"),
         right=("Kr\n[N m/rad]", "V\n[m/s]"),
     )
-    for run, found in zip(campaign.runs, estimate.runs, strict=True):
+    for run, estimated in zip(campaign.runs, estimate.runs, strict=True):
         result.add_row(
             Text(run.id),
             "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
             f"{run.wind_speed:g}",
-            _concise(found.omega_n),
-            _concise(found.zeta),
-            _status(found.status),
+            _concise(estimated.omega_n),
+            _concise(estimated.zeta),
+            _status(estimated.status),
         )
     return result
 
