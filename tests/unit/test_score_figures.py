@@ -6,9 +6,9 @@ import polars as pl
 import pytest
 
 from identification.estimators import ALL_ESTIMATORS
-from tunnel_lab.experiments.breakdown import breakdown_figure, exceeding
+from tunnel_lab.experiments.breakdown import breakdown_figure, exceeding, packaged_breakdown
 from tunnel_lab.experiments.score_grid import Cell
-from tunnel_lab.experiments.score_trials import packaged_baseline, packaged_breakdown
+from tunnel_lab.experiments.score_trials import packaged_baseline
 from tunnel_lab.experiments.score_view import cell_labels, score_figure
 from tunnel_sim.effects import ALL_EFFECTS
 

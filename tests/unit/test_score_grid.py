@@ -10,7 +10,8 @@ from identification.scoring.accuracy import score
 from tests.reference.free_decays import damped_cosine
 from tunnel_lab.experiments import score_trials
 from tunnel_lab.experiments.score_grid import Cell, Grid, draw_trial, load_grid, packaged_grid
-from tunnel_lab.experiments.score_trials import Results, read_trials, scores_frame, write_trials
+from tunnel_lab.experiments.score_trials import Results, read_trials, write_trials
+from tunnel_lab.experiments.score_view import scores_frame
 from tunnel_sim.vocabulary.errors import TunnelError
 
 HEAD = 'schema_version = 1\nname = "g"\nseed = 1\ntrials = 4\n'

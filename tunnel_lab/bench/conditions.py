@@ -1,4 +1,4 @@
-"""Conditions of the runs and sizes of the rig, as a table of texts that one can type, and in ``campaign.toml``."""
+"""The stage Conditions: conditions of the runs and sizes of the rig, typed in a table, kept in ``campaign.toml``."""
 
 from __future__ import annotations
 

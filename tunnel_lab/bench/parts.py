@@ -1,4 +1,4 @@
-"""Parts that several pages share: the frame with the stages, errors, tables and links."""
+"""Parts that several pages share: the frame with the stages, errors, tables, links, charts and the drop zone."""
 
 from __future__ import annotations
 
@@ -203,7 +203,7 @@ class Chart(ui.element, component="static/chart.js"):
         self._props.update(marks=[])
         self.classes("chart")
         if moved is not None:
-            self.on("moved", lambda event: moved(*_mark(event)))
+            self.on("moved", lambda event: moved(str(event.args["id"]), float(event.args["at"])))
 
     def show(self, data: Sequence[Sequence[float | None]]) -> None:
         """Show other curves of the same labels."""
@@ -219,10 +219,6 @@ class Chart(ui.element, component="static/chart.js"):
         """
         self._props.update(marks=[dict(mark) for mark in marks])
         self.update()
-
-
-def _mark(event: events.GenericEventArguments) -> tuple[str, float]:
-    return str(event.args["id"]), float(event.args["at"])
 
 
 def too_large(size: int) -> str:

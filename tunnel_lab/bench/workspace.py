@@ -1,4 +1,4 @@
-"""The files of the bench: campaigns in a folder, and beside each what belongs to it."""
+"""The files of the bench: campaigns in a folder, what belongs to each, and the stages that these files open."""
 
 from __future__ import annotations
 

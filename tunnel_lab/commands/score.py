@@ -190,8 +190,8 @@ def _rows(grid: Grid, names: tuple[str, ...], jobs: int, out: Path | None) -> li
 def _keep(out: Path, results: Results) -> list[Path]:
     import shutil
 
-    from tunnel_lab.experiments.score_trials import parquet, scores_frame, write_trials
-    from tunnel_lab.experiments.score_view import score_figure
+    from tunnel_lab.experiments.score_trials import parquet, write_trials
+    from tunnel_lab.experiments.score_view import score_figure, scores_frame
     from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import write_whole
 

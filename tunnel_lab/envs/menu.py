@@ -1,4 +1,4 @@
-"""The conditions that an operator can choose for a run, and its cost in rig time."""
+"""The conditions that an operator can choose for a run, its cost in rig time, and the presets of both."""
 
 from __future__ import annotations
 

@@ -22,7 +22,6 @@ from identification.decay.decay_fit import Reading, RunFit
 from identification.decay.residual_noise import stated_noise
 from identification.decay.run_fit import identify_run
 from identification.estimate import PARAMETERS, UNITS
-from identification.status import Status
 from tunnel_lab.envs.menu import Choice, Costs, Menu
 from tunnel_sim.effects import Effect, effect_class, effect_from
 from tunnel_sim.engine.simulate import simulate
@@ -242,7 +241,8 @@ def _identified(known: Knowledge, choice: Choice) -> Knowledge:
     conditions = known.conditions
     fitted = identify_run(known.runs[-1], conditions.sensor_properties)
     if fitted.fit is None:
-        return replace(known, status=f"no information: {_reason(fitted.estimate.status)}")
+        reason = fitted.estimate.status.value.partition(":")[0]
+        return replace(known, status=f"no information: {reason}")
     fits = (*known.fits, (conditions.link(choice), fitted.reading, fitted.fit))
     links, pairs = [link for link, _, _ in fits], [(reading, fit) for _, reading, fit in fits]
     try:
@@ -259,10 +259,6 @@ def _diagnosed(known: Knowledge) -> Knowledge:
         return replace(known, study=investigate(known.campaign, kinds))
     except TunnelError as error:
         return replace(known, status=f"not diagnosed: {error.what}")
-
-
-def _reason(status: Status) -> str:
-    return status.value.partition(":")[0]
 
 
 def answers(effects: Sequence[str]) -> tuple[str, ...]:

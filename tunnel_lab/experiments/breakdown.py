@@ -1,8 +1,8 @@
-"""The bias that each unmodelled effect causes in each estimator.
+"""The bias that each unmodelled effect causes in each estimator, with its tables and figures.
 
 The campaigns are made by the reference simulator, which shares no numerics with estimators or model. Each has
 twelve runs on three springs and one effect in its textbook form. The effect is sized so that the residuals of the
-nominal refit exceed the noise by 1 or 10 times its power.
+nominal refit exceed the noise by 1 or 10 times its power. matplotlib is imported inside the functions.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import resources
 from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,13 +34,18 @@ from tunnel_sim.effects import ALL_EFFECTS
 
 if TYPE_CHECKING:
     import polars as pl
+
+    from tunnel_sim.vocabulary.campaign import Campaign
+
+if TYPE_CHECKING:
+    import polars as pl
     from matplotlib.figure import Figure
     from rich.table import Table
 
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
-NO_EFFECT = "no effect"
+NOTHING_ADDED = "no effect"
 SEVERITIES = (1.0, 10.0)
 """Mean squared residual of the nominal refit over the noise power, minus one."""
 QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
@@ -165,7 +171,7 @@ def _random(draw: CampaignDraw) -> bool:
 
 def _realise(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
     """The same case with other noise, and other forcing where it is random."""
-    name = draw.effects[0].form.family if draw.effects else NO_EFFECT
+    name = draw.effects[0].form.family if draw.effects else NOTHING_ADDED
     key = EFFECTS.index(name) if draw.effects else len(EFFECTS)
     rng = np.random.default_rng([seed, key, number, 1])
     noise = int(rng.integers(2**62))
@@ -184,7 +190,7 @@ def _case(draw: CampaignDraw, simulated: Simulated, number: int) -> Case:
     noise = float(np.sqrt(draw.conditions.noise_power))
     bound = campaign_bound(campaign, **TRUTH, noise_std=noise, initial_states=starts)
     return Case(
-        effect=draw.effects[0].form.family if draw.effects else NO_EFFECT,
+        effect=draw.effects[0].form.family if draw.effects else NOTHING_ADDED,
         severity=draw.effects[0].target if draw.effects else 0.0,
         reached=simulated.excess,
         realisation=number,
@@ -398,3 +404,11 @@ def exceeding(frame: pl.DataFrame, quantity: str) -> dict[tuple[str, float, str]
         if percent is not None and stds is not None and abs(stds) > 1.0:
             cells[row["effect"], row["severity_noise_powers"], row["estimator"]] = (percent, stds)
     return cells
+
+
+def packaged_breakdown() -> pl.DataFrame:
+    """Results of ``tunnel score --breakdown``; columns as in its Parquet file."""
+    import polars as pl
+
+    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-breakdown.parquet") as path:
+        return pl.read_parquet(path)

@@ -1,4 +1,9 @@
-"""The grid of conditions that estimators are scored on, a TOML file, and its cells."""
+"""The grid of conditions that estimators are scored on, a TOML file; its cells, and the records drawn for them.
+
+The motion comes from the compiled forward integrator, the reading from the virtual potentiometer. A trial depends
+on the seed, its cell and its number only. Therefore every estimator gets the same records, and a cell keeps them
+in any grid.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +18,7 @@ from zlib import crc32
 import numpy as np
 from pydantic import Field, TypeAdapter
 
-from tunnel_lab.terminal.inputs import parse_effect
+from tunnel_lab.terminal.inputs import NO_EFFECT, parse_effect
 from tunnel_sim.effects import Effect, EffectChain, effect_from
 from tunnel_sim.engine.sensor import read_motion
 from tunnel_sim.files.plan_schema import check_size, first_twice
@@ -31,7 +36,6 @@ from tunnel_sim.vocabulary.plan import SensorModel, Truth
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
 
-NO_EFFECT = "none"
 DECAY_QUANTITIES = ("zeta", "omega_n")
 CAMPAIGN_QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 

@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from identification.estimate import UNITS, Quantity
-from identification.scoring.accuracy import Outcome, Score, Trials, collect, score
+from identification.scoring.accuracy import Outcome, Trials, collect
 from tunnel_lab.experiments.runner import Progress, processes, run_tasks
-from tunnel_lab.experiments.score_grid import NO_EFFECT, Cell, Grid, check_trials
+from tunnel_lab.experiments.score_grid import Cell, Grid, check_trials
+from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.files.json_text import json_line
 from tunnel_sim.files.reading import (
     as_described,
@@ -426,14 +427,6 @@ def packaged_baseline() -> Results:
         return read_trials(path)
 
 
-def packaged_breakdown() -> pl.DataFrame:
-    """Results of ``tunnel score --breakdown``; columns as in its Parquet file."""
-    import polars as pl
-
-    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-breakdown.parquet") as path:
-        return pl.read_parquet(path)
-
-
 def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
     """Refuse incomplete rows: each estimator must have all cells, and each estimate all values."""
     wanted = {(at, quantity) for at, cell in enumerate(grid.cells) for quantity in cell.quantities}
@@ -464,47 +457,6 @@ def _can_be_scored(row: Row) -> bool:
         return True
     scales = [abs(scale) for scale in (truth, std, bound) if scale]
     return bool(std >= 0.0) and all(abs(value - truth) / scale <= limits.LARGEST_NUMBER for scale in scales)
-
-
-def scores_frame(results: Results) -> pl.DataFrame:
-    """A row for every estimator, cell and quantity: conditions, figures, standard errors and intervals.
-
-    Args:
-        results: at least one trial.
-
-    Returns:
-        Columns with the unit in their name, or in the column ``unit``.
-    """
-    import polars as pl
-
-    rows = []
-    for (estimator, index, quantity), trials in results.trials().items():
-        judged = score(trials)
-        rows.append(
-            {
-                "estimator": estimator,
-                **describe(results.grid.cells[index]),
-                "quantity": quantity,
-                "unit": trials.unit,
-                **_figures(judged),
-                "milliseconds_per_record": results.milliseconds(estimator, [index]),
-            }
-        )
-    return pl.DataFrame(rows, infer_schema_length=None)
-
-
-def _figures(judged: Score) -> dict[str, Any]:
-    figures: dict[str, Any] = {"trials": judged.count, "failures": judged.failures.count}
-    for name in ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound"):
-        quantity: Quantity | None = getattr(judged, name)
-        label = "relative_bias_percent" if name == "relative_bias" else name
-        figures[label] = None if quantity is None else quantity.value
-        figures[f"{label}_std_error"] = None if quantity is None else quantity.std
-    shares = {"coverage": judged.coverage, "failure_share": judged.failures}
-    for name, share in shares.items():
-        figures[name] = None if share is None else share.value
-        figures[f"{name}_low"], figures[f"{name}_high"] = (None, None) if share is None else share.interval
-    return figures
 
 
 def parquet(frame: pl.DataFrame) -> bytes:

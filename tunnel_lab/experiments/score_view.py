@@ -1,4 +1,4 @@
-"""Comparison of a score with its baseline: which estimators are worse beyond sampling error."""
+"""A score in tables and in a figure, and against its baseline. matplotlib is imported inside the functions."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.text import Text
 
+from identification.estimate import Quantity
 from identification.policy import DIFFERENCE_RATE
 from identification.printing.numbers import SYMBOLS, concise, significant
 from identification.scoring.accuracy import (
@@ -22,11 +23,16 @@ from identification.scoring.accuracy import (
 )
 from identification.scoring.comparison import Change, changes, holm
 from identification.statistics.proportion import Proportion
-from tunnel_lab.experiments.score_grid import NO_EFFECT, Cell
-from tunnel_lab.experiments.score_trials import Key, Results, groups_of
+from tunnel_lab.experiments.score_grid import Cell
+from tunnel_lab.experiments.score_trials import Key, Results, describe, groups_of
 from tunnel_lab.plotting.style import COLOURS, MARKERS, figure, grid, log_axis, styled
+from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_lab.terminal.tables import table
 from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    import polars as pl
+
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -160,6 +166,47 @@ def _estimates(results: Results, estimators: Sequence[str]) -> dict[tuple[Key, i
         for row in results.rows
         if row["estimator"] in estimators
     }
+
+
+def scores_frame(results: Results) -> pl.DataFrame:
+    """A row for every estimator, cell and quantity: conditions, figures, standard errors and intervals.
+
+    Args:
+        results: at least one trial.
+
+    Returns:
+        Columns with the unit in their name, or in the column ``unit``.
+    """
+    import polars as pl
+
+    rows = []
+    for (estimator, index, quantity), trials in results.trials().items():
+        judged = score(trials)
+        rows.append(
+            {
+                "estimator": estimator,
+                **describe(results.grid.cells[index]),
+                "quantity": quantity,
+                "unit": trials.unit,
+                **_figures(judged),
+                "milliseconds_per_record": results.milliseconds(estimator, [index]),
+            }
+        )
+    return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def _figures(judged: Score) -> dict[str, Any]:
+    figures: dict[str, Any] = {"trials": judged.count, "failures": judged.failures.count}
+    for name in ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound"):
+        quantity: Quantity | None = getattr(judged, name)
+        label = "relative_bias_percent" if name == "relative_bias" else name
+        figures[label] = None if quantity is None else quantity.value
+        figures[f"{label}_std_error"] = None if quantity is None else quantity.std
+    shares = {"coverage": judged.coverage, "failure_share": judged.failures}
+    for name, share in shares.items():
+        figures[name] = None if share is None else share.value
+        figures[f"{name}_low"], figures[f"{name}_high"] = (None, None) if share is None else share.interval
+    return figures
 
 
 def summary_tables(results: Results, *, times: bool = True) -> list[Table]:

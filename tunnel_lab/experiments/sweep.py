@@ -21,7 +21,8 @@ import numpy as np
 
 from identification.estimators import ALL_ESTIMATORS
 from tunnel_lab.experiments.runner import Progress, Workers, run_tasks
-from tunnel_lab.experiments.sweep_cases import NO_EFFECT, Case, Sweep, SweepDocument, check_sweep_size
+from tunnel_lab.experiments.sweep_cases import Case, Sweep, SweepDocument, check_sweep_size
+from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.leftovers import clear_leftovers
 from tunnel_sim.files.plan_schema import check_conditions, first_twice

@@ -1,4 +1,8 @@
-"""The tables of a sweep file: those of a campaign description, with lists of the values to sweep."""
+"""The cases of a sweep: the tables of its file, and their product.
+
+The tables are those of a campaign description, with lists of the values to sweep. Every case is a campaign
+description with a seed computed from its contents.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field
 
+from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.files.plan_file import plan_from
 from tunnel_sim.files.plan_schema import (
     STEPS_PER_SECOND,
@@ -38,7 +43,6 @@ from tunnel_sim.vocabulary.rig import Rig
 
 STEPS_PER_SHARD = 500_000
 """Integration steps of one shard: about two seconds on one core, the most that a killed sweep loses per worker."""
-NO_EFFECT = "none"
 
 
 def _listed(value: object) -> object:

@@ -21,7 +21,8 @@ import polars as pl
 from identification import identify
 from identification.estimate import PARAMETERS, UNITS
 from identification.estimators import Estimator, make_estimator
-from tunnel_lab.experiments.sweep_cases import NO_EFFECT, Case, Sweep
+from tunnel_lab.experiments.sweep_cases import Case, Sweep
+from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.toml_input import one_line
 from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness

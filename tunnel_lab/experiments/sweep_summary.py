@@ -17,8 +17,8 @@ from identification.printing.numbers import SYMBOLS, concise, significant, unit
 from identification.scoring.accuracy import Score, Trials, score
 from identification.statistics.proportion import Proportion
 from tunnel_lab.experiments.sweep import TIMINGS, Store
-from tunnel_lab.experiments.sweep_cases import NO_EFFECT
-from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled
+from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
+from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_lab.terminal.tables import table
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.reading import as_described
@@ -59,7 +59,6 @@ DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "
 """Quantities that have a panel; Izz, Cr and the sensor's zero are in the first table and the CSV."""
 NAMES: Mapping[str, str] = {**DRAWN, **SYMBOLS, "sensor_zero": "zero"}
 BRACKETS = "In brackets: the standard error in the last digits, from the number of trials; of shares 95 %."
-_INTERVAL = 1.96
 _TICKS = 5  # intervals between labels of six digits, such as 0.00075, that do not touch
 _ASIDE = 0.012  # of the axis, between two estimators
 _LOGARITHMIC = ("noise_std", "spring_stiffness")
@@ -291,7 +290,7 @@ def _errorbars(
     axes.errorbar(
         [x for x, _ in pairs],
         [quantity.value for _, quantity in pairs],
-        yerr=[_INTERVAL * quantity.std for _, quantity in pairs],
+        yerr=[INTERVAL * quantity.std for _, quantity in pairs],
         color=COLOURS[place % len(COLOURS)],
         marker=MARKERS[place % len(MARKERS)],
         markersize=4.0,

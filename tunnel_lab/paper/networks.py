@@ -23,6 +23,7 @@ from tunnel_lab.paper.page import Picture, Section, signed
 from tunnel_lab.plotting.style import (
     BLUE,
     COLOURS,
+    INTERVAL,
     MARKERS,
     VERMILION,
     WIDTH,
@@ -275,7 +276,7 @@ def table3_figure(rows: Sequence[WindowRow], shown: Mapping[str, Sequence[Window
             axes.errorbar(
                 number[: len(kept)] + aside,
                 [value.value for value in values],
-                [1.96 * value.std for value in values],
+                [INTERVAL * value.std for value in values],
                 fmt=f"{MARKERS[place + 1]}-",
                 color=COLOURS[place],
                 lw=0.8,

@@ -1,7 +1,6 @@
-"""Figures of campaigns and estimates. matplotlib is imported inside the functions.
+"""Figures of runs, windows, estimates and imports. matplotlib is imported inside the functions.
 
-Every function returns a figure and writes nothing; ``save`` writes one completely or not at all. The colours follow
-Okabe and Ito (2008), which colour-blind readers can distinguish.
+Every function returns a figure and writes nothing.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from identification.printing.numbers import SYMBOLS
 from tunnel_lab.plotting.style import (
     BLUE,
     COLOURS,
+    INTERVAL,
     MARKERS,
     VERMILION,
     WIDTH,
@@ -45,12 +45,10 @@ PANELS_PER_PAGE = 12
 BINS_PER_DECADE = 60
 LEAKING = 2
 """Cycles in a record below which a Hann window leaks the mean."""
-INTERVAL = 1.96
 RUNS_PER_PLOT = 6
 """More lines than colours cannot be distinguished in one plot."""
 ONE_RIG = 1.5
 """Frequencies within this factor share one plot in absolute units."""
-_INTERVAL = 1.96
 MOST_PANELS = 24
 _COLUMNS = 3
 _POINTS = 2000  # least and greatest readings of as many stretches are drawn
@@ -292,7 +290,7 @@ def _intervals(
 ) -> None:
     """Points with 95 % intervals."""
     style: dict[str, Any] = {"color": COLOURS[index], "marker": MARKERS[index], "label": label}
-    spans = [_INTERVAL * q.std for q in quantities]
+    spans = [INTERVAL * q.std for q in quantities]
     axes.errorbar(x, [q.value for q in quantities], yerr=spans, linewidth=0.8, markersize=3.5, **style)
 
 

@@ -1,4 +1,7 @@
-"""What all figures have in common. matplotlib is imported inside the functions."""
+"""What all figures have in common, and how they are written. matplotlib is imported inside the functions.
+
+The colours follow Okabe and Ito (2008), which colour-blind readers can distinguish.
+"""
 
 from __future__ import annotations
 
@@ -31,6 +34,8 @@ if TYPE_CHECKING:
 
 WIDTH = 7.2
 """Width of a figure that fills a page, inches."""
+INTERVAL = 1.96
+"""Standard deviations on either side of a 95 % interval."""
 _FEW_DECADES = 2.5
 _WIDE = 5.0  # times the median standard deviation
 P = ParamSpec("P")

@@ -14,6 +14,7 @@ from diagnosis.printing import excess_std, held_out_excess
 from identification.printing.numbers import coefficient_label
 from tunnel_lab.plotting.style import (
     COLOURS,
+    INTERVAL,
     MARKERS,
     WIDTH,
     figure,
@@ -57,7 +58,6 @@ _LEAST_NOISE = 0.03  # noise variances, three standard deviations: where the doc
 _MOST_CURVES = len(COLOURS)
 _LEGEND, _HANDLE = 108, 8  # characters: the width of the figure, and the line beside a label
 _AXES = {"angle": "angle [rad]", "rate": "rate [rad/s]", "time": "time since the start [s]"}
-_BAND = 1.96
 _STEP_LABEL = 20  # characters in a line of a label
 _LEAST_STEP_NOISE = 1e-3  # noise powers: where the document has no maps, and so no noise of an excess
 
@@ -209,7 +209,7 @@ def coefficients_figure(document: Document) -> Figure | None:
         for row, (values, colour, marker) in enumerate(((before, BEFORE, "s"), (after, AFTER, "o"))):
             std = values[name]["std"]
             axes.errorbar(
-                values[name]["value"], row, xerr=None if std is None else 1.96 * std, color=colour,
+                values[name]["value"], row, xerr=None if std is None else INTERVAL * std, color=colour,
                 marker=marker, ms=6, capsize=4,
             )  # fmt: skip
         axes.set_yticks([0, 1], ["before", "after"])
@@ -273,7 +273,7 @@ def _curve(
 ) -> None:
     order = np.argsort(x)
     colour, marker = style["color"], str(style["marker"])
-    band = 1.96 * std[order]
+    band = INTERVAL * std[order]
     axes.fill_between(x[order], y[order] - band, y[order] + band, color=colour, alpha=0.15, linewidth=0)
     axes.plot(x[order], y[order], color=colour, marker=marker, ms=3.5, lw=1.0, label=label)
 
@@ -297,13 +297,15 @@ def law_figure(document: Document) -> Figure | None:
     axes.set_xlabel(_AXES[curve["over"][0]])
     if len(shape) == 1:
         (place,) = curve["places"]
-        axes.fill_between(place, values - _BAND * std, values + _BAND * std, color=AFTER, alpha=0.25, lw=0)
+        axes.fill_between(
+            place, values - INTERVAL * std, values + INTERVAL * std, color=AFTER, alpha=0.25, lw=0
+        )
         axes.plot(place, values, color=AFTER)
         axes.set_ylabel(name)
         grid(axes)
         return fig
     reach = float(np.max(np.abs(values))) or 1.0
-    shown = np.where(np.abs(values) > _BAND * std, values, np.nan)
+    shown = np.where(np.abs(values) > INTERVAL * std, values, np.nan)
     mesh = axes.pcolormesh(
         *curve["places"],
         shown.T,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -19,11 +18,10 @@ from identification.printing.numbers import COEFFICIENTS, p_text, significant, u
 from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figures
+from tunnel_lab.report.view import Document
 from tunnel_lab.report.where import charts
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign
-
-Document = Mapping[str, Any]
 
 DESCRIPTIONS = {
     "waterfall": "What is left of the gap as the causes are added one after another.",

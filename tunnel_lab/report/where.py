@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.plotting.style import WIDTH, figure, grid, styled, with_breaks
+from tunnel_lab.plotting.style import INTERVAL, WIDTH, figure, grid, styled, with_breaks
 from tunnel_lab.report.drawing import (
     AFTER,
     BEFORE,
@@ -234,7 +234,9 @@ def moment_figure(document: Document) -> Figure | None:
     for axes, name, label in zip(fig.subplots(1, 2), ("by_angle", "by_rate"), (_ANGLE, _RATE), strict=True):
         mean, spread = factor * array(plane[name]), factor * array(plane[f"{name}_std"])
         axes.axhline(0.0, color=QUIET, linewidth=0.8)
-        axes.fill_between(centre, mean - 1.96 * spread, mean + 1.96 * spread, color=BEFORE, alpha=0.2, lw=0)
+        axes.fill_between(
+            centre, mean - INTERVAL * spread, mean + INTERVAL * spread, color=BEFORE, alpha=0.2, lw=0
+        )
         axes.plot(centre, mean, color=BEFORE, marker="o", ms=3)
         axes.set_xlabel(label)
         axes.set_ylabel(f"mean over all {'rates' if name == 'by_angle' else 'angles'} [{unit}]")

@@ -1,4 +1,4 @@
-"""The campaign that a command is given: a folder, or one file of a data logger."""
+"""What commands are given: a campaign, as a folder or as a file of a data logger, and an effect."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.plan import EffectSetting
 
 
+NO_EFFECT = "none"
+"""How the nominal model is written where an effect may be named."""
 HELP = (
     "Folder of the campaign: campaign.toml and its runs. Or one file of a data logger, as for tunnel import."
 )

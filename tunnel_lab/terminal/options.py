@@ -1,4 +1,4 @@
-"""Parts of the command line that several commands share."""
+"""Options that several commands share; ``--quiet`` and ``--format`` belong to every command."""
 
 from __future__ import annotations
 

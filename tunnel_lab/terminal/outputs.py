@@ -1,4 +1,4 @@
-"""An estimate as a command prints it: tables, then notes."""
+"""What several commands print: an estimate, an import, an uncertainty budget."""
 
 from __future__ import annotations
 

@@ -128,7 +128,7 @@ def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Ta
             result.add_section()
         result.add_row(Text(estimate.estimator, style="bold"))
         for name, value in truth.items():
-            row = (_named(SYMBOLS[name], UNITS[name]), significant(value))
+            row = (Text(f"{SYMBOLS[name]} {unit(UNITS[name])}"), significant(value))
             quantity: Quantity | None = getattr(estimate, name)
             if quantity is None:
                 result.add_row(*row, _status(estimate.status))
@@ -184,11 +184,6 @@ def windows_table(run: RunEstimate) -> Table:
             _concise(window.omega_n),
         )
     return result
-
-
-def _named(symbol: str, unit_name: str) -> Text:
-    """A symbol with its unit."""
-    return Text(f"{symbol} {unit(unit_name)}")
 
 
 def _concise(quantity: Quantity | None) -> str:
