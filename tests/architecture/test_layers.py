@@ -87,6 +87,7 @@ def test_the_import_contracts_hold() -> None:
         ("diagnosis/result.py", "import diagnosis.study"),
         ("tunnel_reference/forms.py", "import tunnel_sim.physics.motion"),
         ("tunnel_lab/cli.py", "import tunnel_reference.forms"),
+        ("tunnel_lab/bench/work.py", "import tunnel_lab.cli"),
     ],
 )
 def test_a_planted_breach_is_caught(tmp_path: Path, module: str, line: str) -> None:

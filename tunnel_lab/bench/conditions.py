@@ -1,4 +1,4 @@
-"""The stage Conditions: conditions of the runs and sizes of the rig, typed in a table, kept in ``campaign.toml``."""
+"""The stage Conditions: conditions of the runs and sizes of the rig, typed in a table and kept in the campaign."""
 
 from __future__ import annotations
 
