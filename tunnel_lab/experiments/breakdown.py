@@ -141,10 +141,10 @@ def make_cases(
     conditions = conditions_of(seed, duration=duration)
     nothing = CampaignDraw("none", conditions, (), 0)
     sized = size_effects(
-        [_draw(conditions, name, severity, seed) for name in effects for severity in severities],
+        [draw_effect(conditions, name, severity, seed) for name in effects for severity in severities],
         progress=show_steps,
     )
-    several = [_realise(draw, i, seed) for draw in (nothing, *sized) for i in range(realisations)]
+    several = [realised(draw, i, seed) for draw in (nothing, *sized) for i in range(realisations)]
     # A motion without random forcing is integrated once.
     moving = [draw for i, draw in enumerate(several) if i % realisations == 0 or _random(draw)]
     motions = iter(simulate_motions(moving))
@@ -157,7 +157,12 @@ def make_cases(
     return cases
 
 
-def _draw(conditions: Conditions, name: str, severity: float, seed: int) -> CampaignDraw:
+def draw_effect(conditions: Conditions, name: str, severity: float, seed: int) -> CampaignDraw:
+    """A campaign with one effect in its textbook form.
+
+    Args:
+        severity: excess to size it for, in noise powers (a ratio).
+    """
     form = forms_of(name)[0]
     rng = np.random.default_rng([seed, EFFECTS.index(name)])
     extra = {key: float(value) for key, value in form.draw(rng, conditions).items()}
@@ -169,7 +174,7 @@ def _random(draw: CampaignDraw) -> bool:
     return any("seed" in effect.extra for effect in draw.effects)
 
 
-def _realise(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
+def realised(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
     """The same case with other noise, and other forcing where it is random."""
     name = draw.effects[0].form.family if draw.effects else NOTHING_ADDED
     key = EFFECTS.index(name) if draw.effects else len(EFFECTS)

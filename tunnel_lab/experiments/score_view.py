@@ -228,7 +228,7 @@ def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
             _section(result, results, name, cells, times=times)
             for quantity in results.grid.cells[cells[0]].quantities:
                 result.add_row(
-                    f"  {NAMES[quantity]}", *_summary([trials[name, cell, quantity] for cell in cells])
+                    f"  {NAMES[quantity]}", *pooled_figures([trials[name, cell, quantity] for cell in cells])
                 )
         tables.append(result)
     return tables
@@ -244,7 +244,12 @@ def _section(result: Table, results: Results, name: str, cells: Sequence[int], *
         result.add_row("  ms/record", significant(results.milliseconds(name, cells), 2))
 
 
-def _summary(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
+def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
+    """Figures of cells taken together, as text.
+
+    Returns:
+        RMSE over the bound, the worst cell's, bias over the bound, and the shares covered and failed in %.
+    """
     scores = [score(trials) for trials in every]
     worst = [s.rmse_over_bound.value for s in scores if s.rmse_over_bound is not None]
     scaled = [float(value) for trials in every if trials.bound is not None for value in trials.scaled]
@@ -275,12 +280,13 @@ def cell_tables(results: Results) -> list[Table]:
         for name in results.estimators:
             _section(result, results, name, [index])
             for quantity in cell.quantities:
-                result.add_row(f"  {NAMES[quantity]}", *_cell(score(trials[name, index, quantity])))
+                result.add_row(f"  {NAMES[quantity]}", *cell_figures(score(trials[name, index, quantity])))
         tables.append(result)
     return tables
 
 
-def _cell(judged: Score) -> tuple[str, ...]:
+def cell_figures(judged: Score) -> tuple[str, ...]:
+    """Figures of one cell, as text: RMSE over the bound, bias in % and in deviations, shares covered and failed."""
     return (
         _figure(judged.rmse_over_bound),
         _figure(judged.relative_bias),

@@ -132,14 +132,19 @@ def summarise(store: Store) -> list[Line]:
         asked = pl.col("value").is_not_null() | ~pl.col("status").is_in(NOT_ASKED)
         data = frame.filter(mine & asked & pl.col("truth").is_not_null()).select(columns).collect()
         if len(data):
-            lines += _lines(data, estimator, quantity)
+            lines += lines_of(data, estimator, quantity)
     order = [OVERALL, *AXES, SEVERITY]
     return sorted(
         lines, key=lambda line: (order.index(line.axis), line.effect if line.axis == SEVERITY else "")
     )
 
 
-def _lines(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Line]:
+def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Line]:
+    """The lines of one quantity of an estimator: of all cases, then along each axis.
+
+    Args:
+        data: rows of the results, with the columns of `summarise`.
+    """
     import polars as pl
 
     plain = data.filter(pl.col("effect") == NO_EFFECT)

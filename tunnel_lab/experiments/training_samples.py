@@ -312,7 +312,7 @@ def sizes_at_unit_excess(seed: int) -> dict[str, float]:
         effect = EffectDraw(form, extra, form.signs[-1], _UNIT, form.start)
         draws.append(replace(plain, conditions=conditions, effects=(effect,)))
     for _ in range(_ROUNDS):
-        draws = [_nearer(draw, excess) for draw, excess in zip(draws, _excesses(draws), strict=True)]
+        draws = [nearer(draw, excess) for draw, excess in zip(draws, _excesses(draws), strict=True)]
     return {label(form): draw.effects[0].value for form, draw in zip(forms, draws, strict=True)}
 
 
@@ -328,7 +328,12 @@ def _excess(draw: CampaignDraw, motion: Motion) -> float:
             return np.inf
 
 
-def _nearer(draw: CampaignDraw, excess: float) -> CampaignDraw:
+def nearer(draw: CampaignDraw, excess: float) -> CampaignDraw:
+    """A draw whose one effect is nearer to the unit excess.
+
+    Args:
+        excess: of the draw, in noise powers (a ratio); infinite where the motion grows without bound.
+    """
     effect = draw.effects[0]
     if np.isfinite(excess):
         factor = float(np.sqrt(_UNIT / max(excess, 0.03)))

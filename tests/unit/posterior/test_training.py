@@ -109,12 +109,12 @@ def test_variants_of_a_campaign_lose_runs_and_ends_and_differ_in_noise(monkeypat
 def test_a_size_of_an_effect_that_diverges_is_moved_towards_its_usual_size(factor):
     from dataclasses import replace
 
-    from tunnel_lab.experiments.training_samples import _nearer
+    from tunnel_lab.experiments.training_samples import nearer
     from tunnel_reference.draw import Mixture, draw_campaign
 
     drawn = draw_campaign(np.random.default_rng(1), kind="single", mixture=Mixture(rare=0.0))
     effect = replace(drawn.effects[0], value=factor * drawn.effects[0].form.start)
-    moved = _nearer(replace(drawn, effects=(effect,)), np.inf).effects[0].value
+    moved = nearer(replace(drawn, effects=(effect,)), np.inf).effects[0].value
     assert abs(np.log(moved / effect.form.start)) < abs(np.log(factor))
 
 
