@@ -26,8 +26,8 @@ from identification.neural.posterior.features import CAMPAIGN_NAMES, RECORD_NAME
 from identification.neural.posterior.mixture import distribution
 from identification.neural.posterior.network import forward, variances
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
-from tunnel_lab.training.fit import INPUTS, FitSpec, fit, losses, start_state, usable
-from tunnel_lab.training.samples import read_shards
+from tunnel_lab.experiments.training import INPUTS, FitSpec, fit, losses, start_state, usable
+from tunnel_lab.experiments.training_samples import read_shards
 from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
 

@@ -27,9 +27,14 @@ from identification.decay.first_guess import starting_frequency
 from identification.neural.posterior.demodulated import WINDOWS, Demodulated, demodulate
 from identification.neural.posterior.features import record_features
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
-from tunnel_lab.training.draw import sizes_at_unit_excess
-from tunnel_lab.training.fit import FAR
-from tunnel_lab.training.samples import ShardSpec, decay_of, readings_of, truth_of
+from tunnel_lab.experiments.training import FAR
+from tunnel_lab.experiments.training_samples import (
+    ShardSpec,
+    decay_of,
+    readings_of,
+    sizes_at_unit_excess,
+    truth_of,
+)
 from tunnel_reference.linear_families import LINEAR_IN_A_RECORD
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.record import Array, Record

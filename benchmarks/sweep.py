@@ -59,7 +59,7 @@ def bare(file: Path, threads: int) -> dict[str, float]:
     import numpy as np
     from mujoco import batch as mujoco_batch
 
-    from tunnel_lab.sweep.reading import read_sweep
+    from tunnel_lab.experiments.sweep import read_sweep
     from tunnel_sim.effects import EffectChain
     from tunnel_sim.engine.model import build_model
     from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
@@ -94,18 +94,15 @@ def bare(file: Path, threads: int) -> dict[str, float]:
 def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]:
     """Seconds per run and peak memory of a sweep: by processes, or by one whose simulation has threads."""
     wall, cpu = time.perf_counter(), time.process_time()
-    from tunnel_lab.sweep.engine import run_sweep
-    from tunnel_lab.sweep.processes import shards_in_processes
-    from tunnel_lab.sweep.reading import read_sweep
+    from tunnel_lab.experiments.runner import lasting_processes
+    from tunnel_lab.experiments.sweep import read_sweep, run_sweep
 
-    def by_threads(text, shards):
-        from tunnel_lab.sweep.shard import run_shard
-
+    def by_threads(work, shards):
         for index in shards:
-            yield run_shard(text, index, nthread=threads)
+            yield index, work(index, nthread=threads)
 
     plan = read_sweep(file)
-    run_sweep(plan, out, by_threads if threads > 1 else shards_in_processes(workers, print))
+    run_sweep(plan, out, by_threads if threads > 1 else lasting_processes(workers, print))
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = time.process_time() - cpu + children.ru_utime + children.ru_stime
     return {

@@ -37,7 +37,7 @@ from tunnel_lab.commands import (
     train,
     view,
 )
-from tunnel_lab.terminal.table_format import with_format, with_quiet
+from tunnel_lab.terminal.options import with_format, with_quiet
 from tunnel_sim.vocabulary.errors import TunnelError
 
 BAD_INPUT = 2

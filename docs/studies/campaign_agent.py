@@ -19,8 +19,8 @@ from gymnasium.wrappers.vector import NormalizeObservation
 
 import tunnel_sim.envs  # noqa: F401  registers the environments
 from docs.studies.campaign_policies import Row, from_csv, play, replaced, table, to_csv
-from tunnel_lab.envs.agent import FEATURES, LAYERS, Agent, features, menu_text
 from tunnel_lab.envs.campaign import CampaignEnv
+from tunnel_lab.envs.policies import FEATURES, LAYERS, Agent, features, menu_text
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.record import Array
 

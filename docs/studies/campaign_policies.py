@@ -24,8 +24,7 @@ from identification.statistics.proportion import Proportion
 from tunnel_lab.envs.campaign import CampaignEnv, reached
 from tunnel_lab.envs.policies import POLICIES, run_campaign
 from tunnel_lab.envs.session import Knowledge, answers, probabilities
-from tunnel_lab.plotting.common import WIDTH, figure, grid, log_axis, styled
-from tunnel_lab.plotting.plots import COLOURS, MARKERS
+from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.record import Array
 
@@ -222,7 +221,7 @@ def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
 
 def draw(rows: Sequence[Row], path: Path) -> None:
     """Draw the figure of the page."""
-    from tunnel_lab.plotting.plots import save
+    from tunnel_lab.plotting.style import save
 
     save(policies_figure(rows, example()), path)
 

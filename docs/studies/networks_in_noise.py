@@ -13,7 +13,7 @@ from identification import identify
 from identification.decay.damped_oscillation import Decay, free_decay
 from identification.estimate import Quantity
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
-from tunnel_lab.paper.network_study import METHODS, NETWORK
+from tunnel_lab.paper.networks import METHODS, NETWORK
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_lab.paper.network_study import CONVENTIONAL, METHODS, NETWORK, Closeness
+from tunnel_lab.paper.networks import CONVENTIONAL, METHODS, NETWORK, Closeness
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.plan import Truth
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from docs.studies.window_rivals import Explanation, WindowDiagnosis
-from tunnel_lab.plotting.common import WIDTH, figure, grid, styled
-from tunnel_lab.plotting.plots import COLOURS
+from tunnel_lab.plotting.style import COLOURS, WIDTH, figure, grid, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

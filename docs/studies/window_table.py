@@ -2,7 +2,7 @@
 
 Such a table holds damping ratio and natural frequency of one wind-on run, three cycles at a time. The linear
 model leaves both columns constant; `docs.studies.window_rivals` compares what makes them drift. The paper does not
-name the run behind its table: `RigState` is an inference, see `tunnel_lab.paper.network_study.infer_springs`.
+name the run behind its table: `RigState` is an inference, see `tunnel_lab.paper.networks.infer_springs`.
 """
 
 from __future__ import annotations

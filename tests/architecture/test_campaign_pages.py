@@ -44,7 +44,7 @@ def test_the_arguments_are_those_of_the_code() -> None:
 
 
 def test_the_menus_are_those_of_the_code() -> None:
-    from tunnel_lab.envs.presets import PRESETS
+    from tunnel_lab.envs.menu import PRESETS
 
     for _, name, *shown, _ in rows(TEXT, "Action"):
         key = name.split("`")[1]
@@ -61,7 +61,7 @@ def test_the_menus_are_those_of_the_code() -> None:
 
 
 def test_the_truth_is_drawn_as_the_page_says() -> None:
-    from tunnel_lab.envs.truth import MEAN, STD
+    from tunnel_lab.envs.session import MEAN, STD
 
     shown = {name.strip("`"): (float(mean), float(std)) for _, name, mean, std, _ in rows(TEXT, "Start")}
     assert shown.pop("sensor_zero") == (0.0, 0.004)

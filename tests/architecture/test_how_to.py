@@ -11,7 +11,7 @@ import pytest
 from test_readme import BLOCK, HOW_TO, ROOT, assert_same, output_of, sessions, toml_block
 from test_tutorials import printed, steps
 
-from tunnel_lab.scoring.results import packaged_baseline
+from tunnel_lab.experiments.score_trials import packaged_baseline
 
 PAGES = HOW_TO
 INDEX = ROOT / "docs" / "README.md"

@@ -164,8 +164,7 @@ def spring_table(folder: Path, rng: Rng) -> None:
     """A table of springs changed, and fitted and shown where it is accepted."""
     import typer
 
-    from tunnel_lab.commands.springs import show
-    from tunnel_lab.terminal.spring_table import read_spring_table
+    from tunnel_lab.commands.springs import read_spring_table, show
 
     table = read_spring_table(_written(folder / "springs.csv", changed_csv(seeds.springs_csv(), rng), rng))
     try:
@@ -176,7 +175,7 @@ def spring_table(folder: Path, rng: Rng) -> None:
 
 def effect_option(_folder: Path, rng: Rng) -> None:
     """The value of ``--effect`` changed, and the effect made."""
-    from tunnel_lab.terminal.effect_option import parse_effect
+    from tunnel_lab.terminal.inputs import parse_effect
     from tunnel_sim.effects import effect_from
 
     setting = parse_effect(changed_line(seeds.EFFECT, rng))
@@ -252,7 +251,7 @@ def estimate(_folder: Path, rng: Rng) -> None:
 def blind_answers(folder: Path, rng: Rng) -> None:
     """Truth, answer, key or seal of a blind set changed; the hashes mostly agree."""
     from diagnosis.blind import score_set
-    from tunnel_lab.diagnosis_view import blind_page
+    from tunnel_lab.report import blind
 
     changed = ("truth", "answer", "seal")[rng.choice(3, p=(0.4, 0.4, 0.2))]
     (folder / "c1").mkdir()
@@ -266,7 +265,7 @@ def blind_answers(folder: Path, rng: Rng) -> None:
     _answer(folder, changed, rng)
     found = score_set(folder)
     found.to_json_dict()
-    blind_page.markdown(found, "set")
+    blind.markdown(found, "set")
 
 
 def _digest(content: bytes) -> str:
@@ -294,8 +293,7 @@ def _answer(folder: Path, changed: str, rng: Rng) -> None:
 
 def sweep_file(folder: Path, rng: Rng) -> None:
     """A sweep file changed, and its folder begun where it is accepted."""
-    from tunnel_lab.sweep.reading import read_sweep
-    from tunnel_lab.sweep.store import begin
+    from tunnel_lab.experiments.sweep import begin, read_sweep
 
     sweep = read_sweep(_written(folder / "sweep.toml", _toml(seeds.SMALL.encode(), rng), rng))
     begin(sweep, folder / "out")
@@ -303,9 +301,8 @@ def sweep_file(folder: Path, rng: Rng) -> None:
 
 def sweep_folder(folder: Path, rng: Rng) -> None:
     """``sweep.json`` or a part of the results changed, as a sweep that goes on or is summed up meets it."""
-    from tunnel_lab.sweep.figures import overall_table, pace_table
-    from tunnel_lab.sweep.store import open_store
-    from tunnel_lab.sweep.summary import paces, summarise
+    from tunnel_lab.experiments.sweep import open_store
+    from tunnel_lab.experiments.sweep_summary import overall_table, pace_table, paces, summarise
 
     files = dict(seeds.sweep_folder())
     names = [name for name in files if name.startswith(("results", "timings"))]
@@ -328,7 +325,7 @@ def sweep_folder(folder: Path, rng: Rng) -> None:
 
 def score_grid(folder: Path, rng: Rng) -> None:
     """A score grid changed."""
-    from tunnel_lab.scoring.grid import load_grid
+    from tunnel_lab.experiments.score_grid import load_grid
 
     load_grid(
         _written(folder / "grid.toml", _toml(seeds.regression("score-grid.toml").read_bytes(), rng), rng)
@@ -339,8 +336,8 @@ def score_baseline(folder: Path, rng: Rng) -> None:
     """A baseline's table, or the grid in it, changed; where it is accepted, it is compared with itself."""
     import polars as pl
 
-    from tunnel_lab.scoring.check import check
-    from tunnel_lab.scoring.results import read_trials
+    from tunnel_lab.experiments.score_trials import read_trials
+    from tunnel_lab.experiments.score_view import check
 
     frame = seeds.baseline_frame()
     if rng.random() < 0.5:

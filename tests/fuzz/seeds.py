@@ -158,10 +158,9 @@ def springs_csv() -> bytes:
 @cache
 def sweep_folder() -> dict[str, bytes]:
     """The files of a sweep of which three shards of twelve are finished."""
-    from tunnel_lab.sweep.product import Sweep
-    from tunnel_lab.sweep.reading import read_sweep
-    from tunnel_lab.sweep.shard import run_shard
-    from tunnel_lab.sweep.store import begin
+    from tunnel_lab.experiments.sweep import begin, read_sweep
+    from tunnel_lab.experiments.sweep_cases import Sweep
+    from tunnel_lab.experiments.sweep_shards import run_shard
 
     with tempfile.TemporaryDirectory() as name:
         file = Path(name) / "sweep.toml"

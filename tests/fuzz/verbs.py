@@ -33,7 +33,7 @@ def identify_campaign(folder: Path, rng: Rng) -> None:
     from identification import identify
     from identification.estimate import Estimate
     from identification.estimators import ALL_ESTIMATORS
-    from tunnel_lab.terminal.estimate_output import show_estimate
+    from tunnel_lab.terminal.outputs import show_estimate
     from tunnel_sim.files.json_text import json_text
 
     campaign = accepted_campaign(folder, rng)
@@ -50,21 +50,21 @@ def identify_campaign(folder: Path, rng: Rng) -> None:
 def draw(campaign: Campaign, found: Any, folder: Path) -> None:
     """The figures of ``tunnel plot``."""
     from tunnel_lab.commands.plot import spread
-    from tunnel_lab.plotting import plots
-    from tunnel_lab.plotting.window_figure import windows_figure
+    from tunnel_lab.plotting import runs, style
+    from tunnel_lab.plotting.runs import windows_figure
 
-    for page in plots.trace_pages(campaign):
-        plots.save(page, folder / "traces.png")
-    plots.save(plots.spectrum_figure(spread(campaign)), folder / "spectrum.png")
+    for page in runs.trace_pages(campaign):
+        style.save(page, folder / "traces.png")
+    style.save(runs.spectrum_figure(spread(campaign)), folder / "spectrum.png")
     if any(run.windows for run in found.runs):
-        plots.save(windows_figure(found), folder / "windows.png")
+        style.save(windows_figure(found), folder / "windows.png")
 
 
 def diagnose_campaign(folder: Path, rng: Rng) -> None:
     """A diagnosis with a small vocabulary: shown, written and, now and then, reported."""
     from diagnosis import diagnose
     from tunnel_lab.commands.diagnose import show
-    from tunnel_lab.diagnosis_view import write_report
+    from tunnel_lab.report import write_report
     from tunnel_sim.effects import ALL_EFFECTS
     from tunnel_sim.files.json_text import json_text
 

@@ -201,7 +201,7 @@ def _prepare() -> None:
     __import__("tunnel_sim.engine.joint_patch")
     __import__("tunnel_sim.engine.virtual_campaign")
     __import__("diagnosis._diagnose")
-    __import__("tunnel_lab.diagnosis_view")
+    __import__("tunnel_lab.report")
     for make in _seed_makers(seeds):
         make()
     used = int(Path("/proc/self/statm").read_text("ascii").split()[0]) * resource.getpagesize()

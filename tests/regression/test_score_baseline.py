@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from identification.estimators import ALL_ESTIMATORS
-from tunnel_lab.scoring.check import check
-from tunnel_lab.scoring.grid import load_grid
-from tunnel_lab.scoring.results import Results, packaged_baseline, read_trials
-from tunnel_lab.scoring.work import score_grid
+from tunnel_lab.experiments.score_grid import load_grid
+from tunnel_lab.experiments.score_trials import Results, packaged_baseline, read_trials, score_grid
+from tunnel_lab.experiments.score_view import check
 
 HERE = Path(__file__).parent
 

@@ -9,7 +9,7 @@ from scipy.stats import binom, chi2
 from docs.studies.reference_campaigns import reference_campaigns, verdict
 from identification import identify
 from tests.reference.free_decays import damped_cosine
-from tunnel_lab.paper.network_study import CONVENTIONAL, NETWORK, closeness
+from tunnel_lab.paper.networks import CONVENTIONAL, NETWORK, closeness
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from identification import Status, identify
-from tunnel_lab.scoring.draw import draw_trial
-from tunnel_lab.scoring.grid import NO_EFFECT, Cell
+from tunnel_lab.experiments.score_grid import Cell, draw_trial
+from tunnel_lab.terminal.inputs import NO_EFFECT
 
 pytestmark = pytest.mark.slow
 TRIALS = 12

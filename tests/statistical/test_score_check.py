@@ -12,10 +12,9 @@ from identification import identify
 from identification.uncertainty.budget import make_budget
 from identification.uncertainty.input_uncertainty import InputUncertainties
 from tests.reference.free_decays import RESOLUTION, Setting, campaign
-from tunnel_lab.scoring.check import check
-from tunnel_lab.scoring.grid import Cell, Grid
-from tunnel_lab.scoring.results import Results
-from tunnel_lab.scoring.work import score_grid
+from tunnel_lab.experiments.score_grid import Cell, Grid
+from tunnel_lab.experiments.score_trials import Results, score_grid
+from tunnel_lab.experiments.score_view import check
 
 pytestmark = pytest.mark.slow
 

@@ -11,8 +11,8 @@ from diagnosis.blind.score import Score
 from diagnosis.blind.smooth import smooth_calibration
 from identification.statistics.proportion import Proportion
 from tests.unit.test_blind_score import document
-from tunnel_lab.diagnosis_view import blind_page
-from tunnel_lab.diagnosis_view.blind_figures import calibration_figure, confusion_figure
+from tunnel_lab.report import blind
+from tunnel_lab.report.blind import calibration_figure, confusion_figure
 
 THREE = ["coulomb_friction", "gravity_stiffness", "quadratic_damping"]
 
@@ -168,11 +168,11 @@ def test_the_confusion_is_drawn_as_counted():
 def test_the_page_and_the_figure_show_the_calibration_of_inclusion():
     cases = tuple(made(["free_play"], ["free_play"], inclusion={"free_play": 0.9}) for _ in range(5))
     score = Score(cases, (), "", "", {}, False)
-    page = blind_page.markdown(score, "set", ("inclusion.png", "confusion.png"))
+    page = blind.markdown(score, "set", ("inclusion.png", "confusion.png"))
     assert "## Calibration of inclusion" in page
     assert page.index("](inclusion.png)") < page.index("](confusion.png)")
     assert "5/5, 100.0 %" in page
     title = calibration_figure(score).axes[1].get_title("left")
     assert title == f"5 effects: smooth calibration error {score.inclusion().error:.3f}"
     assert score.to_json_dict()["inclusion_calibration"]["statements"] == 5
-    assert "Calibration of inclusion" not in blind_page.markdown(Score(CASES, (), "", "", {}, False), "set")
+    assert "Calibration of inclusion" not in blind.markdown(Score(CASES, (), "", "", {}, False), "set")

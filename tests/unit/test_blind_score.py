@@ -13,7 +13,7 @@ from diagnosis.blind.cases import case
 from diagnosis.blind.score import Score
 from diagnosis.blind.statistics import calibration
 from identification.statistics.proportion import Proportion
-from tunnel_lab.diagnosis_view import blind_page
+from tunnel_lab.report import blind
 
 
 def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12), std=(0.001, 0.001)):
@@ -120,7 +120,7 @@ def test_a_rival_is_named_where_the_truth_is_among_those_not_distinguished():
 
 
 def test_the_page_holds_every_figure_and_no_empty_cell_of_the_matrix(score):
-    page = blind_page.markdown(score, "set")
+    page = blind.markdown(score, "set")
     assert "| one effect | 2 | 5 | 40.0 % |" in page
     assert "## Confusion matrix" in page
     rows = [line for line in page.splitlines() if line.startswith("|")]
@@ -138,16 +138,16 @@ def test_the_page_holds_every_figure_and_no_empty_cell_of_the_matrix(score):
 def test_times_are_on_the_page_where_they_are_known(score):
     """Linear interpolation between the order statistics: the 90th percentile of 1, 2, ..., 11 is 10."""
     title = "Seconds for each campaign"
-    assert title not in [section.title for section in blind_page.sections(score)]
+    assert title not in [section.title for section in blind.sections(score)]
     timed = tuple(
         case(f"c{i}", {**TRUTH, "effects": []}, document([]) | {"wall_s": float(i)}) for i in range(1, 12)
     )
-    (found,) = [s for s in blind_page.sections(Score(timed, (), "", "", {}, False)) if s.title == title]
+    (found,) = [s for s in blind.sections(Score(timed, (), "", "", {}, False)) if s.title == title]
     assert found.rows == (("6.0", "10.0", "11.0"),)
 
 
 def test_answers_are_listed_by_truth_with_what_was_answered_otherwise(score):
-    (found,) = [s for s in blind_page.sections(score) if s.title == "Answers by truth"]
+    (found,) = [s for s in blind.sections(score) if s.title == "Answers by truth"]
     assert set(found.rows) == {
         ("coulomb_friction", "2", "1", "quadratic_damping 1"),
         ("free_play", "2", "1", "unknown 1"),

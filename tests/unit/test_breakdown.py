@@ -6,8 +6,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from tunnel_lab.scoring import breakdown as work
-from tunnel_lab.scoring import breakdown_view as view
+from tunnel_lab.experiments import breakdown as view
+from tunnel_lab.experiments import breakdown as work
 
 NAMES = ("matrix_pencil", "conventional")
 EFFECTS = ("coulomb_friction", "sensor_drift")
@@ -83,18 +83,18 @@ def test_an_interrupted_map_goes_on(cases, found, tmp_path, monkeypatch):
 def test_all_effects_of_the_vocabulary_have_a_form_to_inject():
     conditions = work.conditions_of(1)
     for name in work.EFFECTS:
-        assert work._draw(conditions, name, 1.0, 1).effects[0].form.family == name
+        assert work.draw_effect(conditions, name, 1.0, 1).effects[0].form.family == name
 
 
 def test_realisations_have_noise_and_random_forcing_of_their_own():
     conditions = work.conditions_of(1)
-    cases = [work._draw(conditions, name, 1.0, 1) for name in ("coulomb_friction", "buffeting")]
-    made = [[work._realise(case, number, 1) for number in range(3)] for case in cases]
+    cases = [work.draw_effect(conditions, name, 1.0, 1) for name in ("coulomb_friction", "buffeting")]
+    made = [[work.realised(case, number, 1) for number in range(3)] for case in cases]
     assert len({one.seed for of_case in made for one in of_case}) == 6
     steady, random = made
     assert all(one.effects is cases[0].effects for one in steady)
     assert random[0].effects is cases[1].effects  # as it was sized
     seeds = [one.effects[0].extra["seed"] for one in random]
     assert len(set(seeds)) == 3
-    again = work._realise(cases[1], 2, 1)
+    again = work.realised(cases[1], 2, 1)
     assert (again.seed, again.effects[0].extra["seed"]) == (random[2].seed, seeds[2])

@@ -10,9 +10,18 @@ import pytest
 
 from docs.studies.campaign_agent import SEEDS, train
 from docs.studies.campaign_policies import from_csv, median_interval
-from tunnel_lab.envs.agent import FEATURES, Agent, features, menu_text, packaged_agent, read_agent
 from tunnel_lab.envs.campaign import CampaignEnv
-from tunnel_lab.envs.policies import run_campaign, scripted, trained
+from tunnel_lab.envs.policies import (
+    FEATURES,
+    Agent,
+    features,
+    menu_text,
+    packaged_agent,
+    read_agent,
+    run_campaign,
+    scripted,
+    trained,
+)
 from tunnel_sim.vocabulary.errors import TunnelError
 
 DOCS = Path(__file__).parents[2] / "docs"

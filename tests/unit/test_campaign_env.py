@@ -16,8 +16,7 @@ from identification import identify
 from identification.campaign.belief import information_gain
 from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_lab.envs.menu import Costs
-from tunnel_lab.envs.session import probabilities
-from tunnel_lab.envs.truth import MEAN, RigTruth, draw_truth
+from tunnel_lab.envs.session import MEAN, RigTruth, draw_truth, probabilities
 from tunnel_sim.vocabulary.errors import TunnelError
 
 ID = "tunnel_sim/Campaign-v0"

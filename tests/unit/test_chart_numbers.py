@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from tests.unit.diagnosis_document import IDS, campaign, document
-from tunnel_lab.diagnosis_view.charts import charts
-from tunnel_lab.diagnosis_view.figures_common import run_label
+from tunnel_lab.report.drawing import run_label
+from tunnel_lab.report.where import charts
 
 Document = dict[str, Any]
 

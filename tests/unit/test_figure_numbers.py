@@ -14,13 +14,11 @@ from matplotlib.colors import to_hex
 
 from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.unit.shown_numbers import assert_shows, numbers
-from tunnel_lab.diagnosis_view import figures_answer as answer
-from tunnel_lab.diagnosis_view import figures_where as where
-from tunnel_lab.diagnosis_view.figures_backbone import backbone_figure
-from tunnel_lab.diagnosis_view.figures_common import run_label
-from tunnel_lab.diagnosis_view.figures_law import law_figure
-from tunnel_lab.diagnosis_view.figures_waterfall import waterfall_figure
-from tunnel_lab.plotting.common import styled
+from tunnel_lab.plotting.style import styled
+from tunnel_lab.report import figures as answer
+from tunnel_lab.report import where
+from tunnel_lab.report.drawing import run_label
+from tunnel_lab.report.figures import backbone_figure, law_figure, waterfall_figure
 
 Document = dict[str, Any]
 

@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 
 from tests.unit.sweep.small_sweep import SMALL
-from tunnel_lab.scoring.grid import load_grid, packaged_grid
-from tunnel_lab.scoring.work import score_grid
-from tunnel_lab.sweep.product import Sweep
-from tunnel_lab.sweep.reading import read_sweep
+from tunnel_lab.experiments.score_grid import load_grid, packaged_grid
+from tunnel_lab.experiments.score_trials import score_grid
+from tunnel_lab.experiments.sweep import read_sweep
+from tunnel_lab.experiments.sweep_cases import Sweep
 from tunnel_sim.engine.virtual_campaign import run_settings
 from tunnel_sim.files.plan_file import load_plan, paper_plan
 from tunnel_sim.files.plan_schema import first_twice
@@ -254,9 +254,9 @@ def test_the_pages_links_lead_somewhere() -> None:
 
 def test_networks_are_warned_of_where_they_are_used() -> None:
     from tunnel_lab.commands import sweep, view
-    from tunnel_lab.show import web
+    from tunnel_lab.show import live
 
-    for text in (web.WARNING, view.run.__doc__, PAGE.read_text(encoding="utf-8")):
+    for text in (live.WARNING, view.run.__doc__, PAGE.read_text(encoding="utf-8")):
         assert "password" in text
         assert "Origin" in text
     assert "no password" in str(sweep.run.__doc__)

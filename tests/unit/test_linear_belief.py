@@ -10,7 +10,7 @@ from identification.campaign.linear_belief import linear_belief, linear_run, sho
 from identification.decay.damped_oscillation import Decay
 from identification.statistics.information import scaled_solve
 from tunnel_lab.envs.campaign import CampaignEnv
-from tunnel_lab.envs.truth import MEAN, STD
+from tunnel_lab.envs.session import MEAN, STD
 
 ACTIONS = ([0, 0, 2, 0], [0, 3, 2, 0], [1, 2, 1, 0])
 

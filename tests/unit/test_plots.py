@@ -14,10 +14,9 @@ import pytest
 
 from identification.estimate import Quantity
 from tests.unit.diagnosis_document import campaign
-from tunnel_lab.plotting import plots
-from tunnel_lab.plotting.common import figure, limit_to_known, log_axis, styled
-from tunnel_lab.plotting.import_figure import thinned
-from tunnel_lab.plotting.window_figure import deviations, windows_figure
+from tunnel_lab.plotting import runs, style
+from tunnel_lab.plotting.runs import deviations, thinned, windows_figure
+from tunnel_lab.plotting.style import figure, limit_to_known, log_axis, styled
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Record
 
@@ -81,7 +80,7 @@ def test_a_spectrum_shows_its_line_and_not_the_mean() -> None:
     time = np.arange(4000) / 100.0
     rng = np.random.default_rng(5)
     angle = 3.0 + 0.1 * time + 0.01 * np.sin(2.0 * np.pi * 5.0 * time) + 1e-5 * rng.standard_normal(4000)
-    frequency, density = plots.spectrum(Run("r", Record(time, angle), 0.0))
+    frequency, density = runs.spectrum(Run("r", Record(time, angle), 0.0))
     assert frequency[0] == pytest.approx(2.0 / 40.0)
     assert frequency[np.argmax(density[frequency > 1.0]) + np.sum(frequency <= 1.0)] == pytest.approx(
         5.0, rel=0.03
@@ -91,7 +90,7 @@ def test_a_spectrum_shows_its_line_and_not_the_mean() -> None:
 
 
 def test_a_spectrum_of_two_samples() -> None:
-    frequency, density = plots.spectrum(Run("r", Record(np.array([0.0, 1.0]), np.array([0.0, 1.0])), 0.0))
+    frequency, density = runs.spectrum(Run("r", Record(np.array([0.0, 1.0]), np.array([0.0, 1.0])), 0.0))
     assert frequency.tolist() == [0.5]
     assert density.shape == (1,)
 
@@ -103,7 +102,7 @@ def test_errors_are_drawn_in_standard_deviations() -> None:
             estimator="c", cn_beta=Quantity(0.4, 0.02, "1/rad"), cn_r=Quantity(-0.1, 0.0, "1/rad")
         ),
     ]
-    errors, stds = plots.truth_figure(given, {"cn_beta": 0.5, "cn_r": -0.1}).axes
+    errors, stds = runs.truth_figure(given, {"cn_beta": 0.5, "cn_r": -0.1}).axes
     drawn = [line.get_xdata() for line in errors.lines if line.get_linestyle() == "None"]
     assert [list(x) for x in drawn] == [pytest.approx([2.0]), pytest.approx([-5.0])]
     low, high = errors.get_xlim()
@@ -116,21 +115,21 @@ def test_errors_are_drawn_in_standard_deviations() -> None:
 
 def test_estimates_without_errors_are_drawn_empty(tmp_path: Path) -> None:
     given = [SimpleNamespace(estimator="a", cn_beta=Quantity(0.5, 0.0, "1/rad"), cn_r=None)]
-    fig = plots.truth_figure(given, {"cn_beta": 0.5, "cn_r": -0.1})
-    assert plots.save(fig, tmp_path / "a.png").exists()
+    fig = runs.truth_figure(given, {"cn_beta": 0.5, "cn_r": -0.1})
+    assert style.save(fig, tmp_path / "a.png").exists()
 
 
 def test_a_reading_that_does_not_move_has_a_figure(tmp_path: Path) -> None:
     run = Run("r", Record(np.arange(100.0), np.zeros(100)), 0.0)
-    assert plots.save(plots.spectrum_figure((run,)), tmp_path / "a.png").exists()
+    assert style.save(runs.spectrum_figure((run,)), tmp_path / "a.png").exists()
 
 
 def test_no_line_crosses_missing_samples() -> None:
     time = np.delete(0.01 * np.arange(600), range(200, 300))
     record = Record(time, np.cos(time))
     run = Run("r", record, 0.0)
-    (page,) = plots.trace_pages(replace(campaign(), runs=(run,)))
-    drawn = [axes.lines[0].get_xydata() for axes in (*page.axes, *plots.wind_off_on_figure(run, run).axes)]
+    (page,) = runs.trace_pages(replace(campaign(), runs=(run,)))
+    drawn = [axes.lines[0].get_xydata() for axes in (*page.axes, *runs.wind_off_on_figure(run, run).axes)]
     long = np.repeat(time, 20) + np.tile(0.0005 * np.arange(20), time.size)  # more samples than are drawn
     drawn += [np.stack(thinned(t, np.cos(t)), axis=-1) for t in (time, long)]
     for curve in map(np.asarray, drawn):
@@ -159,18 +158,18 @@ def test_the_colours_are_those_of_the_style() -> None:
 
         return [entry["color"] for entry in mpl.rcParams["axes.prop_cycle"]]
 
-    assert tuple(cycle()) == plots.COLOURS
+    assert tuple(cycle()) == style.COLOURS
 
 
 def test_a_figure_for_print_holds_its_font_and_no_date(tmp_path: Path) -> None:
     fig = figure(3.0, 2.0)
     fig.add_subplot().set_title("ωn [rad/s]")
-    picture, printed = plots.save_both(fig, tmp_path / "a.b.png")
+    picture, printed = style.save_both(fig, tmp_path / "a.b.png")
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert printed == tmp_path / "a.b.pdf"
     content = printed.read_bytes()
     assert b"/FontFile2" in content
     assert b"/Type3" not in content
     assert b"CreationDate" not in content
-    plots.save_both(fig, tmp_path / "a.b.png")
+    style.save_both(fig, tmp_path / "a.b.png")
     assert printed.read_bytes() == content

@@ -16,11 +16,10 @@ from identification.estimate import Estimate, Quantity, RunEstimate
 from identification.neural.checkpoint import Checkpoint, read_checkpoint
 from identification.neural.files import read_networks, shipped_record
 from identification.uncertainty.input_uncertainty import load_uncertainties
-from tunnel_lab.scoring.grid import load_grid
-from tunnel_lab.scoring.results import read_trials
-from tunnel_lab.sweep.reading import read_sweep
-from tunnel_lab.sweep.store import open_store
-from tunnel_lab.terminal.spring_table import read_spring_table
+from tunnel_lab.commands.springs import read_spring_table
+from tunnel_lab.experiments.score_grid import load_grid
+from tunnel_lab.experiments.score_trials import read_trials
+from tunnel_lab.experiments.sweep import open_store, read_sweep
 from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.reading import check_count, parse_json, read_json, read_regular

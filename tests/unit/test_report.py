@@ -23,10 +23,10 @@ from diagnosis.result import (
     RunGap,
 )
 from tests.unit.gap_campaigns import campaign, nominal, studied
-from tunnel_lab.diagnosis_view import Byline, render_report, write_report
-from tunnel_lab.diagnosis_view.figures import diagnosis_figures
-from tunnel_lab.diagnosis_view.figures_common import THEMED
-from tunnel_lab.diagnosis_view.page import DESCRIPTIONS
+from tunnel_lab.report import Byline, render_report, write_report
+from tunnel_lab.report.drawing import THEMED
+from tunnel_lab.report.figures import diagnosis_figures
+from tunnel_lab.report.page import DESCRIPTIONS
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -93,7 +93,7 @@ def page(document, data):
 @pytest.fixture
 def written(monkeypatch, data):
     """Renders a page whose figures are built but not drawn: drawing takes nearly all of the time."""
-    monkeypatch.setattr("tunnel_lab.diagnosis_view.page.inline_svg", lambda *_: "")
+    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")
     return lambda document, *byline: render_report(document, data, *byline)
 
 

@@ -18,7 +18,7 @@ import pytest
 
 from tests.unit.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
 from tests.unit.diagnosis_document import campaign, document
-from tunnel_lab.diagnosis_view import Byline, write_report
+from tunnel_lab.report import Byline, write_report
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Record
 

@@ -13,7 +13,8 @@ import pytest
 
 from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
-from tunnel_lab.diagnosis_view import provenance, render_report, view, view_detail
+from tunnel_lab.report import page as report_page
+from tunnel_lab.report import render_report, view
 
 Document = dict[str, Any]
 NOT_READ = ("svg", "style", "script", "caption", "figcaption", "footer")
@@ -66,7 +67,7 @@ def given() -> Document:
 @pytest.fixture(scope="module")
 def page(given: Document) -> Sections:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tunnel_lab.diagnosis_view.page.inline_svg", lambda *_: "")  # pictures are not read
+        patch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")  # pictures are not read
         return Sections(render_report(given, campaign()))
 
 
@@ -86,11 +87,11 @@ def test_the_head_is_on_the_page(given: Document, page: Sections) -> None:
 
 
 def test_where_the_gap_is(given: Document) -> None:
-    rows = [value for _, value in view_detail.place_rows(given) if re.search(r"\d", value)]
+    rows = [value for _, value in view.place_rows(given) if re.search(r"\d", value)]
     where = given["where"]
     for text, key in zip(rows, ("time_s", "amplitude_rad", "frequency_hz"), strict=True):
         assert_shows(text, where[key])
-    assert ", ".join(where["runs"]) in [value for _, value in view_detail.place_rows(given)]
+    assert ", ".join(where["runs"]) in [value for _, value in view.place_rows(given)]
 
 
 def test_narrow_lines(given: Document, page: Sections) -> None:
@@ -119,7 +120,7 @@ def test_the_gap_as_the_causes_are_added(given: Document, page: Sections) -> Non
     assert_shows(page.row("how-far-section", "nominal model"), [28.45])
     assert_shows(page.row("how-far-section", CAUSE.replace("_", " ")), [2.75, 21.85])
     assert_shows(page.row("how-far-section", RIVAL.replace("_", " ")), [0.1345, 2.85])
-    assert view_detail.step_rows(given | {"waterfall": []}) == []
+    assert view.step_rows(given | {"waterfall": []}) == []
 
 
 def test_a_coefficient_that_is_not_determined_has_no_interval(given: Document) -> None:
@@ -163,7 +164,7 @@ def test_every_run(given: Document, page: Sections) -> None:
 
 def test_a_run_that_the_gap_leaves_out_has_no_excess(given: Document) -> None:
     fewer = given | {"gap": given["gap"] | {"runs": given["gap"]["runs"][1:]}}
-    first, second, _ = view_detail.run_rows(fewer, campaign())
+    first, second, _ = view.run_rows(fewer, campaign())
     assert (first["before"], first["after"]) == ("–", "–")
     assert_shows(f"{second['before']} ; {second['after']}", [4.583, 0.2345])
 
@@ -215,24 +216,24 @@ def test_tests_and_times(given: Document, page: Sections) -> None:
         assert_shows(page.row("provenance", name), [value])
     for name, value in given["seconds"].items():
         assert_shows(page.row("provenance", name), [value])
-    for name in provenance.TESTS:
+    for name in report_page.TESTS:
         document = given | {"gap": given["gap"] | {"tests": {name: 0.5}}}
-        ((_, words, p),) = provenance.test_rows(document)
-        assert (words, p) == (provenance.TESTS[name], "0.5")
-    assert_shows(provenance.false_alarms(given), [given["gap"]["false_alarm_rate"]])
+        ((_, words, p),) = report_page.test_rows(document)
+        assert (words, p) == (report_page.TESTS[name], "0.5")
+    assert_shows(report_page.false_alarms(given), [given["gap"]["false_alarm_rate"]])
 
 
 def test_the_uncertainty_budget(given: Document) -> None:
     shares = {"noise": 0.36, "misfit": 0.64, "air density": 0.0}
     after = {"cn_beta": {"value": 0.4789, "std": 0.0013, "unit": "1/rad", "shares": shares}}
-    heads, rows = provenance.budget(given | {"coefficients": given["coefficients"] | {"after": after}})
+    heads, rows = report_page.budget(given | {"coefficients": given["coefficients"] | {"after": after}})
     assert heads == ["Cnβ [1/rad]"]
     found = dict(rows)
     assert_shows(found["noise of the readings"], [0.6 * 0.0013, 36.0])
     assert_shows(found["what the model leaves unexplained"], [0.8 * 0.0013, 64.0])
     assert found["rounding of the stated air density"] == "–"
     assert_shows(found["combined standard deviation"], [0.0013])
-    assert provenance.budget(given) == ([], [])
+    assert report_page.budget(given) == ([], [])
 
 
 @pytest.mark.parametrize(
@@ -295,8 +296,8 @@ def test_excesses(value: float, text: str) -> None:
 
 def test_a_line_cannot_hold_more_than_all() -> None:
     line = {"run": "alpha", "frequency_hz": 50.0, "amplitude_rad": 1e-3, "share": 1.3}
-    assert view_detail.line_rows({"maps": {"lines": [line]}})[0]["share"] == "100 %"
-    assert view_detail.line_rows({"maps": None}) == []
+    assert view.line_rows({"maps": {"lines": [line]}})[0]["share"] == "100 %"
+    assert view.line_rows({"maps": None}) == []
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,10 @@ import polars as pl
 import pytest
 
 from identification.estimators import ALL_ESTIMATORS
-from tunnel_lab.scoring.breakdown_view import breakdown_figure, exceeding
-from tunnel_lab.scoring.figures import cell_labels, score_figure
-from tunnel_lab.scoring.grid import Cell
-from tunnel_lab.scoring.results import packaged_baseline, packaged_breakdown
+from tunnel_lab.experiments.breakdown import breakdown_figure, exceeding, packaged_breakdown
+from tunnel_lab.experiments.score_grid import Cell
+from tunnel_lab.experiments.score_trials import packaged_baseline
+from tunnel_lab.experiments.score_view import cell_labels, score_figure
 from tunnel_sim.effects import ALL_EFFECTS
 
 

@@ -8,10 +8,10 @@ import pytest
 
 from identification.scoring.accuracy import score
 from tests.reference.free_decays import damped_cosine
-from tunnel_lab.scoring import work
-from tunnel_lab.scoring.draw import draw_trial
-from tunnel_lab.scoring.grid import Cell, Grid, load_grid, packaged_grid
-from tunnel_lab.scoring.results import Results, read_trials, scores_frame, write_trials
+from tunnel_lab.experiments import score_trials
+from tunnel_lab.experiments.score_grid import Cell, Grid, draw_trial, load_grid, packaged_grid
+from tunnel_lab.experiments.score_trials import Results, read_trials, write_trials
+from tunnel_lab.experiments.score_view import scores_frame
 from tunnel_sim.vocabulary.errors import TunnelError
 
 HEAD = 'schema_version = 1\nname = "g"\nseed = 1\ntrials = 4\n'
@@ -97,9 +97,9 @@ def test_the_bound_is_that_of_the_start_actually_released():
 def test_the_number_of_processes_changes_no_bit_and_an_interruption_costs_little(
     small, tmp_path, monkeypatch
 ):
-    here = work.score_grid(small, NAMES, jobs=0)
+    here = score_trials.score_grid(small, NAMES, jobs=0)
     reported = []
-    there = work.score_grid(
+    there = score_trials.score_grid(
         small, NAMES, jobs=2, parts=tmp_path / "parts", progress=lambda *now: reported.append(now)
     )
     assert timeless(here) == timeless(there)
@@ -108,17 +108,19 @@ def test_the_number_of_processes_changes_no_bit_and_an_interruption_costs_little
     # All is kept: going on estimates nothing again, unless the seed is another or a part was spoilt.
     (tmp_path / "parts" / "c0001-t00000.json").write_text('{"fingerprint": ')
     done = []
-    real = work.score_unit
-    monkeypatch.setattr(work, "score_unit", lambda *given: done.append(given[-1].name) or real(*given))
-    again = work.score_grid(small, NAMES, jobs=0, parts=tmp_path / "parts")
+    real = score_trials.score_unit
+    monkeypatch.setattr(
+        score_trials, "score_unit", lambda *given: done.append(given[-1].name) or real(*given)
+    )
+    again = score_trials.score_grid(small, NAMES, jobs=0, parts=tmp_path / "parts")
     assert timeless(again) == timeless(here)
     assert done == ["c0001-t00000"]
-    work.score_grid(replace(small, seed=2), NAMES, jobs=0, parts=tmp_path / "parts")
+    score_trials.score_grid(replace(small, seed=2), NAMES, jobs=0, parts=tmp_path / "parts")
     assert len(done) == 5
 
 
 def test_slow_methods_see_the_first_trials(small):
-    rows = work.score_grid(replace(small, trials_of=(("conventional", 2),)), NAMES, jobs=0)
+    rows = score_trials.score_grid(replace(small, trials_of=(("conventional", 2),)), NAMES, jobs=0)
     assert {row["trial"] for row in rows} == {0, 1}
 
 
@@ -129,14 +131,14 @@ def test_an_estimator_that_raises_is_a_failure_that_is_named(small, monkeypatch)
         raise np.linalg.LinAlgError("singular")
 
     monkeypatch.setattr(Conventional, "estimate", fall)
-    results = Results(small, NAMES, tuple(work.score_grid(small, NAMES, jobs=0)))
+    results = Results(small, NAMES, tuple(score_trials.score_grid(small, NAMES, jobs=0)))
     assert results.raised() == {"conventional": ["LinAlgError"]}
     assert {trials.failures for trials in results.trials().values()} == {4}
     assert scores_frame(results)["failure_share"].to_list() == [1.0] * 12
 
 
 def test_trials_survive_the_disk(small, tmp_path):
-    results = Results(small, NAMES, tuple(work.score_grid(small, NAMES, jobs=0)))
+    results = Results(small, NAMES, tuple(score_trials.score_grid(small, NAMES, jobs=0)))
     again = read_trials(write_trials(tmp_path / "trials.parquet", results))
     assert again.rows == results.rows
     assert (again.grid, again.estimators) == (small, NAMES)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.scoring.accuracy import Trials, score
-from tunnel_lab.scoring.tables import _cell, _summary
+from tunnel_lab.experiments.score_view import cell_figures, pooled_figures
 
 
 def trials(errors: list[float], failures: int = 0, *, bound: bool = True) -> Trials:
@@ -16,7 +16,7 @@ def trials(errors: list[float], failures: int = 0, *, bound: bool = True) -> Tri
 
 
 def test_cells_are_pooled_in_units_of_their_bounds() -> None:
-    rmse, worst, bias, covered, failed = _summary([trials([1.0, -1.0, 3.0]), trials([2.0, 2.0], 1)])
+    rmse, worst, bias, covered, failed = pooled_figures([trials([1.0, -1.0, 3.0]), trials([2.0, 2.0], 1)])
     assert float(rmse.partition("(")[0]) == pytest.approx(((11.0 / 3.0 + 4.0) / 2.0) ** 0.5, abs=0.05)
     assert float(worst) == 2.0
     assert float(bias.partition("(")[0]) == pytest.approx(1.4, abs=0.05)  # 1.4 ± 0.68
@@ -25,19 +25,19 @@ def test_cells_are_pooled_in_units_of_their_bounds() -> None:
 
 
 def test_what_a_cell_does_not_give_is_a_dash() -> None:
-    assert _summary([trials([1.0, 2.0], bound=False)])[:3] == ("–", "–", "–")
-    assert _summary([trials([], 3)]) == ("–", "–", "–", "–", "100 (44–100)")
-    assert _cell(score(trials([], 2)))[:4] == ("–", "–", "–", "–")
-    assert _cell(score(trials([1.0, 1.0, 1.0])))[3:] == ("100 (44–100)", "0")
+    assert pooled_figures([trials([1.0, 2.0], bound=False)])[:3] == ("–", "–", "–")
+    assert pooled_figures([trials([], 3)]) == ("–", "–", "–", "–", "100 (44–100)")
+    assert cell_figures(score(trials([], 2)))[:4] == ("–", "–", "–", "–")
+    assert cell_figures(score(trials([1.0, 1.0, 1.0])))[3:] == ("100 (44–100)", "0")
 
 
 def test_two_trials_have_a_bias_and_one_has_none() -> None:
-    assert float(_summary([trials([1.0, 2.0])])[2].partition("(")[0]) == pytest.approx(1.5, abs=0.05)
-    assert _summary([trials([1.0])])[2] == "–"
+    assert float(pooled_figures([trials([1.0, 2.0])])[2].partition("(")[0]) == pytest.approx(1.5, abs=0.05)
+    assert pooled_figures([trials([1.0])])[2] == "–"
 
 
 def test_a_cell_has_its_bias_in_per_cent_and_in_deviations() -> None:
-    over_bound, per_cent, deviations, *_ = _cell(score(trials([1.0, 2.0, 3.0])))
+    over_bound, per_cent, deviations, *_ = cell_figures(score(trials([1.0, 2.0, 3.0])))
     assert float(over_bound.partition("(")[0]) == pytest.approx((14.0 / 3.0) ** 0.5, abs=0.05)
     assert float(per_cent.partition("(")[0]) == pytest.approx(10.0, abs=0.5)
     assert float(deviations.partition("(")[0]) == pytest.approx(2.0, abs=0.05)

@@ -11,8 +11,8 @@ from diagnosis.closure import Rest, Step, Waterfall
 from diagnosis.decision import decision
 from diagnosis.printing import gap_table, parameters_table
 from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
-from tunnel_lab.diagnosis_view import view
-from tunnel_lab.diagnosis_view.page import render_report
+from tunnel_lab.report import view
+from tunnel_lab.report.page import render_report
 
 
 def gap(*held_out: bool) -> GapSummary:

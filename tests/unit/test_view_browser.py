@@ -17,7 +17,7 @@ import pytest
 from matplotlib import image
 
 from tests.unit.browser import IN_A_BROWSER, chromium
-from tunnel_lab.show.web import _free_port
+from tunnel_lab.show.live import _free_port
 
 pytestmark = IN_A_BROWSER
 WIDTH, HEIGHT = 900, 600

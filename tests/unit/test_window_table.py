@@ -10,7 +10,7 @@ import pytest
 from docs.studies.window_rivals import diagnose_windows
 from docs.studies.window_table import Columns, read_table, rig_state, simulate_windows
 from identification.datasets import WindowRow, paper_windows
-from tunnel_lab.paper.network_study import infer_springs
+from tunnel_lab.paper.networks import infer_springs
 from tunnel_sim.effects import effect_from
 from tunnel_sim.effects.coulomb_friction import CoulombFriction
 from tunnel_sim.effects.cubic_stiffness import CubicStiffness

@@ -295,7 +295,7 @@ def test_a_table_is_written_by_its_library(tmp_path: Path) -> None:
 
 
 def test_a_report_that_cannot_be_drawn_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from tunnel_lab.diagnosis_view import page
+    from tunnel_lab.report import page
 
     def fails(*_: object) -> str:
         raise ValueError("no such glyph")

@@ -1,18 +1,28 @@
-"""Parts that several pages share: the frame with the stages, errors, tables and links."""
+"""Parts that several pages share: the frame with the stages, errors, tables, links, charts and the drop zone."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html import escape
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from nicegui import ui
+from nicegui import events, ui
 
 from identification.printing.table import TextTable, as_html
-from tunnel_lab.bench.stages import STAGES, closed
-from tunnel_lab.bench.workspace import Session
+from tunnel_lab.bench.workspace import (
+    STAGES,
+    Session,
+    closed,
+    safe_name,
+)
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 
 _THEME = "bench-theme"
 _HEAD = """
@@ -62,7 +72,15 @@ class Frame:
         self.steps.clear()
         with self.steps, ui.element("ol"):
             for number, stage in enumerate(STAGES, 1):
-                _step(self._session, stage.key, f"{number} {stage.title}", here=stage.key == self._stage)
+                text = f"{number} {stage.title}"
+                why = _closed(self._session, stage.key)
+                with ui.element("li"):
+                    if stage.key == self._stage:
+                        ui.link(text, address(self._session, stage.key)).props("aria-current=step")
+                    elif why:
+                        ui.html(text, sanitize=False, tag="span").props("aria-disabled=true").tooltip(why)
+                    else:
+                        ui.link(text, address(self._session, stage.key))
 
     def way_on(self) -> None:
         """A link to the next stage, where it is open."""
@@ -80,17 +98,6 @@ def _closed(session: Session, key: str) -> str:
         return closed(session, key)
     except TunnelError as error:
         return str(error)
-
-
-def _step(session: Session, key: str, text: str, *, here: bool) -> None:
-    why = _closed(session, key)
-    with ui.element("li"):
-        if here:
-            ui.link(text, address(session, key)).props("aria-current=step")
-        elif why:
-            ui.html(text, sanitize=False, tag="span").props("aria-disabled=true").tooltip(why)
-        else:
-            ui.link(text, address(session, key))
 
 
 def _theme_button() -> None:
@@ -164,7 +171,103 @@ def button(text: str, action: Callable[[], object], *, main: bool = False) -> ui
     Args:
         main: whether it is the way on.
     """
-    found = ui.element("button").props("type=button").classes("button go" if main else "button")
-    with found:
+    element = ui.element("button").props("type=button").classes("button go" if main else "button")
+    with element:
         ui.html(escape(text), sanitize=False, tag="span")
-    return found.on("click", action)
+    return element.on("click", action)
+
+
+class Chart(ui.element, component="static/chart.js"):
+    """The chart.
+
+    Args:
+        title: what it shows, for a screen reader too.
+        x: label of the abscissa, with its unit.
+        y: label of the ordinate, with its unit.
+        series: labels of the curves and the names of their colours (``before``, ``after``, ``soft``, …).
+        data: abscissas and the ordinates of every curve; None is a gap.
+        moved: called with the id of a mark and where it was moved, in the unit of its axis; may be awaitable.
+    """
+
+    def __init__(
+        self,
+        title: str,
+        x: str,
+        y: str,
+        series: Sequence[tuple[str, str]],
+        data: Sequence[Sequence[float | None]],
+        moved: Callable[[str, float], Any] | None = None,
+    ) -> None:
+        super().__init__()
+        self._props.update(title=title, x=x, y=y, series=[list(curve) for curve in series], data=data)
+        self._props.update(marks=[])
+        self.classes("chart")
+        if moved is not None:
+            self.on("moved", lambda event: moved(str(event.args["id"]), float(event.args["at"])))
+
+    def show(self, data: Sequence[Sequence[float | None]]) -> None:
+        """Show other curves of the same labels."""
+        self._props["data"] = data
+        self.update()
+
+    def show_marks(self, marks: Sequence[Mapping[str, Any]]) -> None:
+        """Show marks.
+
+        Args:
+            marks: ``id``, ``label``, ``kind``, ``at`` and its ``unit`` of each. A ``start`` or an ``end`` is on the
+                abscissa. A ``rest`` is on the ordinate, drawn from ``from`` to ``to`` with the words ``about``.
+        """
+        self._props.update(marks=[dict(mark) for mark in marks])
+        self.update()
+
+
+def too_large(size: int) -> str:
+    """Why an upload is refused.
+
+    Args:
+        size: of it, bytes.
+    """
+    return (
+        f"{size / 1e6:.0f} MB are more than the {UPLOAD_BYTES / 1e6:.0f} MB of an upload; "
+        "use tunnel import, or drop fewer files at a time"
+    )
+
+
+def drop_zone(dropped: events.Handler[events.MultiUploadEventArguments], fault: Fault) -> None:
+    """A place to drop files on, or to choose them with.
+
+    Args:
+        dropped: called with the files of a drop together.
+        fault: where a refusal is shown.
+    """
+    limit = f"at most {UPLOAD_BYTES / 1e6:.0f} MB"
+    zone = ui.upload(
+        label=f"Drop files here, or press + to choose ({limit})",
+        multiple=True,
+        auto_upload=True,
+        max_total_size=UPLOAD_BYTES - 1_000_000,  # less the frame of the request
+        on_multi_upload=dropped,
+    )
+    zone.classes("drop").props('flat bordered aria-label="Files of a data logger"')
+    # The browser knows the size before it sends anything.
+    zone.on(
+        "rejected",
+        lambda event: fault.show(too_large(int(event.args))),
+        js_handler="(found) => emit(found.reduce((sum, one) => sum + one.file.size, 0))",
+    )
+
+
+async def keep(session: Session, given: events.MultiUploadEventArguments) -> None:
+    """Keep dropped files under safe names; a file of the same name is replaced.
+
+    Args:
+        given: the drop.
+    """
+    from tunnel_sim.files.writing import output_folder, write_whole
+
+    target = output_folder(session.uploads)
+    names = [safe_name(file.name) for file in given.files]
+    if len(set(names)) < len(names):
+        raise TunnelError("two files of one name were dropped", remedy="rename one, or drop them separately")
+    for name, file in zip(names, given.files, strict=True):
+        write_whole(target / name, await file.read())

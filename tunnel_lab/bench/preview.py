@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import tomli_w
+from nicegui import events, ui
 
+from tunnel_lab.bench.parts import show_command
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
 from tunnel_sim.files.toml_input import validate
@@ -21,8 +23,10 @@ if TYPE_CHECKING:
     from tunnel_sim.files.importing.records import Imported, Part
     from tunnel_sim.vocabulary.record import Array
 
+
 MOST_RECORDS = 24
 """At most this many records are drawn."""
+Changed = Callable[[str, Any], Awaitable[None]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +112,9 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
     """
     choices = choices_of(session)
     now = choices.stretch_of(mark.file, mark.run)
-    others = [one for one in choices.stretches if (one.file, one.run) != (mark.file, mark.run)]
+    others = [
+        stretch for stretch in choices.stretches if (stretch.file, stretch.run) != (mark.file, mark.run)
+    ]
     stated = now.model_dump() | dict(places)
     first = mark.start if stated["start"] is None else stated["start"]
     last = mark.end if stated["end"] is None else stated["end"]
@@ -118,7 +124,7 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
             where=f"run '{mark.run}'",
             remedy="move one of them",
         )
-    state(session, {"stretches": [*(one.model_dump() for one in others), stated]})
+    state(session, {"stretches": [*(stretch.model_dump() for stretch in others), stated]})
 
 
 def read(session: Session) -> Imported:
@@ -171,7 +177,7 @@ def points(time: Array, reading: Array) -> tuple[list[float], list[float | None]
     Returns:
         Times and readings, few enough to draw; None within a gap.
     """
-    from tunnel_lab.plotting.import_figure import thinned
+    from tunnel_lab.plotting.runs import thinned
 
     when, values = thinned(time, reading)
     return when.tolist(), [None if isnan(value) else value for value in values.tolist()]
@@ -203,3 +209,67 @@ def _rest(part: Part, unit: str) -> tuple[float, str]:
         return centre.zero, f"{with_std(centre.zero, centre.std)} {unit}, found"
     end = float(np.median(part.reading[-max(part.reading.size // 10, 2) :]))
     return end, f"about {significant(end, 2)} {unit}, found"
+
+
+class ChoicesPart:
+    """The fields.
+
+    Args:
+        session: whose files they are about.
+        columns: names of the columns in the files.
+        changed: called with the name of a choice and its new value; None: found from the files.
+    """
+
+    def __init__(self, session: Session, columns: list[str], changed: Changed) -> None:
+        from tunnel_sim.files.importing.units import UNITS
+
+        self._now = choices_of(session)
+        self._changed = changed
+        angle = [unit for kind, units in UNITS.items() if kind != "time" for unit in units]
+        with ui.element("div").classes("fields"):
+            self._select("angle", "Column of the angle", columns, several=True)
+            self._select("unit", "Unit of the angle", angle)
+            self._select("time", "Column of the times", columns)
+            self._select("time_unit", "Unit of the times", list(UNITS["time"]))
+            self._number("rate", "Sample rate, where there are no times [Hz]")
+            self._number("counts_per_turn", "Counts of an encoder per turn")
+            self._text("calibration", "Angle of a voltage, such as 0.1 + 20*V")
+            self._number("start", "Leave out samples before [s]")
+            self._number("end", "Leave out samples after [s]")
+            self._number("rest", "Reading at rest of every run, to be subtracted [rad]")
+            self._text("name", "Conditions in the file names, such as S{spring}_V{wind_speed}_*")
+            ui.checkbox(
+                "Cut records at releases", value=self._now.cut, on_change=lambda e: changed("cut", e.value)
+            )
+        show_command(
+            f"tunnel import {session.uploads}/* --recipe {session.choices} --out {session.campaign} --yes"
+        )
+
+    def _select(self, key: str, label: str, options: list[str], *, several: bool = False) -> None:
+        now = getattr(self._now, key)
+        value = list(now) if several else now
+        shown = [
+            *options,
+            *(choice for choice in (value if several else [value]) if choice and choice not in options),
+        ]
+
+        async def change(event: events.ValueChangeEventArguments[Any]) -> None:
+            await self._changed(key, event.value or (() if several else None))
+
+        ui.select(shown, label=label, value=value, multiple=several, clearable=True, on_change=change).props(
+            "dense"
+        )
+
+    def _number(self, key: str, label: str) -> None:
+        async def change() -> None:
+            await self._changed(key, field.value)
+
+        field = ui.number(label, value=getattr(self._now, key)).props("dense step=any")
+        field.on("change", change)
+
+    def _text(self, key: str, label: str) -> None:
+        async def change() -> None:
+            await self._changed(key, field.value or None)
+
+        field = ui.input(label, value=getattr(self._now, key) or "").props("dense")
+        field.on("change", change)

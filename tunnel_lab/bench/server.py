@@ -1,23 +1,38 @@
-"""The server of the bench, on the loopback interface only."""
+"""The server of the bench, on the loopback interface only: who may use it, and its addresses."""
 
 from __future__ import annotations
 
 import asyncio
+import hmac
+import re
 import secrets
 import socket
 from contextlib import suppress
-from importlib import resources
+from dataclasses import dataclass
+from importlib import import_module, resources
 from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import parse_qsl, quote, urlencode
 
-from nicegui import app, background_tasks, core, ui
+from fastapi.responses import FileResponse
+from nicegui import app, background_tasks, core, events, ui
 
-from tunnel_lab.bench import hand, work
-from tunnel_lab.bench.guard import Guard
-from tunnel_lab.bench.pages import add_pages
+from tunnel_lab.bench import work
+from tunnel_lab.bench.parts import Fault, Frame, address, drop_zone, keep, too_large
+from tunnel_lab.bench.workspace import STAGES, Session, Stage, closed, new_session, open_session, sessions
 from tunnel_lab.terminal.tables import say
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from starlette.types import ASGIApp, Receive, Scope, Send
+
 
 HOST = "127.0.0.1"
+_LENGTH = re.compile(r"[0-9]{1,20}")
+_HEADERS = [(b"content-type", b"text/plain; charset=utf-8"), (b"cache-control", b"no-store")]
 
 
 def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
@@ -36,14 +51,27 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
     address = f"{first}?token={token}"
     core.app.add_middleware(Guard, port=port, token=token)
     static = resources.files("tunnel_lab")
-    for name, place in (("bench", "bench/static"), ("uplot", "diagnosis_view/vendor")):
+    for name, place in (("bench", "bench/static"), ("uplot", "report/vendor")):
         app.add_static_files(f"/static/{name}", str(static.joinpath(place)))
     add_pages(folder)
     words = f"The bench: http://{HOST}:{port}{address}\nCampaigns: {folder.resolve()}\nCtrl-C ends it."
     app.on_startup(lambda: background_tasks.create(_say_when_open(port, words)))
     app.on_shutdown(_end)
     with suppress(KeyboardInterrupt):  # the usual end
-        _run(port, address if browser else "")
+        icon = resources.files("tunnel_lab").joinpath("bench/static/favicon.svg")
+        ui.run(
+            host=HOST,
+            port=port,
+            title="Bench of the virtual wind tunnel",
+            favicon=icon.read_text("utf-8"),
+            dark=None,
+            reload=False,
+            show=address if browser else False,
+            show_welcome_message=False,
+            tailwind=False,
+            storage_secret=None,
+            language="en-GB",
+        )
 
 
 async def _say_when_open(port: int, words: str) -> None:
@@ -59,25 +87,8 @@ async def _say_when_open(port: int, words: str) -> None:
 
 async def _end() -> None:
     """End what was started: the user has ended the bench, it has not crashed."""
-    hand.end()
+    work.end_fits()
     await asyncio.to_thread(work.stop_all)
-
-
-def _run(port: int, shown: str) -> None:
-    icon = resources.files("tunnel_lab").joinpath("bench/static/favicon.svg")
-    ui.run(
-        host=HOST,
-        port=port,
-        title="Bench of the virtual wind tunnel",
-        favicon=icon.read_text("utf-8"),
-        dark=None,
-        reload=False,
-        show=shown or False,
-        show_welcome_message=False,
-        tailwind=False,
-        storage_secret=None,
-        language="en-GB",
-    )
 
 
 def _free_port(port: int) -> int:
@@ -97,3 +108,170 @@ def _free_port(port: int) -> int:
                 remedy="name another one, or leave it out",
             ) from error
         return int(trial.getsockname()[1])
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a request is not answered.
+
+    Args:
+        status: of HTTP (count).
+        words: one line.
+    """
+
+    status: int
+    words: str
+
+
+class Guard:
+    """Lets only the bench's own pages through.
+
+    Args:
+        app: what is guarded.
+        port: of the server (count).
+        token: secret of this start of the server.
+    """
+
+    def __init__(self, app: ASGIApp, port: int, token: str) -> None:
+        self._app = app
+        self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
+        self._token = token
+        self._cookie = f"tunnel-bench-{port}"  # cookies do not distinguish ports
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+        query = dict(parse_qsl(scope.get("query_string", b"").decode("latin-1")))
+        refusal = self._refusal(headers, query)
+        if refusal is not None:
+            await _refuse(scope, send, refusal)
+        elif "token" in query and scope["type"] == "http" and scope["method"] == "GET":
+            await self._welcome(scope, query, send)
+        else:
+            await self._app(scope, receive, send)
+
+    def _refusal(self, headers: Mapping[str, str], query: Mapping[str, str]) -> Refusal | None:
+        host, origin = headers.get("host", ""), headers.get("origin")
+        if host not in self._hosts:
+            return Refusal(
+                421, "This is the bench of another address; use the one that tunnel bench printed."
+            )
+        if origin is not None and origin != f"http://{host}":
+            return Refusal(403, "The request comes from another page; use the bench itself.")
+        given = query.get("token") or _cookies(headers.get("cookie", "")).get(self._cookie, "")
+        if not hmac.compare_digest(given.encode(), self._token.encode()):
+            return Refusal(
+                403, "The token is missing or old; use the whole address that tunnel bench printed."
+            )
+        length = headers.get("content-length", "0")
+        if "transfer-encoding" in headers or not _LENGTH.fullmatch(length):
+            return Refusal(411, "The length of the request is not stated.")
+        if int(length) > UPLOAD_BYTES:
+            return Refusal(413, too_large(int(length)))
+        return None
+
+    async def _welcome(self, scope: Scope, query: dict[str, str], send: Send) -> None:
+        """Move the token from the address into a cookie, so that it is in no history or bookmark."""
+        rest = urlencode({name: value for name, value in query.items() if name != "token"})
+        # The path cannot name another host or end the header.
+        path = "/" + quote(scope["path"].lstrip("/\\"), errors="replace")
+        place = path + (f"?{rest}" if rest else "")
+        cookie = f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+        headers = [*_HEADERS, (b"location", place.encode()), (b"set-cookie", cookie.encode())]
+        await send({"type": "http.response.start", "status": 303, "headers": headers})
+        await send({"type": "http.response.body", "body": b""})
+
+
+def _cookies(header: str) -> dict[str, str]:
+    pairs = (part.strip().partition("=") for part in header.split(";"))
+    return {name: value for name, _, value in pairs}
+
+
+async def _refuse(scope: Scope, send: Send, refusal: Refusal) -> None:
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": 1008, "reason": refusal.words[:120]})
+        return
+    headers = [*_HEADERS, (b"connection", b"close")]  # what is left of the request is not read
+    await send({"type": "http.response.start", "status": refusal.status, "headers": headers})
+    await send({"type": "http.response.body", "body": f"{refusal.words}\n".encode()})
+
+
+def add_pages(folder: Path) -> None:
+    """Add the pages of a workspace."""
+
+    @ui.page("/")
+    def first() -> None:
+        frame = Frame("From a logger's files to a report")
+        with frame.main:
+            build_start(folder)
+
+    @ui.page("/try")
+    def rig() -> None:
+        frame = Frame("Try it")
+        with frame.main:
+            import_module("tunnel_lab.bench.try_it").build(folder)
+
+    @app.get("/{name}/report.html")
+    def report(name: str) -> FileResponse:
+        session = open_session(folder, name)
+        return FileResponse(session.report, headers={"cache-control": "no-store"})
+
+    @ui.page("/{name}/{stage}")
+    def stage(name: str, stage: str) -> None:
+        try:
+            session = open_session(folder, name)
+            opened = {each.key: each for each in STAGES}.get(stage, STAGES[0])
+            frame = Frame(opened.title, session, opened.key)
+            with frame.main:
+                why = closed(session, opened.key)
+                if why:
+                    ui.label(why).classes("fault")
+                    ui.link("Back to the records", address(session, "records")).classes("button")
+                else:
+                    # Only here: the first page need not wait for what the stages load.
+                    module, _, build = opened.builder.partition(".")
+                    getattr(import_module(f"tunnel_lab.bench.{module}"), build)(session, frame)
+        except TunnelError as error:
+            ui.label(f"tunnel: {error}").classes("fault")
+            ui.link("All campaigns", "/")
+
+
+def build_start(folder: Path) -> None:
+    """Build the page."""
+    ui.label("Drop the files of a data logger. Every step writes the files that the commands write.").classes(
+        "lede"
+    )
+    fault = Fault()
+
+    async def dropped(given: events.MultiUploadEventArguments) -> None:
+        with fault.around():
+            session = new_session(folder, given.files[0].name)
+            await keep(session, given)
+            ui.navigate.to(address(session, "records"))
+
+    drop_zone(dropped, fault)
+    place = folder if folder.name else folder.resolve()
+    ui.label(f"Dropped files are kept in {place}, in a folder of their own beside the campaign.").classes(
+        "soft"
+    )
+    campaigns = sessions(folder)
+    if campaigns:
+        with ui.element("h2"):
+            ui.html("Campaigns here", sanitize=False, tag="span")
+        with ui.element("ul").classes("sessions"):
+            for session in campaigns:
+                with ui.element("li"):
+                    stage = _furthest(session)
+                    ui.link(session.name, address(session, stage.key))
+                    ui.label(f"open up to {stage.title}").classes("soft")
+
+
+def _furthest(session: Session) -> Stage:
+    """The last stage that is open."""
+    try:
+        return [stage for stage in STAGES if not closed(session, stage.key)][-1]
+    except TunnelError:
+        return STAGES[0]

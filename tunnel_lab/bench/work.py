@@ -1,11 +1,13 @@
-"""A command of ``tunnel`` in a process of its own, which outlives a page and a crash of the server.
+"""Work of the bench in processes of their own: commands of ``tunnel``, and fits with causes chosen by hand.
 
-Its log says everything about it: the command and the process in the first line, what the command prints, and its
-exit status in the last line. The process holds a lock on the log, so that any server sees whether it still runs.
+A command outlives a page and a crash of the server. Its log says everything about it: the command and the process
+in the first line, what the command prints, and its exit status in the last line. The process holds a lock on the
+log, so that any server sees whether it still runs. The process of the fits keeps those made so far.
 """
 
 from __future__ import annotations
 
+import asyncio
 import os
 import re
 import signal
@@ -13,16 +15,29 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import cache, lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from tunnel_sim.processes import Worker
 from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from diagnosis.by_hand import ByHand, Closure
+
 
 _FIRST = re.compile(r"\$ (?P<command>.*) \(process (?P<process>\d+), started (?P<started>\S+)\)")
 _LAST = re.compile(r"exit status (?P<status>-?\d+)")
 _PAUSED, _GOES_ON = "paused", "goes on"
 _PATIENCE_S = 3.0  # for a command to end by itself
 _started: dict[Path, subprocess.Popen[bytes]] = {}
+Given = ParamSpec("Given")
+ResultT = TypeVar("ResultT")
+State = tuple[tuple[str, int, int], ...]
 
 
 @dataclass(frozen=True)
@@ -54,8 +69,8 @@ class Work:
             return (
                 "" if self.running or not self.command or self.status == 0 else "It was ended from outside."
             )
-        said = [line.removeprefix("tunnel: ") for line in self.lines if line.startswith("tunnel: ")]
-        return said[-1] if said else f"It ended with exit status {self.status}."
+        errors = [line.removeprefix("tunnel: ") for line in self.lines if line.startswith("tunnel: ")]
+        return errors[-1] if errors else f"It ended with exit status {self.status}."
 
 
 def work_of(log: Path) -> Work:
@@ -94,7 +109,7 @@ def start(words: Sequence[str], log: Path) -> None:
     if work_of(log).running or (child is not None and child.poll() is None):
         raise TunnelError("is running already", where=words[0], remedy="wait for it, or stop it")
     log.write_bytes(b"")
-    arguments = [sys.executable, "-m", __name__, str(log), *words]
+    arguments = [sys.executable, "-m", "tunnel_lab.logged", str(log), *words]
     _started[log] = subprocess.Popen(arguments, stdin=subprocess.DEVNULL, start_new_session=True)
     deadline = time.monotonic() + 30.0
     while not work_of(log).command and _started[log].poll() is None and time.monotonic() < deadline:
@@ -157,25 +172,71 @@ def _is_locked(log: Path) -> bool:
     return False
 
 
-def _run(log: Path, words: Sequence[str]) -> int:
-    """Run a command with everything it prints in the log, and the lock on it."""
-    import fcntl
-    import shlex
-    from datetime import datetime
+async def closure(campaign: Path, state: State, effects: Sequence[str], *, converged: bool) -> Closure:
+    """How far the gap closes with effects chosen by hand.
 
-    stream = log.open("a")
-    fcntl.flock(stream, fcntl.LOCK_EX)
-    for descriptor in (1, 2):
-        os.dup2(stream.fileno(), descriptor)
-    now = datetime.now().astimezone().isoformat(timespec="seconds")
-    print(f"$ {shlex.join(['tunnel', *words])} (process {os.getpid()}, started {now})", flush=True)
-    from tunnel_lab.cli import main
+    Args:
+        campaign: its folder.
+        state: of its files; fits of another state are not used.
+        converged: whether the fit frees their forms and goes on until it has converged.
 
-    status = main(words)
-    sys.stdout.flush()
-    print(f"exit status {status}", flush=True)
-    return status
+    Raises:
+        TunnelError: when the campaign cannot be read, or an effect cannot be fitted to it.
+    """
+    return await _in_fitter(_closure, campaign, state, tuple(sorted(effects)), converged)
 
 
-if __name__ == "__main__":
-    sys.exit(_run(Path(sys.argv[1]), sys.argv[2:]))
+async def next_run(
+    campaign: Path, state: State, first: Sequence[str], second: Sequence[str]
+) -> dict[str, Any] | None:
+    """The run that would distinguish two sets of effects; None in normalised form.
+
+    Args:
+        campaign: its folder.
+        state: of its files.
+        first: names of effects.
+        second: names of their rivals.
+
+    Raises:
+        TunnelError: as `closure`.
+    """
+    answers = (tuple(sorted(first)), tuple(sorted(second)))
+    return await _in_fitter(_next_run, campaign, state, *answers)
+
+
+async def _in_fitter(work: Callable[Given, ResultT], *given: Given.args, **named: Given.kwargs) -> ResultT:
+    try:
+        return await asyncio.wrap_future(_fitter().submit(work, *given, **named))
+    except BrokenProcessPool:
+        _fitter.cache_clear()
+        raise TunnelError("the fitting process was ended from outside", remedy="try again") from None
+
+
+@cache
+def _fitter() -> Worker:
+    return Worker()
+
+
+def end_fits() -> None:
+    """End the process, also in the middle of a fit."""
+    if _fitter.cache_info().currsize:
+        _fitter().end()
+
+
+@lru_cache(maxsize=2)
+def _by_hand(campaign: Path, state: State) -> ByHand:
+    from diagnosis.by_hand import ByHand
+    from tunnel_sim.files.campaign_io import read_campaign
+
+    del state  # part of the key only
+    return ByHand(read_campaign(campaign))
+
+
+def _closure(campaign: Path, state: State, effects: tuple[str, ...], converged: bool) -> Closure:
+    return _by_hand(campaign, state).closure(effects, converged=converged)
+
+
+def _next_run(
+    campaign: Path, state: State, first: tuple[str, ...], second: tuple[str, ...]
+) -> dict[str, Any] | None:
+    return _by_hand(campaign, state).next_run(first, second)

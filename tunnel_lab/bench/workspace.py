@@ -1,17 +1,23 @@
-"""The files of the bench: campaigns in a folder, and beside each what belongs to it."""
+"""The files of the bench: campaigns in a folder, what belongs to each, and the stages that these files open."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
+from tunnel_lab.bench.work import work_of
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 
 CAMPAIGN_FILE = "campaign.toml"  # as in campaign_schema, which is slow to load
 _LONGEST = 80  # characters of a file name
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # devices of Windows
+ESTIMATOR = "output_error"
+"""The estimator whose estimate opens the diagnosis."""
 
 
 @dataclass(frozen=True)
@@ -85,13 +91,13 @@ class Session:
 
 def sessions(folder: Path) -> list[Session]:
     """The sessions of a workspace, by name: campaigns, and dropped files that are not one yet."""
-    found = set()
+    names = set()
     for path in folder.iterdir():
         if (path / CAMPAIGN_FILE).is_file():
-            found.add(path.name)
+            names.add(path.name)
         elif path.name.endswith(".uploads") and path.is_dir():
-            found.add(path.name.removesuffix(".uploads"))
-    return [Session(folder, name) for name in sorted(found) if name == safe_name(name)]
+            names.add(path.name.removesuffix(".uploads"))
+    return [Session(folder, name) for name in sorted(names) if name == safe_name(name)]
 
 
 def open_session(folder: Path, name: str) -> Session:
@@ -103,14 +109,14 @@ def open_session(folder: Path, name: str) -> Session:
     Raises:
         TunnelError: when there is no such session.
     """
-    found = {session.name: session for session in sessions(folder)}
-    if name not in found:
+    by_name = {session.name: session for session in sessions(folder)}
+    if name not in by_name:
         raise TunnelError(
             f"there is no campaign '{one_line(name, 60)}'",
             where=str(folder),
             remedy="choose one on the first page",
         )
-    return found[name]
+    return by_name[name]
 
 
 def new_session(folder: Path, file_name: str) -> Session:
@@ -143,3 +149,93 @@ def safe_name(text: str) -> str:
         plain = f"{stem[: _LONGEST - 1 - len(ending)]}.{ending}"
     plain = plain[:_LONGEST].strip("._-") or "file"
     return f"file-{plain}" if _RESERVED.match(plain) else plain
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage.
+
+    Args:
+        key: in addresses.
+        title: of the page.
+        builder: module of this package and its function that builds the page.
+    """
+
+    key: str
+    title: str
+    builder: str
+
+
+STAGES = (
+    Stage("records", "Records", "records.build"),
+    Stage("conditions", "Conditions", "conditions.build"),
+    Stage("identify", "Identify", "identify.build"),
+    Stage("diagnose", "Diagnose", "diagnosis.build_diagnose"),
+    Stage("next-run", "Next run", "diagnosis.build_next_run"),
+    Stage("report", "Report", "diagnosis.build_report"),
+)
+
+
+def closed(session: Session, key: str) -> str:
+    """Why a stage cannot be opened.
+
+    Returns:
+        What to do first, in one line; empty where the stage is open.
+    """
+    place = [stage.key for stage in STAGES].index(key)
+    checks: tuple[Callable[[Session], str], ...] = (
+        lambda session: "" if session.imported else "Write the campaign on the page Records first.",
+        lambda session: "Correct the conditions that are marked first." if session.draft.is_file() else "",
+        _identified,
+        _diagnosed,
+        lambda _: "",
+    )
+    return next((why for check in checks[:place] if (why := check(session))), "")
+
+
+def _identified(session: Session) -> str:
+    document = read_result(session.estimate(ESTIMATOR))
+    if document is None or not is_current(session, session.estimate(ESTIMATOR)):
+        return f"Identify the campaign with {ESTIMATOR} first."
+    if work_of(session.log(ESTIMATOR)).status == 1:
+        return "The campaign could not be identified; the page Identify says why."
+    return ""
+
+
+def _diagnosed(session: Session) -> str:
+    if read_result(session.diagnosis) is None or not is_current(session, session.diagnosis):
+        return "Diagnose the campaign first."
+    return ""
+
+
+def is_current(session: Session, result: Path) -> bool:
+    """Whether a result is of the campaign as it is now."""
+    document = read_result(result)
+    if document is None:
+        return False
+    stated = document.get("provenance", {}).get("sha256")
+    if stated is not None:  # a copied folder has new times but the same content
+        return bool(stated == _hashes(session, session.state()))
+    return max(changed for _, changed, _ in session.state()) <= result.stat().st_mtime_ns
+
+
+@lru_cache(maxsize=16)
+def _hashes(session: Session, state: object) -> dict[str, str]:
+    """SHA-256 of the campaign's files; they are read again only when ``state`` has changed."""
+    from tunnel_lab.terminal.inputs import file_hashes
+
+    del state
+    return file_hashes(session.campaign)
+
+
+def read_result(path: Path) -> dict[str, Any] | None:
+    """The JSON document that a command has written; None where there is none.
+
+    Raises:
+        TunnelError: when the file is not such a document.
+    """
+    from tunnel_sim.files.reading import read_json
+
+    if not path.is_file():
+        return None
+    return read_json(path, remedy="delete it, and let the bench write it again")

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tunnel_lab.terminal.options import EffectsFileOption, split_names
-from tunnel_lab.terminal.table_format import with_format, with_quiet
+from tunnel_lab.terminal.options import EffectsFileOption, split_names, with_format, with_quiet
 
 if TYPE_CHECKING:
     from diagnosis.blind import Score
@@ -176,7 +175,7 @@ def score(
     """
     from diagnosis import vocabulary
     from diagnosis.blind import score_set
-    from tunnel_lab.diagnosis_view import blind_page
+    from tunnel_lab.report import blind
     from tunnel_lab.terminal.options import refuse_unwritable_files
     from tunnel_lab.terminal.tables import say_written
     from tunnel_sim.files.writing import write_json, write_whole
@@ -187,35 +186,35 @@ def score(
     refuse_unwritable_files(markdown, json, figure)
     if figure is not None and figure.suffix != ".png":
         raise TunnelError("is not a .png", where=f"--figure {figure}", remedy="name a file that ends in .png")
-    found = score_set(folder, excluded=names, key=key, effects_file=effects_file)
-    drawn = () if figure is None else _draw(found, figure)
+    result = score_set(folder, excluded=names, key=key, effects_file=effects_file)
+    drawn = () if figure is None else _draw(result, figure)
     if markdown is not None:
         addresses = [os.path.relpath(path, markdown.parent) for path in drawn[::2]] or ("", "")
-        write_whole(markdown, blind_page.markdown(found, str(folder), addresses).encode())
+        write_whole(markdown, blind.markdown(result, str(folder), addresses).encode())
     if json is not None:
-        write_json(json, found.to_json_dict())
-    _show(found)
+        write_json(json, result.to_json_dict())
+    _show(result)
     say_written(markdown, json, *drawn)
 
 
-def _show(found: Score) -> None:
+def _show(result: Score) -> None:
     """Print the score."""
-    from tunnel_lab.diagnosis_view import blind_page
+    from tunnel_lab.report import blind
     from tunnel_lab.terminal.tables import rich_table, say, show_tables
 
-    for line in blind_page.origin_lines(found):
+    for line in blind.origin_lines(result):
         say(line)
     say("")
-    for section in blind_page.sections(found):
+    for section in blind.sections(result):
         show_tables(rich_table(section))
         if section.note:
             say(section.note + "\n")
 
 
-def _draw(found: Score, path: Path) -> tuple[Path, ...]:
+def _draw(result: Score, path: Path) -> tuple[Path, ...]:
     """Draw the calibration and the confusion, each as a picture and for print."""
-    from tunnel_lab.diagnosis_view.blind_figures import calibration_figure, confusion_figure
-    from tunnel_lab.plotting.plots import save_both
+    from tunnel_lab.plotting.style import save_both
+    from tunnel_lab.report.blind import calibration_figure, confusion_figure
 
     beside = path.with_name(f"{path.stem}-confusion.png")
-    return (*save_both(calibration_figure(found), path), *save_both(confusion_figure(found), beside))
+    return (*save_both(calibration_figure(result), path), *save_both(confusion_figure(result), beside))

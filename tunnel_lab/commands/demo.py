@@ -90,17 +90,17 @@ def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
         A clause for each; the distance is checked for the maximum-likelihood estimator only, whose
         standard deviations should be exact.
     """
-    found = [f"{e.estimator}: {e.status.value}" for e in estimates if e.status.failed]
+    lines = [f"{e.estimator}: {e.status.value}" for e in estimates if e.status.failed]
     for estimate in estimates:
         if estimate.estimator != CHECKED_ESTIMATOR or estimate.status.failed:
             continue
         for name, value in truth_of(plan).items():
             quantity = getattr(estimate, name)
             if quantity is None:
-                found.append(f"{estimate.estimator}: no {name}")
+                lines.append(f"{estimate.estimator}: no {name}")
             elif abs(quantity.value - value) > CHECK_STDS * quantity.std:
-                found.append(f"{estimate.estimator}: {name} misses the truth by more than {CHECK_STDS:g} std")
-    return found
+                lines.append(f"{estimate.estimator}: {name} misses the truth by more than {CHECK_STDS:g} std")
+    return lines
 
 
 def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Estimate, ...]]:
@@ -158,7 +158,7 @@ def measured_part(folder: Path) -> tuple[Campaign, Estimate]:
 
 def show_measured(campaign: Campaign, estimate: Estimate) -> None:
     """Print a measured campaign's estimate with its windows."""
-    from tunnel_lab.terminal.estimate_output import show_estimate
+    from tunnel_lab.terminal.outputs import show_estimate
     from tunnel_lab.terminal.tables import say
 
     say(f"Measured: {campaign.name}, {len(campaign.runs)} runs. {campaign.description}\n")
@@ -176,18 +176,18 @@ def draw(
     Returns:
         Why there is no picture of the rig; empty where there is one.
     """
-    from tunnel_lab.plotting import plots
-    from tunnel_lab.plotting.window_figure import windows_figure
+    from tunnel_lab.plotting import runs, style
+    from tunnel_lab.plotting.runs import windows_figure
     from tunnel_lab.show.film import Look, write_still
     from tunnel_lab.show.request import Request
     from tunnel_lab.terminal.tables import console
     from tunnel_sim.vocabulary.errors import TunnelError
 
     off, on = wind_off_on_pair(campaign)
-    plots.save_both(plots.wind_off_on_figure(off, on), folder / "traces.png")
-    plots.save_both(plots.spectrum_figure((off, on)), folder / "spectrum.png")
-    plots.save_both(windows_figure(measured), folder / "windows.png")
-    plots.save_both(plots.truth_figure(estimates, truth_of(plan)), folder / "estimates.png")
+    style.save_both(runs.wind_off_on_figure(off, on), folder / "traces.png")
+    style.save_both(runs.spectrum_figure((off, on)), folder / "spectrum.png")
+    style.save_both(windows_figure(measured), folder / "windows.png")
+    style.save_both(runs.truth_figure(estimates, truth_of(plan)), folder / "estimates.png")
     with console(stderr=True).status("rendering the rig"):
         try:
             write_still(Request(), Look(height=800, trace=False), folder / "rig.png", 0.0)

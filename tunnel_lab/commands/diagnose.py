@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tunnel_lab.terminal.given_campaign import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.options import EffectsFileOption
+from tunnel_lab.terminal.progress import step_display
 
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
@@ -21,18 +19,6 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 NAME = "diagnose"
-STEPS = {
-    "noise": "estimating the noise",
-    "nominal fit": "fitting the nominal model",
-    "where": "locating the gap",
-    "effects": "fitting sets of effects",
-    "random moments": "fitting random moments",
-    "pruning": "fitting the answer without each effect",
-    "polishing": "fitting the answer to convergence",
-    "how far it closes": "predicting held-out runs",
-    "what no effect explains": "estimating what no effect explains",
-}
-"""Steps of the study in words; any other progress message is a set of effects."""
 
 
 def run(
@@ -125,7 +111,7 @@ def run(
       written completely or not at all.
     """
     from diagnosis import read_model, vocabulary
-    from tunnel_lab.terminal.given_campaign import file_hashes, given_campaign
+    from tunnel_lab.terminal.inputs import file_hashes, given_campaign
     from tunnel_lab.terminal.options import refuse_unwritable_files, split_names
     from tunnel_lab.terminal.tables import say, say_written
     from tunnel_sim.files.json_text import json_text
@@ -143,14 +129,14 @@ def run(
         )
     data = given_campaign(campaign)
     hashes = file_hashes(campaign)
-    own = None
+    own_model = None
     if model is not None and joint is not None:
-        own = read_model(model, joint, data, split_names(free) or None, asset_dir)
-    if own is not None and patch is not None:
+        own_model = read_model(model, joint, data, split_names(free) or None, asset_dir)
+    if own_model is not None and patch is not None:
         from diagnosis.answer.patched_model import refuse_unpatchable
 
-        refuse_unpatchable(own, data, patch)
-    answer = diagnose_with_progress(data, kinds, own)
+        refuse_unpatchable(own_model, data, patch)
+    answer = diagnose_with_progress(data, kinds, own_model)
     document = answer.to_json_dict()
     document["provenance"]["sha256"] = hashes
     # Files first: the reader of a pipe may close it early.
@@ -160,7 +146,7 @@ def run(
         write_patch(answer, patch)
     if report is not None:
         from diagnosis.detection.limit_cycles import diagnosable
-        from tunnel_lab.diagnosis_view import Byline, write_report
+        from tunnel_lab.report import Byline, write_report
 
         today = datetime.now().astimezone().date().isoformat()
         byline = Byline(today, author, notes, "" if patch is None else patch.name)
@@ -219,39 +205,11 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
     from tunnel_sim.vocabulary.errors import TunnelError
 
     if answer.model is None:
-        said = next((one.rstrip(".") for one in answer.cautions if one.startswith(UNPATCHED)), UNPATCHED)
-        raise TunnelError(said, where="--patch", remedy="leave out --patch for the answer alone")
+        reason = next(
+            (caution.rstrip(".") for caution in answer.cautions if caution.startswith(UNPATCHED)), UNPATCHED
+        )
+        raise TunnelError(reason, where="--patch", remedy="leave out --patch for the answer alone")
     answer.model.write(path)
-
-
-@contextmanager
-def step_display() -> Iterator[Callable[[str], None]]:
-    """A spinner with the step, the effect tried and the time; one line per step where no terminal shows it.
-
-    Yields:
-        The function to call with each step.
-    """
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    from tunnel_lab.terminal.tables import console
-
-    terminal = console(stderr=True)
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-    with Progress(*columns, console=terminal, disable=not terminal.is_terminal, transient=True) as progress:
-        task = progress.add_task("starting", total=None)
-        step, begun = "", time.perf_counter()
-
-        def show_step(text: str) -> None:
-            nonlocal step
-            if text in STEPS:
-                step = STEPS[text]
-                progress.update(task, description=step)
-                if not terminal.is_terminal:
-                    terminal.print(f"{time.perf_counter() - begun:.1f} s: {step}", markup=False)
-            else:
-                progress.update(task, description=f"{step}: {text}")
-
-        yield show_step
 
 
 def show(document: dict[str, Any]) -> None:

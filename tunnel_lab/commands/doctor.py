@@ -40,12 +40,12 @@ def run() -> None:
     from tunnel_lab.terminal.tables import show_tables, table
 
     rows = table("Installation", "part", "found")
-    for part, found in (*versions(), *native(), *machine(), *extras()):
-        rows.add_row(part, found)
+    for part, text in (*versions(), *native(), *machine(), *extras()):
+        rows.add_row(part, text)
     checks = table("Self-check", "check", "result")
     works = True
-    for part, found, fine in self_check():
-        checks.add_row(part, found if fine else f"FAILED: {found}")
+    for part, text, fine in self_check():
+        checks.add_row(part, text if fine else f"FAILED: {text}")
         works = works and fine
     show_tables(rows, checks)
     if not works:
@@ -86,12 +86,12 @@ def compiler() -> str:
     if name is None:
         return "none; needed only to install from source"
     try:
-        said = subprocess.run(
+        done = subprocess.run(
             [*name.split(), "--version"], capture_output=True, text=True, timeout=_COMPILER_S, check=False
         ).stdout
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"{name} does not answer ({type(error).__name__})"
-    return f"{name}: {(said.splitlines() or ['version unknown'])[0]}"
+    return f"{name}: {(done.splitlines() or ['version unknown'])[0]}"
 
 
 def machine() -> Iterator[tuple[str, str]]:

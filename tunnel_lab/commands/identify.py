@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from identification.estimators import SUMMARIES
-from tunnel_lab.terminal.given_campaign import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
@@ -98,9 +98,9 @@ def run(
       0 identified, 1 nothing could be identified, 2 bad input.
     """
     from identification import identify
-    from tunnel_lab.terminal.estimate_output import show_estimate
-    from tunnel_lab.terminal.given_campaign import given_campaign
+    from tunnel_lab.terminal.inputs import given_campaign
     from tunnel_lab.terminal.options import known_estimator
+    from tunnel_lab.terminal.outputs import show_estimate
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.json_text import json_text
     from tunnel_sim.files.writing import refuse_unwritable, write_json
@@ -180,7 +180,7 @@ def budgeted(
     }
     terminal = console(stderr=True)
     with terminal.status("uncertainty budget") as status:
-        found = make_budget(
+        budget = make_budget(
             campaign,
             estimate,
             partial(identify, estimator=chosen, throw=False),
@@ -188,7 +188,7 @@ def budgeted(
             others=others,
             progress=lambda what: status.update(Text(f"uncertainty budget: {what}")),
         )
-    return with_budget(estimate, found), found
+    return with_budget(estimate, budget), budget
 
 
 def show_budget(budget: dict[str, Any]) -> None:
@@ -197,13 +197,13 @@ def show_budget(budget: dict[str, Any]) -> None:
     Args:
         budget: as in the JSON document.
     """
-    from tunnel_lab.terminal import budget_table, tables
+    from tunnel_lab.terminal import outputs, tables
 
     tables.say("")
-    table = tables.rich_table(budget_table.budget_table(budget))
+    table = tables.rich_table(outputs.budget_table(budget))
     table.rows[-2].end_section = True
     tables.show_tables(table)
-    for line in budget_table.budget_lines(budget):
+    for line in outputs.budget_lines(budget):
         tables.say(line)
     tables.say("The standard deviations above are the combined ones.")
 

@@ -108,8 +108,8 @@ def run(
     [bold]Exit status[/bold]
       0 imported, 1 declined, 2 bad input; nothing is left half written.
     """
-    from tunnel_lab.plotting.import_figure import import_picture
-    from tunnel_lab.terminal.import_output import show_import
+    from tunnel_lab.plotting.runs import import_picture
+    from tunnel_lab.terminal.outputs import show_import
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
     from tunnel_sim.files.importing.records import read_records

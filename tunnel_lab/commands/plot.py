@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tunnel_lab.terminal.given_campaign import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 
 if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign, Run
@@ -37,20 +37,20 @@ def run(
       input.
     """
     from identification import identify
-    from tunnel_lab.plotting import plots
-    from tunnel_lab.plotting.window_figure import windows_figure
-    from tunnel_lab.terminal.given_campaign import given_campaign
+    from tunnel_lab.plotting import runs, style
+    from tunnel_lab.plotting.runs import windows_figure
+    from tunnel_lab.terminal.inputs import given_campaign
     from tunnel_lab.terminal.tables import say, say_written
     from tunnel_sim.files.writing import output_folder
 
     data = given_campaign(campaign)
     folder = output_folder(out / campaign.resolve().name)
-    drawn = {f"traces-{number}": page for number, page in enumerate(plots.trace_pages(data), 1)}
-    drawn["spectrum"] = plots.spectrum_figure(spread(data))
+    drawn = {f"traces-{number}": page for number, page in enumerate(runs.trace_pages(data), 1)}
+    drawn["spectrum"] = runs.spectrum_figure(spread(data))
     estimate = identify(data, "output_error", throw=False)
-    if any(found.windows for found in estimate.runs):
+    if any(run.windows for run in estimate.runs):
         drawn["windows"] = windows_figure(estimate)
-    written = [plots.save_both(figure, folder / f"{name}.png") for name, figure in drawn.items()]
+    written = [style.save_both(figure, folder / f"{name}.png") for name, figure in drawn.items()]
     say_written(*(path for pair in written for path in pair))
     if estimate.status.failed:
         say(f"Note: {estimate.status.value}", stderr=True)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from tunnel_lab.scoring.grid import Grid
-    from tunnel_lab.scoring.results import Results
+    from tunnel_lab.experiments.score_grid import Grid
+    from tunnel_lab.experiments.score_trials import Results
 
 NAME = "score"
 PACKAGED = "packaged"
@@ -95,9 +95,9 @@ def run(
       0 scored, 1 an estimator got worse, 2 bad input,
       130 interrupted (finished work is kept in --out).
     """
-    from tunnel_lab.scoring import check as checking
-    from tunnel_lab.scoring import tables
-    from tunnel_lab.scoring.results import Results, write_trials
+    from tunnel_lab.experiments import score_view
+    from tunnel_lab.experiments import score_view as checking
+    from tunnel_lab.experiments.score_trials import Results, write_trials
     from tunnel_lab.terminal.options import refuse_unwritable_files
     from tunnel_lab.terminal.tables import say, say_written, show_tables
 
@@ -115,18 +115,18 @@ def run(
     written = [] if out is None else _keep(out, results)
     if write_baseline is not None:
         written.append(write_trials(write_baseline, results))
-    show_tables(*tables.summary_tables(results))
+    show_tables(*score_view.summary_tables(results))
     if cells:
-        show_tables(*tables.cell_tables(results))
-    say(tables.ABOUT)
+        show_tables(*score_view.cell_tables(results))
+    say(score_view.ABOUT)
     for name, kinds in results.raised().items():
         say(f"Note: {name} raised {', '.join(kinds)}; counted as failures")
     say_written(*written)
     if baseline is not None:
         verdict = checking.check(baseline, results)
         say("")
-        show_tables(tables.worse_table(verdict))
-        for line in tables.verdict_lines(verdict):
+        show_tables(score_view.worse_table(verdict))
+        for line in score_view.verdict_lines(verdict):
             say(line)
         if not verdict.passed:
             raise typer.Exit(1)
@@ -153,7 +153,7 @@ def chosen(names: list[str] | None) -> tuple[str, ...]:
 
 
 def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results:
-    from tunnel_lab.scoring.results import packaged_baseline, read_trials
+    from tunnel_lab.experiments.score_trials import packaged_baseline, read_trials
     from tunnel_sim.vocabulary.errors import TunnelError
 
     baseline = packaged_baseline() if text == PACKAGED else read_trials(Path(text))
@@ -168,7 +168,7 @@ def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results
 
 
 def _grid(path: Path | None, baseline: Results | None, trials: int | None, seed: int | None) -> Grid:
-    from tunnel_lab.scoring.grid import load_grid, packaged_grid
+    from tunnel_lab.experiments.score_grid import load_grid, packaged_grid
 
     grid = baseline.grid if baseline is not None else packaged_grid()
     if path is not None:
@@ -179,7 +179,7 @@ def _grid(path: Path | None, baseline: Results | None, trials: int | None, seed:
 
 
 def _rows(grid: Grid, names: tuple[str, ...], jobs: int, out: Path | None) -> list[dict[str, object]]:
-    from tunnel_lab.scoring.work import score_grid
+    from tunnel_lab.experiments.score_trials import score_grid
     from tunnel_lab.terminal.progress import bar
 
     parts = None if out is None else out / "parts"
@@ -190,9 +190,9 @@ def _rows(grid: Grid, names: tuple[str, ...], jobs: int, out: Path | None) -> li
 def _keep(out: Path, results: Results) -> list[Path]:
     import shutil
 
-    from tunnel_lab.plotting.plots import save_both
-    from tunnel_lab.scoring.figures import score_figure
-    from tunnel_lab.scoring.results import parquet, scores_frame, write_trials
+    from tunnel_lab.experiments.score_trials import parquet, write_trials
+    from tunnel_lab.experiments.score_view import score_figure, scores_frame
+    from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import write_whole
 
     written = [
@@ -235,10 +235,10 @@ def _refuse_of_the_grid(given: dict[str, object]) -> None:
 def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, trials: int | None) -> None:
     import shutil
 
-    from tunnel_lab.plotting.plots import save_both
-    from tunnel_lab.scoring import breakdown as work
-    from tunnel_lab.scoring import breakdown_view as view
-    from tunnel_lab.scoring.results import parquet
+    from tunnel_lab.experiments import breakdown as view
+    from tunnel_lab.experiments import breakdown as work
+    from tunnel_lab.experiments.score_trials import parquet
+    from tunnel_lab.plotting.style import save_both
     from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import console, say, say_written, show_tables
     from tunnel_sim.files.writing import write_whole
@@ -248,15 +248,15 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
     parts = None if out is None else out / "parts"
     with bar("scoring") as progress:
         rows = work.break_down(cases, names, seed, jobs=jobs, parts=parts, progress=progress)
-    found = work.biases(rows)
+    biases = work.biases(rows)
     written = []
     if out is not None:
-        frame = work.breakdown_frame(found)
+        frame = work.breakdown_frame(biases)
         written.append(write_whole(out / "breakdown.parquet", parquet(frame)))
         for quantity in view.SHOWN:
             path = out / f"breakdown-{quantity.replace('_', '-')}.png"
             written += save_both(view.breakdown_figure(frame, quantity), path)
         shutil.rmtree(out / "parts", ignore_errors=True)
-    show_tables(*(one for quantity in view.SHOWN for one in view.breakdown_tables(found, quantity)))
+    show_tables(*(shown for quantity in view.SHOWN for shown in view.breakdown_tables(biases, quantity)))
     say(view.ABOUT)
     say_written(*written)

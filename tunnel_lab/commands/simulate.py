@@ -68,7 +68,7 @@ def run(
     [bold]Exit status[/bold]
       0 written, 2 bad input; nothing is written then.
     """
-    from tunnel_lab.terminal.effect_option import parse_effect
+    from tunnel_lab.terminal.inputs import parse_effect
     from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign, truth_document

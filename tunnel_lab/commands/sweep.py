@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    from tunnel_lab.sweep.engine import Work
-    from tunnel_lab.sweep.product import Sweep
 
 NAME = "sweep"
 
@@ -101,8 +97,8 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
     Raises:
         TunnelError: for bad input.
     """
-    from tunnel_lab.sweep.engine import run_sweep
-    from tunnel_lab.sweep.reading import read_sweep
+    from tunnel_lab.experiments.runner import available_processors, lasting_processes, on_cluster
+    from tunnel_lab.experiments.sweep import read_sweep, run_sweep
     from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.vocabulary.errors import TunnelError
@@ -114,9 +110,14 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
             remedy="leave out --workers",
         )
     sweep = read_sweep(file)
-    work = _work(workers, scheduler, sweep)
+    count = min(workers or available_processors(), sweep.shards)
+
+    def say_line(line: str) -> None:
+        say(f"tunnel: {line}", stderr=True)
+
+    crew = lasting_processes(count, say_line) if scheduler is None else on_cluster(scheduler, count, say_line)
     with bar("cases", sweep.size) as progress:
-        outcome = run_sweep(sweep, out, work, progress)
+        outcome = run_sweep(sweep, out, crew, progress)
     if outcome.found:
         say(f"{outcome.found} of {sweep.shards} shards were finished before")
     estimates = sweep.size * len(sweep.document.estimators)
@@ -129,21 +130,6 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
         raise typer.Exit(1)
 
 
-def _work(workers: int | None, scheduler: str | None, sweep: Sweep) -> Work:
-    from tunnel_lab.sweep.cluster import on_cluster
-    from tunnel_lab.sweep.processes import available_processors, shards_in_processes
-    from tunnel_lab.terminal.tables import say
-
-    count = min(workers or available_processors(), sweep.shards)
-
-    def say_line(line: str) -> None:
-        say(f"tunnel: {line}", stderr=True)
-
-    return (
-        shards_in_processes(count, say_line) if scheduler is None else on_cluster(scheduler, count, say_line)
-    )
-
-
 def show_summary(folder: Path) -> None:
     """Tabulate and draw the finished part of a sweep.
 
@@ -152,31 +138,31 @@ def show_summary(folder: Path) -> None:
     """
     import polars as pl
 
-    from tunnel_lab.plotting import plots
-    from tunnel_lab.sweep import figures
-    from tunnel_lab.sweep.store import open_store
-    from tunnel_lab.sweep.summary import paces, summarise
+    from tunnel_lab.experiments import sweep_summary
+    from tunnel_lab.experiments.sweep import open_store
+    from tunnel_lab.experiments.sweep_summary import paces, summarise
+    from tunnel_lab.plotting import style
     from tunnel_lab.terminal.tables import say, show_tables
     from tunnel_sim.files.writing import output_folder, write_encoded
 
     store = open_store(folder)
     lines = summarise(store)
-    grouped = figures.groups(lines)
+    grouped = sweep_summary.groups(lines)
     target = output_folder(folder / "summary")
     written = [
         write_encoded(target / "summary.csv", pl.DataFrame([line.to_row() for line in lines]).write_csv)
     ]
     for name, part in grouped.items():
-        drawn = figures.error_figure(part)
+        drawn = sweep_summary.error_figure(part)
         if drawn is not None:
-            written += plots.save_both(drawn, target / f"{name}.png")
+            written += style.save_both(drawn, target / f"{name}.png")
     done, shards = len(store.finished()), store.sweep.shards
     if done < shards:
         say(f"Finished: {done} of {shards} shards; run the same command again for the rest\n")
     show_tables(
-        figures.overall_table(lines),
-        *map(figures.axis_table, grouped.values()),
-        figures.pace_table(paces(store)),
+        sweep_summary.overall_table(lines),
+        *map(sweep_summary.axis_table, grouped.values()),
+        sweep_summary.pace_table(paces(store)),
     )
-    say(figures.BRACKETS)
+    say(sweep_summary.BRACKETS)
     say(f"Written to {target}: {', '.join(path.name for path in written)}")

@@ -66,10 +66,10 @@ def run(
     name = checked_camera(camera)
     shown = shown_run(request)
     if web:
-        from tunnel_lab.show.web import view_in_browser
+        from tunnel_lab.show.live import view_in_browser
 
         view_in_browser(shown, port=port, camera=name, open_browser=browser)
     else:
-        from tunnel_lab.show.window import view_in_window
+        from tunnel_lab.show.live import view_in_window
 
         view_in_window(shown, camera=name, speed=speed)

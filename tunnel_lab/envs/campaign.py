@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from identification.campaign.belief import information_gain
 from identification.estimate import PARAMETERS
-from tunnel_lab.envs.menu import Costs, make_menu
-from tunnel_lab.envs.presets import PRESETS, Preset, preset_sensor
+from identification.printing.numbers import SYMBOLS
+from tunnel_lab.envs.menu import PRESETS, Costs, Preset, make_menu, preset_sensor
 from tunnel_lab.envs.session import (
     LARGE,
     Conditions,
@@ -22,23 +22,29 @@ from tunnel_lab.envs.session import (
     Session,
     answers,
     diagnostic_information,
+    draw_truth,
     first_knowledge,
     probabilities,
 )
-from tunnel_lab.envs.truth import draw_truth
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
 Observation = dict[str, Array]
+WIDTH, HEIGHT = 960, 480
+_DPI = 100
 
 
 class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
     """Choose the runs of a campaign; the reward is the information gained minus the cost.
 
-    Arguments that are None take the preset's value (`tunnel_lab.envs.presets`).
+    Arguments that are None take the preset's value (`tunnel_lab.envs.menu`).
 
     Args:
         preset: ``identification`` or ``diagnosis``.
@@ -189,8 +195,6 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         Returns:
             For ``rgb_array`` an image of shape (480, 960, 3); None otherwise: ``human`` prints a line.
         """
-        from tunnel_lab.envs.picture import line_of, picture
-
         if self.render_mode == "human":
             print(line_of(self.known), flush=True)
         elif self.render_mode == "rgb_array":
@@ -294,3 +298,82 @@ def _check_positive(*, most: float = np.inf, **values: float) -> None:
         if isinstance(value, bool) or not 0.0 < value <= most:
             bound = "above 0" if most == np.inf else f"above 0 and at most {most:g}"
             raise TunnelError(f"{name} = {value!r} must be {bound}", where="Campaign-v0", remedy="correct it")
+
+
+def line_of(known: Knowledge) -> str:
+    """The last run and the estimate after it, in one line."""
+    if known.last is None:
+        return "new campaign"
+    belief = known.belief
+    words = ", ".join(
+        f"{SYMBOLS[name]} = {value:.4g} ± {belief.std(name):.2g} 1/rad"
+        for name, value in zip(("cn_beta", "cn_r"), belief.values, strict=False)
+    )
+    text = f"run {len(known.choices)}: {known.last.words}; {words}; rig time {known.rig_time / 60.0:.1f} min"
+    if known.conditions.effects:
+        chances = probabilities(known)
+        best = int(np.argmax(chances))
+        text += f"; {answers(known.conditions.effects)[best]} (probability {chances[best]:.2f})"
+    return text if known.status == "ok" else f"{text}; {known.status}"
+
+
+def picture(known: Knowledge, targets: tuple[float, float], probability: float) -> NDArray[np.uint8]:
+    """The last record beside the standard deviations, or the probabilities, so far.
+
+    Args:
+        targets: relative standard deviations of Cnβ and Cnr, fractions.
+        probability: that ends a diagnosis (a probability).
+
+    Returns:
+        RGB, shape (480, 960, 3).
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from tunnel_lab.plotting.style import COLOURS
+
+    figure = Figure(figsize=(WIDTH / _DPI, HEIGHT / _DPI), dpi=_DPI, layout="constrained")
+    canvas: Any = FigureCanvasAgg(figure)  # matplotlib types it in parts only
+    angles, bars = figure.subplots(1, 2)
+    _draw_record(angles, known)
+    if known.conditions.effects:
+        names = [name.replace("_", "\n") for name in answers(known.conditions.effects)]
+        bars.bar(names, probabilities(known), color=COLOURS[0])
+        bars.axhline(probability, color=COLOURS[1], linestyle="--", linewidth=1)
+        bars.set_ylim(0.0, 1.0)
+        bars.set_ylabel("probability")
+        bars.tick_params(axis="x", labelsize=7)
+        bars.set_title(f"{known.rig_time / 60.0:.0f} min of rig time; dashed: the goal", fontsize=10)
+    else:
+        _draw_spread(bars, known, targets)
+    canvas.draw()
+    return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3], dtype=np.uint8)
+
+
+def _draw_record(axes: Axes, known: Knowledge) -> None:
+    from tunnel_lab.plotting.runs import WIND_OFF, WIND_ON
+
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("angle β [rad]")
+    if known.last is None or not known.runs:
+        axes.set_title("no run yet", fontsize=10)
+        return
+    run = known.runs[-1]
+    colour = WIND_ON if run.wind_on else WIND_OFF
+    axes.plot(run.record.time_s, run.record.yaw_rad, ".", markersize=2, color=colour)
+    axes.set_title(f"run {len(known.choices)}: {known.last.words}", fontsize=10)
+
+
+def _draw_spread(axes: Axes, known: Knowledge, targets: tuple[float, float]) -> None:
+    from tunnel_lab.plotting.style import COLOURS
+
+    history = known.beliefs
+    for place, (name, target) in enumerate(zip(("cn_beta", "cn_r"), targets, strict=True)):
+        spread = [100.0 * belief.relative_std(name) for belief in history]
+        axes.semilogy(range(len(spread)), spread, "o-", color=COLOURS[place], label=SYMBOLS[name])
+        axes.axhline(100.0 * target, color=COLOURS[place], linestyle="--", linewidth=1)
+    axes.set_xlabel("informative runs")
+    axes.set_ylabel("standard deviation [%]")
+    axes.set_xticks(range(0, len(history), 1 + len(history) // 10))
+    axes.legend(loc="upper right")
+    axes.set_title(f"{known.rig_time / 60.0:.0f} min of rig time; dashed: the goal", fontsize=10)

@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import exp, isfinite, log
+from typing import Any
 
 import numpy as np
 
@@ -19,21 +21,26 @@ from identification.decay.damped_oscillation import Decay, free_decay
 from identification.decay.decay_fit import Reading, RunFit
 from identification.decay.residual_noise import stated_noise
 from identification.decay.run_fit import identify_run
-from identification.status import Status
+from identification.estimate import PARAMETERS, UNITS
 from tunnel_lab.envs.menu import Choice, Costs, Menu
-from tunnel_lab.envs.truth import MEAN, STD, RigTruth
-from tunnel_sim.effects import effect_class
+from tunnel_sim.effects import Effect, effect_class, effect_from
 from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.engine.virtual_campaign import run_settings, stated_run
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import Condition, SensorModel
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.plan import Condition, SensorModel, Truth
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
 
 LARGE = 1e4
 """Bound of estimates and covariances in the observation, in their units."""
 _EMPTY = Record(np.arange(2.0), np.zeros(2))  # of a run that is only planned
+MEAN = {"cn_beta": 0.45, "cn_r": -0.12, "yaw_inertia": 0.1014, "mechanical_damping": 0.016}
+"""Means of the coefficients an episode draws, in their units."""
+STD = {"cn_beta": 0.08, "cn_r": 0.03, "yaw_inertia": 0.004, "mechanical_damping": 0.004}
+"""Their standard deviations: normal, independent, cut at `CUT` of them. Also the estimate's prior."""
+CUT = 2.5
+OPTIONS = ("truth", "effects")
 
 
 @dataclass(frozen=True)
@@ -144,15 +151,15 @@ class Knowledge:
         run = (0.0,) * 4 if last is None else (
             last.spring_stiffness, last.wind_speed, last.release_angle, last.duration
         )  # fmt: skip
-        found = {
+        observed = {
             "estimate": np.clip(self.belief.values, -LARGE, LARGE),
             "covariance": np.clip(self.belief.covariance.ravel(), -LARGE, LARGE),
             "last_run": np.array(run),
             "progress": np.array([float(len(self.choices)), self.rig_time]),
         }
         if self.conditions.effects:
-            found["probabilities"] = probabilities(self)
-        return found
+            observed["probabilities"] = probabilities(self)
+        return observed
 
 
 def first_knowledge(conditions: Conditions) -> Knowledge:
@@ -234,7 +241,8 @@ def _identified(known: Knowledge, choice: Choice) -> Knowledge:
     conditions = known.conditions
     fitted = identify_run(known.runs[-1], conditions.sensor_properties)
     if fitted.fit is None:
-        return replace(known, status=f"no information: {_reason(fitted.estimate.status)}")
+        reason = fitted.estimate.status.value.partition(":")[0]
+        return replace(known, status=f"no information: {reason}")
     fits = (*known.fits, (conditions.link(choice), fitted.reading, fitted.fit))
     links, pairs = [link for link, _, _ in fits], [(reading, fit) for _, reading, fit in fits]
     try:
@@ -251,10 +259,6 @@ def _diagnosed(known: Knowledge) -> Knowledge:
         return replace(known, study=investigate(known.campaign, kinds))
     except TunnelError as error:
         return replace(known, status=f"not diagnosed: {error.what}")
-
-
-def _reason(status: Status) -> str:
-    return status.value.partition(":")[0]
 
 
 def answers(effects: Sequence[str]) -> tuple[str, ...]:
@@ -274,16 +278,16 @@ def probabilities(known: Knowledge) -> Array:
         ``none`` has all but the false-alarm rate.
     """
     names = answers(known.conditions.effects)
-    found = np.zeros(len(names))
+    shares = np.zeros(len(names))
     if known.study is None:
         return np.full(len(names), 1.0 / len(names))
     if not known.study.weighed:
-        found[0], found[-1] = 1.0 - GAP_FALSE_ALARM_RATE, GAP_FALSE_ALARM_RATE
-        return found
+        shares[0], shares[-1] = 1.0 - GAP_FALSE_ALARM_RATE, GAP_FALSE_ALARM_RATE
+        return shares
     for answer in known.study.weighed:
         name = answer.effects[0] if len(answer.effects) == 1 else "several"
-        found[names.index(name)] += answer.probability
-    return np.asarray(found / found.sum())
+        shares[names.index(name)] += answer.probability
+    return np.asarray(shares / shares.sum())
 
 
 def diagnostic_information(known: Knowledge) -> float:
@@ -294,6 +298,108 @@ def diagnostic_information(known: Knowledge) -> float:
     """
     if known.study is None or not known.study.weighed:
         return 0.0
-    found = probabilities(known)
-    positive = found[found > 0.0]
-    return float(np.log(found.size) + np.sum(positive * np.log(positive)))
+    shares = probabilities(known)
+    positive = shares[shares > 0.0]
+    return float(np.log(shares.size) + np.sum(positive * np.log(positive)))
+
+
+@dataclass(frozen=True)
+class RigTruth:
+    """The truth of an episode, which no observation contains.
+
+    Args:
+        effects: those added to it.
+        sensor_zero: rad.
+    """
+
+    coefficients: Truth
+    effects: tuple[Effect, ...] = field(default=())
+    sensor_zero: float = 0.0
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The coefficients by name, in the units of `identification.estimate.UNITS`."""
+        return {name: float(getattr(self.coefficients, name)) for name in PARAMETERS}
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Coefficients by name, effects with their parameters, the sensor's zero; SI."""
+        return {
+            **self.values,
+            "sensor_zero": self.sensor_zero,
+            "effects": {effect.name: effect.to_json_dict()["parameters"] for effect in self.effects},
+        }
+
+
+def draw_truth(
+    rng: np.random.Generator,
+    severities: Mapping[str, tuple[float, float]],
+    options: Mapping[str, Any] | None,
+) -> RigTruth:
+    """Draw an episode's truth; values from the options replace the drawn ones.
+
+    Every number is always drawn, so that one option does not change the other numbers.
+
+    Args:
+        severities: the effects, of which one acts, each with the same probability and a severity log-uniform in
+            its range (SI units); no effect acts where it is empty.
+        options: ``truth``: coefficients by name, ``sensor_zero`` among them; ``effects``: parameters by effect
+            name, empty for none.
+
+    Raises:
+        TunnelError: for an unknown option, coefficient or effect, or a number that is out of range.
+    """
+    options = {} if options is None else dict(options)
+    for key in options:
+        if key not in OPTIONS:
+            raise TunnelError(f"unknown reset option {key!r}", remedy=did_you_mean(str(key), OPTIONS))
+    values = {name: _normal(rng, MEAN[name], STD[name]) for name in PARAMETERS}
+    zero = _normal(rng, 0.0, 0.004)
+    effects = _draw_effect(rng, severities)
+    given = _numbers(options.get("truth", {}))
+    zero = given.pop("sensor_zero", zero)
+    if options.get("effects") is not None:
+        effects = _given_effects(options["effects"])
+    return RigTruth(Truth(**(values | given)), effects, zero)
+
+
+def _normal(rng: np.random.Generator, mean: float, std: float) -> float:
+    while True:
+        step = float(rng.standard_normal())
+        if abs(step) <= CUT:
+            return mean + std * step
+
+
+def _draw_effect(
+    rng: np.random.Generator, severities: Mapping[str, tuple[float, float]]
+) -> tuple[Effect, ...]:
+    if not severities:
+        return ()
+    name = list(severities)[int(rng.integers(len(severities)))]
+    low, high = severities[name]
+    severity = exp(rng.uniform(log(low), log(high)))
+    return (effect_from(name, {effect_class(name).parameters()[0].name: severity}),)
+
+
+def _numbers(given: Any) -> dict[str, float]:
+    known = (*PARAMETERS, "sensor_zero")
+    if not isinstance(given, Mapping):
+        raise TunnelError("option truth is not a mapping", remedy=f"give some of {', '.join(known)} by name")
+    for name, value in given.items():
+        if name not in known:
+            raise TunnelError(
+                f"unknown coefficient {name!r}", where="truth", remedy=did_you_mean(name, known)
+            )
+        positive = name in ("yaw_inertia", "mechanical_damping")
+        number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+        if not number or (positive and value <= 0.0):
+            unit = UNITS.get(name, "rad")
+            remedy = f"give a {'positive ' if positive else ''}number in {unit}"
+            raise TunnelError(f"{name} = {value!r} is out of range", where="truth", remedy=remedy)
+    return {name: float(value) for name, value in given.items()}
+
+
+def _given_effects(given: Any) -> tuple[Effect, ...]:
+    if not isinstance(given, Mapping):
+        remedy = "give parameters by effect, as {'coulomb_friction': {'friction_moment': 0.004}}"
+        raise TunnelError("option effects is not a mapping", remedy=remedy)
+    return tuple(effect_from(name, dict(parameters)) for name, parameters in given.items())

@@ -19,14 +19,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tunnel_lab.plotting.style import with_breaks
 from tunnel_lab.show.request import Request, ShownRun, shown_run
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.record import Array, Record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from tunnel_sim.engine.model import Model
 
 Image = NDArray[np.uint8]
 CAMERAS = ("overview", "above", "side")
@@ -37,6 +38,10 @@ FIRST_FRAME_S = 60.0
 _SHADOW, _SAMPLES = 2048, 4  # for a film: a quarter of the time of a still, without visible difference
 
 REMEDY = "install EGL or OSMesa (Debian and Ubuntu: libegl1 or libosmesa6) to get the picture"
+_DPI = 100
+_DOT = 5  # pixels
+_CURSOR = (90, 90, 90)
+_VERMILION = (213, 94, 0)
 
 
 def backends() -> tuple[str, ...]:
@@ -167,8 +172,8 @@ def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, i
         if child.returncode == 0:
             return ""
         errors.seek(0)
-        said = errors.read().strip().splitlines()
-    return (said or [f"ended with status {child.returncode}"])[-1][:80]
+        lines = errors.read().strip().splitlines()
+    return (lines or [f"ended with status {child.returncode}"])[-1][:80]
 
 
 def _follow(child: subprocess.Popen[str], progress: Callable[[int, int], None] | None) -> bool:
@@ -207,15 +212,17 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
     """
     import mujoco
 
-    from tunnel_lab.show.trace import draw_trace
     from tunnel_sim.engine.model import build_model
 
     model = build_model(run.rig, run.settings)
-    left = 2 * round(BODY_SHARE * look.width / 2) if look.trace else look.width
-    trace = draw_trace(run.record(), look.width - left, look.height, run.title) if look.trace else None
-    _prepare(model, left, look.height)
+    width = 2 * round(BODY_SHARE * look.width / 2) if look.trace else look.width
+    trace = draw_trace(run.record(), look.width - width, look.height, run.title) if look.trace else None
+    model.mj.vis.global_.offwidth = max(width, model.mj.vis.global_.offwidth)
+    model.mj.vis.global_.offheight = max(look.height, model.mj.vis.global_.offheight)
+    model.mj.vis.quality.shadowsize = _SHADOW
+    model.mj.vis.quality.offsamples = _SAMPLES
     data = model.release_state()
-    with mujoco.Renderer(model.mj, look.height, left) as renderer:
+    with mujoco.Renderer(model.mj, look.height, width) as renderer:
         for time in times:
             steps = round(time / run.settings.timestep) - round(data.time / run.settings.timestep)
             if steps > 0:
@@ -224,13 +231,6 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
             renderer.update_scene(data, camera=look.camera)
             picture = renderer.render()
             yield picture if trace is None else np.concatenate((picture, trace.at(float(time))), axis=1)
-
-
-def _prepare(model: Model, width: int, height: int) -> None:
-    model.mj.vis.global_.offwidth = max(width, model.mj.vis.global_.offwidth)
-    model.mj.vis.global_.offheight = max(height, model.mj.vis.global_.offheight)
-    model.mj.vis.quality.shadowsize = _SHADOW
-    model.mj.vis.quality.offsamples = _SAMPLES
 
 
 def _draw(order: dict[str, Any]) -> None:
@@ -257,3 +257,86 @@ def _draw(order: dict[str, Any]) -> None:
 
 if __name__ == "__main__":
     _draw(json.loads(sys.argv[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Two drawings of the same axes, and the positions of the samples.
+
+    Args:
+        faint: all of the trace in grey, shape (height, width, 3).
+        full: all of it in colour, of the same shape.
+        time: of the samples, shape (n,), s.
+        columns: of the samples, shape (n,), pixels from the left.
+        rows: of the samples, shape (n,), pixels from the top.
+        top: first row of the axes, pixels.
+        bottom: last row, pixels.
+    """
+
+    faint: Image
+    full: Image
+    time: Array
+    columns: Array
+    rows: Array
+    top: int
+    bottom: int
+
+    def at(self, time: float) -> Image:
+        """The trace up to a time.
+
+        Args:
+            time: s from the release.
+
+        Returns:
+            RGB, shape (height, width, 3).
+        """
+        picture = self.faint.copy()
+        column = round(float(np.interp(time, self.time, self.columns)))
+        row = round(float(np.interp(time, self.time, self.rows)))
+        picture[:, : column + 1] = self.full[:, : column + 1]
+        picture[self.top : self.bottom, column] = _CURSOR
+        down, across = np.ogrid[: picture.shape[0], : picture.shape[1]]
+        picture[(down - row) ** 2 + (across - column) ** 2 <= _DOT**2] = _VERMILION
+        return picture
+
+
+def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
+    """Draw a record's axes once.
+
+    Args:
+        width: pixels.
+        height: pixels.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
+    figure.set_layout_engine("constrained", w_pad=0.15, h_pad=0.1)  # inches
+    canvas: Any = FigureCanvasAgg(figure)  # matplotlib types it in parts only
+    axes = figure.add_subplot()
+    time, angle = record.time_s - record.time_s[0], record.yaw_rad
+    (line,) = axes.plot(*with_breaks(time, angle), color="0.85", linewidth=1.2)
+    axes.set_xlim(time[0], time[-1])
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("angle β [rad]")
+    axes.set_title(title, fontsize=10, wrap=True)
+    axes.grid(alpha=0.3)
+    faint = _pixels(canvas)
+    line.set_color("#0072B2")
+    full = _pixels(canvas)
+    places = axes.transData.transform(np.column_stack((time, angle)))
+    box = axes.get_window_extent()
+    return Trace(
+        faint,
+        full,
+        time,
+        np.clip(places[:, 0], 0.0, width - 1.0),
+        np.clip(height - 1.0 - places[:, 1], 0.0, height - 1.0),
+        round(height - box.y1),
+        round(height - box.y0),
+    )
+
+
+def _pixels(canvas: Any) -> Image:
+    canvas.draw()
+    return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3], dtype=np.uint8)

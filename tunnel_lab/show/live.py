@@ -1,18 +1,49 @@
-"""A run in real time, which is released again when it is over."""
+"""A run in real time, which is released again when it is over: in a window, or in a browser."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import os
+import socket
+import sys
+import textwrap
+import time
+from math import degrees
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
+from mujoco.studio import messages, plugin, step_control
+from mujoco.studio.dear_imgui import dear_imgui as imgui
+from mujoco.studio.implot import implot
 
 from tunnel_lab.show.request import ShownRun
+from tunnel_lab.terminal.tables import say
 from tunnel_sim.engine.model import build_model, build_spec
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+
+_YIELD_S = 1e-3  # as in Studio's own stepper: otherwise the loop starves the viewer's threads
+FRAME_S = 1.0 / 60.0
+_KEY_SPACE, _KEY_R = 32, 82
+_NO_DISPLAY = "use tunnel view --web, or tunnel render for a film"
+WARNING = (
+    "The server listens on all network interfaces, without a password or a check of the Origin. Anyone who reaches "
+    "this port, and any web page in a browser of this machine, can watch and control the view. "
+    "Use it only in a network that you trust."
+)
+"""MuJoCo 4.0 has no option that binds the loopback only; see docs/reference/limits.md."""
+_FIRST_PORT, _PORTS = 8080, 100
+_WIDTH, _PLOT, _MARGIN, _TOP = (
+    380.0,
+    170.0,
+    12.0,
+    36.0,
+)  # pixels; the height is that of the lines and the plot
+_CHARACTERS = 54  # in a line: Studio's own wrapping breaks words
 
 
 class LiveRun:
@@ -80,8 +111,8 @@ class Puppet:
         spec = build_spec(live.run.rig, live.run.settings)
         for sensor in [sensor for sensor in spec.sensors if sensor.type == mujoco.mjtSensor.mjSENS_PLUGIN]:
             spec.delete(sensor)
-        for plugin in list(spec.plugins):
-            spec.delete(plugin)
+        for unused in list(spec.plugins):
+            spec.delete(unused)
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.follow(live)
@@ -130,3 +161,275 @@ class History:
     def points(self) -> Array:
         """Time [s] and angle [rad], shape (n, 2)."""
         return np.array(self._points, dtype=np.float64).reshape(-1, 2)
+
+
+class _PuppetMaster(step_control.StepControl):  # type: ignore[misc]  # mujoco is untyped
+    """Studio's pause, speed and single step, applied to the full physics instead of the shown model."""
+
+    def __init__(self, live: LiveRun) -> None:
+        super().__init__()
+        self._live = live
+
+    @messages.handler(priority=messages.Priority.INTERNAL)  # type: ignore[untyped-decorator]
+    def _on_step(self, event: messages.StepEvent) -> None:
+        live = self._live
+        with self._send_if_changes():
+            live.advance_by(lambda: self.step_control.advance(live.model.mj, live.data))
+        pose(event.data, live.data)
+        mujoco.mj_forward(event.model, event.data)
+        time.sleep(_YIELD_S)
+
+    @messages.handler(priority=messages.Priority.INTERNAL)  # type: ignore[untyped-decorator]
+    def _on_reset_button(self, event: messages.ResetEvent) -> None:
+        del event
+        self._live.release()
+
+
+def puppet_master(live: LiveRun) -> Any:
+    """Studio's stepper for a run.
+
+    Returns:
+        A plugin for ``mujoco.studio.launch_web.launch``.
+    """
+    return _PuppetMaster(live)
+
+
+def missing_display() -> str:
+    """Why no window can be opened; empty where the environment shows no reason."""
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        return "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)"
+    return ""
+
+
+class Controls:
+    """The keys of the window: space pauses, R releases again."""
+
+    def __init__(self, live: LiveRun) -> None:
+        self._live = live
+        self.paused = False
+        self.released = False
+
+    def key(self, code: int) -> None:
+        """Record a key; called from the viewer's thread, so it only sets a flag.
+
+        Args:
+            code: of the key, a GLFW number (count).
+        """
+        if code == _KEY_SPACE:
+            self.paused = not self.paused
+        elif code == _KEY_R:
+            self.released = True
+
+    def advance(self, seconds: float) -> None:
+        """Advance by the clock, as the keys demand.
+
+        Args:
+            seconds: since the last call, s.
+        """
+        if self.released:
+            self.released = False
+            self._live.release()
+        elif not self.paused:
+            self._live.advance(seconds)
+
+
+def view_in_window(run: ShownRun, *, camera: str, speed: float) -> None:
+    """Open a window and show the run until it is closed.
+
+    Args:
+        camera: of ``mjcf/rig.xml``.
+        speed: factor on real time (ratio).
+
+    Raises:
+        TunnelError: when there is no display, or the window cannot be opened.
+    """
+    missing = missing_display()
+    if missing:
+        raise TunnelError(missing, where="tunnel view", remedy=_NO_DISPLAY)
+    import glfw
+
+    # Checked first: a failure inside the viewer's thread would leave this process waiting for ever.
+    if not glfw.init():
+        raise TunnelError("the display cannot be opened", where="tunnel view", remedy=_NO_DISPLAY)
+    import mujoco.viewer
+
+    live = LiveRun(run)
+    controls = Controls(live)
+    try:
+        handle = mujoco.viewer.launch_passive(
+            live.model.mj, live.data, key_callback=controls.key, show_left_ui=False, show_right_ui=False
+        )
+    except RuntimeError as error:  # macOS wants its own interpreter
+        remedy = "start it with mjpython -m tunnel_lab.cli view, or use tunnel view --web"
+        raise TunnelError(str(error), where="tunnel view", remedy=remedy) from error
+    with handle:
+        with handle.lock():
+            handle.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
+            handle.cam.fixedcamid = live.model.mj.camera(camera).id
+        window_loop(handle, live, controls, speed)
+
+
+def window_loop(
+    handle: Any,
+    live: LiveRun,
+    controls: Controls,
+    speed: float,
+    *,
+    clock: Callable[[], float] = time.perf_counter,
+    sleep: Callable[[float], None] = time.sleep,
+) -> None:
+    """Advance and show until the window is closed.
+
+    Args:
+        handle: of MuJoCo's passive viewer.
+        speed: factor on real time (ratio).
+        clock: wall time, s.
+        sleep: waits for s.
+    """
+    last = clock()
+    while handle.is_running():
+        now = clock()
+        with handle.lock():
+            controls.advance(min(now - last, 0.1) * speed)
+        last = now
+        import mujoco
+
+        width, height = (
+            (handle.viewport.width, handle.viewport.height) if handle.viewport is not None else (1200, 900)
+        )
+        handle.set_figures(
+            (mujoco.MjrRect(width - width // 3, 0, width // 3, height // 4), _figure(live.history))
+        )
+        handle.set_texts((None, None, "space\nR", "pause\nrelease again"))
+        handle.sync()
+        sleep(max(0.0, FRAME_S - (clock() - now)))
+
+
+def _figure(history: History) -> Any:
+    """The trace as a figure of MuJoCo's."""
+    import mujoco
+
+    figure = mujoco.MjvFigure()
+    mujoco.mjv_defaultFigure(figure)
+    figure.title = "angle [rad] against time [s]"
+    figure.flg_extend = 1
+    figure.gridsize[:] = 3, 3
+    figure.linergb[0][:] = 0.84, 0.37, 0.0
+    points = history.points.astype(np.float32)
+    figure.linepnt[0] = len(points)
+    figure.linedata[0][: 2 * len(points)] = points.ravel()
+    return figure
+
+
+def view_in_browser(
+    run: ShownRun, *, port: int, camera: str, open_browser: bool, seconds: float | None = None
+) -> None:
+    """Serve the run to browsers until interrupted.
+
+    Args:
+        port: TCP port (index); 0 takes the first free one from 8080 on.
+        camera: of ``mjcf/rig.xml``, from which the page looks first.
+        seconds: time until it stops, s; None runs until interrupted.
+
+    Raises:
+        TunnelError: when the port is taken or MuJoCo Studio is not installed.
+    """
+    try:
+        from mujoco.studio import app, launch_web, viewer_protocol
+    except ImportError as error:
+        remedy = "install the full mujoco package (pip install mujoco), not only mujoco-core"
+        raise TunnelError("MuJoCo Studio is missing", where="tunnel view --web", remedy=remedy) from error
+
+    live = LiveRun(run)
+    puppet = Puppet(live)
+    puppet.model.vis.global_.cameraid = puppet.model.camera(camera).id
+    port = port or _free_port()
+    address = f"http://localhost:{port}/"
+    say(f"Serving {address}; Ctrl-C ends it. {WARNING}", stderr=True)
+    config = viewer_protocol.ViewerConfig(
+        gfx="web", http_port=port, open_browser=open_browser, title="virtual wind tunnel"
+    )
+    # The inspector lies where the trace is, and shows the copy rather than the physics.
+    plugins = [app.App(app.Config(show_inspector=False)), puppet_master(live), overlay(live, address)]
+    begun = time.monotonic()
+    try:
+        with launch_web.launch(config, plugins=plugins) as handle:
+            handle.set_model(puppet.model, data=puppet.data)
+            while handle.is_running() and (seconds is None or time.monotonic() - begun < seconds):
+                handle.sync()
+    except RuntimeError as error:
+        raise TunnelError(str(error), where="tunnel view --web", remedy="name another --port") from error
+
+
+def _free_port() -> int:
+    """The first free TCP port from 8080 on; 0, which lets Studio choose, where there is none."""
+    for port in range(_FIRST_PORT, _FIRST_PORT + _PORTS):
+        with socket.socket(socket.AF_INET6 if socket.has_ipv6 else socket.AF_INET) as trial:
+            try:
+                trial.bind(("", port))
+            except OSError:
+                continue
+            return port
+    return 0
+
+
+class _Overlay(plugin.ViewerPlugin):  # type: ignore[misc]  # mujoco is untyped
+    """A window in the upper right corner, drawn with every frame from the shown pose."""
+
+    def __init__(self, live: LiveRun, address: str) -> None:
+        self._head = textwrap.wrap(live.run.title, _CHARACTERS)
+        self._address = address
+        self._wind, self._at = live.run.settings.wind_speed, live.model.yaw_address
+        self._limit = 1.3 * abs(degrees(live.run.settings.release_angle))
+        self._history = live.history
+
+    @messages.handler  # type: ignore[untyped-decorator]
+    def _on_build_gui(self, event: messages.BuildGuiEvent) -> None:
+        del event
+        data = self.viewer.data
+        time, angle = float(data.time), float(data.qpos[self._at])
+        size = imgui.GetIO().DisplaySize
+        place, corner = imgui.Vec2(size.x - _MARGIN, _TOP), imgui.Vec2(1.0, 0.0)
+        imgui.SetNextWindowPos(place, imgui.Cond.Always, corner)
+        imgui.SetNextWindowSize(imgui.Vec2(_WIDTH, 0.0), imgui.Cond.Always)
+        imgui.Begin("Run")
+        for line in (*self._head, readings(time, angle, self._wind), f"served at {self._address}"):
+            imgui.TextUnformatted(line)
+        if implot.BeginPlot("##angle against time", imgui.Vec2(-1.0, _PLOT)):
+            self._plot(time)
+            implot.EndPlot()
+        imgui.End()
+
+    def _plot(self, time: float) -> None:
+        points = self._history.points
+        span = self._history.span
+        begin = max(0.0, time - span)
+        implot.SetupAxes("time [s]", "angle [deg]")
+        implot.SetupAxesLimits(begin, begin + span, -self._limit, self._limit, implot.Cond.Always)
+        implot.PlotLine("", points[:, 0].tolist(), [degrees(value) for value in points[:, 1]])
+
+
+def readings(time: float, angle: float, wind_speed: float) -> str:
+    """Time, angle and wind speed in one line.
+
+    Args:
+        time: s.
+        angle: rad.
+        wind_speed: m/s.
+    """
+    wind = f"{wind_speed:.1f} m/s" if wind_speed > 0.0 else "off"
+    return f"time {time:5.2f} s   angle {degrees(angle):+6.2f} deg   wind {wind}"
+
+
+def overlay(live: LiveRun, address: str) -> Any:
+    """The window of a run.
+
+    Args:
+        address: of the page.
+
+    Returns:
+        A plugin for ``mujoco.studio.launch_web.launch``.
+    """
+    return _Overlay(live, address)

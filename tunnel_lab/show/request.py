@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.terminal.effect_option import parse_effect
+from tunnel_lab.terminal.inputs import parse_effect
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
@@ -127,12 +127,12 @@ def _run_of(plan: CampaignPlan, request: Request) -> Condition:
         raise TunnelError(
             "there is no plan", where=f"--run {request.run}", remedy="name the plan of this run"
         )
-    found = {condition.id: condition for condition in plan.conditions}
-    if request.run not in found:
+    by_id = {condition.id: condition for condition in plan.conditions}
+    if request.run not in by_id:
         raise TunnelError(
-            f"has no run {request.run!r}", where=request.plan, remedy=did_you_mean(request.run, found)
+            f"has no run {request.run!r}", where=request.plan, remedy=did_you_mean(request.run, by_id)
         )
-    return found[request.run]
+    return by_id[request.run]
 
 
 def _changed(condition: Condition, request: Request, rig: Rig) -> Condition:

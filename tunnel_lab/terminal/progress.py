@@ -1,7 +1,8 @@
-"""A progress bar with the time left."""
+"""Progress on standard error: a bar with the time left, and the steps of a diagnosis."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -43,3 +44,45 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
             progress.update(task, completed=done, total=count, description=f"{what} {name}".rstrip())
 
         yield advance
+
+
+STEPS = {
+    "noise": "estimating the noise",
+    "nominal fit": "fitting the nominal model",
+    "where": "locating the gap",
+    "effects": "fitting sets of effects",
+    "random moments": "fitting random moments",
+    "pruning": "fitting the answer without each effect",
+    "polishing": "fitting the answer to convergence",
+    "how far it closes": "predicting held-out runs",
+    "what no effect explains": "estimating what no effect explains",
+}
+"""Steps of the study in words; any other progress message is a set of effects."""
+
+
+@contextmanager
+def step_display() -> Iterator[Callable[[str], None]]:
+    """A spinner with the step, the effect tried and the time; one line per step where no terminal shows it.
+
+    Yields:
+        The function to call with each step.
+    """
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    terminal = console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=terminal, disable=not terminal.is_terminal, transient=True) as progress:
+        task = progress.add_task("starting", total=None)
+        step, begun = "", time.perf_counter()
+
+        def show_step(text: str) -> None:
+            nonlocal step
+            if text in STEPS:
+                step = STEPS[text]
+                progress.update(task, description=step)
+                if not terminal.is_terminal:
+                    terminal.print(f"{time.perf_counter() - begun:.1f} s: {step}", markup=False)
+            else:
+                progress.update(task, description=f"{step}: {text}")
+
+        yield show_step

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from rich import box
+from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from identification.printing.numbers import SYMBOLS, concise, in_stds, significant, unit, with_std
-from tunnel_lab.terminal.stacked import is_too_wide, keep_whole, stacked
-from tunnel_lab.terminal.table_format import TableFormat, chosen, quiet, rendered
+from tunnel_lab.terminal.options import TableFormat, chosen, quiet, rendered
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from rich.table import Column
 
     from identification.estimate import Estimate, Quantity, RunEstimate, Status
     from identification.printing.table import TextTable
@@ -24,6 +27,9 @@ if TYPE_CHECKING:
 
 BRACKETS = "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10."
 """Printed once below tables in the short notation."""
+PROSE = 30
+"""Columns: a longer cell is a sentence, which may go over several lines."""
+_PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
 
 
 class _Console(Console):
@@ -67,15 +73,15 @@ def show_tables(*tables: Table) -> None:
         tables: those without rows are left out.
     """
     out = console()
-    for one in tables:
-        if not one.row_count:
+    for table in tables:
+        if not table.row_count:
             continue
-        if chosen.get() is TableFormat.TEXT and is_too_wide(one, out.width):
-            out.print(stacked(one, out.width), soft_wrap=True)
+        if chosen.get() is TableFormat.TEXT and is_too_wide(table, out.width):
+            out.print(stacked(table, out.width), soft_wrap=True)
         elif chosen.get() is TableFormat.TEXT:
-            out.print(keep_whole(one))
+            out.print(keep_whole(table))
         else:
-            out.print(rendered(one, chosen.get()), soft_wrap=True, end="")
+            out.print(rendered(table, chosen.get()), soft_wrap=True, end="")
         if chosen.get() is not TableFormat.JSON:
             out.print()
 
@@ -122,7 +128,7 @@ def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Ta
             result.add_section()
         result.add_row(Text(estimate.estimator, style="bold"))
         for name, value in truth.items():
-            row = (_named(SYMBOLS[name], UNITS[name]), significant(value))
+            row = (Text(f"{SYMBOLS[name]} {unit(UNITS[name])}"), significant(value))
             quantity: Quantity | None = getattr(estimate, name)
             if quantity is None:
                 result.add_row(*row, _status(estimate.status))
@@ -145,14 +151,14 @@ def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
         *("run", "Kr\n[N m/rad]", "V\n[m/s]", "ωn\n[rad/s]", "ζ\n[1]", "status"),
         right=("Kr\n[N m/rad]", "V\n[m/s]"),
     )
-    for run, found in zip(campaign.runs, estimate.runs, strict=True):
+    for run, estimated in zip(campaign.runs, estimate.runs, strict=True):
         result.add_row(
             Text(run.id),
             "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
             f"{run.wind_speed:g}",
-            _concise(found.omega_n),
-            _concise(found.zeta),
-            _status(found.status),
+            _concise(estimated.omega_n),
+            _concise(estimated.zeta),
+            _status(estimated.status),
         )
     return result
 
@@ -180,11 +186,6 @@ def windows_table(run: RunEstimate) -> Table:
     return result
 
 
-def _named(symbol: str, unit_name: str) -> Text:
-    """A symbol with its unit."""
-    return Text(f"{symbol} {unit(unit_name)}")
-
-
 def _concise(quantity: Quantity | None) -> str:
     """A quantity without its unit, which is in the heading."""
     return "–" if quantity is None else concise(quantity.value, quantity.std)
@@ -193,3 +194,60 @@ def _concise(quantity: Quantity | None) -> str:
 def _status(status: Status) -> str:
     """A status in a few words; its remedy is printed below the table."""
     return status.name.lower().replace("_", " ")
+
+
+def is_too_wide(table: Table, width: int) -> bool:
+    """Whether cells other than sentences, or words of a heading, would be broken.
+
+    Args:
+        width: of the terminal, columns (count).
+    """
+    needed = sum(_least_width(column) + _PADDING for column in table.columns)
+    return needed + _BETWEEN * (len(table.columns) - 1) > width
+
+
+def keep_whole(table: Table) -> Table:
+    """The same table, with columns so wide that only headings and sentences are wrapped."""
+    for column in table.columns:
+        column.min_width = _least_width(column)
+    return table
+
+
+def _least_width(column: Column) -> int:
+    words = map(cell_len, str(column.header).split())
+    return max((*words, *map(_unbroken, column.cells)), default=0)
+
+
+def _unbroken(cell: object) -> int:
+    """Columns that a cell takes: its longest line, or the longest word of a sentence."""
+    longest = max(map(cell_len, str(cell).splitlines()), default=0)
+    return longest if longest <= PROSE else max(map(cell_len, str(cell).split()))
+
+
+def stacked(table: Table, width: int) -> str:
+    """A table row by row: its first cell, and below it the others with their headings; empty ones are left out.
+
+    Args:
+        width: of the terminal, columns (count); sentences are wrapped, words are never broken.
+    """
+    heads = [" ".join(str(column.header).split()) for column in table.columns]
+    lines = [str(table.title or "")]
+    for first, *others in zip(*(column.cells for column in table.columns), strict=True):
+        named = [(head, str(cell)) for head, cell in zip(heads[1:], others, strict=True) if str(cell)]
+        if len(heads) == 2:
+            named, first = [], f"{first}: {others[0]}"
+        else:
+            first = f"{heads[0]} {first}"
+        lines += _wrapped(first, " ", width)
+        room = max((cell_len(head) for head, _ in named), default=0)
+        for head, cell in named:
+            lines += _wrapped(cell, f"   {head}{' ' * (room - cell_len(head))}  ", width)
+    return "\n".join(lines)
+
+
+def _wrapped(text: str, prefix: str, width: int) -> Iterator[str]:
+    """Lines of a text after a prefix, the later ones indented as far."""
+    room = max(width - cell_len(prefix), PROSE)
+    lines = [part for line in text.splitlines() for part in wrap(line, room, break_long_words=False)]
+    for number, line in enumerate(lines or [""]):
+        yield f"{prefix if number == 0 else ' ' * cell_len(prefix)}{line}".rstrip()

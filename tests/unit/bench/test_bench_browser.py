@@ -18,7 +18,7 @@ from tests.unit.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
 from tests.unit.diagnosis_document import campaign, document
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench.workspace import Session
-from tunnel_lab.terminal.given_campaign import file_hashes
+from tunnel_lab.terminal.inputs import file_hashes
 from tunnel_sim.files import import_records
 from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.files.importing.choices import read_recipe

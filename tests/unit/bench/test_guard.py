@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tunnel_lab.bench.guard import Guard
+from tunnel_lab.bench.server import Guard
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
 HOST, TOKEN = "127.0.0.1:8050", "secret"

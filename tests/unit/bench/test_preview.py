@@ -9,7 +9,7 @@ import pytest
 
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench import conditions, preview
-from tunnel_lab.bench.stage_records import write
+from tunnel_lab.bench.records import write
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.files.importing.choices import read_recipe

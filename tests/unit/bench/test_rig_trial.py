@@ -8,8 +8,8 @@ from math import pi, radians, sqrt
 import numpy as np
 import pytest
 
-from tunnel_lab.bench.rig_trial import Trial, chosen_effect, effect_words, plan_text, said, simulate
-from tunnel_lab.terminal.effect_option import parse_effect
+from tunnel_lab.bench.try_it import Trial, chosen_effect, effect_words, plan_text, said, simulate
+from tunnel_lab.terminal.inputs import parse_effect
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.errors import TunnelError

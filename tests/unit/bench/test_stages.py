@@ -12,9 +12,8 @@ import pytest
 
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench import work
-from tunnel_lab.bench.stages import STAGES, closed
-from tunnel_lab.bench.workspace import Session
-from tunnel_lab.terminal.given_campaign import file_hashes
+from tunnel_lab.bench.workspace import STAGES, Session, closed
+from tunnel_lab.terminal.inputs import file_hashes
 from tunnel_sim.files.campaign_io import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
@@ -69,7 +68,7 @@ def test_an_answer_is_shown_unless_the_campaign_has_changed(
     from nicegui import Client, ui
     from starlette.requests import Request
 
-    from tunnel_lab.bench import stage_diagnose
+    from tunnel_lab.bench import diagnosis
     from tunnel_lab.bench.parts import Frame
 
     session = Session(tmp_path, "rig")
@@ -77,9 +76,9 @@ def test_an_answer_is_shown_unless_the_campaign_has_changed(
     write_campaign(Campaign("rig", RigProperties(), SensorProperties(), (run,)), session.campaign)
     hashes = {} if changed else file_hashes(session.campaign)
     session.diagnosis.write_text(json.dumps({"verdict": "A gap.", "provenance": {"sha256": hashes}}))
-    monkeypatch.setattr(stage_diagnose, "_Answer", lambda _, document: ui.label(document["verdict"]))
+    monkeypatch.setattr(diagnosis, "_Answer", lambda _, document: ui.label(document["verdict"]))
     with Client(ui.page("/"), request=Request({"type": "http", "path": "/", "headers": []})) as client:
-        stage_diagnose.build(session, Frame("Diagnose", session, "diagnose"))
+        diagnosis.build_diagnose(session, Frame("Diagnose", session, "diagnose"))
     shown = [one.text for one in client.elements.values() if isinstance(one, ui.label)]
     assert ("A gap." in shown) is not changed
     assert any("has changed since it was diagnosed" in text for text in shown) is changed
@@ -90,7 +89,7 @@ def test_as_many_estimators_run_at_a_time_as_there_are_processors(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, processors: int
 ) -> None:
     pytest.importorskip("nicegui")
-    from tunnel_lab.bench import stage_identify
+    from tunnel_lab.bench import identify
 
     looks: Counter[Path] = Counter()
     started: list[tuple[str, ...]] = []
@@ -111,10 +110,10 @@ def test_as_many_estimators_run_at_a_time_as_there_are_processors(
     monkeypatch.setattr(work, "start", start)
     monkeypatch.setattr(work, "work_of", look)
     monkeypatch.setattr(os, "cpu_count", lambda: processors)
-    monkeypatch.setattr(stage_identify, "_POLL_S", 0.01)
+    monkeypatch.setattr(identify, "_POLL_S", 0.01)
     session = Session(tmp_path, "rig")
     orders = [(name, ("-e", name)) for name in ("a", "b", "c", "d", "e")]
-    asyncio.run(stage_identify.run_commands(session, orders))
+    asyncio.run(identify.run_commands(session, orders))
     assert max(at_a_time) == processors
     assert sorted(started) == [("identify", str(session.campaign), "-e", name) for name, _ in orders]
     assert len(ended) == 5

@@ -15,7 +15,7 @@ from diagnosis import diagnose
 from identification import identify
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.commands import doctor
-from tunnel_lab.terminal.schemas import SCHEMAS, schema
+from tunnel_lab.commands.schema import SCHEMAS, schema
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_io import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from tests.reference.effect_cases import VOCABULARY
-from tunnel_lab.terminal.effect_listing import example, markdown
-from tunnel_lab.terminal.effect_option import parse_effect
+from tunnel_lab.commands.effects import example, reference_page
+from tunnel_lab.terminal.inputs import parse_effect
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import EffectSetting
@@ -74,7 +74,7 @@ def test_the_reference_page_is_the_registrys(tunnel: Tunnel, tmp_path: Path) -> 
 
 
 def test_a_page_of_other_effects_is_another_page() -> None:
-    assert markdown(ALL_EFFECTS) != markdown(ALL_EFFECTS[:-1])
+    assert reference_page(ALL_EFFECTS) != reference_page(ALL_EFFECTS[:-1])
 
 
 def test_unknown_effect_is_one_line(tunnel: Tunnel) -> None:

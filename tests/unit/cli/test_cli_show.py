@@ -19,11 +19,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tunnel_lab.show.film import Look, backends, write_film
-from tunnel_lab.show.live import History, LiveRun, Puppet
+from tunnel_lab.show.film import Look, backends, draw_trace, write_film
+from tunnel_lab.show.live import Controls, History, LiveRun, Puppet, missing_display, window_loop
 from tunnel_lab.show.request import Request, shown_run
-from tunnel_lab.show.trace import draw_trace
-from tunnel_lab.show.window import Controls, missing_display, window_loop
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.json_text import as_json
@@ -203,7 +201,7 @@ def test_the_history_keeps_the_last_seconds_and_begins_anew() -> None:
 
 
 def test_the_panel_shows_a_long_title_whole_and_the_history_of_the_physics() -> None:
-    overlay = pytest.importorskip("tunnel_lab.show.overlay")
+    overlay = pytest.importorskip("tunnel_lab.show.live")
     effects = ("coulomb_friction:friction_moment=0.01", "rod_flexibility:compliance=0.01")
     live = LiveRun(shown_run(Request(effects=effects)))
     panel = overlay.overlay(live, "http://localhost:8080/")

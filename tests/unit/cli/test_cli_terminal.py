@@ -12,8 +12,7 @@ import pytest
 from rich.console import Console
 
 from tunnel_lab.terminal import progress
-from tunnel_lab.terminal.stacked import is_too_wide, stacked
-from tunnel_lab.terminal.tables import table
+from tunnel_lab.terminal.tables import is_too_wide, stacked, table
 from tunnel_sim.files.nearby import inside, nearest
 
 Tunnel = Callable[..., tuple[int, str, str]]

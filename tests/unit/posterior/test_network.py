@@ -8,8 +8,7 @@ import pytest
 
 from identification.neural.posterior.files import Trained, to_bytes, trained_of
 from identification.neural.posterior.network import forward
-from tunnel_lab.training.fit import INPUTS, FitSpec, fit, losses, start_state
-from tunnel_lab.training.train import contexts, judged
+from tunnel_lab.experiments.training import INPUTS, FitSpec, contexts, fit, judged, losses, start_state
 from tunnel_reference.forms import FAMILIES
 from tunnel_sim.vocabulary.errors import TunnelError
 

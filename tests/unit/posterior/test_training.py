@@ -21,14 +21,14 @@ WORDS = ["-e", "neural_posterior", "--shards", "1", "--steps", "4", "--jobs", "0
 @pytest.fixture
 def small(monkeypatch):
     """Two campaigns of three seconds in a shard, and typical sizes of the effects."""
-    from tunnel_lab.training import draw, samples, train
+    from tunnel_lab.experiments import training, training_samples
 
-    sizes = {draw.label(form): form.start for form in FORMS if form.group is not Group.RARE}
-    monkeypatch.setattr(train, "sizes_at_unit_excess", lambda _seed: sizes)
-    monkeypatch.setattr(samples, "CAMPAIGNS", 2)
-    monkeypatch.setattr(draw, "DURATION", 4.0)
-    monkeypatch.setattr(train, "_KEPT_EVERY", 2)
-    return train
+    sizes = {training_samples.label(form): form.start for form in FORMS if form.group is not Group.RARE}
+    monkeypatch.setattr(training, "sizes_at_unit_excess", lambda _seed: sizes)
+    monkeypatch.setattr(training_samples, "CAMPAIGNS", 2)
+    monkeypatch.setattr(training_samples, "DURATION", 4.0)
+    monkeypatch.setattr(training, "_KEPT_EVERY", 2)
+    return training
 
 
 @pytest.mark.slow
@@ -67,7 +67,7 @@ def test_interrupted_training_gives_the_same_bits_and_its_weights_are_used(
 
 
 def test_rare_and_outside_forms_are_never_drawn():
-    from tunnel_lab.training.draw import draw_for_training, label
+    from tunnel_lab.experiments.training_samples import draw_for_training, label
 
     sizes = {label(form): form.start for form in FORMS if form.group is not Group.RARE}
     drawn = [draw_for_training(np.random.default_rng(seed), sizes) for seed in range(60)]
@@ -77,16 +77,18 @@ def test_rare_and_outside_forms_are_never_drawn():
 
 
 def test_variants_of_a_campaign_lose_runs_and_ends_and_differ_in_noise(monkeypatch):
-    from tunnel_lab.training import draw, samples
+    from tunnel_lab.experiments import training_samples
 
-    monkeypatch.setattr(samples, "CAMPAIGNS", 8)
-    monkeypatch.setattr(draw, "DURATION", 2.0)
-    sizes = {draw.label(form): form.start for form in FORMS if form.group is not Group.RARE}
-    made = list(samples.readings_of(samples.ShardSpec(1, "tuning", 0, tuple(sizes.items()))))
+    monkeypatch.setattr(training_samples, "CAMPAIGNS", 8)
+    monkeypatch.setattr(training_samples, "DURATION", 2.0)
+    sizes = {training_samples.label(form): form.start for form in FORMS if form.group is not Group.RARE}
+    made = list(
+        training_samples.readings_of(training_samples.ShardSpec(1, "tuning", 0, tuple(sizes.items())))
+    )
     fewer = shorter = 0
-    for first in range(0, len(made), samples.VARIANTS):
-        (whole, drawn, families, _), *others = made[first : first + samples.VARIANTS]
-        assert [number for *_, number in made[first : first + samples.VARIANTS]] == [0, 1, 2]
+    for first in range(0, len(made), training_samples.VARIANTS):
+        (whole, drawn, families, _), *others = made[first : first + training_samples.VARIANTS]
+        assert [number for *_, number in made[first : first + training_samples.VARIANTS]] == [0, 1, 2]
         names = [run.id for run in whole.runs]
         assert {run.record.time_s.size for run in whole.runs} == {500}  # 2 s at 250 Hz
         for one, read, of, _ in others:
@@ -95,7 +97,7 @@ def test_variants_of_a_campaign_lose_runs_and_ends_and_differ_in_noise(monkeypat
             (size,) = {run.record.time_s.size for run in one.runs}
             assert 200 <= size <= 500
             assert 0.3 <= read.noise_std / drawn.noise_std <= 8.0
-            assert (samples.truth_of(read), of) == (samples.truth_of(drawn), families)
+            assert (training_samples.truth_of(read), of) == (training_samples.truth_of(drawn), families)
             fewer += len(kept) < len(names)
             shorter += size < 500
     # One in two each, but for a draw of all runs: of 16, none or all would be 1 in 65 000.
@@ -107,19 +109,19 @@ def test_variants_of_a_campaign_lose_runs_and_ends_and_differ_in_noise(monkeypat
 def test_a_size_of_an_effect_that_diverges_is_moved_towards_its_usual_size(factor):
     from dataclasses import replace
 
-    from tunnel_lab.training.draw import _nearer
+    from tunnel_lab.experiments.training_samples import nearer
     from tunnel_reference.draw import Mixture, draw_campaign
 
     drawn = draw_campaign(np.random.default_rng(1), kind="single", mixture=Mixture(rare=0.0))
     effect = replace(drawn.effects[0], value=factor * drawn.effects[0].form.start)
-    moved = _nearer(replace(drawn, effects=(effect,)), np.inf).effects[0].value
+    moved = nearer(replace(drawn, effects=(effect,)), np.inf).effects[0].value
     assert abs(np.log(moved / effect.form.start)) < abs(np.log(factor))
 
 
 def test_the_flexible_rod_moves_as_the_reference_integrator_says():
     from dataclasses import replace
 
-    from tunnel_lab.training.motions import flexible_motion
+    from tunnel_lab.experiments.training_samples import flexible_motion
     from tunnel_reference.conditions import Rod
     from tunnel_reference.draw import draw_conditions, with_defaults
     from tunnel_reference.integrator import integrate
@@ -134,7 +136,7 @@ def test_the_flexible_rod_moves_as_the_reference_integrator_says():
 
 def test_white_noise_tells_as_much_at_the_rate_of_training():
     """Its power per hertz is the same; coloured noise, far below either rate, keeps its level."""
-    from tunnel_lab.training.draw import SAMPLE_RATE, at_low_rate
+    from tunnel_lab.experiments.training_samples import SAMPLE_RATE, at_low_rate
 
     fast = rig(sample_rate=1000.0, noise_std=3e-3, coloured_share=0.25)
     slow = at_low_rate(fast)

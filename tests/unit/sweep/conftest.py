@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from tests.unit.sweep.small_sweep import SMALL
-from tunnel_lab.sweep.product import Sweep
-from tunnel_lab.sweep.reading import read_sweep
-from tunnel_lab.sweep.shard import ONE_THREAD, run_shard
+from tunnel_lab.experiments.sweep import read_sweep
+from tunnel_lab.experiments.sweep_cases import Sweep
+from tunnel_lab.experiments.sweep_shards import ONE_THREAD
 
 
 @pytest.fixture
@@ -32,8 +32,8 @@ def here(monkeypatch: pytest.MonkeyPatch):
     for name in ONE_THREAD:
         monkeypatch.setenv(name, "1")
 
-    def work(text, shards):
+    def workers(work, shards):
         for index in reversed(shards):
-            yield run_shard(text, index)
+            yield index, work(index)
 
-    return work
+    return workers

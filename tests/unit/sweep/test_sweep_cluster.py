@@ -14,10 +14,10 @@ import pytest
 
 from tests.unit.sweep.small_sweep import contents
 from tunnel_lab.cli import main
-from tunnel_lab.sweep import cluster
-from tunnel_lab.sweep.cluster import on_cluster
-from tunnel_lab.sweep.engine import run_sweep
-from tunnel_lab.sweep.product import Sweep
+from tunnel_lab.experiments import runner
+from tunnel_lab.experiments.runner import on_cluster
+from tunnel_lab.experiments.sweep import run_sweep
+from tunnel_lab.experiments.sweep_cases import Sweep
 
 ROOT = Path(__file__).parents[3]
 WORKERS = 3
@@ -87,13 +87,13 @@ def test_a_scheduler_that_goes_away_is_one_line(
     processes.append(worker(address))
 
     with pytest.MonkeyPatch.context() as patch:
-        original = cluster._Crew._result
+        original = runner._Crew._result
 
         def result(crew, future, index):
             processes[0].kill()
             return original(crew, future, index)
 
-        patch.setattr(cluster._Crew, "_result", result)
+        patch.setattr(runner._Crew, "_result", result)
         status = main(["sweep", str(small), "--out", str(tmp_path / "out"), "--scheduler", address])
     said = capsys.readouterr().err.splitlines()
     assert status == 2

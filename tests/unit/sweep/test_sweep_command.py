@@ -18,13 +18,12 @@ import pytest
 from tests.unit.gone_reader import unheard
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
-from tunnel_lab.plotting.common import styled
-from tunnel_lab.sweep import cluster, figures
-from tunnel_lab.sweep.engine import run_sweep
-from tunnel_lab.sweep.product import Sweep
-from tunnel_lab.sweep.reading import read_sweep
-from tunnel_lab.sweep.rows import RESULT_COLUMNS
-from tunnel_lab.sweep.summary import Line, _lines, summarise
+from tunnel_lab.experiments import runner, sweep_summary
+from tunnel_lab.experiments.sweep import read_sweep, run_sweep
+from tunnel_lab.experiments.sweep_cases import Sweep
+from tunnel_lab.experiments.sweep_shards import RESULT_COLUMNS
+from tunnel_lab.experiments.sweep_summary import Line, lines_of, summarise
+from tunnel_lab.plotting.style import styled
 from tunnel_sim.vocabulary.errors import TunnelError
 
 EFFECT = 'name = "coulomb_friction"\nparameters = { friction_moment = [0.002, 0.02] }'
@@ -96,7 +95,7 @@ def test_bad_words_are_one_line(
     words: list[str],
     said: str,
 ) -> None:
-    monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
+    monkeypatch.setattr(runner, "CONNECT_S", 0.5)
     (tmp_path / "taken").mkdir()
     (tmp_path / "taken" / "thesis.txt").write_text("")
     places = {"FILE": small, "OUT": tmp_path / "out", "TAKEN": tmp_path / "taken"}
@@ -165,7 +164,7 @@ def hand_made(values: list[float | None], status: str = "ok") -> pl.DataFrame:
 
 
 def test_figures_by_hand() -> None:
-    lines = list(_lines(hand_made([2.02, 1.98, 2.2, 2.2, None, 2.2], "raised"), "e", "zeta"))
+    lines = list(lines_of(hand_made([2.02, 1.98, 2.2, 2.2, None, 2.2], "raised"), "e", "zeta"))
     overall, *along = lines
     assert [line.at for line in along] == [1.0, 10.0]  # not by speed (one value) or spring (none)
     assert overall.score.failures.count == 1
@@ -179,19 +178,19 @@ def test_figures_by_hand() -> None:
 def test_errors_about_a_truth_of_zero_are_in_its_unit() -> None:
     rows = hand_made([0.02, -0.02, 0.1, 0.1]).with_columns(truth=pl.lit(0.0), unit=pl.lit("rad"))
     for truth, unit, rmse in ((0.0, "rad", 0.1), (-1.0, "%", 110.0)):
-        *_, last = _lines(rows.with_columns(truth=pl.lit(truth)), "e", "sensor_zero")
+        *_, last = lines_of(rows.with_columns(truth=pl.lit(truth)), "e", "sensor_zero")
         assert (last.score.rmse.value, last.score.rmse.unit) == (pytest.approx(rmse), unit)
 
 
 def test_a_row_of_the_csv_is_its_line_with_intervals() -> None:
-    overall, *_ = _lines(hand_made([2.02, 1.98, 2.2, 2.2, None, 2.2], "raised"), "e", "zeta")
+    overall, *_ = lines_of(hand_made([2.02, 1.98, 2.2, 2.2, None, 2.2], "raised"), "e", "zeta")
     row = overall.to_row()
     assert (row["axis"], row["at"], row["unit"], row["count"]) == ("all", None, "%", 6)
     assert (row["bias"], row["rmse"]) == (pytest.approx(6.0), pytest.approx((302.0 / 5.0) ** 0.5))
     assert (row["failures"], row["coverage"]) == (pytest.approx(1.0 / 6.0), pytest.approx(0.4))
     for name in ("failures", "coverage"):
         assert 0.0 < row[f"{name}_low"] < row[name] < row[f"{name}_high"] < 1.0
-    none, *_ = _lines(hand_made([None, None], "raised"), "e", "zeta")
+    none, *_ = lines_of(hand_made([None, None], "raised"), "e", "zeta")
     empty = none.to_row()
     assert empty["failures"] == 1.0
     assert [empty[name] for name in ("unit", "bias", "rmse_std", "coverage", "coverage_low")] == [None] * 5
@@ -199,9 +198,9 @@ def test_a_row_of_the_csv_is_its_line_with_intervals() -> None:
 
 def test_a_figure_has_a_column_of_panels_for_each_quantity() -> None:
     values = {"zeta": [2.02, 1.98, 2.2, 2.2], "omega_n": [2.0, 2.02, 2.04, 2.08]}
-    lines = [line for name, some in values.items() for line in _lines(hand_made(some), "e", name)]
+    lines = [line for name, some in values.items() for line in lines_of(hand_made(some), "e", name)]
     along = [line for line in lines if line.axis == "noise_std"]
-    drawn = figures.error_figure(along)
+    drawn = sweep_summary.error_figure(along)
     assert drawn is not None
     panels = [[line.get_ydata().tolist() for line in axes.get_lines()[:1]] for axes in drawn.axes]
     wanted = [[quantity, figure] for quantity in ("omega_n", "zeta") for figure in ("rmse", "bias")]
@@ -220,7 +219,9 @@ def test_labels_of_the_axes_do_not_touch(noise: tuple[float, ...]) -> None:
     rows = pl.concat(
         [hand_made([2.02, 1.98, 2.2, 2.3]).with_columns(noise_std=at) for at in map(pl.lit, noise)]
     )
-    drawn = figures.error_figure([line for line in _lines(rows, "e", "zeta") if line.axis == "noise_std"])
+    drawn = sweep_summary.error_figure(
+        [line for line in lines_of(rows, "e", "zeta") if line.axis == "noise_std"]
+    )
     assert drawn is not None
     shown = []
     drawn.draw_without_rendering()
@@ -311,14 +312,14 @@ def unwrapped(capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def test_a_figure_without_quantities_to_draw_is_none() -> None:
-    lines: list[Line] = [*_lines(hand_made([1.0, 2.0, 3.0, 4.0]), "e", "yaw_inertia")]
-    assert figures.error_figure(lines[1:]) is None
+    lines: list[Line] = [*lines_of(hand_made([1.0, 2.0, 3.0, 4.0]), "e", "yaw_inertia")]
+    assert sweep_summary.error_figure(lines[1:]) is None
     assert "noise_std" in RESULT_COLUMNS
 
 
 def test_the_sweep_package_loads_nothing_heavy() -> None:
     code = (
-        "import sys, tunnel_lab.commands.sweep, tunnel_lab.sweep.processes\n"
+        "import sys, tunnel_lab.commands.sweep, tunnel_lab.experiments.runner\n"
         "print(sorted({'mujoco', 'numpy', 'polars', 'dask', 'distributed'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

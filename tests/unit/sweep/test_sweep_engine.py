@@ -17,13 +17,11 @@ import pytest
 
 from tests.unit.killed import names_of_the_dead
 from tests.unit.sweep.small_sweep import SMALL, contents
-from tunnel_lab.sweep import shard as shard_module
-from tunnel_lab.sweep import store as store_module
-from tunnel_lab.sweep.engine import run_sweep
-from tunnel_lab.sweep.processes import shards_in_processes
-from tunnel_lab.sweep.product import Sweep
-from tunnel_lab.sweep.reading import read_sweep
-from tunnel_lab.sweep.store import begin, open_store
+from tunnel_lab.experiments import sweep as store_module
+from tunnel_lab.experiments import sweep_shards as shard_module
+from tunnel_lab.experiments.runner import lasting_processes
+from tunnel_lab.experiments.sweep import begin, open_store, read_sweep, run_sweep
+from tunnel_lab.experiments.sweep_cases import Sweep
 from tunnel_sim.vocabulary.errors import TunnelError
 
 ROOT = Path(__file__).parents[3]
@@ -97,7 +95,7 @@ def test_a_lost_process_costs_nothing(sweep: Sweep, here, tmp_path: Path) -> Non
             killed.append(int(mine[0]))
             os.kill(killed[0], signal.SIGKILL)
 
-    run_sweep(sweep, tmp_path / "out", shards_in_processes(2, said.append), kill_one)
+    run_sweep(sweep, tmp_path / "out", lasting_processes(2, said.append), kill_one)
     assert said == ["a worker process was lost; its shards are repeated"]
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")
 

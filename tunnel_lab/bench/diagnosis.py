@@ -1,0 +1,446 @@
+"""The stages of the diagnosis: Diagnose, Next run and Report, with causes switched on and off by hand."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from datetime import datetime
+from math import degrees
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+
+from tunnel_lab.bench import work
+from tunnel_lab.bench.parts import Fault, Frame, address, button, show_command, show_parts
+from tunnel_lab.bench.workspace import Session, is_current, read_result
+from tunnel_lab.terminal.progress import STEPS
+from tunnel_sim.files.reading import read_json
+from tunnel_sim.files.writing import write_json
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from diagnosis.by_hand import Closure
+
+
+WORK = "diagnosis"
+STOPPED = 130
+_AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one goes on where it was"
+_STOP = "Stop ends it: a stopped diagnosis starts again from the beginning."
+_POLL_S = 0.5
+_ABOUT = (
+    "Switch causes on and off: they are fitted in their textbook form, and the gap is predicted for runs, or "
+    "stretches of time, held out of the fit. The diagnosis itself does not change; it also frees the forms."
+)
+_CONVERGE = "Free the forms, and fit to convergence (up to a minute)"
+_NO_SPRING = "no run can be planned without a stated spring"
+
+
+def build_diagnose(session: Session, frame: Frame) -> None:
+    """Build the page."""
+    _Diagnose(session, frame)
+
+
+class _Diagnose:
+    """The page: it follows the log of the command, whoever has started it."""
+
+    def __init__(self, session: Session, frame: Frame) -> None:
+        self._session, self._frame = session, frame
+        self._log = session.log(WORK)
+        self._shown: object = None
+        show_command(" ".join(("tunnel", *_words(session))))
+        self._fault = Fault()
+        self._buttons = ui.element("p").classes("buttons")
+        self._clock = ui.label().classes("soft")
+        self._progress = ui.element("ol").classes("progress").props("role=status aria-live=polite")
+        self._result = ui.element("div")
+        self._on = ui.element("p").classes("buttons")
+        self._look()
+        ui.timer(_POLL_S, self._look)
+
+    def _look(self) -> None:
+        state = work.work_of(self._log)
+        result = self._session.diagnosis
+        written = result.stat().st_mtime_ns if result.is_file() and not state.running else 0
+        if (state, written) == self._shown:
+            self._show_clock(state)
+            return
+        self._shown = (state, written)
+        self._show_buttons(state)
+        self._show_clock(state)
+        self._show_progress(state)
+        if state.error:
+            self._fault.show(f"{state.error}{_AFTER_STOP if state.status == STOPPED else ''}")
+        self._show_result(state)
+
+    def _show_buttons(self, state: work.Work) -> None:
+        self._buttons.clear()
+        with self._buttons:
+            if not state.running:
+                button(
+                    "Diagnose again" if self._session.diagnosis.is_file() else "Diagnose",
+                    self._start,
+                    main=True,
+                )
+                return
+            if state.paused:
+                button("Go on", lambda: work.go_on(self._log), main=True)
+            else:
+                button("Pause", lambda: work.pause(self._log))
+            button("Stop", self._stop)
+
+    def _show_clock(self, state: work.Work) -> None:
+        since = f"{_elapsed(state):.0f} s so far. It runs in a process of its own: this page may be closed."
+        words = "Paused; it goes on where it was." if state.paused else since
+        self._clock.set_text(f"{words} {_STOP}" if state.running else "")
+
+    async def _start(self) -> None:
+        with self._fault.around():
+            await asyncio.to_thread(work.start, _words(self._session), self._log)
+
+    async def _stop(self) -> None:
+        await asyncio.to_thread(work.stop, self._log)
+
+    def _show_progress(self, state: work.Work) -> None:
+        self._progress.clear()
+        if not state.running:
+            return
+        done = [line.partition(" s: ") for line in state.lines if line.partition(" s: ")[2] in STEPS.values()]
+        with self._progress:
+            for place, (seconds, _, words) in enumerate(done):
+                last = place == len(done) - 1
+                with ui.element("li").classes("now" if last else "done"):
+                    ui.label(f"{words} … since {seconds} s" if last else f"{words}, from {seconds} s on")
+
+    def _show_result(self, state: work.Work) -> None:
+        self._result.clear()
+        self._on.clear()
+        if state.running:
+            return
+        with self._result:
+            document = read_result(self._session.diagnosis)
+            if document is not None and is_current(self._session, self._session.diagnosis):
+                _Answer(self._session, document)
+            elif document is not None:
+                ui.label("The campaign has changed since it was diagnosed; diagnose it again.").classes(
+                    "fault"
+                )
+        self._frame.refresh()
+        with self._on:
+            self._frame.way_on()
+
+
+def _elapsed(state: work.Work) -> float:
+    """Time since a command was started, s."""
+    if not state.started:
+        return 0.0
+    return (datetime.now().astimezone() - datetime.fromisoformat(state.started)).total_seconds()
+
+
+def _words(session: Session) -> list[str]:
+    return ["diagnose", str(session.campaign), "--json", str(session.diagnosis)]
+
+
+class _Answer:
+    """The answer: in words, in figures, and by hand."""
+
+    def __init__(self, session: Session, document: dict[str, Any]) -> None:
+        from tunnel_lab.report import view
+
+        answer, kind = view.headline(document)
+        with ui.element("section").classes(f"verdict {kind}").props("aria-label=Verdict"):
+            ui.label(answer).classes("answer")
+            ui.label(document["verdict"])
+            with ui.element("div").classes("facts"):
+                for fact in view.facts(document):
+                    with ui.element("div"):
+                        ui.label(fact.value).classes("value")
+                        ui.label(fact.label).classes("soft")
+                        ui.label(fact.note).classes("soft")
+        self._figures = ui.element("div").classes("figures")
+        ui.timer(0.0, lambda: self._draw(document), once=True)
+        self._words(document)
+        if document["gap"]["detected"]:
+            ByHandPart(session, document)
+
+    async def _draw(self, document: dict[str, Any]) -> None:
+        drawings = await asyncio.to_thread(figures, document)
+        if self._figures.is_deleted:
+            return
+        with self._figures:
+            for drawing in drawings:
+                ui.html(drawing, sanitize=False, tag="figure")  # drawn here, its texts escaped
+
+    def _words(self, document: dict[str, Any]) -> None:
+        from diagnosis import printing
+        from diagnosis.closable import closable_table, closable_words
+
+        show_parts([printing.where_line(document), *printing.rival_lines(document)])
+        show_parts([printing.candidates_table(document), printing.parameters_table(document)])
+        show_parts([printing.waterfall_table(document), printing.coefficients_table(document)])
+        with ui.expansion("What remains, the runs, and caveats"):
+            show_parts([document["rest"]["words"], closable_words(document), closable_table(document)])
+            show_parts([printing.gap_table(document), *printing.closing_lines(document)])
+
+
+def figures(document: dict[str, Any]) -> list[str]:
+    """The report's figures of the summary, as elements of a page."""
+    from tunnel_lab.report.drawing import inline_svg
+    from tunnel_lab.report.figures import waterfall_figure
+    from tunnel_lab.report.page import DESCRIPTIONS
+    from tunnel_lab.report.where import runs_figure
+
+    drawn = {"waterfall": waterfall_figure(document)}
+    if document.get("maps"):
+        drawn["where-runs"] = runs_figure(document)
+    return [
+        inline_svg(figure, name, DESCRIPTIONS[name]) for name, figure in drawn.items() if figure is not None
+    ]
+
+
+class ByHandPart:
+    """Switches for the causes, and the closure with those that are on.
+
+    Args:
+        document: of its diagnosis; its causes are on at first.
+    """
+
+    def __init__(self, session: Session, document: dict[str, Any]) -> None:
+        from tunnel_sim.effects import known_effects
+
+        self._session = session
+        self._waiting = self._converged = False
+        ui.html("By hand", sanitize=False, tag="h2")
+        ui.label(_ABOUT).classes("soft")
+        listed = [name for candidate in document["candidates"] for name in candidate["effect"].split(" + ")]
+        known = [kind for kind in known_effects() if kind.fitted]
+        known.sort(key=lambda kind: listed.index(kind.name) if kind.name in listed else len(listed))
+        self._boxes = {}
+        with ui.element("fieldset").classes("switches"):
+            with ui.element("legend"):
+                ui.html("Causes", sanitize=False, tag="span")
+            for kind in known:
+                box = ui.checkbox(kind.name.replace("_", " "), value=kind.name in document["causes"])
+                self._boxes[kind.name] = box.on_value_change(self._switch)
+        self._fault = Fault()
+        self._place = ui.element("div").props("role=status aria-live=polite").classes("by-hand")
+        with ui.element("p").classes("buttons"):
+            button(_CONVERGE, self._converge)
+        ui.timer(0.0, self._fit_chosen, once=True)
+
+    async def _switch(self) -> None:
+        self._converged = False
+        await self._fit_chosen()
+
+    async def _converge(self) -> None:
+        self._converged = True
+        await self._fit_chosen()
+
+    def _chosen(self) -> tuple[list[str], bool]:
+        return [name for name, box in self._boxes.items() if box.value], self._converged
+
+    async def _fit_chosen(self) -> None:
+        """Fit what is chosen; changes made meanwhile are fitted together afterwards."""
+        if self._waiting:
+            return
+        self._waiting, shown = True, None
+        self._place.classes(add="waiting")
+        while shown != (now := self._chosen()):
+            shown = now
+            closure = await self._closure(*now)
+            if self._place.is_deleted:  # the page was left
+                return
+            self._place.clear()
+            with self._place:
+                if closure is not None:
+                    show_closure(closure)
+        self._waiting = False
+        self._place.classes(remove="waiting")
+
+    async def _closure(self, effects: list[str], converged: bool) -> Closure | None:
+        try:
+            closure = await work.closure(
+                self._session.campaign, self._session.state(), effects, converged=converged
+            )
+        except TunnelError as error:
+            self._fault.show(error)
+            return None
+        self._fault.clear()
+        return closure
+
+
+def show_closure(closure: Closure) -> None:
+    """The closure with causes chosen by hand."""
+    from tunnel_lab.report.view import estimate, excess, percent
+
+    with ui.element("div").classes("facts"):
+        for value, label in (
+            (percent(closure.closed), f"share closed, {closure.held_out}"),
+            (f"{excess(closure.after)} noise variances", "left of the gap"),
+            (f"{excess(closure.before)} noise variances", "with the nominal model"),
+        ):
+            with ui.element("div"):
+                ui.label(value).classes("value")
+                ui.label(label).classes("soft")
+    ui.linear_progress(closure.closed, show_value=False).props('aria-label="share of the gap closed"')
+    with ui.element("ul").classes("notes"):
+        for name, given in closure.parameters.items():
+            with ui.element("li"):
+                words = name.replace("_", " ").replace(".", ": ")
+                ui.label(f"{words} = {estimate(given.to_json_dict())}")
+
+
+def build_next_run(session: Session, frame: Frame) -> None:
+    """Build the page."""
+    from diagnosis.printing import rival_lines
+    from tunnel_lab.report.view import next_steps
+
+    document = read_result(session.diagnosis)
+    assert document is not None  # else the stage is closed
+    ui.html("What to do next", sanitize=False, tag="h2")
+    with ui.element("ol"):
+        for step in next_steps(document):
+            with ui.element("li"):
+                ui.label(step)
+    show_parts(rival_lines(document))
+    if document["next_run"] is not None:
+        show_run(document["next_run"])
+    _Rivals(session, document)
+    with ui.element("p").classes("buttons"):
+        frame.way_on()
+
+
+class _Rivals:
+    """Two answers to choose, and the run that would distinguish them."""
+
+    def __init__(self, session: Session, document: dict[str, Any]) -> None:
+        from tunnel_sim.effects import known_effects
+
+        self._session = session
+        fitted = {kind.name: kind.name.replace("_", " ") for kind in known_effects() if kind.fitted}
+        answers = [
+            [name for name in candidate["effect"].split(" + ") if name in fitted]
+            for candidate in document["candidates"]
+        ]
+        answers = [answer for answer in answers if answer] or [[next(iter(fitted))]]
+        ui.html("Which run would distinguish two answers?", sanitize=False, tag="h2")
+        with ui.element("div").classes("fields"):
+            self._first, self._second = (
+                ui.select(fitted, label=label, value=answer, multiple=True).props("dense use-chips")
+                for label, answer in (
+                    ("This answer", answers[0]),
+                    ("or that one", answers[min(1, len(answers) - 1)]),
+                )
+            )
+        self._fault = Fault()
+        with ui.element("p").classes("buttons"):
+            button("Find the run", self._find)
+        self._place = ui.element("div").props("role=status aria-live=polite")
+
+    async def _find(self) -> None:
+        self._place.clear()
+        with self._fault.around():
+            first, second = sorted(self._first.value), sorted(self._second.value)
+            if first == second:
+                raise TunnelError("both answers are the same", remedy="choose different causes")
+            with self._place:
+                ui.label("Simulating runs …").classes("soft")
+            try:
+                run = await work.next_run(self._session.campaign, self._session.state(), first, second)
+            finally:
+                if not self._place.is_deleted:
+                    self._place.clear()
+            if self._place.is_deleted:  # the page was left
+                return
+            if run is None:
+                raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
+            with self._place:
+                show_run(run)
+
+
+def show_run(run: dict[str, float]) -> None:
+    """A run to make.
+
+    Args:
+        run: spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and separation.
+    """
+    wind = "off" if run["wind_speed"] == 0.0 else f"{run['wind_speed']:g} m/s"
+    with ui.element("div").classes("facts"):
+        for value, label in (
+            (f"{run['spring_stiffness']:.4g} N m/rad", "spring"),
+            (wind, "wind"),
+            (f"{run['release_angle']:.2g} rad ({degrees(run['release_angle']):.0f}°)", "release"),
+            (f"{run['duration']:.3g} s", "length of the record"),
+            (f"{run['separation']:.0f} standard deviations", "expected difference, in the noise's"),
+        ):
+            with ui.element("div"):
+                ui.label(value).classes("value")
+                ui.label(label).classes("soft")
+
+
+def build_report(session: Session, frame: Frame) -> None:
+    """Build the page."""
+    del frame
+    _Report(session)
+
+
+class _Report:
+    """The page: the report is written anew when author or notes change."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        stated = {"author": "", "notes": ""}
+        if session.byline.is_file():
+            stated |= read_json(session.byline, remedy="delete it")
+        with ui.element("div").classes("fields wide"):
+            self._author = ui.input("Author", value=str(stated["author"])).props("dense")
+            self._notes = ui.textarea(
+                "Notes, shown at the head of the report", value=str(stated["notes"])
+            ).props("dense autogrow")
+        self._author.on("change", self._write)
+        self._notes.on("change", self._write)
+        self._fault = Fault()
+        with ui.element("p").classes("buttons"):
+            button("Download the report", self._download, main=True)
+            ui.link("Open in a tab", address(session, "report.html"), new_tab=True).classes("button")
+        ui.label(f"Written: {session.report}").classes("soft")
+        show_command(
+            f"tunnel diagnose {session.campaign} --report {session.report} --author NAME --notes TEXT"
+        )
+        self._place = ui.element("div").classes("preview")
+        ui.timer(0.0, self._write, once=True)
+
+    async def _write(self) -> None:
+        author, notes = str(self._author.value or ""), str(self._notes.value or "")
+        with self._fault.around():
+            write_json(self._session.byline, {"author": author, "notes": notes})
+            await asyncio.to_thread(write_session_report, self._session, author, notes)
+            if self._place.is_deleted:  # the page was left
+                return
+            self._place.clear()
+            source = f"{address(self._session, 'report.html')}?{time.time_ns()}"
+            with self._place:
+                ui.element("iframe").props(f'src="{source}" title="Preview of the report"')
+
+    async def _download(self) -> None:
+        ui.download(self._session.report, f"{self._session.name}-report.html")
+
+
+def write_session_report(session: Session, author: str, notes: str) -> None:
+    """Write the report of the session's diagnosis, as ``tunnel diagnose --report`` does.
+
+    Args:
+        author: who made it; may be empty.
+        notes: for the head of the page; may be empty.
+
+    Raises:
+        TunnelError: when it cannot be written.
+    """
+    from diagnosis.detection.limit_cycles import diagnosable
+    from tunnel_lab.report import Byline, write_report
+    from tunnel_sim.files.campaign_io import read_campaign
+
+    document = read_result(session.diagnosis)
+    assert document is not None  # else the stage is closed
+    made = datetime.fromtimestamp(session.diagnosis.stat().st_mtime).astimezone().date().isoformat()
+    campaign = diagnosable(read_campaign(session.campaign)).campaign
+    write_report(document, campaign, session.report, Byline(made, author, notes))

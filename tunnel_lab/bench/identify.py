@@ -1,0 +1,236 @@
+"""The stage Identify: estimators side by side, and the uncertainty budget; each a command in its own process."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from nicegui import background_tasks, ui
+
+from identification.estimate import UNITS
+from identification.estimators import ALL_ESTIMATORS, SUMMARIES
+from identification.printing.numbers import SYMBOLS, unit, with_std
+from identification.printing.table import TextTable
+from tunnel_lab.bench import work
+from tunnel_lab.bench.parts import Fault, Frame, button, show_command, show_parts
+from tunnel_lab.bench.workspace import ESTIMATOR, Session, is_current, read_result
+from tunnel_lab.terminal.outputs import budget_lines, budget_table
+from tunnel_sim.files.toml_input import load_toml
+from tunnel_sim.files.writing import write_whole
+from tunnel_sim.vocabulary.errors import TunnelError
+
+_FIRST = (ESTIMATOR, "conventional", "matrix_pencil")
+"""Estimators that are chosen at first: quick ones."""
+_INPUTS = {
+    "spring_stiffness": "stiffness Kr",
+    "wind_speed": "wind speed V",
+    "air_density": "air density ρ",
+    "frontal_area": "frontal area A",
+    "reference_length": "reference length l",
+}
+_BUDGET = "budget"
+_POLL_S = 0.5
+Document = Mapping[str, Any]
+_MOST_RUNS = 50
+
+
+def build(session: Session, frame: Frame) -> None:
+    """Build the page."""
+    _Identify(session, frame)
+
+
+class _Identify:
+    """The page: it looks at the files until every command has ended."""
+
+    def __init__(self, session: Session, frame: Frame) -> None:
+        self._session, self._frame = session, frame
+        self._shown: object = None
+        with ui.element("fieldset"):
+            with ui.element("legend"):
+                ui.html("Estimators", sanitize=False, tag="span")
+            self._chosen = {
+                name: ui.checkbox(f"{name}: {SUMMARIES[name]}", value=name in _FIRST)
+                for name in ALL_ESTIMATORS
+            }
+        self._fault = Fault()
+        with ui.element("p").classes("buttons"):
+            button("Identify", self._start, main=True)
+        show_command(
+            f"tunnel identify {session.campaign} --estimator {ESTIMATOR} --json {session.estimate(ESTIMATOR)}"
+        )
+        self._progress = ui.element("ul").classes("progress").props("role=status aria-live=polite")
+        self._result = ui.element("div")
+        self._on = ui.element("p").classes("buttons")
+        with ui.expansion("Uncertainty budget"):
+            self._budget()
+        self._look()
+        ui.timer(_POLL_S, self._look)
+
+    def _start(self) -> None:
+        names = [name for name, box in self._chosen.items() if box.value]
+        with self._fault.around():
+            if ESTIMATOR not in names:
+                raise TunnelError(
+                    f"{ESTIMATOR} is not chosen", remedy="choose it: its estimate opens the diagnosis"
+                )
+            orders = [
+                (name, ("--estimator", name, "--json", str(self._session.estimate(name)))) for name in names
+            ]
+            self._run(orders)
+
+    def _run(self, orders: Sequence[tuple[str, tuple[str, ...]]]) -> None:
+        for name, _ in orders:
+            if work.work_of(self._session.log(name)).running:
+                raise TunnelError(f"{name} is running already", remedy="wait for it")
+        background_tasks.create(run_commands(self._session, orders), name="identify")
+
+    def _budget(self) -> None:
+        ui.label("Standard uncertainties of what is stated, in per cent; an empty field is exact.").classes(
+            "soft"
+        )
+        self._stated = _stated(self._session)
+        with ui.element("div").classes("fields"):
+            for key, words in _INPUTS.items():
+                field = ui.number(f"{words} [%]", value=self._stated.get(key), min=0.0).props(
+                    "dense step=any"
+                )
+
+                field.on("change", partial(self._state, key, field))
+        fault = Fault()
+
+        def start() -> None:
+            with fault.around():
+                kept = {key: value / 100.0 for key, value in self._stated.items() if value}
+                document = {"schema_version": 1, "common": kept}
+                write_whole(self._session.uncertainties, tomli_w.dumps(document).encode())
+                words = ("--uncertainties", str(self._session.uncertainties), "--json")
+                others = [name for name in _FIRST if name != ESTIMATOR]
+                models = [word for name in others for word in ("--model", name)]
+                result = str(self._session.estimate(_BUDGET))
+                self._run([(_BUDGET, (*words, result, *models))])
+
+        with ui.element("p").classes("buttons"):
+            button("Make the budget", start)
+
+    def _state(self, key: str, field: ui.number) -> None:
+        self._stated[key] = field.value
+
+    def _look(self) -> None:
+        works = {name: work.work_of(self._session.log(name)) for name in (*ALL_ESTIMATORS, _BUDGET)}
+        estimates = [self._session.estimate(name) for name in (*ALL_ESTIMATORS, _BUDGET)]
+        state = (works, [path.stat().st_mtime_ns for path in estimates if path.is_file()])
+        if state == self._shown:
+            return
+        self._shown = state
+        self._progress.clear()
+        with self._progress:
+            for name, progress in works.items():
+                _progress(name, progress)
+        with self._fault.around():
+            self._show()
+        self._frame.refresh()
+        self._on.clear()
+        with self._on:
+            self._frame.way_on()
+
+    def _show(self) -> None:
+        self._result.clear()
+        paths = [self._session.estimate(name) for name in ALL_ESTIMATORS]
+        documents = [read_result(path) for path in paths if is_current(self._session, path)]
+        shown = [document for document in documents if document is not None]
+        with self._result:
+            if shown:
+                show_parts(side_by_side(shown))
+            budget = read_result(self._session.estimate(_BUDGET))
+            if (
+                budget is not None
+                and "budget" in budget
+                and is_current(self._session, self._session.estimate(_BUDGET))
+            ):
+                show_parts([budget_table(budget["budget"]), *budget_lines(budget["budget"])])
+
+
+def _progress(name: str, state: work.Work) -> None:
+    if not state.running and not state.error:
+        return
+    with ui.element("li"):
+        ui.label(f"{name}: {'running …' if state.running else state.error}").classes(
+            "" if state.running else "fault"
+        )
+
+
+async def run_commands(session: Session, orders: Sequence[tuple[str, tuple[str, ...]]]) -> None:
+    """Run ``tunnel identify`` several times, as many at a time as there are processors.
+
+    Args:
+        orders: name of the log and options of each.
+    """
+    free = asyncio.Semaphore(os.cpu_count() or 1)
+
+    async def one(name: str, options: tuple[str, ...]) -> None:
+        log: Path = session.log(name)
+        async with free:
+            await asyncio.to_thread(work.start, ("identify", str(session.campaign), *options), log)
+            while (await asyncio.to_thread(work.work_of, log)).running:
+                await asyncio.sleep(_POLL_S)
+
+    await asyncio.gather(*(one(*order) for order in orders))
+
+
+def _stated(session: Session) -> dict[str, float | None]:
+    """The uncertainties stated before, in per cent."""
+    if not session.uncertainties.is_file():
+        return {}
+    common = load_toml(session.uncertainties, missing="").get("common", {})
+    return {key: 100.0 * float(value) for key, value in common.items()}
+
+
+def side_by_side(documents: Sequence[Document]) -> list[str | TextTable]:
+    """Estimates of one campaign by several estimators.
+
+    Args:
+        documents: one for each estimator.
+
+    Returns:
+        The coefficients, ωn and ζ of the runs, and what the estimators say.
+    """
+    names = tuple(str(document["estimator"]) for document in documents)
+    given = [name for name in UNITS if any(document[name] for document in documents)]
+    rows = tuple(
+        (f"{SYMBOLS[name]} {unit(UNITS[name])}", *(_cell(document[name]) for document in documents))
+        for name in given
+    )
+    notes: dict[str, list[str]] = {}
+    for document in documents:
+        for line in _notes(document):
+            notes.setdefault(line, []).append(document["estimator"])
+    return [
+        TextTable("Coefficients ± one standard deviation", ("quantity", *names), rows),
+        _runs("ωn [rad/s] of the runs ± one standard deviation", "omega_n", documents, names),
+        _runs("ζ [1] of the runs ± one standard deviation", "zeta", documents, names),
+        *(f"{', '.join(names)}: {line}" for line, names in notes.items()),
+    ]
+
+
+def _runs(title: str, key: str, documents: Sequence[Document], names: tuple[str, ...]) -> TextTable:
+    by_run = [{run["id"]: run[key] for run in document["runs"]} for document in documents]
+    ids = list(dict.fromkeys(name for runs in by_run for name in runs))[:_MOST_RUNS]
+    rows = tuple((name, *(_cell(runs.get(name)) for runs in by_run)) for name in ids)
+    return TextTable(title, ("run", *names), rows)
+
+
+def _cell(quantity: Document | None) -> str:
+    return "–" if quantity is None else with_std(quantity["value"], quantity["std"])
+
+
+def _notes(document: Document) -> list[str]:
+    from identification.printing.estimate_tables import status_lines
+    from identification.remark import Remark
+
+    notes = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
+    return [*notes, *status_lines(document)]

@@ -1,0 +1,244 @@
+"""The stage Records: what the dropped files hold, what is stated about them, and the campaign that they become."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Any
+
+from nicegui import events, ui
+
+from tunnel_lab.bench import preview
+from tunnel_lab.bench.parts import Chart, Fault, Frame, address, button, drop_zone, keep, show_parts
+from tunnel_lab.bench.preview import ChoicesPart
+from tunnel_lab.bench.workspace import Session
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from tunnel_sim.files.importing.records import Imported
+
+
+_TIME = "time [s], from the record's first sample"
+_KINDS = {"start": "release", "end": "end", "rest": "rest"}
+_HELP = (
+    "Drag a mark, or move it with the arrow keys, to where a run is released (circle) or ends (square), and the "
+    "dashed line to the angle at which it rests: that angle is then subtracted. Drag in a chart to zoom; "
+    "double-click to see all of it."
+)
+
+
+def build(session: Session, frame: Frame) -> None:
+    """Build the page."""
+    _Records(session, frame)
+
+
+class _Records:
+    """The page: it reads the files again whenever a choice changes."""
+
+    def __init__(self, session: Session, frame: Frame) -> None:
+        self._session, self._frame = session, frame
+        self._imported: Imported | None = None
+        if not preview.files_of(session):
+            _as_it_is(session)
+            frame.way_on()
+            return
+        self._files = ui.element("div")
+        self._fault = Fault()
+        with ui.element("p").classes("buttons"):
+            button("Write the campaign", self._write, main=True)
+            if session.imported:
+                frame.way_on()
+        self._written = Fault()
+        self._form_place = ui.expansion("What the files do not say, or was found wrongly").classes("choices")
+        self._reading = 0
+        self._charts: list[Chart] = []
+        self._rests: list[ui.number] = []
+        self._drawn = ui.element("div")
+        self._table = ui.element("div").props("role=status aria-live=polite")
+        with self._table:
+            ui.label("Reading the files …").classes("soft")
+        ui.timer(0.0, self._first, once=True)
+
+    async def _first(self) -> None:
+        columns = await asyncio.to_thread(preview.column_names, self._session)
+        with self._form_place:
+            ChoicesPart(self._session, columns, self._changed)
+        self._show_files()
+        await self._read()
+        if self._imported is None:
+            self._form_place.open()
+
+    async def _changed(self, key: str, value: Any) -> None:
+        with self._fault.around():
+            preview.state(self._session, {key: value})
+            await self._read()
+
+    async def _moved(self, mark: preview.Mark, kind: str, at: float | None) -> None:
+        """Keep a mark where it was moved; it goes back where the files cannot be read like that."""
+        with self._fault.around():
+            before = preview.choices_of(self._session).stretch_of(mark.file, mark.run)
+            preview.move(self._session, mark, {kind: at})
+            if await self._read(redraw=False):
+                return
+            preview.move(self._session, mark, {kind: getattr(before, kind)})
+        if self._imported is not None:
+            self._draw(self._imported)
+
+    async def _read(self, *, redraw: bool = True) -> bool:
+        """Read the files with the choices as they are; the charts stay where only a mark was moved.
+
+        Returns:
+            False where the files cannot be read.
+        """
+        self._reading += 1
+        mine = self._reading
+        imported, error = None, None
+        try:
+            imported = await asyncio.to_thread(preview.read, self._session)
+        except TunnelError as refused:
+            error = refused
+        if (
+            mine != self._reading or self._table.is_deleted
+        ):  # a later choice is being read, or the page was left
+            return True
+        self._fault.show(error or "")
+        if error is not None and not redraw:
+            return False
+        self._imported = imported
+        self._table.clear()
+        if redraw:
+            self._drawn.clear()
+        if imported is None:
+            return False
+        with self._drawn:
+            self._draw(imported)
+        with self._table:
+            from tunnel_lab.terminal.outputs import parts_table
+
+            show_parts([parts_table(imported)])
+            with ui.element("ul").classes("notes"):
+                for line in imported.remarks():
+                    with ui.element("li"):
+                        ui.label(line)
+        return True
+
+    def _show_files(self) -> None:
+        self._files.clear()
+        with self._files:
+            names = ", ".join(path.name for path in preview.files_of(self._session))
+            ui.label(f"{names}; kept in {self._session.uploads}").classes("soft")
+            with ui.expansion("Add files"):
+                fault = Fault()
+
+                async def dropped(given: events.MultiUploadEventArguments) -> None:
+                    with fault.around():
+                        await keep(self._session, given)
+                        self._show_files()
+                        await self._read()
+
+                drop_zone(dropped, fault)
+
+    def _draw(self, imported: Imported) -> None:
+        """Draw the records, or only their marks where they are drawn already."""
+        records = preview.drawn(imported)
+        if not self._drawn.default_slot.children:
+            self._charts = []
+            ui.label(_HELP).classes("soft")
+            with ui.element("div").classes("charts"):
+                self._charts = [self._chart(record) for record in records]
+            hidden = len({id(part.raw) for part in imported.parts}) - len(records)
+            if hidden > 0:
+                ui.label(f"{hidden} more records are not drawn.").classes("soft")
+            with ui.expansion("Resting angles as numbers"), ui.element("div").classes("fields"):
+                self._rests = [self._rest(mark, record.unit) for record in records for mark in record.marks]
+        for chart, record in zip(self._charts, records, strict=True):
+            chart.show_marks(_marks(record))
+        for field, mark in zip(
+            self._rests, (mark for record in records for mark in record.marks), strict=True
+        ):
+            field.set_value(float(f"{mark.rest:.6g}"))
+            field.props["hint"] = mark.about
+            field.update()
+
+    def _rest(self, mark: preview.Mark, unit: str) -> ui.number:
+        """A field for the reading at which a run rests; where it is emptied, the rest is found again."""
+
+        async def change() -> None:
+            await self._moved(mark, "rest", field.value)
+
+        field = ui.number(f"Rest of {mark.run}, to be subtracted [{unit}]").props("dense step=any")
+        return field.on("change", change)
+
+    def _chart(self, record: preview.Drawn) -> Chart:
+        marks = {f"{mark.run} {kind}": (mark, kind) for mark in record.marks for kind in _KINDS}
+        label = f"reading [{record.unit}]"
+        return Chart(
+            record.title,
+            _TIME,
+            label,
+            [("reading", "after")],
+            [record.time, record.reading],
+            lambda name, at: self._moved(*marks[name], at),
+        )
+
+    async def _write(self) -> None:
+        with self._written.around():
+            if self._imported is None:
+                raise TunnelError("the files cannot be read yet", remedy="state what is asked for above")
+            await asyncio.to_thread(write, self._session, self._imported)
+            ui.navigate.to(address(self._session, "conditions"))
+
+
+def _marks(record: preview.Drawn) -> list[dict[str, Any]]:
+    """The runs of a record as marks of its chart."""
+    return [
+        {
+            "id": f"{mark.run} {kind}",
+            "at": getattr(mark, kind),
+            "kind": kind,
+            "label": f"{words} of {mark.run}",
+            "unit": record.unit if kind == "rest" else "s",
+            "from": mark.start,
+            "to": mark.end,
+            "about": f"rest {mark.about}",
+        }
+        for mark in record.marks
+        for kind, words in _KINDS.items()
+    ]
+
+
+def write(session: Session, imported: Imported) -> None:
+    """Write the campaign, as ``tunnel import`` does; conditions that were stated before are kept.
+
+    Raises:
+        TunnelError: when the folder cannot be written.
+    """
+    from tunnel_lab.bench import conditions
+    from tunnel_lab.plotting.runs import import_picture
+    from tunnel_sim.files.importing.writing import write_imported
+
+    before = conditions.stated(session) if session.imported else None
+    write_imported(imported, session.campaign, overwrite=True, picture=import_picture)
+    if before is not None:
+        conditions.restore(session, before)
+
+
+def _as_it_is(session: Session) -> None:
+    """A campaign that was not made of dropped files: its runs, as they are."""
+    ui.label(f"The campaign in {session.campaign}, as it is.").classes("soft")
+    fault = Fault()
+    place = ui.element("div")
+
+    async def show() -> None:
+        from tunnel_sim.files.campaign_io import read_campaign
+
+        with fault.around():
+            campaign = await asyncio.to_thread(read_campaign, session.campaign)
+            if place.is_deleted:  # the page was left
+                return
+            with place.classes("charts"):
+                for run in campaign.runs[: preview.MOST_RECORDS]:
+                    label = f"reading [{campaign.sensor.unit}]"
+                    curve = preview.points(run.record.time_s, run.record.yaw_rad)
+                    Chart(run.id, "time [s]", label, [("reading", "after")], curve)
+
+    ui.timer(0.0, show, once=True)

@@ -1,0 +1,419 @@
+"""The bias that each unmodelled effect causes in each estimator, with its tables and figures.
+
+The campaigns are made by the reference simulator, which shares no numerics with estimators or model. Each has
+twelve runs on three springs and one effect in its textbook form. The effect is sized so that the residuals of the
+nominal refit exceed the noise by 1 or 10 times its power. matplotlib is imported inside the functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib import resources
+from math import radians
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.text import Text
+
+from identification.printing.numbers import significant
+from identification.scoring.accuracy import Score, collect, score
+from tunnel_lab.experiments.runner import Progress
+from tunnel_lab.experiments.score_trials import Row, estimate_rows, fingerprint, outcome, rows_of
+from tunnel_lab.experiments.score_view import NAMES
+from tunnel_lab.plotting.style import figure, styled
+from tunnel_lab.terminal.tables import table
+from tunnel_reference.conditions import Conditions
+from tunnel_reference.draw import CampaignDraw, EffectDraw
+from tunnel_reference.forms import forms_of
+from tunnel_reference.make import as_campaign
+from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_effects
+from tunnel_sim.effects import ALL_EFFECTS
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from tunnel_sim.vocabulary.campaign import Campaign
+
+if TYPE_CHECKING:
+    import polars as pl
+    from matplotlib.figure import Figure
+    from rich.table import Table
+
+    from tunnel_sim.vocabulary.campaign import Campaign
+
+
+NOTHING_ADDED = "no effect"
+SEVERITIES = (1.0, 10.0)
+"""Mean squared residual of the nominal refit over the noise power, minus one."""
+QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
+EFFECTS: tuple[str, ...] = tuple(kind.name for kind in ALL_EFFECTS)
+REALISATIONS = 3
+TRUTH = {"cn_beta": 0.49, "cn_r": -0.11, "yaw_inertia": 0.1014, "mechanical_damping": 0.012}
+NOISE = 5e-4  # rad
+
+_SPRINGS, _SPEEDS = (16.12, 35.02, 51.88), (0.0, 15.0, 25.0)
+_DENSITY = 1.204
+_RUNS = (
+    *((spring, speed, 20.0) for spring in _SPRINGS for speed in _SPEEDS),
+    (16.12, 0.0, 8.0),
+    (16.12, 25.0, 8.0),
+    (35.02, 20.0, 14.0),
+)  # N m/rad, m/s, degrees
+SHOWN = ("cn_beta", "cn_r")
+ABOUT = (
+    "Bias in % of the truth; in brackets in reported standard deviations. Severity: excess residual power after "
+    "the nominal refit, in noise powers."
+)
+_SIDE_BY_SIDE = 3  # estimators in one table of a terminal of 80 columns
+_DECADES = 2.0  # of standard deviations above one, at the ends of the colours
+_DARK = 1.2  # decades from which white text is legible
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A campaign under one effect, or none.
+
+    Args:
+        effect: its name, or ``no effect``.
+        severity: excess that it was sized for, as a ratio to the noise power; 0 for no effect.
+        reached: excess after the reference simulator's own nominal refit, in noise powers (a ratio).
+        realisation: number of the realisation, from 0.
+        bound: Cramér–Rao bound of the nominal model by quantity, SI.
+    """
+
+    effect: str
+    severity: float
+    reached: float
+    realisation: int
+    campaign: Campaign
+    bound: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        """Name of its file."""
+        return f"{self.effect.replace(' ', '_')}-{self.severity:g}-{self.realisation}"
+
+
+def conditions_of(seed: int, *, duration: float = 10.0) -> Conditions:
+    """The campaign to which the effects are added.
+
+    Args:
+        seed: of the actual release angles.
+        duration: of every run, s.
+    """
+    springs, speeds, degrees = (np.array(column) for column in zip(*_RUNS, strict=True))
+    release = np.round(np.radians(degrees), 4)
+    start = release * (1.0 + 0.03 * np.random.default_rng(seed).standard_normal(release.size))
+    return Conditions(
+        spring_stiffness=springs, wind_speed=speeds, release_angle=release, start_angle=start,
+        air_density=_DENSITY, duration=duration, noise_std=NOISE, zero=radians(0.2),
+        yaw_inertia=TRUTH["yaw_inertia"], mechanical_damping=TRUTH["mechanical_damping"],
+        cn_beta=TRUTH["cn_beta"], cn_r=TRUTH["cn_r"],
+    )  # fmt: skip
+
+
+def make_cases(
+    seed: int,
+    *,
+    realisations: int = REALISATIONS,
+    effects: Sequence[str] = EFFECTS,
+    severities: Sequence[float] = SEVERITIES,
+    duration: float = 10.0,
+    show_steps: bool = False,
+) -> list[Case]:
+    """Size the effects and simulate their campaigns.
+
+    Realisations differ in the noise, and in the forcing where it is random. Effects that have a sign are
+    positive.
+
+    Args:
+        realisations: number of campaigns for each effect and severity.
+        severities: excess to leave after the nominal refit, in noise powers.
+        duration: of every run, s.
+        show_steps: show the progress of sizing on standard error.
+
+    Returns:
+        The campaign without effect, then by effect, severity and realisation.
+    """
+    conditions = conditions_of(seed, duration=duration)
+    nothing = CampaignDraw("none", conditions, (), 0)
+    sized = size_effects(
+        [draw_effect(conditions, name, severity, seed) for name in effects for severity in severities],
+        progress=show_steps,
+    )
+    several = [realised(draw, i, seed) for draw in (nothing, *sized) for i in range(realisations)]
+    # A motion without random forcing is integrated once.
+    moving = [draw for i, draw in enumerate(several) if i % realisations == 0 or _random(draw)]
+    motions = iter(simulate_motions(moving))
+    cases = []
+    motion = None
+    for i, draw in enumerate(several):
+        if motion is None or i % realisations == 0 or _random(draw):
+            motion = next(motions)
+        cases.append(_case(draw, read_and_fit(draw, motion), i % realisations))
+    return cases
+
+
+def draw_effect(conditions: Conditions, name: str, severity: float, seed: int) -> CampaignDraw:
+    """A campaign with one effect in its textbook form.
+
+    Args:
+        severity: excess to size it for, in noise powers (a ratio).
+    """
+    form = forms_of(name)[0]
+    rng = np.random.default_rng([seed, EFFECTS.index(name)])
+    extra = {key: float(value) for key, value in form.draw(rng, conditions).items()}
+    effect = EffectDraw(form, extra, max(form.signs), severity, form.start)
+    return CampaignDraw("single", conditions, (effect,), seed)
+
+
+def _random(draw: CampaignDraw) -> bool:
+    return any("seed" in effect.extra for effect in draw.effects)
+
+
+def realised(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
+    """The same case with other noise, and other forcing where it is random."""
+    name = draw.effects[0].form.family if draw.effects else NOTHING_ADDED
+    key = EFFECTS.index(name) if draw.effects else len(EFFECTS)
+    rng = np.random.default_rng([seed, key, number, 1])
+    noise = int(rng.integers(2**62))
+    effects = draw.effects
+    if _random(draw) and number > 0:
+        other = {"seed": float(rng.integers(0, 2**31))}
+        effects = tuple(replace(effect, extra=effect.extra | other) for effect in effects)
+    return replace(draw, effects=effects, seed=noise)
+
+
+def _case(draw: CampaignDraw, simulated: Simulated, number: int) -> Case:
+    from identification.uncertainty.cramer_rao import campaign_bound
+
+    campaign = as_campaign(simulated, "breakdown")
+    starts = [(float(angle), 0.0) for angle in draw.conditions.start_angle]
+    noise = float(np.sqrt(draw.conditions.noise_power))
+    bound = campaign_bound(campaign, **TRUTH, noise_std=noise, initial_states=starts)
+    return Case(
+        effect=draw.effects[0].form.family if draw.effects else NOTHING_ADDED,
+        severity=draw.effects[0].target if draw.effects else 0.0,
+        reached=simulated.excess,
+        realisation=number,
+        campaign=campaign,
+        bound={name: bound.std(name) for name in QUANTITIES},
+    )
+
+
+def break_down(
+    cases: Sequence[Case],
+    estimators: Sequence[str],
+    seed: int,
+    *,
+    jobs: int = 2,
+    parts: Path | None = None,
+    progress: Progress | None = None,
+) -> list[Row]:
+    """Every estimator on every case.
+
+    Args:
+        seed: the cases were made with.
+        jobs: number of processes; 0 works in this one.
+        parts: folder for finished work, so that an interrupted score can be continued; None for none.
+        progress: called with the number of finished cases and of all cases.
+    """
+    mark = fingerprint({"breakdown": sorted(case.name for case in cases), "seed": seed}, estimators)
+    work = partial(_estimate_case, tuple(estimators))
+    rows = rows_of(work, cases, mark, jobs=jobs, parts=parts, progress=progress)
+    return [row for case in cases for row in rows[case.name]]
+
+
+def _estimate_case(estimators: Sequence[str], case: Case) -> list[Row]:
+    about = {
+        "effect": case.effect,
+        "severity": case.severity,
+        "reached": case.reached,
+        "realisation": case.realisation,
+    }
+    return [
+        row for name in estimators for row in estimate_rows(name, case.campaign, TRUTH, case.bound, about)
+    ]
+
+
+@dataclass(frozen=True)
+class Bias:
+    """The bias that one effect causes in one estimate.
+
+    Args:
+        effect: its name, or ``no effect``.
+        severity: excess that it was sized for, as a ratio to the noise power; 0 for no effect.
+        reached: mean excess over the realisations, in noise powers (a ratio).
+        departs: share of the realisations in which the estimator reported that the model departs.
+    """
+
+    effect: str
+    severity: float
+    reached: float
+    estimator: str
+    quantity: str
+    score: Score
+    departs: float
+
+
+def biases(rows: Sequence[Row]) -> list[Bias]:
+    """Rows summarised over realisations."""
+    groups: dict[tuple[str, float, str, str], list[Row]] = {}
+    for row in rows:
+        key = (row["effect"], row["severity"], row["estimator"], row["quantity"])
+        groups.setdefault(key, []).append(row)
+    return [
+        Bias(
+            effect, severity, float(np.mean([row["reached"] for row in some])), estimator, quantity,
+            score(collect(outcome(row) for row in some)),
+            float(np.mean([row["status"] == "model_departs" for row in some])),
+        )
+        for (effect, severity, estimator, quantity), some in groups.items()
+    ]  # fmt: skip
+
+
+def breakdown_frame(biases: Sequence[Bias]) -> pl.DataFrame:
+    """The map as a table.
+
+    Returns:
+        A row for each effect, severity, estimator and quantity; units in the columns' names.
+    """
+    import polars as pl
+
+    return pl.DataFrame([_record(bias) for bias in biases], infer_schema_length=None)
+
+
+def _record(bias: Bias) -> dict[str, Any]:
+    judged = bias.score
+    relative, in_stds = judged.relative_bias, judged.bias_in_stds
+    return {
+        "effect": bias.effect,
+        "severity_noise_powers": bias.severity,
+        "reached_noise_powers": bias.reached,
+        "estimator": bias.estimator,
+        "quantity": bias.quantity,
+        "realisations": judged.count,
+        "failures": judged.failures.count,
+        "bias_percent": None if relative is None else relative.value,
+        "bias_percent_std_error": None if relative is None else relative.std,
+        "bias_in_stds": None if in_stds is None else in_stds.value,
+        "bias_in_stds_std_error": None if in_stds is None else in_stds.std,
+        "rmse_over_bound": None if judged.rmse_over_bound is None else judged.rmse_over_bound.value,
+        "covered": None if judged.coverage is None else judged.coverage.count,
+        "model_departs_share": bias.departs,
+    }
+
+
+def breakdown_tables(biases: Sequence[Bias], quantity: str) -> list[Table]:
+    """The bias of one quantity, with effects in rows and estimators in columns, three to a table."""
+    mine = [bias for bias in biases if bias.quantity == quantity]
+    estimators = list(dict.fromkeys(bias.estimator for bias in mine))
+    cells = {(bias.effect, bias.severity, bias.estimator): _cell(bias) for bias in mine}
+    tables = []
+    for first in range(0, len(estimators), _SIDE_BY_SIDE):
+        some = estimators[first : first + _SIDE_BY_SIDE]
+        one_table = table(f"Bias of {NAMES[quantity]} [%]", "effect", "×", *some, right=("×", *some))
+        one_table.columns[0].no_wrap = True
+        for effect, severity in dict.fromkeys((bias.effect, bias.severity) for bias in mine):
+            row = [cells[effect, severity, name] for name in some]
+            one_table.add_row(Text(effect), f"{severity:g}" if severity else "", *row)
+        tables.append(one_table)
+    return tables
+
+
+def _cell(bias: Bias) -> str:
+    relative, in_stds = bias.score.relative_bias, bias.score.bias_in_stds
+    if relative is None:
+        return "failed" if bias.score.failures.count else "–"
+    deviations = "–" if in_stds is None else _compact(in_stds.value)
+    return f"{_compact(relative.value)} ({deviations}σ)"
+
+
+def _compact(value: float) -> str:
+    """Two digits and a sign."""
+    size = abs(value)
+    text = significant(size, 2) if 1e-3 <= size < 1e4 else f"{size:.0e}" if size else "0"
+    return f"{'−' if value < 0 else '+'}{text}"
+
+
+@styled
+def breakdown_figure(frame: pl.DataFrame, quantity: str) -> Figure:
+    """The biases of one quantity that exceed one reported standard deviation.
+
+    Args:
+        frame: of `breakdown_frame`.
+        quantity: ``cn_beta`` or another of the frame.
+
+    Returns:
+        Effects in rows and estimators in columns, each with its severities side by side. The colour is the bias
+        in reported standard deviations, the number the bias in %; smaller biases stay empty.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.patches import Rectangle
+
+    cells = exceeding(frame, quantity)
+    mine = frame.filter(frame["quantity"] == quantity)
+    effects, names = (mine[key].unique(maintain_order=True).to_list() for key in ("effect", "estimator"))
+    severities = sorted(set(mine["severity_noise_powers"]) - {0.0})
+    fig = figure(1.6 + 0.42 * len(names) * max(len(severities), 2), 1.3 + 0.2 * len(effects))
+    axes = fig.add_subplot()
+    colours = ScalarMappable(Normalize(-_DECADES, _DECADES), "RdBu_r")
+    for (effect, severity, name), (percent, stds) in cells.items():
+        width = 1.0 / len(severities) if severity else 1.0
+        place = severities.index(severity) * width if severity else 0.0
+        shade = float(np.sign(stds) * np.log10(abs(stds)))
+        corner = (names.index(name) + place, effects.index(effect) - 0.5)
+        axes.add_patch(
+            Rectangle(corner, width, 1.0, color=colours.to_rgba(np.array([shade]))[0], linewidth=0.0)
+        )
+        axes.text(
+            corner[0] + 0.5 * width, effects.index(effect), _compact(percent), ha="center", va="center",
+            fontsize=6, color="white" if abs(shade) > _DARK else "black",
+        )  # fmt: skip
+    for edge in range(1, len(names)):
+        axes.axvline(edge, color="0.75", linewidth=0.6)
+    for edge in range(1, len(effects)):
+        axes.axhline(edge - 0.5, color="0.9", linewidth=0.4, zorder=0)
+    labels = [name.replace("_", "\n") for name in names]
+    axes.set_xticks(np.arange(len(names)) + 0.5, labels)
+    axes.set_yticks(range(len(effects)), [effect.replace("_", " ") for effect in effects])
+    axes.set(xlim=(0.0, len(names)), ylim=(len(effects) - 0.5, -0.5))
+    axes.tick_params(length=0)
+    each = ", ".join(f"{severity:g}" for severity in severities)
+    axes.set_title(
+        f"Bias of {NAMES[quantity]} in % where it exceeds one σ; from left to right: {each} × noise power"
+    )
+    bar = fig.colorbar(colours, ax=axes, location="bottom", aspect=60, shrink=0.6)
+    bar.set_ticks([-2, -1, 0, 1, 2], labels=["≤ −100", "−10", "±1", "10", "≥ 100"])
+    bar.set_label("bias in reported standard deviations σ")
+    return fig
+
+
+def exceeding(frame: pl.DataFrame, quantity: str) -> dict[tuple[str, float, str], tuple[float, float]]:
+    """Biases that are larger than one reported standard deviation.
+
+    Args:
+        frame: of `breakdown_frame`.
+
+    Returns:
+        By effect, severity in noise powers (a ratio) and estimator: the bias in % of the truth and in reported
+        standard deviations (a ratio).
+    """
+    cells = {}
+    for row in frame.filter(frame["quantity"] == quantity).iter_rows(named=True):
+        percent, stds = row["bias_percent"], row["bias_in_stds"]
+        if percent is not None and stds is not None and abs(stds) > 1.0:
+            cells[row["effect"], row["severity_noise_powers"], row["estimator"]] = (percent, stds)
+    return cells
+
+
+def packaged_breakdown() -> pl.DataFrame:
+    """Results of ``tunnel score --breakdown``; columns as in its Parquet file."""
+    import polars as pl
+
+    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-breakdown.parquet") as path:
+        return pl.read_parquet(path)

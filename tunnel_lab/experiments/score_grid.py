@@ -1,0 +1,460 @@
+"""The grid of conditions that estimators are scored on, a TOML file; its cells, and the records drawn for them.
+
+The motion comes from the compiled forward integrator, the reading from the virtual potentiometer. A trial depends
+on the seed, its cell and its number only. Therefore every estimator gets the same records, and a cell keeps them
+in any grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, Literal
+from zlib import crc32
+
+import numpy as np
+from pydantic import Field, TypeAdapter
+
+from tunnel_lab.terminal.inputs import NO_EFFECT, parse_effect
+from tunnel_sim.effects import Effect, EffectChain, effect_from
+from tunnel_sim.engine.sensor import read_motion
+from tunnel_sim.files.plan_schema import check_size, first_twice
+from tunnel_sim.files.reading import as_described, check_count, check_shape
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, read_document, shown
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.steps import follow_fastest, whole_steps
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import SensorModel, Truth
+from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.rig import Rig
+
+DECAY_QUANTITIES = ("zeta", "omega_n")
+CAMPAIGN_QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
+
+Positive = Annotated[float, Field(gt=0.0)]
+_LEAST_TRIALS = 2
+_ZETA_SPREAD, _FREQUENCY_SPREAD, _RELEASE_SPREAD = 0.05, 0.02, 0.03
+_ZERO_STD = 0.004  # rad
+
+
+class DecaysTable(StrictModel):
+    """``[[decays]]``: single free decays with the wind off; every combination is a cell."""
+
+    zeta: list[Annotated[float, Field(gt=0.0, lt=1.0)]] = Field(
+        min_length=1, description="a list of damping ratios between 0 and 1, such as [0.002, 0.05]"
+    )
+    frequency: list[Positive] = Field(
+        min_length=1, description="a list of natural frequencies in Hz, such as [0.8, 4.0]"
+    )
+    noise: list[Positive] = Field(
+        min_length=1, description="a list of noise levels over the amplitude, such as [0.001, 0.01]"
+    )
+    duration: list[Positive] = Field(min_length=1, description="a list of record lengths in s, such as [20]")
+    amplitude: Positive = Field(default=0.35, description="the release angle, a positive number in rad")
+    sample_rate: SampleRate = Field(default=1000.0, description="a positive number in Hz")
+    resolution: Annotated[float, Field(ge=0.0)] = Field(
+        default=0.0, description="a number in rad, zero for none"
+    )
+
+
+class CampaignsTable(StrictModel):
+    """``[[campaigns]]``: every spring with the wind off and at one speed; each speed, noise, … makes a cell."""
+
+    springs: list[Positive] = Field(min_length=1, description="a list of stiffnesses in N m/rad")
+    wind_speeds: list[Positive] = Field(min_length=1, description="a list of speeds in m/s, such as [10, 25]")
+    noise: list[Positive] = Field(
+        min_length=1, description="a list of noise levels over the amplitude, such as [0.001, 0.01]"
+    )
+    duration: list[Positive] = Field(min_length=1, description="a list of record lengths in s, such as [20]")
+    effects: list[OneLine] = Field(
+        default=[NO_EFFECT],
+        min_length=1,
+        description='a list such as ["none", "coulomb_friction:friction_moment=0.004"]',
+    )
+    amplitude: Positive = Field(default=0.35, description="the release angle, a positive number in rad")
+    sample_rate: SampleRate = Field(default=1000.0, description="a positive number in Hz")
+    resolution: Annotated[float, Field(ge=0.0)] = Field(
+        default=0.0, description="a number in rad, zero for none"
+    )
+
+
+class GridDocument(StrictModel):
+    """The whole of a grid."""
+
+    schema_version: int = Field(description="1")
+    name: OneLine = Field(description="a short name in quotes")
+    seed: int = Field(ge=0, description="a whole number, zero or more")
+    trials: int = Field(ge=2, le=100_000, description="the records in each cell, a whole number from 2")
+    trials_of: dict[str, Annotated[int, Field(ge=2)]] = Field(
+        default={}, description="a table of estimators that see fewer records, such as { bayesian = 20 }"
+    )
+    decays: list[DecaysTable] = Field(default=[], description="[[decays]] tables")
+    campaigns: list[CampaignsTable] = Field(default=[], description="[[campaigns]] tables")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One point of the grid.
+
+    Args:
+        kind: ``decay`` (one wind-off run of stated ζ and frequency) or ``campaign``.
+        noise: standard deviation of the sensor's noise over the amplitude, a ratio.
+        duration: of every record, s.
+        amplitude: of the release, rad.
+        sample_rate: Hz.
+        resolution: of the sensor, rad; 0 for none.
+        zeta: damping ratio of a decay; 0 in a campaign.
+        frequency: natural frequency of a decay, Hz; 0 in a campaign.
+        wind_speed: of a campaign's wind-on runs, m/s; 0 in a decay.
+        springs: of a campaign, N m/rad; none in a decay.
+        effect: as ``tunnel simulate --effect`` takes it; ``none`` for the nominal model.
+    """
+
+    kind: Literal["decay", "campaign"]
+    noise: float
+    duration: float
+    amplitude: float
+    sample_rate: float
+    resolution: float
+    zeta: float = 0.0
+    frequency: float = 0.0
+    wind_speed: float = 0.0
+    springs: tuple[float, ...] = ()
+    effect: str = NO_EFFECT
+
+    @property
+    def label(self) -> str:
+        """The cell in one line; different cells have different lines."""
+        tail = f"S/A {100 * self.noise:g} %, {self.duration:g} s"
+        if (self.amplitude, self.sample_rate, self.resolution) != (0.35, 1000.0, 0.0):
+            tail += f", A {self.amplitude:g} rad, {self.sample_rate:g} Hz"
+            tail += f", step {self.resolution:g} rad" if self.resolution else ""
+        if self.kind == "decay":
+            return f"ζ {self.zeta:g}, {self.frequency:g} Hz, {tail}"
+        springs = "/".join(f"{spring:g}" for spring in self.springs)
+        effect = "" if self.effect == NO_EFFECT else f", {self.effect}"
+        return f"Kr {springs} N m/rad, V {self.wind_speed:g} m/s, {tail}{effect}"
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The scored quantities, by their names in an estimate's JSON."""
+        return DECAY_QUANTITIES if self.kind == "decay" else CAMPAIGN_QUANTITIES
+
+    @property
+    def runs(self) -> int:
+        """Number of records in one trial."""
+        return 1 if self.kind == "decay" else 2 * len(self.springs)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What to score on.
+
+    Args:
+        trials: number of records, or campaigns, in each cell.
+        trials_of: the same for estimators that get fewer, by name.
+        cells: at least one, all different.
+    """
+
+    name: str
+    seed: int
+    trials: int
+    trials_of: tuple[tuple[str, int], ...]
+    cells: tuple[Cell, ...]
+
+    def trials_for(self, estimator: str) -> int:
+        """Number of trials that an estimator gets of each cell, always the first ones."""
+        return min(self.trials, dict(self.trials_of).get(estimator, self.trials))
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Everything that determines the records, in JSON's types."""
+        return {
+            "name": self.name,
+            "seed": self.seed,
+            "trials": self.trials,
+            "trials_of": dict(self.trials_of),
+            "cells": [dict(vars(cell)) | {"springs": list(cell.springs)} for cell in self.cells],
+        }
+
+    @classmethod
+    def from_json_dict(cls, data: dict[str, Any]) -> Grid:
+        """The inverse of `to_json_dict`.
+
+        Args:
+            data: of one grid.
+
+        Raises:
+            TunnelError: when it is not a grid, or too large.
+        """
+        where, remedy = "the grid as JSON", "write it again"
+        check_shape(data, where, remedy)
+        with as_described("is not a grid", where, remedy):
+            grid: Grid = _GRID.validate_python(data | {"trials_of": tuple(data["trials_of"].items())})
+            if not grid.cells or grid.trials < _LEAST_TRIALS or not all(map(_is_possible, grid.cells)):
+                raise ValueError("a cell or a number of trials is out of range")
+        check_count(len(grid.cells), limits.SCORE_CELLS, "cells", where, "shorten a list")
+        for cell in grid.cells:
+            check_size(cell.runs, cell.duration, cell.sample_rate, where)
+        return grid
+
+
+_GRID = TypeAdapter(Grid)
+
+
+def _is_possible(cell: Cell) -> bool:
+    """Whether the numbers of a cell are within the limits of the tables."""
+    positive = (cell.noise, cell.duration, cell.amplitude, cell.sample_rate, *cell.springs)
+    return min(positive) > 0.0 and min(cell.resolution, cell.wind_speed) >= 0.0 and 0.0 <= cell.zeta < 1.0
+
+
+def check_trials(grid: Grid, estimators: Sequence[str], where: str) -> None:
+    """Refuse more trials than a table can hold before any is drawn.
+
+    Raises:
+        TunnelError: with the number of rows and the limit.
+    """
+    quantities = sum(len(cell.quantities) for cell in grid.cells)
+    rows = quantities * sum(grid.trials_for(name) for name in estimators)
+    what = "rows (trials × estimators × quantities)"
+    check_count(rows, limits.SCORE_ROWS, what, where, "give fewer trials, cells or estimators")
+
+
+def load_grid(path: Path) -> Grid:
+    """Read a grid.
+
+    Args:
+        path: a TOML file like the packaged ``score-grid.toml``.
+
+    Returns:
+        The grid; cells in the order of the tables, the last list of a table varies fastest.
+
+    Raises:
+        TunnelError: for the first error, in one line that names file, key and remedy.
+    """
+    missing = "name a grid such as the packaged score-grid.toml, or leave it out"
+    document = read_document(GridDocument, path, missing=missing)
+    where = shown(path)
+    _check_effects(document, where)
+    _check_sizes(document, where)
+    cells = [cell for table in document.decays for cell in _decays(table)]
+    cells += [cell for table in document.campaigns for cell in _campaigns(table)]
+    if not cells:
+        raise TunnelError("no cells", where=where, remedy="add a [[decays]] or [[campaigns]] table")
+    twice = first_twice(cells)
+    if twice is not None:
+        raise TunnelError(f"the cell {twice.label!r} occurs twice", where=where, remedy="remove one")
+    from identification.estimators import ALL_ESTIMATORS
+    from tunnel_sim.vocabulary.errors import did_you_mean
+
+    for name in document.trials_of:
+        if name not in ALL_ESTIMATORS:
+            remedy = did_you_mean(name, ALL_ESTIMATORS)
+            raise TunnelError(f"no estimator {name!r}", where=f"{where}, [trials_of]", remedy=remedy)
+    trials_of = tuple(document.trials_of.items())
+    return Grid(document.name, document.seed, document.trials, trials_of, tuple(cells))
+
+
+def packaged_grid() -> Grid:
+    """The default grid."""
+    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-grid.toml") as path:
+        return load_grid(path)
+
+
+def _check_sizes(document: GridDocument, where: str) -> None:
+    """Count cells, runs and samples from the lengths of the lists, before any cell is made."""
+    cells = 0
+    for decay in document.decays:
+        cells += len(decay.zeta) * len(decay.frequency) * len(decay.noise) * len(decay.duration)
+        check_size(1, max(decay.duration), decay.sample_rate, f"{where}, decays")
+    for table in document.campaigns:
+        cells += len(table.wind_speeds) * len(table.noise) * len(table.duration) * len(table.effects)
+        check_size(2 * len(table.springs), max(table.duration), table.sample_rate, f"{where}, campaigns")
+    check_count(cells, limits.SCORE_CELLS, "cells", where, "shorten a list")
+
+
+def _check_effects(document: GridDocument, where: str) -> None:
+    texts = dict.fromkeys(text for table in document.campaigns for text in table.effects)
+    for text in texts:
+        if text == NO_EFFECT:
+            continue
+        try:
+            setting = parse_effect(text)
+            null = effect_from(setting.name, setting.parameters).is_null
+        except TunnelError as error:
+            raise TunnelError(error.what, where=f"{where}, effect {text!r}", remedy=error.remedy) from error
+        if null:
+            remedy = f'give its severity, or write "{NO_EFFECT}"'
+            raise TunnelError(f"effect {text!r} does nothing", where=where, remedy=remedy)
+
+
+def _decays(table: DecaysTable) -> list[Cell]:
+    common = (table.amplitude, table.sample_rate, table.resolution)
+    return [
+        Cell("decay", noise, duration, *common, zeta=zeta, frequency=frequency)
+        for zeta, frequency, noise, duration in product(
+            table.zeta, table.frequency, table.noise, table.duration
+        )
+    ]
+
+
+def _campaigns(table: CampaignsTable) -> list[Cell]:
+    common = (table.amplitude, table.sample_rate, table.resolution)
+    springs = tuple(table.springs)
+    return [
+        Cell("campaign", noise, duration, *common, wind_speed=speed, springs=springs, effect=effect)
+        for speed, noise, duration, effect in product(
+            table.wind_speeds, table.noise, table.duration, table.effects
+        )
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One campaign of known truth.
+
+    Args:
+        campaign: input of the estimators; it does not state the noise.
+        truth: value of each scored quantity, by name, SI.
+        bound: the Cramér–Rao bound of each, by name, SI; of the nominal model, with or without an effect.
+    """
+
+    campaign: Campaign
+    truth: Mapping[str, float]
+    bound: Mapping[str, float]
+
+
+def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
+    """Make one trial.
+
+    Args:
+        number: of the trial in its cell, from 0.
+
+    Returns:
+        The trial; the same arguments give the same bits.
+
+    Raises:
+        TunnelError: when a run leaves the finite range.
+    """
+    rng = np.random.default_rng([seed, crc32(cell.label.encode()), number])
+    return _decay_trial(cell, rng) if cell.kind == "decay" else _campaign_trial(cell, rng)
+
+
+def _decay_trial(cell: Cell, rng: np.random.Generator) -> Trial:
+    from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+
+    rig = load_rig()
+    zeta = cell.zeta * (1.0 + _ZETA_SPREAD * rng.uniform(-1.0, 1.0))
+    omega = 2.0 * np.pi * cell.frequency * (1.0 + _FREQUENCY_SPREAD * rng.uniform(-1.0, 1.0))
+    inertia = rig.dynamics.yaw_inertia
+    truth = Truth(0.0, 0.0, inertia, 2.0 * zeta * omega * inertia)
+    runs = ((inertia * omega**2, 0.0, cell.amplitude),)
+    campaign = _campaign(cell, truth, runs, rig, rng, stated=False)
+    # Released at rest: A cos φ is the angle and A sin φ = −(decay rate)·angle/ωd.
+    damped = omega * np.sqrt(1.0 - zeta**2)
+    lag = -zeta * omega / damped
+    bound = damped_sinusoid_bound(
+        campaign.runs[0].record.time_s,
+        amplitude=cell.amplitude * float(np.hypot(1.0, lag)),
+        phase=float(np.arctan2(lag, 1.0)),
+        frequency=float(damped) / (2.0 * np.pi),
+        zeta=zeta,
+        noise_std=_noise(cell),
+    )
+    return Trial(campaign, {"zeta": zeta, "omega_n": omega}, {"zeta": bound.zeta, "omega_n": bound.omega_n})
+
+
+def _campaign_trial(cell: Cell, rng: np.random.Generator) -> Trial:
+    from identification.uncertainty.cramer_rao import campaign_bound
+
+    truth = Truth(
+        cn_beta=rng.uniform(0.25, 0.57),
+        cn_r=-rng.uniform(0.06, 0.24),
+        yaw_inertia=rng.uniform(0.098, 0.110),
+        mechanical_damping=rng.uniform(0.007, 0.020),
+    )
+    runs = tuple(
+        (spring, speed, cell.amplitude * (1.0 + _RELEASE_SPREAD * rng.standard_normal()))
+        for spring in cell.springs
+        for speed in (0.0, cell.wind_speed)
+    )
+    campaign = _campaign(cell, truth, runs, load_rig(), rng, stated=True)
+    states = [(release, 0.0) for _, _, release in runs]
+    bound = campaign_bound(campaign, **vars(truth), noise_std=_noise(cell), initial_states=states)
+    return Trial(campaign, dict(vars(truth)), {name: bound.std(name) for name in bound.parameters})
+
+
+def _noise(cell: Cell) -> float:
+    return float(np.hypot(cell.noise * cell.amplitude, cell.resolution / np.sqrt(12.0)))
+
+
+def _campaign(
+    cell: Cell,
+    truth: Truth,
+    conditions: Sequence[tuple[float, float, float]],
+    rig: Rig,
+    rng: np.random.Generator,
+    *,
+    stated: bool,
+) -> Campaign:
+    """Runs of (spring, speed, release); unless ``stated``, without their spring, which gives normalised form."""
+    effects = _effects(cell)
+    sensor = SensorModel(
+        cell.sample_rate, cell.noise * cell.amplitude, cell.resolution, _ZERO_STD * rng.standard_normal()
+    )
+    runs = []
+    for number, (spring, speed, release) in enumerate(conditions, 1):
+        settings = RunSettings(
+            spring_stiffness=spring,
+            derivatives=AeroDerivatives(truth.cn_beta, truth.cn_r),
+            yaw_inertia=truth.yaw_inertia,
+            mechanical_damping=truth.mechanical_damping,
+            wind_speed=speed,
+            air_density=rig.air.density,
+            release_angle=release,
+            duration=cell.duration,
+            timestep=whole_steps(cell.sample_rate),
+        )
+        runs.append(
+            Run(
+                id=f"r{number:02d}",
+                record=_record(cell, settings, rig, sensor, effects, rng),
+                wind_speed=speed,
+                spring_stiffness=spring if stated else None,
+                air_density=rig.air.density if speed > 0.0 else None,
+                release_angle=cell.amplitude,
+            )
+        )
+    stated_sensor = SensorProperties(cell.sample_rate, cell.resolution or None)
+    return Campaign("trial", RigProperties.of(rig), stated_sensor, tuple(runs))
+
+
+def _record(
+    cell: Cell,
+    settings: RunSettings,
+    rig: Rig,
+    sensor: SensorModel,
+    effects: Sequence[Effect],
+    rng: np.random.Generator,
+) -> Record:
+    chain = EffectChain.draw(settings, effects, rng)
+    try:
+        motion = forward_motion(rig, follow_fastest(rig, chain.physics()), cell.sample_rate)
+    except ValueError as error:
+        remedy = "choose a stiffer spring or less wind"
+        raise TunnelError(str(error), where=cell.label, remedy=remedy) from error
+    return read_motion(motion, sensor, rng, chain)
+
+
+def _effects(cell: Cell) -> tuple[Effect, ...]:
+    if cell.effect == NO_EFFECT:
+        return ()
+    setting = parse_effect(cell.effect)
+    return (effect_from(setting.name, setting.parameters),)

@@ -1,0 +1,474 @@
+"""The trials of a score: every estimator on every trial of a grid, their table as Parquet, and their scores.
+
+A baseline is such a table of trials. It contains its grid, so that it can be repeated.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from identification.estimate import UNITS, Quantity
+from identification.scoring.accuracy import Outcome, Trials, collect
+from tunnel_lab.experiments.runner import Progress, processes, run_tasks
+from tunnel_lab.experiments.score_grid import Cell, Grid, check_trials
+from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_sim.files.json_text import json_line
+from tunnel_sim.files.reading import (
+    as_described,
+    frame_schema,
+    parse_json,
+    read_frame,
+    read_json,
+    read_regular,
+)
+from tunnel_sim.files.writing import output_folder, write_json, write_whole
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import polars as pl
+
+    from identification.estimate import Estimate
+    from tunnel_sim.vocabulary.campaign import Campaign
+
+
+Row = dict[str, Any]
+UNIT_TRIALS = 5
+"""Trials done together; an interruption loses at most these in each process."""
+_COLUMNS = (
+    "cell", "trial", "estimator", "quantity", "unit", "truth", "value", "std", "bound", "status", "milliseconds"
+)  # fmt: skip
+Key = tuple[str, int, str]
+"""Estimator, index of the cell, quantity."""
+
+
+class Named(Protocol):
+    """A task of a score."""
+
+    @property
+    def name(self) -> str:
+        """Name of its file."""
+
+
+NamedT = TypeVar("NamedT", bound=Named)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Some trials of one cell.
+
+    Args:
+        cell: index of the cell in the grid.
+        first: number of the first trial.
+        stop: number after the last trial.
+    """
+
+    cell: int
+    first: int
+    stop: int
+
+    @property
+    def name(self) -> str:
+        """Name of its file."""
+        return f"c{self.cell:04d}-t{self.first:05d}"
+
+
+def units_of(grid: Grid) -> tuple[Unit, ...]:
+    """The grid in units of a few trials, ordered across cells so that the time left can be estimated early."""
+    return tuple(
+        Unit(cell, first, min(first + UNIT_TRIALS, grid.trials))
+        for first in range(0, grid.trials, UNIT_TRIALS)
+        for cell in range(len(grid.cells))
+    )
+
+
+def score_unit(grid: Grid, estimators: Sequence[str], unit: Unit) -> list[Row]:
+    """Every estimator on the unit's trials."""
+    from tunnel_lab.experiments.score_grid import draw_trial
+
+    cell = grid.cells[unit.cell]
+    rows: list[Row] = []
+    for number in range(unit.first, unit.stop):
+        wanted = [name for name in estimators if number < grid.trials_for(name)]
+        if not wanted:
+            continue
+        trial = draw_trial(cell, grid.seed, number)
+        for name in wanted:
+            rows += estimate_rows(
+                name, trial.campaign, trial.truth, trial.bound, {"cell": unit.cell, "trial": number}
+            )
+    return rows
+
+
+def estimate_rows(
+    estimator: str,
+    campaign: Campaign,
+    truth: Mapping[str, float],
+    bound: Mapping[str, float],
+    about: Mapping[str, Any],
+) -> list[Row]:
+    """One estimator on one campaign of known truth, a row for each quantity of the truth.
+
+    An estimator that raises an exception has failed, and its status names the exception: one bad record must not
+    stop the work.
+
+    Args:
+        truth: by quantity, SI; ζ and ωn are those of the first run.
+        bound: the Cramér–Rao bound by quantity, SI; quantities without one are left out.
+        about: first columns of every row.
+
+    Returns:
+        The rows; value and std are None where the estimator failed.
+    """
+    from identification import identify
+
+    begun = time.perf_counter()
+    try:
+        estimate: Estimate | None = identify(campaign, estimator, throw=False)
+        status = "" if estimate is None else estimate.status.name.lower()
+    except Exception as error:  # any exception of an estimator is counted and shown
+        estimate, status = None, f"raised {type(error).__name__}"
+    milliseconds = 1000.0 * (time.perf_counter() - begun) / len(campaign.runs)
+    rows = []
+    for quantity, value in truth.items():
+        source = (
+            None if estimate is None else estimate.runs[0] if quantity in ("zeta", "omega_n") else estimate
+        )
+        answer = getattr(source, quantity, None)
+        rows.append(
+            {
+                **about,
+                "estimator": estimator,
+                "quantity": quantity,
+                "unit": unit_of(quantity),
+                "truth": value,
+                "value": None if answer is None else answer.value,
+                "std": None if answer is None else answer.std,
+                "bound": bound.get(quantity),
+                "status": status,
+                "milliseconds": milliseconds,
+            }
+        )
+    return rows
+
+
+def outcome(row: Row) -> Outcome:
+    """A row as it is scored."""
+    quantity = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
+    return Outcome(row["truth"], quantity, row["bound"])
+
+
+def unit_of(quantity: str) -> str:
+    """Unit of a scored quantity.
+
+    Raises:
+        KeyError: when no cell scores it.
+    """
+    return {**UNITS, "zeta": "1", "omega_n": "rad/s"}[quantity]
+
+
+def score_grid(
+    grid: Grid,
+    estimators: Sequence[str],
+    *,
+    jobs: int = 2,
+    parts: Path | None = None,
+    progress: Progress | None = None,
+) -> list[Row]:
+    """Every estimator on every trial of a grid.
+
+    Args:
+        jobs: processes; 0 works in this one. Except for the times, the rows are the same to the bit.
+        parts: folder for finished work, from which an interrupted score continues if grid, estimators and code
+            are the same; None for none.
+        progress: called with the number of finished trials and of all trials.
+
+    Returns:
+        The rows, in the order of cells, trials and estimators.
+
+    Raises:
+        TunnelError: more trials than a table can hold.
+    """
+    check_trials(grid, estimators, "score")
+    units = units_of(grid)
+    rows = rows_of(
+        partial(score_unit, grid, tuple(estimators)),
+        units,
+        fingerprint(grid.to_json_dict(), estimators),
+        jobs=jobs,
+        parts=parts,
+        size=lambda unit: unit.stop - unit.first,
+        progress=progress,
+    )
+    order = sorted(units, key=lambda unit: (unit.cell, unit.first))
+    return [row for unit in order for row in rows[unit.name]]
+
+
+def rows_of(
+    work: Callable[[NamedT], list[Row]],
+    tasks: Sequence[NamedT],
+    mark: str,
+    *,
+    jobs: int,
+    parts: Path | None,
+    size: Callable[[NamedT], int] = lambda _: 1,
+    progress: Progress | None = None,
+) -> dict[str, list[Row]]:
+    """The rows of every task, by its name; those of finished tasks are kept in files of JSON.
+
+    Args:
+        work: function of a module.
+        tasks: each with the name of its file.
+        mark: rows kept under another mark are computed again, see `fingerprint`.
+        jobs: number of processes; 0 works in this one.
+        parts: folder of the files; None for none.
+        size: of a task, as progress counts it.
+    """
+    rows: dict[str, list[Row]] = {}
+    if parts is not None:
+        kept = {task.name: _kept(parts / f"{task.name}.json", mark) for task in tasks}
+        rows = {name: found for name, found in kept.items() if found is not None}
+
+    def keep(task: NamedT, found: list[Row]) -> None:
+        if parts is not None:
+            write_json(output_folder(parts) / f"{task.name}.json", {"fingerprint": mark, "rows": found})
+        rows[task.name] = found
+
+    run_tasks(
+        work,
+        tasks,
+        processes(jobs),
+        finished=lambda task: task.name in rows,
+        keep=keep,
+        size=size,
+        progress=progress,
+    )
+    return rows
+
+
+def fingerprint(document: Mapping[str, Any], estimators: Sequence[str]) -> str:
+    """Hash of all that results depend on: conditions, names of the estimators, and code of the packages below.
+
+    Args:
+        document: the conditions, in JSON's types.
+
+    Returns:
+        SHA-256 in hexadecimal.
+    """
+    text = json.dumps([document, list(estimators), _code()], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@cache
+def _code() -> str:
+    """A digest of all files of identification and tunnel_sim, including weights and libraries."""
+    import identification
+    import tunnel_sim
+
+    digest = hashlib.sha256()
+    for package in (identification, tunnel_sim):
+        root = Path(str(package.__file__)).parent
+        for path in sorted(root.rglob("*")):
+            if path.is_file() and "__pycache__" not in path.parts:
+                digest.update(path.relative_to(root).as_posix().encode())
+                digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _kept(path: Path, mark: str) -> list[Row] | None:
+    """Stored rows of a task; None where there are none, or they have another mark."""
+    try:
+        document = read_json(path, remedy="score it again")
+    except TunnelError:
+        return None
+    rows = document.get("rows")
+    whole = isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
+    return rows if whole and document.get("fingerprint") == mark else None
+
+
+def describe(cell: Cell) -> Row:
+    """A cell's conditions as columns of a table, units in their names."""
+    return {
+        "cell": cell.label,
+        "kind": cell.kind,
+        "zeta": cell.zeta or None,
+        "frequency_hz": cell.frequency or None,
+        "wind_speed_m_per_s": cell.wind_speed or None,
+        "effect": cell.effect,
+        "noise_over_amplitude": cell.noise,
+        "duration_s": cell.duration,
+        "runs": cell.runs,
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """A finished score.
+
+    Args:
+        estimators: names, in the order given.
+        rows: one per trial, estimator and quantity; see `tunnel_lab.experiments.score_trials`.
+    """
+
+    grid: Grid
+    estimators: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+    def trials(self) -> dict[Key, Trials]:
+        """The trials of every estimator, cell and quantity."""
+        outcomes: dict[Key, list[Outcome]] = {}
+        for row in self.rows:
+            key = (row["estimator"], row["cell"], row["quantity"])
+            outcomes.setdefault(key, []).append(outcome(row))
+        return {key: collect(every) for key, every in outcomes.items()}
+
+    def milliseconds(self, estimator: str, cells: Sequence[int]) -> float:
+        """Median time an estimator took for one record, ms.
+
+        Args:
+            cells: indices of the cells to include.
+        """
+        from statistics import median
+
+        wanted = set(cells)
+        return median(
+            float(row["milliseconds"])
+            for row in self.rows
+            if row["estimator"] == estimator and row["cell"] in wanted
+        )
+
+    def raised(self) -> dict[str, list[str]]:
+        """Exceptions by estimator; empty where there were none."""
+        by_estimator: dict[str, set[str]] = {}
+        for row in self.rows:
+            if row["status"].startswith("raised "):
+                by_estimator.setdefault(row["estimator"], set()).add(row["status"].removeprefix("raised "))
+        return {name: sorted(kinds) for name, kinds in by_estimator.items()}
+
+
+def groups_of(grid: Grid) -> dict[str, list[int]]:
+    """Cells that are pooled: decays, campaigns, and campaigns with each effect."""
+    groups: dict[str, list[int]] = {}
+    for index, cell in enumerate(grid.cells):
+        groups.setdefault(_group(cell), []).append(index)
+    return groups
+
+
+def _group(cell: Cell) -> str:
+    if cell.kind == "decay":
+        return "single decays"
+    return "campaigns" if cell.effect == NO_EFFECT else f"campaigns with {cell.effect}"
+
+
+def write_trials(path: Path, results: Results) -> Path:
+    """Write the trials with their grid as Parquet, completely or not at all.
+
+    Args:
+        path: the file; replaced when it exists.
+    """
+    import polars as pl
+
+    frame = trials_frame(results)
+    described = json_line(results.grid.to_json_dict(), sort_keys=True)
+    return write_whole(path, parquet(frame.with_columns(pl.lit(described).alias("grid"))))
+
+
+def trials_frame(results: Results) -> pl.DataFrame:
+    """A row for every trial, estimator and quantity.
+
+    Returns:
+        Columns as in the rows; ``cell`` is the index of the grid's cell.
+    """
+    import polars as pl
+
+    columns = {name: [row[name] for row in results.rows] for name in _COLUMNS}
+    return pl.DataFrame(columns, schema_overrides=_types())
+
+
+def read_trials(path: Path) -> Results:
+    """Read what `write_trials` wrote.
+
+    Returns:
+        The results, estimators in the order of their first rows.
+
+    Raises:
+        TunnelError: when there is no such file, or it is not a table of trials.
+    """
+    where, remedy = shown(path), "write one with tunnel score --write-baseline"
+    content = read_regular(path, limits.DATA_BYTES, missing=remedy, readable=remedy)
+    with as_described("is not a table of trials", where, remedy):
+        schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
+        wrong = [name for name, kind in _types().items() if schema.get(name) != kind]
+        if wrong or "grid" not in schema:
+            raise ValueError(", ".join(wrong) or "grid")
+        frame = read_frame(content, where, remedy, _COLUMNS)
+        # Every row carries the same grid; one is enough.
+        text = read_frame(content, where, remedy, ("grid",))["grid"][0]
+        grid = Grid.from_json_dict(parse_json(text, where, remedy))
+        rows = tuple(frame.to_dicts())
+        _check_rows(rows, grid)
+    return Results(grid, tuple(dict.fromkeys(row["estimator"] for row in rows)), rows)
+
+
+def packaged_baseline() -> Results:
+    """The trials of all estimators on the packaged grid, which ``tunnel score --check packaged`` compares with."""
+    with resources.as_file(resources.files("tunnel_lab") / "data" / "score-baseline.parquet") as path:
+        return read_trials(path)
+
+
+def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
+    """Refuse incomplete rows: each estimator must have all cells, and each estimate all values."""
+    wanted = {(at, quantity) for at, cell in enumerate(grid.cells) for quantity in cell.quantities}
+    scored: dict[str, set[tuple[int, str]]] = {}
+    for row in rows:
+        scored.setdefault(row["estimator"], set()).add((row["cell"], row["quantity"]))
+        if None in [row[name] for name in ("trial", "estimator", "unit", "truth", "status")]:
+            raise ValueError("a row without its truth or status")
+        if row["unit"] != unit_of(row["quantity"]):
+            raise ValueError("a unit that is not the quantity's")
+        if (row["value"] is None) != (row["std"] is None):
+            raise ValueError("a value without its standard deviation")
+        if not _can_be_scored(row):
+            raise ValueError("a number out of all range")
+    if not scored or any(cells != wanted for cells in scored.values()):
+        raise ValueError("cells that are not those of the grid")
+
+
+def _can_be_scored(row: Row) -> bool:
+    """Whether the row's error is a number over its bound, its truth and its standard deviation."""
+    truth, value, std, bound = (row[name] for name in ("truth", "value", "std", "bound"))
+    given = [abs(number) for number in (truth, value, std, bound) if number is not None]
+    if not all(number <= limits.LARGEST_NUMBER for number in given):  # false for NaN as well
+        return False
+    if (bound is not None and bound <= 0.0) or (bound is None and truth == 0.0):
+        return False
+    if value is None:
+        return True
+    scales = [abs(scale) for scale in (truth, std, bound) if scale]
+    return bool(std >= 0.0) and all(abs(value - truth) / scale <= limits.LARGEST_NUMBER for scale in scales)
+
+
+def parquet(frame: pl.DataFrame) -> bytes:
+    """A table as the bytes of a Parquet file."""
+    buffer = io.BytesIO()
+    frame.write_parquet(buffer, compression="zstd")
+    return buffer.getvalue()
+
+
+def _types() -> dict[str, Any]:
+    import polars as pl
+
+    text = dict.fromkeys(("estimator", "quantity", "unit", "status"), pl.Utf8)
+    numbers = dict.fromkeys(("truth", "value", "std", "bound", "milliseconds"), pl.Float64)
+    return {**text, **numbers, "cell": pl.Int64, "trial": pl.Int64}

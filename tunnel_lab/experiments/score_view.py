@@ -1,0 +1,463 @@
+"""A score in tables and in a figure, and against its baseline. matplotlib is imported inside the functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.text import Text
+
+from identification.estimate import Quantity
+from identification.policy import DIFFERENCE_RATE
+from identification.printing.numbers import SYMBOLS, concise, significant
+from identification.scoring.accuracy import (
+    INTERVAL,
+    NOMINAL_COVERAGE,
+    Score,
+    Trials,
+    mean_figure,
+    overall,
+    score,
+)
+from identification.scoring.comparison import Change, changes, holm
+from identification.statistics.proportion import Proportion
+from tunnel_lab.experiments.score_grid import Cell
+from tunnel_lab.experiments.score_trials import Key, Results, describe, groups_of
+from tunnel_lab.plotting.style import COLOURS, MARKERS, figure, grid, log_axis, styled
+from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_lab.terminal.tables import table
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+    from rich.table import Table
+
+    from identification.estimate import Quantity
+
+NAMES = {**SYMBOLS, "zeta": "ζ", "omega_n": "ωn"}
+"""How the quantities of a score are written."""
+ABOUT = (
+    "Bound: Cramér–Rao's, of the nominal model. Worst: of the cells. In brackets: the standard error in the last "
+    "digits; after shares: their 95 % interval."
+)
+_SHOWN_WORSE = 12
+_SHOWN = ("zeta", "omega_n", "cn_beta", "cn_r")
+_TITLES = {"decay": "Single decays", "campaign": "Campaigns"}
+_PANEL, _LABELS, _ROW, _HEAD = 0.95, 1.7, 0.2, 0.85  # inches
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One aspect of one estimator in the baseline and now.
+
+    Args:
+        worse: whether it is worse beyond chance, corrected for the number of findings.
+    """
+
+    estimator: str
+    where: str
+    quantity: str
+    change: Change
+    worse: bool
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a check found.
+
+    Args:
+        false_alarm_rate: probability that any finding of unchanged estimators is called worse.
+        identical: whether all estimates are the baseline's to the last bit.
+        added: estimators that are not in the baseline; they were not checked.
+    """
+
+    findings: tuple[Finding, ...]
+    false_alarm_rate: float
+    identical: bool
+    added: tuple[str, ...] = ()
+
+    @property
+    def worse(self) -> tuple[Finding, ...]:
+        """The findings that are worse, the most significant first."""
+        worse = [finding for finding in self.findings if finding.worse]
+        return tuple(sorted(worse, key=lambda finding: finding.change.p_value))
+
+    @property
+    def passed(self) -> bool:
+        """Whether no estimator got worse."""
+        return not self.worse
+
+
+def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> Verdict:
+    """Compare a score with its baseline, cell by cell and over all cells of a kind together.
+
+    Args:
+        now: trials of the same cells, with the same seed or another.
+        rate: false-alarm probability of all tests together.
+
+    Raises:
+        TunnelError: when the baseline has cells that were not scored now, or has none of the estimators.
+    """
+    estimators = [name for name in baseline.estimators if name in now.estimators]
+    places = _places(baseline, now)
+    if not estimators:
+        raise TunnelError(
+            "the baseline has none of the estimators",
+            where="--check",
+            remedy=f"score one of {', '.join(baseline.estimators)}",
+        )
+    before, after = baseline.trials(), now.trials()
+    tested: list[tuple[str, str, str, Change]] = []
+    for name in estimators:
+        for group, cells in groups_of(baseline.grid).items():
+            for quantity in baseline.grid.cells[cells[0]].quantities:
+                old = [before[name, cell, quantity] for cell in cells]
+                new = [after[name, places[cell], quantity] for cell in cells]
+                tested += [(name, *rest) for rest in _tests(baseline, cells, group, quantity, old, new)]
+    verdicts = holm([change.p_value for *_, change in tested], rate)
+    return Verdict(
+        findings=tuple(Finding(*test, worse) for test, worse in zip(tested, verdicts, strict=True)),
+        false_alarm_rate=rate,
+        identical=_estimates(baseline, estimators) == _estimates(now, estimators),
+        added=tuple(name for name in now.estimators if name not in baseline.estimators),
+    )
+
+
+def _tests(
+    baseline: Results,
+    cells: Sequence[int],
+    group: str,
+    quantity: str,
+    old: Sequence[Trials],
+    new: Sequence[Trials],
+) -> list[tuple[str, str, Change]]:
+    tests = []
+    for cell, before, after in zip(cells, old, new, strict=True):
+        tests += [(baseline.grid.cells[cell].label, quantity, c) for c in changes([before], [after])]
+    if len(cells) > 1:
+        tests += [(f"all {len(cells)} {group}", quantity, change) for change in changes(old, new)]
+    return tests
+
+
+def _places(baseline: Results, now: Results) -> list[int]:
+    """Index of each of the baseline's cells in the present grid."""
+    places = []
+    for cell in baseline.grid.cells:
+        if cell not in now.grid.cells:
+            raise TunnelError(
+                f"the baseline's cell {cell.label!r} is not in the grid",
+                where="--check",
+                remedy="leave the grid out: the baseline's own grid is then used",
+            )
+        places.append(now.grid.cells.index(cell))
+    return places
+
+
+def _estimates(results: Results, estimators: Sequence[str]) -> dict[tuple[Key, int], object]:
+    return {
+        ((row["estimator"], row["cell"], row["quantity"]), row["trial"]): (row["value"], row["std"])
+        for row in results.rows
+        if row["estimator"] in estimators
+    }
+
+
+def scores_frame(results: Results) -> pl.DataFrame:
+    """A row for every estimator, cell and quantity: conditions, figures, standard errors and intervals.
+
+    Args:
+        results: at least one trial.
+
+    Returns:
+        Columns with the unit in their name, or in the column ``unit``.
+    """
+    import polars as pl
+
+    rows = []
+    for (estimator, index, quantity), trials in results.trials().items():
+        judged = score(trials)
+        rows.append(
+            {
+                "estimator": estimator,
+                **describe(results.grid.cells[index]),
+                "quantity": quantity,
+                "unit": trials.unit,
+                **_figures(judged),
+                "milliseconds_per_record": results.milliseconds(estimator, [index]),
+            }
+        )
+    return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def _figures(judged: Score) -> dict[str, Any]:
+    figures: dict[str, Any] = {"trials": judged.count, "failures": judged.failures.count}
+    for name in ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound"):
+        quantity: Quantity | None = getattr(judged, name)
+        label = "relative_bias_percent" if name == "relative_bias" else name
+        figures[label] = None if quantity is None else quantity.value
+        figures[f"{label}_std_error"] = None if quantity is None else quantity.std
+    shares = {"coverage": judged.coverage, "failure_share": judged.failures}
+    for name, share in shares.items():
+        figures[name] = None if share is None else share.value
+        figures[f"{name}_low"], figures[f"{name}_high"] = (None, None) if share is None else share.interval
+    return figures
+
+
+def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
+    """One table for each kind of cell, with all cells of that kind pooled.
+
+    Returns:
+        Tables with a section for each estimator and a row for each quantity.
+    """
+    tables = []
+    trials = results.trials()
+    for group, cells in groups_of(results.grid).items():
+        many = f"{len(cells)} cells" if len(cells) > 1 else "1 cell"
+        result = table(
+            f"{group[0].upper()}{group[1:]} ({many})",
+            *("", "RMSE/\nbound", "worst", "bias/\nbound", "95 % covers\n[%]", "failed\n[%]"),
+            right=("worst",),
+        )
+        for name in results.estimators:
+            _section(result, results, name, cells, times=times)
+            for quantity in results.grid.cells[cells[0]].quantities:
+                result.add_row(
+                    f"  {NAMES[quantity]}", *pooled_figures([trials[name, cell, quantity] for cell in cells])
+                )
+        tables.append(result)
+    return tables
+
+
+def _section(result: Table, results: Results, name: str, cells: Sequence[int], *, times: bool = True) -> None:
+    """The estimator's name and time."""
+    if result.row_count:
+        result.add_section()
+    result.columns[0].no_wrap = True
+    result.add_row(Text(name, style="bold"))
+    if times:
+        result.add_row("  ms/record", significant(results.milliseconds(name, cells), 2))
+
+
+def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
+    """Figures of cells taken together, as text.
+
+    Returns:
+        RMSE over the bound, the worst cell's, bias over the bound, and the shares covered and failed in %.
+    """
+    scores = [score(trials) for trials in every]
+    worst = [s.rmse_over_bound.value for s in scores if s.rmse_over_bound is not None]
+    scaled = [float(value) for trials in every if trials.bound is not None for value in trials.scaled]
+
+    bias = mean_figure(np.array(scaled), "1") if len(scaled) > 1 else None
+    identified = sum(trials.error.size for trials in every)
+    covered = Proportion(sum(trials.covered for trials in every), identified) if identified else None
+    failed = Proportion(sum(t.failures for t in every), sum(t.count for t in every))
+    return (
+        _figure(overall(scores)),
+        significant(max(worst), 3) if worst else "–",
+        _figure(bias),
+        _share(covered),
+        _share(failed) if failed.count else "0",
+    )
+
+
+def cell_tables(results: Results) -> list[Table]:
+    """One table for each cell.
+
+    Returns:
+        Tables with a section for each estimator and a row for each quantity.
+    """
+    trials = results.trials()
+    tables = []
+    for index, cell in enumerate(results.grid.cells):
+        result = table(cell.label, "", "RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
+        for name in results.estimators:
+            _section(result, results, name, [index])
+            for quantity in cell.quantities:
+                result.add_row(f"  {NAMES[quantity]}", *cell_figures(score(trials[name, index, quantity])))
+        tables.append(result)
+    return tables
+
+
+def cell_figures(judged: Score) -> tuple[str, ...]:
+    """Figures of one cell, as text: RMSE over the bound, bias in % and in deviations, shares covered and failed."""
+    return (
+        _figure(judged.rmse_over_bound),
+        _figure(judged.relative_bias),
+        _figure(judged.bias_in_stds),
+        _share(judged.coverage),
+        _share(judged.failures) if judged.failures.count else "0",
+    )
+
+
+def _figure(quantity: Quantity | None) -> str:
+    return "–" if quantity is None else concise(quantity.value, quantity.std)
+
+
+def _share(share: Proportion | None) -> str:
+    if share is None:
+        return "–"
+    low, high = share.interval
+    return f"{100 * share.value:.3g} ({100 * low:.0f}–{100 * high:.0f})"
+
+
+def worse_table(verdict: Verdict) -> Table:
+    """The findings that are worse, the most significant first.
+
+    Returns:
+        A table; without rows where none is worse.
+    """
+    result = table(
+        "Worse than the baseline",
+        *("estimator", "", "aspect", "before", "now", "p", "where"),
+        right=("before", "now", "p"),
+    )
+    for finding in verdict.worse[:_SHOWN_WORSE]:
+        before, now = _before_and_now(finding)
+        result.add_row(
+            Text(finding.estimator),
+            NAMES[finding.quantity],
+            finding.change.aspect,
+            before,
+            now,
+            f"{finding.change.p_value:.1g}",
+            Text(finding.where),
+        )
+    return result
+
+
+def _before_and_now(finding: Finding) -> tuple[str, str]:
+    change = finding.change
+    if change.aspect in ("bias", "spread"):
+        return significant(change.before, 3), significant(change.now, 3)
+    return f"{100 * change.before:.1f} %", f"{100 * change.now:.1f} %"
+
+
+def verdict_lines(verdict: Verdict) -> list[str]:
+    """The result of a check in words."""
+    tests = f"{len(verdict.findings)} tests, false-alarm rate {100 * verdict.false_alarm_rate:g} % of all together"
+    worse = verdict.worse
+    if worse:
+        names = ", ".join(sorted({finding.estimator for finding in worse}))
+        lines = [f"Worse than the baseline: {names} ({len(worse)} of {tests})"]
+        if len(worse) > _SHOWN_WORSE:
+            lines.append(f"The {_SHOWN_WORSE} most significant are shown.")
+        lines.append(
+            "bias (size of the mean error) and spread (root mean square error) are in units of the bound"
+        )
+    elif verdict.identical:
+        lines = ["No estimator is worse: all estimates equal the baseline to the last bit."]
+    else:
+        lines = [f"No estimator is worse beyond sampling error ({tests})."]
+    if verdict.added:
+        lines.append(f"Not in the baseline, so not checked: {', '.join(verdict.added)}")
+    return lines
+
+
+@styled
+def score_figure(results: Results) -> Figure:
+    """RMSE over the bound and coverage of 95 % intervals, with the sampling errors' 95 % intervals.
+
+    Returns:
+        For each kind of cell two rows of panels, one panel for each estimator. Cells are in rows, in the grid's
+        order, so that reading across compares the estimators; quantities differ in colour and marker.
+    """
+    kinds = [cell.kind for cell in results.grid.cells]
+    groups = {
+        title: [index for index, kind in enumerate(kinds) if kind == wanted]
+        for wanted, title in _TITLES.items()
+        if wanted in kinds
+    }
+    heights = [_HEAD + _ROW * len(cells) for cells in groups.values() for _ in range(2)]
+    fig = figure(_LABELS + _PANEL * len(results.estimators), sum(heights))
+    parts = iter(fig.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0])
+    for name, cells in groups.items():
+        _block(next(parts), results, name, cells, covered=False)
+        _block(next(parts), results, name, cells, covered=True)
+    return fig
+
+
+def _block(part: SubFigure, results: Results, group: str, cells: Sequence[int], *, covered: bool) -> None:
+    """One row of panels."""
+    labels, common = cell_labels([results.grid.cells[index] for index in cells])
+    trials = results.trials()
+    quantities = [name for name in _SHOWN if name in results.grid.cells[cells[0]].quantities]
+    panels = part.subplots(1, len(results.estimators), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, name in zip(panels, results.estimators, strict=True):
+        axes.axvline(100 * NOMINAL_COVERAGE if covered else 1.0, color="0.4", linewidth=0.8, zorder=1)
+        for place, quantity in enumerate(quantities):
+            scores = [score(trials[name, cell, quantity]) for cell in cells]
+            shift = 0.36 * ((place + 0.5) / len(quantities) - 0.5)
+            draw = _coverage if covered else _errors
+            style = {"color": COLOURS[place], "marker": MARKERS[place], "label": NAMES[quantity]}
+            draw(axes, scores, shift, style)
+        axes.set_title(name.replace("_", " "), loc="center", fontsize=8)
+        axes.tick_params(axis="y", length=0)
+        grid(axes, "x")
+    panels[0].set_yticks(range(len(cells)), labels)
+    panels[0].set_ylim(len(cells) - 0.5, -0.5)
+    if covered:
+        panels[0].set_xlim(-4.0, 104.0)
+        panels[0].set_xticks([0, 50, 100])
+    else:
+        log_axis(panels[0], "x")
+    quantity = "95 % intervals that contain the truth [%]" if covered else "RMSE over the Cramér–Rao bound"
+    part.supxlabel(quantity, fontsize=9)
+    part.suptitle(f"{group}{', ' if common else ''}{common}", x=0.01, ha="left", fontsize=9)
+    handles, names = panels[0].get_legend_handles_labels()
+    part.legend(handles, names, loc="upper right", ncols=len(names), borderaxespad=0.0)
+
+
+def _errors(axes: Axes, scores: Sequence[Score], shift: float, style: dict[str, Any]) -> None:
+    points = [(row, s.rmse_over_bound) for row, s in enumerate(scores) if s.rmse_over_bound is not None]
+    axes.errorbar(
+        [figure.value for _, figure in points],
+        [row + shift for row, _ in points],
+        xerr=[min(INTERVAL * figure.std, 0.9 * figure.value) for _, figure in points],
+        linestyle="none", markersize=3.0, elinewidth=0.8, **style,
+    )  # fmt: skip
+
+
+def _coverage(axes: Axes, scores: Sequence[Score], shift: float, style: dict[str, Any]) -> None:
+    points = [(row, s.coverage) for row, s in enumerate(scores) if s.coverage is not None]
+    value = np.array([100 * share.value for _, share in points])
+    ends = 100 * np.array([share.interval for _, share in points]).reshape(-1, 2)
+    spans = np.maximum(np.stack((value - ends[:, 0], ends[:, 1] - value)), 0.0)
+    axes.errorbar(
+        value,
+        [row + shift for row, _ in points],
+        xerr=spans,
+        linestyle="none", markersize=3.0, elinewidth=0.8, **style,
+    )  # fmt: skip
+
+
+def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
+    """The conditions of cells of one kind in a few words.
+
+    Returns:
+        What distinguishes each cell from the others; and what is common to all.
+    """
+    parts = [_parts(cell) for cell in cells]
+    if len(parts) == 1:
+        return [", ".join(filter(None, parts[0]))], ""
+    varied = [len(set(column)) > 1 for column in zip(*parts, strict=True)]
+    common = [text for text, varies in zip(parts[0], varied, strict=True) if text and not varies]
+    labels = [
+        ", ".join(text for text, varies in zip(texts, varied, strict=True) if text and varies)
+        for texts in parts
+    ]
+    return labels, ", ".join(common)
+
+
+def _parts(cell: Cell) -> tuple[str, ...]:
+    noise, duration = f"noise {100 * cell.noise:g} %", f"{cell.duration:g} s"
+    if cell.kind == "decay":
+        return (f"ζ {cell.zeta:g}", f"{cell.frequency:g} Hz", noise, duration)
+    effect = "" if cell.effect == NO_EFFECT else cell.effect.partition(":")[0].replace("_", " ")
+    return (f"{cell.wind_speed:g} m/s", noise, duration, effect)

@@ -1,0 +1,384 @@
+"""The cases of a sweep: the tables of its file, and their product.
+
+The tables are those of a campaign description, with lists of the values to sweep. Every case is a campaign
+description with a seed computed from its contents.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from math import prod
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+
+from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_sim.files.plan_file import plan_from
+from tunnel_sim.files.plan_schema import (
+    STEPS_PER_SECOND,
+    EffectTable,
+    NotNegative,
+    PlanDocument,
+    Positive,
+    ReleaseAngles,
+    Repeats,
+    Springs,
+    Stiffnesses,
+    WindSpeeds,
+    check_size,
+    run_count,
+)
+from tunnel_sim.files.reading import as_described, check_count, parse_json
+from tunnel_sim.files.rig_file import parse_rig
+from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.plan import DEFAULT_SAMPLE_RATE, CampaignPlan
+from tunnel_sim.vocabulary.rig import Rig
+
+STEPS_PER_SHARD = 500_000
+"""Integration steps of one shard: about two seconds on one core, the most that a killed sweep loses per worker."""
+
+
+def _listed(value: object) -> object:
+    """One value, or one table, is a list of one."""
+    return value if isinstance(value, list) else [value]
+
+
+Many = Annotated[list[float], BeforeValidator(_listed), Field(min_length=1)]
+ManyPositive = Annotated[list[Positive], BeforeValidator(_listed), Field(min_length=1)]
+ManyRates = Annotated[list[SampleRate], BeforeValidator(_listed), Field(min_length=1)]
+ManyNotNegative = Annotated[list[NotNegative], BeforeValidator(_listed), Field(min_length=1)]
+
+
+class RigTable(StrictModel):
+    """``[[rig]]``: a rig description with changes; the packaged one where no file is named."""
+
+    name: OneLine = Field(default="packaged", description="a short name in quotes")
+    file: OneLine | None = Field(default=None, description="the path of a rig description in quotes")
+    changes: dict[str, dict[str, Any]] = Field(
+        default={}, description="tables of the rig description, such as { dynamics = { yaw_inertia = 0.12 } }"
+    )
+
+
+class TruthAxis(StrictModel):
+    """``[truth]`` or ``[[truth]]``: coefficients to inject, each a number or a list."""
+
+    cn_beta: Many = Field(description="a number or a list of them, 1/rad")
+    cn_r: Many = Field(description="a number or a list of them, 1/rad")
+    yaw_inertia: ManyPositive | None = Field(
+        default=None, description="a positive number or a list of them, kg m2"
+    )
+    mechanical_damping: ManyNotNegative | None = Field(
+        default=None, description="a number or a list of them, N m s/rad, zero or more"
+    )
+
+
+class SensorAxis(StrictModel):
+    """``[sensor]`` or ``[[sensor]]``: the potentiometer, each key a number or a list."""
+
+    sample_rate: ManyRates | None = Field(default=None, description="a positive number or a list of them, Hz")
+    noise_std: ManyNotNegative | None = Field(
+        default=None, description="a number or a list of them, rad, zero or more"
+    )
+    resolution: ManyNotNegative | None = Field(
+        default=None, description="a number or a list of them, rad, zero for none"
+    )
+    zero: Many | None = Field(default=None, description="a number or a list of them, rad")
+
+
+class EffectAxis(StrictModel):
+    """``[[effects]]``: one alternative, an effect with its severities; ``none`` is the nominal model."""
+
+    name: OneLine = Field(description='the name of an effect in quotes, or "none"')
+    parameters: dict[str, Many] = Field(
+        default={}, description="a table of numbers or lists of them, such as { x = [0.1, 0.2] }"
+    )
+    together_with: list[EffectTable] = Field(
+        default=[], description='a list of tables such as { name = "…", parameters = { x = 0.1 } }'
+    )
+
+
+class ConditionsTable(StrictModel):
+    """``[conditions]`` or ``[[conditions]]``: the runs of a campaign; each table, and each duration, is one."""
+
+    name: OneLine | None = Field(default=None, description="a short name in quotes")
+    springs: Springs = Field(default=[])
+    spring_stiffness: Stiffnesses = Field(default=[])
+    wind_speeds: WindSpeeds
+    release_angles_deg: ReleaseAngles
+    repeats: Repeats = 1
+    duration: ManyPositive = Field(description="a positive number or a list of them, s")
+    air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
+
+
+class SweepDocument(StrictModel):
+    """The whole of a sweep file: rig × conditions × sensor × truth × effects × replicates, then estimators."""
+
+    name: OneLine = Field(description="a short name in quotes")
+    description: str = Field(default="", description="text in quotes, or leave it out")
+    seed: int = Field(ge=0, lt=2**63, description="a whole number, zero or more")
+    replicates: int = Field(default=1, ge=1, le=1_000_000, description="a whole number from 1 to 1000000")
+    estimators: list[OneLine] = Field(
+        description='a list of names such as ["output_error", "conventional"], or [] to simulate only'
+    )
+    records: bool = Field(default=False, description="true or false")
+    cases_per_shard: int | None = Field(default=None, ge=1, description="a whole number, one or more")
+    rig: Annotated[list[RigTable], BeforeValidator(_listed), Field(min_length=1)] = Field(
+        default=[RigTable()], description="[[rig]] tables"
+    )
+    conditions: Annotated[list[ConditionsTable], BeforeValidator(_listed), Field(min_length=1)] = Field(
+        description="a [conditions] table with springs, wind_speeds, release_angles_deg and duration"
+    )
+    sensor: Annotated[list[SensorAxis], BeforeValidator(_listed), Field(min_length=1)] = Field(
+        default=[SensorAxis()], description="a [sensor] table"
+    )
+    truth: Annotated[list[TruthAxis], BeforeValidator(_listed), Field(min_length=1)] = Field(
+        description="a [truth] table with cn_beta and cn_r"
+    )
+    effects: Annotated[list[EffectAxis], BeforeValidator(_listed), Field(min_length=1)] = Field(
+        default=[EffectAxis(name="none")], description="[[effects]] tables"
+    )
+
+
+@dataclass(frozen=True)
+class Case:
+    """One campaign of a sweep.
+
+    Args:
+        index: in the order of the product, from 0.
+        replicate: number of the repetition with other noise, from 0.
+        duration: of every run, s.
+        plan: the campaign with its seed.
+        document: the same as a campaign description, ready to be written as TOML.
+    """
+
+    index: int
+    replicate: int
+    rig_name: str
+    rig: Rig
+    conditions: str
+    duration: float
+    plan: CampaignPlan
+    document: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep file with its rigs, which together determine the results.
+
+    Args:
+        rigs: sections of each rig's description, in the order of the file.
+    """
+
+    document: SweepDocument
+    rigs: tuple[Mapping[str, Any], ...]
+
+    def to_json(self) -> str:
+        """The sweep as one line of JSON, from which any worker can rebuild it."""
+        return json.dumps(
+            {"document": self.document.model_dump(), "rigs": list(self.rigs)}, sort_keys=True, allow_nan=False
+        )
+
+    @classmethod
+    def from_json(cls, text: str) -> Sweep:
+        """The inverse of `to_json`.
+
+        Raises:
+            TunnelError: when it is not a sweep, or too large.
+        """
+        where, remedy = "the sweep as JSON", "start the sweep again"
+        document = parse_json(text, where, remedy)
+        with as_described("is not a sweep", where, remedy):
+            sweep = cls(SweepDocument.model_validate(document["document"]), tuple(document["rigs"]))
+            check_sweep_size(sweep.document, where)
+            if len(sweep._parsed) != len(sweep.document.rig):
+                raise ValueError("rigs")
+        return sweep
+
+    @cached_property
+    def axes(self) -> tuple[Sequence[Any], ...]:
+        """Values of rig, conditions, sensor, truth and effects; the last varies fastest."""
+        file = self.document
+        return (
+            range(len(self.rigs)),
+            [value for table in file.conditions for value in _conditions(table.model_dump())],
+            [value for table in file.sensor for value in _spread(table.model_dump(exclude_none=True))],
+            [value for table in file.truth for value in _spread(table.model_dump(exclude_none=True))],
+            [value for entry in file.effects for value in _effects(entry.model_dump())],
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of cases."""
+        return prod(axis_lengths(self.document).values()) * self.document.replicates
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        tables = self.document.conditions
+        runs = sum(run_count(table) * len(table.duration) for table in tables)
+        return runs * (self.size // axis_lengths(self.document)["conditions"])
+
+    @property
+    def cases_per_shard(self) -> int:
+        """Number of cases in a shard; it depends on the file only, not on the workers."""
+        return _cases_per_shard(self.document)
+
+    @property
+    def shards(self) -> int:
+        """Number of shards."""
+        return -(-self.size // self.cases_per_shard)
+
+    def shard(self, index: int) -> Iterator[Case]:
+        """The cases of a shard.
+
+        Args:
+            index: from 0.
+        """
+        start = index * self.cases_per_shard
+        for place in range(start, min(start + self.cases_per_shard, self.size)):
+            yield self.case(place)
+
+    def case(self, index: int) -> Case:
+        """A case.
+
+        Args:
+            index: in the order of the product, from 0.
+
+        Returns:
+            The case, which is the same in any sweep of the same seed that contains it.
+        """
+        point, replicate = divmod(index, self.document.replicates)
+        places = np.unravel_index(point, tuple(map(len, self.axes)))
+        rig, conditions, sensor, truth, effects = (
+            axis[int(place)] for axis, place in zip(self.axes, places, strict=True)
+        )
+        physics = {
+            **{key: value for key, value in conditions.items() if key != "name"},
+            "sensor": sensor,
+            "truth": truth,
+            "effects": effects,
+        }
+        seed = case_seed(self.document.seed, {"rig": self.rigs[rig], **physics}, replicate)
+        document = {"name": f"{self.document.name}-{index}", "seed": seed, **physics}
+        plan = plan_from(PlanDocument.model_validate(document), self._parsed[rig], self.document.name)
+        return Case(
+            index=index,
+            replicate=replicate,
+            rig_name=self.document.rig[rig].name,
+            rig=self._parsed[rig],
+            conditions=conditions["name"],
+            duration=conditions["duration"],
+            plan=plan,
+            document=document,
+        )
+
+    @cached_property
+    def _parsed(self) -> tuple[Rig, ...]:
+        named = zip(self.document.rig, self.rigs, strict=True)
+        return tuple(parse_rig(_numbered(sections), f"rig '{table.name}'") for table, sections in named)
+
+
+def case_seed(seed: int, physics: Mapping[str, Any], replicate: int) -> int:
+    """The seed of a case: it depends on the contents of the case, not on its place in the product.
+
+    Args:
+        physics: everything that the records of the case depend on besides the noise, as plain values.
+        replicate: number of the repetition, from 0.
+
+    Returns:
+        A number from 0 to 2⁶³ − 1, as a campaign description's ``seed``.
+    """
+    digest = hashlib.sha256(json.dumps(physics, sort_keys=True, allow_nan=False).encode()).digest()
+    words = tuple(np.frombuffer(digest, dtype="<u4").tolist())
+    sequence = np.random.SeedSequence(seed, spawn_key=(*words, replicate))
+    return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
+
+
+def _spread(table: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
+    """Every combination of lists, the last key fastest."""
+    return [dict(zip(table, values, strict=True)) for values in product(*table.values())]
+
+
+def _conditions(table: Mapping[str, Any]) -> list[dict[str, Any]]:
+    kept = {key: value for key, value in table.items() if value is not None}
+    named = {"name": kept.pop("name", "conditions"), **kept}
+    return [{**named, "duration": duration} for duration in table["duration"]]
+
+
+def _effects(entry: Mapping[str, Any]) -> list[list[dict[str, Any]]]:
+    if entry["name"] == NO_EFFECT:
+        return [[]]
+    others = [dict(other) for other in entry["together_with"]]
+    return [
+        [{"name": entry["name"], "parameters": parameters}, *others]
+        for parameters in _spread(entry["parameters"])
+    ]
+
+
+def axis_lengths(document: SweepDocument) -> dict[str, int]:
+    """Number of values of every axis by its name, counted from the lengths of the lists."""
+    effects = (1 if effect.name == NO_EFFECT else _points(effect.parameters) for effect in document.effects)
+    return {
+        "rig": len(document.rig),
+        "conditions": sum(len(table.duration) for table in document.conditions),
+        "sensor": sum(_points(table.model_dump(exclude_none=True)) for table in document.sensor),
+        "truth": sum(_points(table.model_dump(exclude_none=True)) for table in document.truth),
+        "effects": sum(effects),
+    }
+
+
+def check_sweep_size(document: SweepDocument, where: str) -> None:
+    """Refuse a sweep that is too large before it is expanded.
+
+    Raises:
+        TunnelError: too many values of an axis, cases, shards, runs or samples, with their number and the limit.
+    """
+    lengths = axis_lengths(document)
+    for name, length in lengths.items():
+        check_count(length, limits.SWEEP_AXIS, "values", f"{where}, {name}", "shorten a list")
+    cases = prod(lengths.values()) * document.replicates
+    check_count(cases, limits.SWEEP_CASES, "cases", where, "shorten a list, or make several sweeps")
+    checks = lengths["rig"] * lengths["conditions"] * (lengths["sensor"] + lengths["effects"])
+    combinations = "combinations of rig and conditions with a sensor or an effect"
+    check_count(checks, limits.SWEEP_CHECKS, combinations, where, "shorten a list, or make several sweeps")
+    rates = [rate for table in document.sensor for rate in table.sample_rate or [DEFAULT_SAMPLE_RATE]]
+    for table in document.conditions:
+        place = f"{where}, conditions '{table.name}'"
+        for rate in (min(rates), max(rates)):
+            check_size(run_count(table), max(table.duration), rate, place)
+    _check_shards(document, cases, max(rates), where)
+
+
+def _check_shards(document: SweepDocument, cases: int, rate: float, where: str) -> None:
+    together = min(cases, _cases_per_shard(document))
+    shards = -(-cases // together)
+    check_count(shards, limits.SWEEP_SHARDS, "shards", where, "raise cases_per_shard, or make several sweeps")
+    samples = together * max(_samples(table, rate) for table in document.conditions)
+    check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in a shard", where, "lower cases_per_shard")
+
+
+def _cases_per_shard(document: SweepDocument) -> int:
+    longest = max(_samples(table, STEPS_PER_SECOND) for table in document.conditions)
+    return document.cases_per_shard or max(1, int(STEPS_PER_SHARD // longest))
+
+
+def _samples(table: ConditionsTable, rate: float) -> float:
+    """Of the longest case of some conditions, at a rate in Hz."""
+    return run_count(table) * max(table.duration) * rate
+
+
+def _points(lists: Mapping[str, Sequence[float]]) -> int:
+    """Number of combinations that `_spread` makes."""
+    return prod(map(len, lists.values()))
+
+
+def _numbered(sections: Mapping[str, Any]) -> dict[str, Any]:
+    """A rig's sections with the keys of TOML."""
+    return {name: dict(table) if isinstance(table, Mapping) else table for name, table in sections.items()}

@@ -1,0 +1,382 @@
+"""Summary of a sweep: error against noise, speed, spring and severity, per estimator, with intervals.
+
+Errors are in % of the truth, or in the quantity's unit where a truth is zero. The values of the other axes are
+pooled. Lines along noise, speed and spring use the cases without effects where the sweep has such cases, which
+are also severity 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification.printing.numbers import SYMBOLS, concise, significant, unit
+from identification.scoring.accuracy import Score, Trials, score
+from identification.statistics.proportion import Proportion
+from tunnel_lab.experiments.sweep import TIMINGS, Store
+from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
+from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_lab.terminal.tables import table
+from tunnel_sim.effects import effect_class
+from tunnel_sim.files.reading import as_described
+from tunnel_sim.vocabulary.errors import TunnelError, shown
+from tunnel_sim.vocabulary.record import read_only
+
+if TYPE_CHECKING:
+    import polars as pl
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from rich.table import Table
+
+    from identification.estimate import Quantity
+
+
+OVERALL = "all"
+SEVERITY = "severity"
+AXES = {
+    "noise_std": ("noise", "rad"),
+    "wind_speed": ("wind speed", "m/s"),
+    "spring_stiffness": ("spring stiffness", "N m/rad"),
+    "duration": ("duration", "s"),
+}
+"""Columns that a summary uses as axes, each with its name and unit."""
+NOT_ASKED = (
+    "ok",
+    "model_departs",
+    "noise_disagrees",
+    "no_stiffness",
+    "no_wind_on",
+    "no_wind_off_pair",
+    "stiffness_not_separable",
+    "damping_not_separable",
+    "no_reference_size",
+)
+"""Statuses of values that the runs cannot give; these are not failures of the estimator."""
+DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "cn_r": "Cnr"}
+"""Quantities that have a panel; Izz, Cr and the sensor's zero are in the first table and the CSV."""
+NAMES: Mapping[str, str] = {**DRAWN, **SYMBOLS, "sensor_zero": "zero"}
+BRACKETS = "In brackets: the standard error in the last digits, from the number of trials; of shares 95 %."
+_TICKS = 5  # intervals between labels of six digits, such as 0.00075, that do not touch
+_ASIDE = 0.012  # of the axis, between two estimators
+_LOGARITHMIC = ("noise_std", "spring_stiffness")
+_WIDE = 10.0  # ratio of the largest to the least value from which an axis is drawn logarithmic
+
+
+@dataclass(frozen=True)
+class Line:
+    """The score of an estimator for a quantity at a place on an axis.
+
+    Args:
+        axis: a key of `AXES`, ``severity`` or ``all``.
+        effect: the effect whose severity it is; otherwise the pooled effects.
+        at: the value on the axis, in its unit; None for ``all``.
+        at_unit: unit of the axis.
+        quantity: its name; ``omega_n`` and ``zeta`` are those of single runs.
+        score: bias, RMSE, coverage and failures, in the score's unit.
+    """
+
+    axis: str
+    effect: str
+    at: float | None
+    at_unit: str
+    estimator: str
+    quantity: str
+    score: Score
+
+    def to_row(self) -> dict[str, Any]:
+        """The line as plain values: every figure with its standard error or 95 % interval."""
+        bias, rmse, coverage = self.score.bias, self.score.rmse, self.score.coverage
+        return {
+            "axis": self.axis, "effect": self.effect, "at": self.at, "at_unit": self.at_unit,
+            "estimator": self.estimator, "quantity": self.quantity,
+            "unit": None if bias is None else bias.unit, "count": self.score.count,
+            **_share("failures", self.score.failures),
+            "bias": bias and bias.value, "bias_std": bias and bias.std,
+            "rmse": rmse and rmse.value, "rmse_std": rmse and rmse.std,
+            **_share("coverage", coverage),
+        }  # fmt: skip
+
+
+def _share(name: str, share: Proportion | None) -> dict[str, float | None]:
+    low, high = (None, None) if share is None else share.interval
+    return {name: None if share is None else share.value, f"{name}_low": low, f"{name}_high": high}
+
+
+def summarise(store: Store) -> list[Line]:
+    """Score the finished part of a sweep.
+
+    Args:
+        store: at least one shard finished.
+
+    Returns:
+        Lines: of all cases, then along each axis that has two values or more, by estimator and quantity.
+
+    Raises:
+        TunnelError: when nothing is finished, or the sweep has no estimators.
+    """
+    import polars as pl
+
+    frame = store.scan()
+    if not store.sweep.document.estimators:
+        raise TunnelError(
+            "the sweep has no estimators", where=str(store.folder), remedy="there is no estimate to summarise"
+        )
+    pairs = frame.select("estimator", "quantity").unique(maintain_order=True).collect()
+    columns = ("effect", "severity", *AXES, "truth", "value", "std", "status", "unit")
+    lines: list[Line] = []
+    for estimator, quantity in pairs.iter_rows():
+        mine = (pl.col("estimator") == estimator) & (pl.col("quantity") == quantity)
+        asked = pl.col("value").is_not_null() | ~pl.col("status").is_in(NOT_ASKED)
+        data = frame.filter(mine & asked & pl.col("truth").is_not_null()).select(columns).collect()
+        if len(data):
+            lines += lines_of(data, estimator, quantity)
+    order = [OVERALL, *AXES, SEVERITY]
+    return sorted(
+        lines, key=lambda line: (order.index(line.axis), line.effect if line.axis == SEVERITY else "")
+    )
+
+
+def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Line]:
+    """The lines of one quantity of an estimator: of all cases, then along each axis.
+
+    Args:
+        data: rows of the results, with the columns of `summarise`.
+    """
+    import polars as pl
+
+    plain = data.filter(pl.col("effect") == NO_EFFECT)
+    base, effects = (plain, NO_EFFECT) if len(plain) else (data, "pooled")
+    yield Line(OVERALL, effects, None, "", estimator, quantity, _score(base))
+    for axis, (_, at_unit) in AXES.items():
+        for at, part in _along(base, axis):
+            yield Line(axis, effects, at, at_unit, estimator, quantity, _score(part))
+    for effect in sorted(set(data["effect"]) - {NO_EFFECT}):
+        both = data.filter(pl.col("effect").is_in([effect, NO_EFFECT]))
+        at_unit = effect_class(effect.partition(" + ")[0]).parameters()[0].unit
+        for at, part in _along(both, SEVERITY):
+            yield Line(SEVERITY, effect, at, at_unit, estimator, quantity, _score(part))
+
+
+def _along(data: pl.DataFrame, axis: str) -> list[tuple[float, pl.DataFrame]]:
+    """The parts at each value of an axis, ascending; none where it has one value, or rows without."""
+    values = sorted(set(data[axis].drop_nulls()))
+    if len(values) < 2 or data[axis].null_count():
+        return []
+    return [(value, data.filter(data[axis] == value)) for value in values]
+
+
+def _score(data: pl.DataFrame) -> Score:
+    """In % of the truth, or in the quantity's unit where a truth is zero."""
+    truth = data["truth"].to_numpy()
+    relative = bool(np.all(truth != 0.0))
+    kept = data["value"].is_not_null().to_numpy()
+    given = data.filter(data["value"].is_not_null())
+    scale = 100.0 / np.abs(truth[kept]) if relative else np.ones(int(kept.sum()))
+    return score(
+        Trials(
+            error=read_only((given["value"].to_numpy() - truth[kept]) * scale),
+            std=read_only(given["std"].to_numpy() * scale),
+            truth=read_only(truth[kept] * scale),
+            bound=None,
+            failures=int((~kept).sum()),
+            unit="%" if relative else data["unit"][0],
+        )
+    )
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Time of one step of the work.
+
+    Args:
+        step: ``simulate``, an estimator's name or ``pack``.
+        middle: median over the shards, s per run.
+        low: their lower quartile, s per run.
+        high: their upper quartile, s per run.
+    """
+
+    step: str
+    middle: float
+    low: float
+    high: float
+
+
+def paces(store: Store) -> Sequence[Pace]:
+    """Times of the steps of a sweep per run; they are not comparable under different machine load.
+
+    Args:
+        store: at least one shard finished.
+
+    Raises:
+        TunnelError: when the timings are damaged.
+    """
+    import polars as pl
+
+    each = pl.col("seconds") / pl.col("runs")
+    wanted = [each.quantile(share, "linear").alias(str(share)) for share in (0.5, 0.25, 0.75)]
+    folder = shown(store.folder / TIMINGS)
+    with as_described("cannot be read as a sweep's timings", folder, "remove it: no result depends on it"):
+        table = store.timings().group_by("step", maintain_order=True).agg(*wanted)
+        return [Pace(str(step), float(a), float(b), float(c)) for step, a, b, c in table.iter_rows()]
+
+
+def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
+    """Lines grouped by figure.
+
+    Returns:
+        Lines by file name without its suffix, such as ``error-by-noise-std`` or ``error-by-coulomb-friction``.
+    """
+    by_name: dict[str, list[Line]] = {}
+    for line in lines:
+        if line.axis != OVERALL:
+            what = line.effect.replace(" + ", "-and-") if line.axis == SEVERITY else line.axis
+            by_name.setdefault(f"error-by-{what.replace('_', '-')}", []).append(line)
+    return by_name
+
+
+@styled
+def error_figure(lines: Sequence[Line]) -> Figure | None:
+    """RMSE and bias along one axis, a row of panels for each quantity, a colour for each estimator.
+
+    Args:
+        lines: of one axis, and of one effect where that is severity.
+
+    Returns:
+        The figure, with 95 % intervals from the number of trials; None where no quantity has a panel.
+    """
+    quantities = [name for name in DRAWN if any(line.quantity == name and line.score.rmse for line in lines)]
+    if not quantities:
+        return None
+    estimators = list(dict.fromkeys(line.estimator for line in lines))
+    fig = figure(WIDTH, 1.2 + 1.6 * len(quantities))
+    panels = fig.subplots(len(quantities), 2, sharex=True, squeeze=False)
+    logarithmic = _is_logarithmic(lines)
+    for name, (errors, biases) in zip(quantities, panels, strict=True):
+        mine = [line for line in lines if line.quantity == name and line.score.rmse and line.score.bias]
+        for place, estimator in enumerate(estimators):
+            shown = [line for line in mine if line.estimator == estimator and line.at is not None]
+            aside = (place - (len(estimators) - 1) / 2.0) * _ASIDE
+            at = _moved(shown, aside, logarithmic=logarithmic)
+            _errorbars(errors, at, [line.score.rmse for line in shown], place, estimator)
+            _errorbars(biases, at, [line.score.bias for line in shown], place, estimator)
+        _dress(errors, biases, mine[0], name)
+    for axes in panels[-1]:
+        if logarithmic:
+            log_axis(axes, "x")
+        else:
+            axes.locator_params(axis="x", nbins=_TICKS)
+    for column in panels.T:
+        fig.align_ylabels(column)
+    first = lines[0]
+    label = first.effect.replace("_", " ") if first.axis == SEVERITY else AXES[first.axis][0]
+    fig.supxlabel(f"{label} [{first.at_unit}]", fontsize=9)
+    handles, names = panels[0, 0].get_legend_handles_labels()
+    fig.legend(handles, names, loc="outside upper center", ncols=min(4, len(names)))
+    return fig
+
+
+def _moved(lines: Sequence[Line], aside: float, *, logarithmic: bool) -> list[float]:
+    """Where the lines stand on the axis, a little aside, so that intervals do not hide each other."""
+    at = [float(line.at) for line in lines if line.at is not None]
+    if logarithmic:
+        return [x * (max(at) / min(at)) ** aside for x in at]
+    return [x + aside * (max(at) - min(at)) for x in at]
+
+
+def _errorbars(
+    axes: Axes, at: Sequence[float], figures: Sequence[Quantity | None], place: int, label: str
+) -> None:
+    pairs = [(x, quantity) for x, quantity in zip(at, figures, strict=True) if quantity is not None]
+    if not pairs:
+        return
+    axes.errorbar(
+        [x for x, _ in pairs],
+        [quantity.value for _, quantity in pairs],
+        yerr=[INTERVAL * quantity.std for _, quantity in pairs],
+        color=COLOURS[place % len(COLOURS)],
+        marker=MARKERS[place % len(MARKERS)],
+        markersize=4.0,
+        linewidth=1.0,
+        label=label.replace("_", " "),
+    )
+
+
+def _dress(errors: Axes, biases: Axes, line: Line, name: str) -> None:
+    scale = line.score.rmse.unit if line.score.rmse else ""
+    per = "% of truth" if scale == "%" else scale
+    log_axis(errors, "y")
+    biases.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
+    errors.set_ylabel(f"{NAMES[name]}: RMSE [{per}]")
+    biases.set_ylabel(f"bias [{per}]")
+    for axes in (errors, biases):
+        grid(axes)
+
+
+def _is_logarithmic(lines: Sequence[Line]) -> bool:
+    at = [line.at for line in lines if line.at is not None]
+    return lines[0].axis in _LOGARITHMIC and min(at) > 0.0 and max(at) / min(at) >= _WIDE
+
+
+def overall_table(lines: Iterable[Line]) -> Table:
+    """Bias, RMSE, coverage and failures of each estimator and quantity over all cases."""
+    kept = [line for line in lines if line.axis == OVERALL]
+    pooled = "without effects" if all(line.effect == "none" for line in kept) else "effects pooled"
+    result = table(
+        f"All cases, {pooled}", "estimator", "quantity", "trials", "bias", "RMSE", "in 95 % interval", "failed",
+        right=("trials",),
+    )  # fmt: skip
+    last = ""
+    for line in kept:
+        if last not in ("", line.estimator):
+            result.add_section()
+        last = line.estimator
+        score = line.score
+        result.add_row(
+            line.estimator, NAMES[line.quantity], str(score.count), _figure(score.bias), _figure(score.rmse),
+            _percent(score.coverage), _percent(score.failures),
+        )  # fmt: skip
+    return result
+
+
+def axis_table(lines: Sequence[Line]) -> Table:
+    """RMSE along one axis, a column for each quantity that has a panel in the figures.
+
+    Args:
+        lines: of one axis, and of one effect where that is severity.
+    """
+    first = lines[0]
+    label = first.effect.replace("_", " ") if first.axis == SEVERITY else AXES[first.axis][0]
+    quantities = [name for name in DRAWN if any(line.quantity == name for line in lines)]
+    heads = [f"RMSE {NAMES[name]}" for name in quantities]
+    result = table(f"Error against {label}", f"{label} {unit(first.at_unit)}", "estimator", *heads)
+    cells = {(line.at, line.estimator, line.quantity): line.score.rmse for line in lines}
+    for at in sorted({line.at for line in lines if line.at is not None}):
+        if result.row_count:
+            result.add_section()
+        for estimator in dict.fromkeys(line.estimator for line in lines):
+            figures = [_figure(cells.get((at, estimator, name))) for name in quantities]
+            result.add_row(significant(at), estimator, *figures)
+    return result
+
+
+def pace_table(paces: Sequence[Pace]) -> Table:
+    """Times of the steps."""
+    result = table("Time per run", "step", "median [ms]", "quartiles [ms]", right=("median [ms]",))
+    for pace in paces:
+        middle, low, high = (significant(1e3 * value, 3) for value in (pace.middle, pace.low, pace.high))
+        result.add_row(pace.step, middle, f"{low} to {high}")
+    return result
+
+
+def _figure(quantity: Quantity | None) -> str:
+    return "–" if quantity is None else f"{concise(quantity.value, quantity.std)} {quantity.unit}"
+
+
+def _percent(share: Proportion | None) -> str:
+    if share is None:
+        return "–"
+    low, high = share.interval
+    return f"{100.0 * share.value:.1f} % ({100.0 * low:.1f} to {100.0 * high:.1f})"

@@ -1,0 +1,368 @@
+"""Training of both networks of `neural_posterior` from a seed, resumable, with their thresholds and record."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from identification.neural.posterior.files import KINDS, Trained, to_bytes
+from identification.neural.posterior.network import forward, initial, shapes, variances
+from tunnel_lab.experiments.runner import processes, run_tasks
+from tunnel_lab.experiments.training_samples import (
+    PARTS,
+    ShardSpec,
+    read_shards,
+    sizes_at_unit_excess,
+    write_shard,
+)
+from tunnel_reference.forms import FAMILIES
+from tunnel_sim.files.json_text import json_line
+from tunnel_sim.files.reading import read_json, read_regular
+from tunnel_sim.files.writing import output_folder, write_json, write_whole
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+
+FALSE_ALARMS = 0.01
+"""Share of calibration samples, like those of the training, that are called unlike them."""
+_KEPT_EVERY = 250  # steps between checkpoints
+_SHRINK = 0.05  # of the context's covariance towards its mean variance
+_LETTERS = {"record": "r", "campaign": "c"}
+Progress = Callable[[str, int, int], None]
+INPUTS = ("rivals", "runs", "valid", "shifts")
+"""The network's arguments, by their names among the samples."""
+FAR = 3e4
+"""Standard deviations beyond which a sample is left out: the nominal fit is of another oscillation."""
+_EFFECTS_WEIGHT = 0.1  # of the effects' cross entropy beside the posterior's
+_LEAST_STD = 0.05  # of an input over the training set
+_GREATEST_GRADIENT = 5.0
+
+
+@dataclass(frozen=True)
+class TrainingSpec:
+    """Everything that a training depends on.
+
+    Args:
+        seed: of all random numbers.
+        shards: of training samples, two hundred campaigns each.
+        steps: number of batches of each network.
+    """
+
+    seed: int = 1
+    shards: int = 15
+    steps: int = 2000
+
+    def of_part(self, part: str) -> int:
+        """Number of shards of a part."""
+        return self.shards if part == PARTS[0] else max(1, self.shards // 10)
+
+    @property
+    def fit(self) -> FitSpec:
+        """How each network is fitted."""
+        return FitSpec(self.seed, self.steps)
+
+
+@dataclass(frozen=True)
+class Result:
+    """The result of a training.
+
+    Args:
+        weights: the safetensors file.
+        record: of the training, as JSON.
+    """
+
+    weights: bytes
+    record: dict[str, Any]
+
+
+def train(
+    spec: TrainingSpec, folder: Path, *, jobs: int, progress: Progress = lambda _what, _done, _all: None
+) -> Result:
+    """Simulate what is missing, and fit both networks; finished work in the folder is kept and used.
+
+    Args:
+        folder: of shards and checkpoints.
+        jobs: processes that simulate; the result does not depend on their number.
+        progress: called with what is done, how much of it is finished, and of how much.
+
+    Raises:
+        TunnelError: when the folder belongs to another seed, or cannot be written.
+    """
+    output_folder(folder)
+    sizes = _sizes(spec.seed, folder)
+    shards = [
+        ShardSpec(spec.seed, part, number, sizes) for part in PARTS for number in range(spec.of_part(part))
+    ]
+    run_tasks(
+        partial(write_shard, folder=folder),
+        shards,
+        processes(jobs),
+        finished=lambda shard: (folder / shard.name).exists(),
+        keep=lambda *_: None,
+        progress=partial(progress, "simulating"),
+    )
+    parts = {part: read_shards(folder, part, spec.of_part(part)) for part in PARTS}
+    networks = {kind: _fitted(kind, spec, parts[PARTS[0]], folder, progress) for kind in KINDS}
+    trained = {
+        kind: judged(
+            networks[kind], usable(parts[PARTS[0]], _LETTERS[kind]), usable(parts[PARTS[2]], _LETTERS[kind])
+        )
+        for kind in KINDS
+    }
+    weights = to_bytes(trained)
+    return Result(weights, _record(spec, trained, parts, weights))
+
+
+def _sizes(seed: int, folder: Path) -> tuple[tuple[str, float], ...]:
+    """The sizes of the forms, which also mark the folder as one of this seed."""
+    path = folder / "sizes.json"
+    if not path.exists():
+        write_json(path, {"seed": seed, "sizes": sizes_at_unit_excess(seed)})
+    document = read_json(path, remedy="remove the folder")
+    if document.get("seed") != seed or not isinstance(document.get("sizes"), dict):
+        raise TunnelError(
+            "belongs to another training", where=str(path), remedy="name another file, or --restart"
+        )
+    return tuple(sorted(document["sizes"].items()))
+
+
+def _fitted(
+    kind: str, spec: TrainingSpec, samples: Mapping[str, Array], folder: Path, progress: Progress
+) -> dict[str, Array]:
+    """The weights of one network, from its checkpoint on."""
+    mine = usable(samples, _LETTERS[kind])
+    mark = json_line([asdict(spec), sorted((name, list(value.shape)) for name, value in mine.items())])
+    path = folder / f"{kind}.part.safetensors"
+    state = _resumed(path, mark) or start_state(mine, spec.fit)
+    while state.step < spec.steps:
+        state = fit(mine, spec.fit, state, until=state.step + _KEPT_EVERY)
+        tensors = {f"w/{n}": v for n, v in state.weights.items()} | {
+            f"m/{n}": v for n, v in state.moments.items()
+        }
+        write_whole(path, save(tensors, {"mark": mark, "step": str(state.step)}))
+        progress(f"fitting the network of a {kind}", state.step, spec.steps)
+    return state.weights
+
+
+def _resumed(path: Path, mark: str) -> State | None:
+    """A checkpoint of the same training; None where there is none."""
+    if not path.exists():
+        return None
+    content = read_regular(path, limits.WEIGHTS_BYTES)
+    try:
+        header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])["__metadata__"]
+        if header["mark"] != mark:
+            return None
+        tensors = load(content)
+        step = int(header["step"])
+    except (SafetensorError, ValueError, LookupError, TypeError):
+        return None
+    by_letter = {
+        letter: {n[2:]: v for n, v in tensors.items() if n.startswith(f"{letter}/")} for letter in "wm"
+    }
+    return State(by_letter["w"], by_letter["m"], step)
+
+
+def contexts(weights: Mapping[str, Array], samples: Mapping[str, Array]) -> Array:
+    """What the score of unlikeness uses, shape (samples, c)."""
+    output = forward(np, weights, *(samples[name] for name in INPUTS))
+    return np.asarray(output.context, dtype=np.float64)
+
+
+def judged(weights: dict[str, Array], samples: Mapping[str, Array], apart: Mapping[str, Array]) -> Trained:
+    """The network with its threshold, from samples it was not fitted to."""
+    seen = contexts(weights, samples)
+    covariance = np.cov(seen.T)
+    covariance += _SHRINK * float(np.trace(covariance)) / len(covariance) * np.eye(len(covariance))
+    trained = Trained(
+        weights, seen.mean(axis=0), np.asarray(np.linalg.inv(covariance), np.float64), np.inf, FAMILIES
+    )
+    distances = trained.distance(contexts(weights, apart))
+    return replace(trained, threshold=float(np.quantile(distances, 1.0 - FALSE_ALARMS)))
+
+
+def _record(
+    spec: TrainingSpec,
+    trained: Mapping[str, Trained],
+    parts: Mapping[str, Mapping[str, Array]],
+    weights: bytes,
+) -> dict[str, Any]:
+    networks = {}
+    for kind, letter in _LETTERS.items():
+        used = {part: usable(samples, letter) for part, samples in parts.items()}
+        rivals, runs = used["training"]["rivals"], used["training"]["runs"]
+        networks[kind] = {
+            "sizes": {
+                "rivals": rivals.shape[1],
+                "features": rivals.shape[2],
+                "runs": runs.shape[2] - 1,
+                "quantities": used["training"]["target"].shape[1],
+                "effects": len(FAMILIES),
+            },
+            "samples": {part: len(values["target"]) for part, values in used.items()},
+            "loss": {
+                part: [float(loss) for loss in losses(np, trained[kind].weights, values)]
+                for part, values in used.items()
+            },
+            "threshold": trained[kind].threshold,
+        }
+    return {
+        "schema_version": 1,
+        "seed": spec.seed,
+        "spec": asdict(spec),
+        "false_alarms": FALSE_ALARMS,
+        "effects": list(FAMILIES),
+        "networks": networks,
+        "versions": {name: version(name) for name in ("numpy", "torch", "safetensors")},
+        "weights_sha256": hashlib.sha256(weights).hexdigest(),
+    }
+
+
+@dataclass(frozen=True)
+class FitSpec:
+    """How a network is fitted.
+
+    Args:
+        steps: number of batches.
+        rate: greatest learning rate, dimensionless; it falls to zero as a cosine.
+    """
+
+    seed: int = 1
+    steps: int = 4000
+    batch: int = 64
+    rate: float = 1.5e-3
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Progress of a fit: everything that the next step depends on.
+
+    Args:
+        weights: as `shapes`, and the scalings.
+        moments: first and second moments of the gradients by Adam, by name.
+        step: number of finished steps.
+    """
+
+    weights: dict[str, Array]
+    moments: dict[str, Array]
+    step: int
+
+
+def usable(samples: Mapping[str, Array], kind: str) -> dict[str, Array]:
+    """The samples of a kind whose target is not absurdly far from the nominal fit, without the kind's prefix."""
+    mine = {name[2:]: values for name, values in samples.items() if name.startswith(f"{kind}.")}
+    if not all(np.all(np.isfinite(values)) for values in mine.values()):
+        raise ValueError("internal error: a training sample is not finite")
+    near = np.abs(mine["target"]).max(axis=1) < FAR
+    return {name: values[near] for name, values in mine.items()}
+
+
+def start_state(samples: Mapping[str, Array], spec: FitSpec) -> State:
+    """Initial weights, and scalings from the training samples."""
+    rivals, runs = samples["rivals"], samples["runs"]
+    sizes = shapes(
+        rivals.shape[1],
+        rivals.shape[2],
+        runs.shape[2] - 1,
+        samples["target"].shape[1],
+        samples["labels"].shape[1],
+    )
+    weights = initial(sizes, np.random.default_rng([spec.seed, 0]))
+    moments = {f"{order}.{name}": np.zeros(shape) for name, shape in sizes.items() for order in "12"}
+    there = runs[..., -1] > 0.0
+    weights |= {
+        "rivals.mean": rivals.mean(axis=0),
+        "rivals.std": np.maximum(rivals.std(axis=0), _LEAST_STD),
+        "runs.mean": runs[there][:, :-1].mean(axis=0),
+        "runs.std": np.maximum(runs[there][:, :-1].std(axis=0), _LEAST_STD),
+    }
+    return State({name: value.astype(np.float32) for name, value in weights.items()}, moments, 0)
+
+
+def fit(
+    samples: Mapping[str, Array],
+    spec: FitSpec,
+    state: State,
+    progress: Callable[[int, float], None] = lambda _step, _loss: None,
+    until: int | None = None,
+) -> State:
+    """Continue a fit.
+
+    Args:
+        progress: called with the step and its loss.
+        until: step to stop at; the last one where None.
+    """
+    import torch
+
+    torch.set_num_threads(1)
+    torch.use_deterministic_algorithms(True)
+    data = {name: torch.from_numpy(np.asarray(values, dtype=np.float32)) for name, values in samples.items()}
+    trained = [name for name in state.weights if not name.endswith((".mean", ".std"))]
+    weights = {
+        name: torch.from_numpy(np.array(value, dtype=np.float32)) for name, value in state.weights.items()
+    }
+    first = {name: torch.from_numpy(np.array(state.moments[f"1.{name}"], np.float32)) for name in trained}
+    second = {name: torch.from_numpy(np.array(state.moments[f"2.{name}"], np.float32)) for name in trained}
+    for name in trained:
+        weights[name].requires_grad_(True)
+    count = len(data["target"])
+    for step in range(state.step, min(until or spec.steps, spec.steps)):
+        rng = np.random.default_rng([spec.seed, 1, step])
+        rows = torch.from_numpy(rng.integers(0, count, spec.batch))
+        batch = {name: values[rows] for name, values in data.items()}
+        posterior, effects = losses(torch, weights, batch)
+        value = posterior + _EFFECTS_WEIGHT * effects
+        gradients = torch.autograd.grad(value, [weights[name] for name in trained])
+        norm = math.sqrt(sum(float((g * g).sum()) for g in gradients))
+        shrink = min(1.0, _GREATEST_GRADIENT / max(norm, 1e-12))
+        rate = _rate(step, spec)
+        with torch.no_grad():
+            for name, gradient in zip(trained, gradients, strict=True):
+                first[name].lerp_(shrink * gradient, 0.1)
+                second[name].lerp_((shrink * gradient) ** 2, 0.001)
+                move = first[name] / (1.0 - 0.9 ** (step + 1))
+                size = (second[name] / (1.0 - 0.999 ** (step + 1))).sqrt() + 1e-8
+                weights[name] -= rate * (move / size + 1e-3 * weights[name])
+        progress(step, float(value.detach()))
+    moments = {f"1.{n}": v.numpy() for n, v in first.items()} | {
+        f"2.{n}": v.numpy() for n, v in second.items()
+    }
+    done = min(until or spec.steps, spec.steps)
+    return State({n: v.detach().numpy() for n, v in weights.items()}, moments, max(done, state.step))
+
+
+def _rate(step: int, spec: FitSpec) -> float:
+    warm = min(1.0, (step + 1) / 100.0)
+    return spec.rate * warm * 0.5 * (1.0 + math.cos(math.pi * step / spec.steps))
+
+
+def losses(xp: Any, weights: Mapping[str, Any], batch: Mapping[str, Any]) -> tuple[Any, Any]:
+    """What the fit lowers, means over the samples.
+
+    Args:
+        xp: numpy or torch.
+
+    Returns:
+        The negative logarithm of the posterior's density at the truth, per quantity, and the cross entropy of the
+        effects.
+    """
+    output = forward(xp, weights, *(batch[name] for name in INPUTS))
+    variance = variances(output, batch["widths"])
+    away = batch["target"][:, None, :] - output.means
+    density = output.logarithms[..., None] - 0.5 * (xp.log(variance) + away**2 / variance)
+    top = xp.amax(density, 1)
+    value = top + xp.log(xp.exp(density - top[:, None]).sum(1))
+    logits = xp.clip(output.effects, -30.0, 30.0)
+    entropy = (xp.log(1.0 + xp.exp(logits)) - batch["labels"] * logits).mean()
+    return -(value * batch["known"]).sum() / batch["known"].sum(), entropy

@@ -1,0 +1,163 @@
+"""The page on the paper: its sections, each computed once, so that an interrupted run continues."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from importlib import resources
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+
+from identification.estimate import Quantity
+from tunnel_sim.files.leftovers import clear_leftovers
+from tunnel_sim.files.reading import read_json
+from tunnel_sim.files.writing import output_folder, write_encoded, write_json
+from tunnel_sim.vocabulary.errors import TunnelError
+
+PAGE = "index.html"
+_PARTS = "parts"
+_PACKAGE = "virtual-wind-tunnel"
+_REMEDY = "delete it, and the part is computed again"
+_STRICT = ConfigDict(extra="forbid")
+Outcome = Literal["reproduced", "in part", "not reproducible", "corrected"]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of the page.
+
+    Args:
+        file: its name in the page's folder, a PNG; a PDF of that name stands beside figures.
+        caption: what it shows.
+    """
+
+    __pydantic_config__ = _STRICT
+
+    file: Annotated[str, Field(pattern=r"^[a-z0-9-]+\.png$")]
+    caption: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """What one table or figure of the paper says, and what is found here.
+
+    Args:
+        title: such as ``Table II``.
+        about: what it is of.
+        theirs: the paper's result in a line.
+        ours: ours in a line.
+        outcome: whether the paper's result is found here too.
+        words: paragraphs.
+        headings: of the table's columns; none where there is no table.
+        rows: cells as text.
+        pictures: below the table.
+    """
+
+    __pydantic_config__ = _STRICT
+
+    title: str
+    about: str
+    theirs: str
+    ours: str
+    outcome: Outcome
+    words: tuple[str, ...]
+    headings: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    pictures: tuple[Picture, ...] = ()
+
+
+def signed(value: float, digits: int) -> str:
+    """A number with its sign; zero has none.
+
+    Args:
+        value: in any unit.
+        digits: after the point.
+    """
+    rounded = round(value, digits)
+    return f"{rounded:+.{digits}f}".replace("-", "−") if rounded else f"{0.0:.{digits}f}"
+
+
+def scaled(quantity: Quantity | None, factor: float) -> Quantity | None:
+    """An estimate in another unit.
+
+    Args:
+        factor: the old unit in new ones.
+    """
+    return None if quantity is None else Quantity(factor * quantity.value, factor * quantity.std, "")
+
+
+Part = Callable[[Path], Section]
+"""Computes a part, with its pictures in a folder."""
+
+
+def write_paper(
+    folder: Path,
+    parts: Mapping[str, Part],
+    names: Sequence[str],
+    *,
+    progress: Callable[[int, int, str], None] = lambda *_: None,
+) -> tuple[Path, dict[str, Section]]:
+    """Compute what is missing, and write the page.
+
+    Args:
+        folder: of the page, its pictures and finished parts; made where it does not exist.
+        parts: all parts by name, in the order of the page.
+        names: parts to compute where they are not finished; finished ones stay in the page.
+        progress: called with the number finished, of how many, and the next part's name.
+
+    Returns:
+        The page, and its sections by name.
+
+    Raises:
+        TunnelError: when the folder cannot be written to, or a kept part is damaged.
+    """
+    kept = output_folder(output_folder(folder) / _PARTS)
+    for place in (folder, kept):
+        clear_leftovers(place)
+    sections: dict[str, Section] = {}
+    for name, part in parts.items():
+        path = kept / f"{name}.json"
+        section = _finished(path, folder)
+        if section is None and name in names:
+            progress(len([finished for finished in names if finished in sections]), len(names), name)
+            section = part(folder)
+            write_json(path, {"version": version(_PACKAGE), "section": asdict(section)})
+        if section is not None:
+            sections[name] = section
+    progress(len(names), len(names), "")
+    page = write_encoded(folder / PAGE, lambda stream: stream.write(render(sections).encode()))
+    return page, sections
+
+
+def _finished(path: Path, folder: Path) -> Section | None:
+    """A part of this version that is kept with all its pictures."""
+    if not path.exists():
+        return None
+    document = read_json(path, remedy=_REMEDY)
+    if document.get("version") != version(_PACKAGE):
+        return None
+    try:
+        section = TypeAdapter(Section).validate_json(json.dumps(document.get("section")))
+    except ValidationError as error:
+        reason = error.errors()[0]["msg"]
+        raise TunnelError(f"is not a part of the page ({reason})", where=str(path), remedy=_REMEDY) from None
+    return section if all((folder / picture.file).is_file() for picture in section.pictures) else None
+
+
+def render(sections: Mapping[str, Section]) -> str:
+    """The page as HTML; its pictures stand beside it.
+
+    Args:
+        sections: by name, in order.
+    """
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    template = resources.files("tunnel_lab.paper").joinpath("page.html.j2").read_text("utf-8")
+    return environment.from_string(template).render(sections=sections)

@@ -1,0 +1,362 @@
+"""Figures of runs, windows, estimates and imports. matplotlib is imported inside the functions.
+
+Every function returns a figure and writes nothing.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from math import ceil, sqrt
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification.estimate import Quantity
+from identification.printing.numbers import SYMBOLS
+from tunnel_lab.plotting.style import (
+    BLUE,
+    COLOURS,
+    INTERVAL,
+    MARKERS,
+    VERMILION,
+    WIDTH,
+    figure,
+    figure_text,
+    grid,
+    limit_to_known,
+    log_axis,
+    styled,
+    with_breaks,
+)
+from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from identification.estimate import Estimate, RunEstimate
+    from tunnel_sim.files.importing.records import Imported, Part
+
+
+WIND_OFF, WIND_ON = BLUE, VERMILION
+PANELS_PER_PAGE = 12
+BINS_PER_DECADE = 60
+LEAKING = 2
+"""Cycles in a record below which a Hann window leaks the mean."""
+RUNS_PER_PLOT = 6
+"""More lines than colours cannot be distinguished in one plot."""
+ONE_RIG = 1.5
+"""Frequencies within this factor share one plot in absolute units."""
+MOST_PANELS = 24
+_COLUMNS = 3
+_POINTS = 2000  # least and greatest readings of as many stretches are drawn
+_GREY = "0.6"
+
+
+def run_label(run: Run) -> str:
+    """The conditions of a run in a few words, for a figure.
+
+    Returns:
+        Text such as ``r02 · 16.12 N m/rad · 15 m/s``.
+    """
+    parts = [figure_text(run.id)]
+    if run.spring_stiffness is not None:
+        parts.append(f"{run.spring_stiffness:g} N m/rad")
+    if run.wind_on:
+        parts.append(f"{run.wind_speed:g} m/s")
+    elif run.spring_stiffness is not None:
+        parts.append("wind off")
+    return " · ".join(parts)
+
+
+@styled
+def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
+    """Angle against time, one panel for each run.
+
+    Returns:
+        Figures of up to twelve panels, in the campaign's order.
+    """
+    pages = range(0, len(campaign.runs), PANELS_PER_PAGE)
+    return tuple(_trace_page(campaign.runs[i : i + PANELS_PER_PAGE]) for i in pages)
+
+
+def _trace_page(runs: Sequence[Run]) -> Figure:
+    columns = 1 if len(runs) <= 3 else 2 if len(runs) <= 6 else 3
+    rows = ceil(len(runs) / columns)
+    fig = figure(WIDTH if columns < 3 else 1.4 * WIDTH, 1.8 * rows + 0.6)
+    for place, run in enumerate(runs, 1):
+        axes = fig.add_subplot(rows, columns, place)
+        colour = WIND_ON if run.wind_on else WIND_OFF
+        axes.plot(*with_breaks(run.record.time_s, run.record.yaw_rad), color=colour, linewidth=0.7)
+        axes.set_title(run_label(run))
+        axes.margins(x=0.01)
+        grid(axes)
+        if (place - 1) % columns == 0:
+            axes.set_ylabel("angle β [rad]")
+        if place > len(runs) - columns:
+            axes.set_xlabel("time [s]")
+    return fig
+
+
+@styled
+def wind_off_on_figure(off: Run, on: Run) -> Figure:
+    """One run with the wind off above one with the wind on, on the same axes.
+
+    Args:
+        on: the wind-on run, preferably with the same spring.
+    """
+    fig = figure(WIDTH, 4.2)
+    first: Axes | None = None
+    for place, (run, colour) in enumerate(((off, WIND_OFF), (on, WIND_ON)), 1):
+        axes = fig.add_subplot(2, 1, place, sharex=first, sharey=first)
+        axes.plot(*with_breaks(run.record.time_s, run.record.yaw_rad), color=colour, linewidth=0.8)
+        axes.set_title(run_label(run))
+        axes.set_ylabel("angle β [rad]")
+        axes.margins(x=0.01)
+        grid(axes)
+        first = first or axes
+    axes.set_xlabel("time since the start of the record [s]")
+    return fig
+
+
+@styled
+def spectrum_figure(runs: Sequence[Run]) -> Figure:
+    """Power spectral density of the angle.
+
+    Args:
+        runs: up to six runs, one line each.
+
+    Returns:
+        A figure of one panel with logarithmic axes, rad²/Hz against Hz.
+    """
+    fig = figure(WIDTH, 3.6)
+    axes = fig.add_subplot()
+    for run, colour in zip(runs[:RUNS_PER_PLOT], COLOURS, strict=False):
+        axes.plot(*spectrum(run), color=colour, linewidth=1.0, label=run_label(run))
+    log_axis(axes, "y")
+    log_axis(axes, "x")
+    axes.margins(x=0.01)
+    axes.set_xlabel("frequency [Hz]")
+    axes.set_ylabel("power spectral density of β [rad²/Hz]")
+    fig.legend(loc="outside upper center", ncols=2)
+    grid(axes)
+    return fig
+
+
+def spectrum(run: Run) -> tuple[Array, Array]:
+    """Power spectral density of a run's angle, averaged over sixtieths of a decade.
+
+    Frequencies below two cycles in the record are left out: there a Hann window passes the mean and the trend of
+    the decay, and not a motion.
+
+    Returns:
+        Frequency in Hz and density in rad²/Hz, shape (n,) each.
+    """
+    from scipy.signal import periodogram
+
+    frequency, density = periodogram(
+        run.record.yaw_rad, run.record.sample_rate, window="hann", detrend="constant"
+    )
+    first = min(LEAKING, frequency.size - 1)
+    return _log_averaged(frequency[first:], density[first:], first)
+
+
+@styled
+def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Figure:
+    """Estimates of each estimator against the injected values.
+
+    Args:
+        truth: injected values by name, all nonzero, each in the unit of the estimate's quantity of that
+            name.
+
+    Returns:
+        Two panels with a row for each quantity: the error in reported standard deviations with the interval that
+        holds 95 % of them, and the standard deviations in % of the truth, on a logarithmic scale.
+    """
+    names = tuple(truth)
+    fig = figure(WIDTH, 1.3 + 0.5 * len(names))
+    errors, stds = fig.subplots(1, 2, sharey=True)
+    errors.axvspan(-INTERVAL, INTERVAL, color="#e6e9ec", linewidth=0.0, label="holds 95 %")
+    errors.axvline(0.0, color="0.4", linewidth=0.8)
+    for index, estimate in enumerate(estimates):
+        given = [(row, getattr(estimate, name), truth[name]) for row, name in enumerate(names)]
+        known = [(row, quantity, true) for row, quantity, true in given if quantity and quantity.std > 0.0]
+        rows = [row + 0.6 * ((index + 0.5) / len(estimates) - 0.5) for row, _, _ in known]
+        deviation = [(quantity.value - true) / quantity.std for _, quantity, true in known]
+        relative = [100.0 * quantity.std / abs(true) for _, quantity, true in known]
+        style = {"color": COLOURS[index % len(COLOURS)], "marker": MARKERS[index % len(MARKERS)]}
+        label = estimate.estimator.replace("_", " ")
+        errors.plot(deviation, rows, linestyle="none", label=label, **style)
+        stds.plot(relative, rows, linestyle="none", **style)
+    reach = max(3.0, 1.1 * float(np.max(np.abs(errors.dataLim.intervalx))))
+    errors.set(xlim=(-reach, reach), xlabel="(estimate − truth) / σ", ylim=(len(names) - 0.5, -0.5))
+    errors.set_yticks(range(len(names)), [SYMBOLS[name] for name in names])
+    stds.margins(x=0.08)
+    log_axis(stds, "x")
+    stds.set_xlabel("reported standard deviation σ [% of the truth]")
+    for axes in (errors, stds):
+        grid(axes, "x")
+        for edge in range(1, len(names)):
+            axes.axhline(edge - 0.5, color="0.8", linewidth=0.6)
+        axes.tick_params(axis="y", length=0)
+    fig.legend(loc="outside upper center", ncols=4)
+    return fig
+
+
+def _log_averaged(frequency: Array, density: Array, first: int) -> tuple[Array, Array]:
+    """Means of a spectrum over bins of equal ratio; its first value belongs to ``first`` cycles in the record."""
+    decades = np.log10(frequency[-1] / frequency[0])
+    edges = np.geomspace(first, first + frequency.size, max(2, int(BINS_PER_DECADE * decades)))
+    starts = np.unique(edges.astype(int) - first)[:-1]
+    counts = np.diff(np.append(starts, frequency.size))
+    return np.add.reduceat(frequency, starts) / counts, np.add.reduceat(density, starts) / counts
+
+
+@styled
+def windows_figure(estimate: Estimate) -> Figure:
+    """ζ and ωn of the windows of each run against the amplitude, with 95 % intervals.
+
+    A linear rig gives horizontal lines; a slope shows an effect that the linear model lacks.
+
+    Args:
+        estimate: of any campaign; runs past the sixth and those with fewer than two windows are left out.
+
+    Returns:
+        A figure of two panels. Where the runs differ in frequency, each quantity is shown as its deviation from
+        the weighted mean of its run, so that only its change with the amplitude is seen.
+    """
+    runs = [run for run in estimate.runs if len(run.windows) > 1][:RUNS_PER_PLOT]
+    centres = [window.omega_n.value for run in runs for window in run.windows]
+    one_rig = bool(centres) and max(centres) < ONE_RIG * min(centres)
+    fig = figure(WIDTH, 3.6)
+    panels = fig.subplots(1, 2)
+    for axes, name in zip(panels, ("zeta", "omega_n"), strict=True):
+        shown = [_shown(run, name, absolute=one_rig) for run in runs]
+        for index, (run, quantities) in enumerate(zip(runs, shown, strict=True)):
+            amplitude = [window.amplitude.value for window in run.windows]
+            _intervals(axes, amplitude, quantities, index, figure_text(run.id))
+        if runs:
+            drawn = [quantity for quantities in shown for quantity in quantities]
+            limit_to_known(axes, np.array([q.value for q in drawn]), np.array([q.std for q in drawn]))
+            log_axis(axes, "x")
+        if not one_rig:
+            axes.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
+        axes.set_xlabel("mean amplitude of the window [rad]")
+        grid(axes)
+    if one_rig:
+        labels = ("damping ratio ζ [1]", "natural frequency ωn [rad/s]")
+    else:
+        labels = ("ζ − weighted mean of the run [10⁻³]", "ωn − weighted mean of the run [%]")
+    for axes, label in zip(panels, labels, strict=True):
+        axes.set_ylabel(label)
+    if runs:
+        handles, names = panels[0].get_legend_handles_labels()
+        fig.legend(handles, names, loc="outside upper center", ncols=3)
+    return fig
+
+
+def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
+    """Each value less the weighted mean of all.
+
+    Args:
+        quantities: independent, of one unit.
+
+    Returns:
+        The deviations. Their variance is that of the value less that of the mean, which has the value in it.
+    """
+    stds = np.array([quantity.std for quantity in quantities])
+    least = 1e-6 * float(np.min(stds[stds > 0.0], initial=np.inf))
+    weights = np.maximum(stds, least if np.isfinite(least) else 1.0) ** -2.0  # a value may be exact
+    mean = float(weights @ [quantity.value for quantity in quantities] / weights.sum())
+    of_mean = 1.0 / float(weights.sum())
+    return [Quantity(q.value - mean, sqrt(max(q.std**2 - of_mean, 0.0)), q.unit) for q in quantities]
+
+
+def _shown(run: RunEstimate, name: str, *, absolute: bool) -> list[Quantity]:
+    """One quantity of the windows as it is drawn."""
+    given: list[Quantity] = [getattr(window, name) for window in run.windows]
+    if absolute:
+        return given
+    shifts = deviations(given)
+    mean = given[0].value - shifts[0].value
+    scale, unit = (1e3, "10⁻³") if name == "zeta" else (100.0 / mean, "%")
+    return [Quantity(scale * q.value, scale * q.std, unit) for q in shifts]
+
+
+def _intervals(
+    axes: Axes, x: Sequence[float], quantities: Sequence[Quantity], index: int, label: str
+) -> None:
+    """Points with 95 % intervals."""
+    style: dict[str, Any] = {"color": COLOURS[index], "marker": MARKERS[index], "label": label}
+    spans = [INTERVAL * q.std for q in quantities]
+    axes.errorbar(x, [q.value for q in quantities], yerr=spans, linewidth=0.8, markersize=3.5, **style)
+
+
+@styled
+def import_picture(imported: Imported) -> bytes:
+    """Draw what was read.
+
+    Returns:
+        A PNG. Samples that are left out are grey; a vertical line marks where a run begins.
+    """
+    from matplotlib.figure import Figure
+
+    raws = {id(part.raw): part.raw for part in imported.parts}
+    shown = list(raws)[:MOST_PANELS]
+    columns = min(_COLUMNS, len(shown))
+    rows = -(-len(shown) // columns)
+    figure = Figure(figsize=(max(4.5 * columns, 8.0), 2.2 * rows + 0.8), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for key, axes in zip(shown, panels, strict=False):
+        _draw(axes, [part for part in imported.parts if id(part.raw) == key], imported.campaign.sensor.unit)
+    for axes in panels[len(shown) :]:
+        axes.remove()
+    more = f" (the first {MOST_PANELS} of {len(raws)} records)" if len(raws) > MOST_PANELS else ""
+    figure.suptitle(
+        figure_text(f"{imported.campaign.name}\nruns in colour, samples that are left out in grey{more}"),
+        fontsize=9,
+    )
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=120)
+    return stream.getvalue()
+
+
+def _draw(axes: Axes, parts: list[Part], unit: str) -> None:
+    """One record with its runs."""
+    raw = parts[0].raw
+    time, reading = raw.cleaned.time_s, raw.cleaned.reading
+    axes.plot(*thinned(time, reading), color=_GREY, linewidth=0.7)
+    for number, part in enumerate(parts):
+        if part.run is None:
+            continue
+        piece = slice(part.piece.first, part.piece.last)
+        colour = COLOURS[number % len(COLOURS)] if len(parts) > 1 else BLUE
+        axes.plot(*thinned(time[piece], reading[piece]), color=colour, linewidth=0.7)
+        axes.axvline(time[part.piece.first], color=VERMILION, linewidth=0.8, linestyle="--")
+    kept = sum(part.run is not None for part in parts)
+    about = raw.id if kept == 1 else f"{raw.id}: {kept} runs"
+    axes.set_title(figure_text(about), fontsize=9, loc="left")
+    axes.set_xlabel("time [s]", fontsize=8)
+    axes.set_ylabel(f"reading [{unit}]", fontsize=8)
+    axes.tick_params(labelsize=7)
+
+
+def thinned(time: Array, reading: Array) -> tuple[Array, Array]:
+    """A curve with few points that looks the same, and that breaks where samples are missing.
+
+    Args:
+        time: shape (n,), s.
+        reading: shape (n,).
+
+    Returns:
+        Times and readings, shape (m,): the least and the greatest reading of each stretch; NaN within a gap.
+    """
+    size = time.size // _POINTS
+    if size > 1:
+        starts = np.arange(0, time.size, size)
+        ends = np.stack([np.minimum.reduceat(reading, starts), np.maximum.reduceat(reading, starts)], axis=1)
+        time, reading = np.repeat(time[starts], 2), ends.ravel()
+    when, values = with_breaks(time, reading)
+    return when, values

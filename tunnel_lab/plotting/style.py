@@ -1,0 +1,191 @@
+"""What all figures have in common, and how they are written. matplotlib is imported inside the functions.
+
+The colours follow Okabe and Ito (2008), which colour-blind readers can distinguish.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from importlib import resources
+from math import log10
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
+
+import numpy as np
+
+from tunnel_sim.files.writing import write_encoded
+from tunnel_sim.vocabulary.record import Array, gaps
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+
+WIDTH = 7.2
+"""Width of a figure that fills a page, inches."""
+INTERVAL = 1.96
+"""Standard deviations on either side of a 95 % interval."""
+_FEW_DECADES = 2.5
+_WIDE = 5.0  # times the median standard deviation
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+COLOURS = (
+    "#0072b2", "#d55e00", "#009e73", "#b0529b", "#9a6f00", "#2f8fb0", "#b5484f", "#6f8200", "#7a63c7", "#77808a",
+    "#c88090", "#207060", "#7090f0", "#989860", "#b878d8", "#805870",
+)  # fmt: skip
+"""Of `figures.mplstyle`."""
+
+
+BLUE, VERMILION = COLOURS[:2]
+
+
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
+
+
+def styled(draw: Callable[P, R]) -> Callable[P, R]:
+    """A function that draws in the style of `figures.mplstyle`, without changing the settings of the process."""
+
+    @wraps(draw)
+    def drawn(*args: P.args, **named: P.kwargs) -> R:
+        from matplotlib import style
+
+        file = resources.files("tunnel_lab.plotting") / "figures.mplstyle"
+        with resources.as_file(file) as path, style.context(path):
+            return draw(*args, **named)
+
+    return drawn
+
+
+def figure(width: float, height: float) -> Figure:
+    """An empty figure; made without pyplot, so that no global state is touched.
+
+    Args:
+        width: inches.
+        height: inches.
+    """
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
+    """A quiet grid behind the data."""
+    axes.grid(visible=True, axis=axis)
+
+
+def log_axis(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Make an axis logarithmic, with labels that are few enough not to touch.
+
+    Matplotlib labels the ticks between the powers of ten as well, as 6×10⁰, where an axis is short.
+
+    Args:
+        axes: whose data are drawn, because the labels depend on the limits.
+    """
+    from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, NullFormatter
+
+    least = axes.dataLim.minposx if which == "x" else axes.dataLim.minposy
+    if not np.isfinite(least):  # nothing is drawn that a logarithmic axis could show
+        return
+    axis: Axis
+    if which == "x":
+        axes.set_xscale("log")
+        axis, limits = axes.xaxis, axes.get_xlim()
+    else:
+        axes.set_yscale("log")
+        axis, limits = axes.yaxis, axes.get_ylim()
+    decades = log10(max(limits) / min(limits))
+    axis.set_minor_formatter(NullFormatter())
+    if decades > _FEW_DECADES:
+        axis.set_major_locator(LogLocator(10.0, (1.0,), numticks=8))
+        axis.set_major_formatter(LogFormatterSciNotation(10.0))
+    else:
+        steps = (1.0, 2.0, 5.0) if decades > 1.0 else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+        axis.set_major_locator(LogLocator(10.0, steps))
+        plain = min(limits) >= 1e-4 and max(limits) < 1e5
+        powers = LogFormatterSciNotation(10.0, minor_thresholds=(np.inf, np.inf))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}") if plain else powers)
+
+
+def limit_to_known(axes: Axes, values: Array, stds: Array) -> None:
+    """Limit the vertical axis to the values that are known as well as most, with their 95 % intervals.
+
+    The few that are known far worse, such as those of the last cycles of a decay, would set the scale otherwise.
+    Their intervals cross the axis.
+
+    Args:
+        values: shape (n,), in the axis' unit; NaN where there is none.
+        stds: their standard deviations, shape (n,), in the same unit.
+    """
+    known_at_all = np.isfinite(values) & np.isfinite(stds)
+    if not known_at_all.any():
+        return
+    known = known_at_all & (stds <= _WIDE * np.median(stds[known_at_all]))
+    low, high = np.min((values - 2.0 * stds)[known]), np.max((values + 2.0 * stds)[known])
+    margin = 0.05 * (high - low) or 0.1 * abs(high) or 1.0
+    axes.set_ylim(low - margin, high + margin)
+
+
+def with_breaks(time: Array, *readings: Array) -> tuple[Array, ...]:
+    """Curves that break where samples are missing, instead of crossing the gap in a straight line.
+
+    Args:
+        time: shape (n,), s, increasing.
+        readings: against it, shape (n,) each.
+
+    Returns:
+        The time and the readings, shape (m,) each: in the middle of every gap stands a time whose readings are NaN.
+    """
+    after = np.flatnonzero(gaps(time)) + 1
+    middles = 0.5 * (time[after - 1] + time[after])
+    return np.insert(time, after, middles), *(np.insert(reading, after, np.nan) for reading in readings)
+
+
+def figure_text(text: str) -> str:
+    """A text of the user's, such as the id of a run, as matplotlib has to be given it to show it as it is.
+
+    Dollar signs would begin a formula, and a legend leaves out what begins with an underscore.
+
+    Returns:
+        The text with its dollar signs escaped, and with a blank before a leading underscore.
+    """
+    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
+
+
+@styled
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure, completely or not at all; the same figure gives the same file.
+
+    Args:
+        path: the file, ``.png`` or ``.pdf``; replaced when it exists.
+
+    Raises:
+        TunnelError: when the file cannot be written.
+    """
+    form = path.suffix[1:]
+    dates = {"CreationDate": None} if form == "pdf" else None
+    return write_encoded(path, lambda stream: figure.savefig(stream, format=form, metadata=dates))
+
+
+def save_both(figure: Figure, path: Path) -> tuple[Path, Path]:
+    """Write a figure as a picture, and as a vector graphic beside it.
+
+    Args:
+        path: the picture, ``.png``.
+
+    Returns:
+        The picture and the PDF.
+    """
+    return save(figure, path), save(figure, path.with_suffix(".pdf"))

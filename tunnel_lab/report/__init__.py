@@ -1,0 +1,15 @@
+"""The report of a diagnosis: one self-contained HTML page, rendered from its JSON document and the records.
+
+The names below load on first use.
+"""
+
+from typing import TYPE_CHECKING
+
+from tunnel_sim.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from tunnel_lab.report.page import Byline, render_report, write_report
+else:
+    __getattr__, __dir__ = lazy_names(__name__, {".page": "Byline render_report write_report"})
+
+__all__ = ["Byline", "render_report", "write_report"]

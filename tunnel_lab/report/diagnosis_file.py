@@ -1,0 +1,139 @@
+"""The JSON document of a diagnosis: what ``tunnel compare`` reads of it, and its schema."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+from tunnel_sim.files.reading import read_json
+from tunnel_sim.files.toml_input import OneLine, StrictModel, check_version, validate
+
+REMEDY = "give a file that tunnel diagnose --json wrote"
+Excess = Annotated[float, Field(description="a number of noise powers")]
+Share = Annotated[float, Field(ge=0.0, le=1.0, description="a number from 0 to 1")]
+
+
+class Part(StrictModel):
+    """A part of the document; fields that are not compared are left alone."""
+
+    model_config = ConfigDict(extra="ignore")
+
+
+class _Estimate(Part):
+    value: float
+    std: Annotated[float, Field(ge=0.0)] | None
+    unit: OneLine
+    bound: OneLine | None = None
+    determined: bool = True
+    interval: tuple[float, float] | None = Field(
+        default=None, description="ends of the central interval of 0.95, where it is not value ± 1.96 std"
+    )
+
+
+class _Gap(Part):
+    excess_before: Excess
+    excess_after: Excess
+    closed: Share
+
+
+class _Candidate(Part):
+    probability: Share
+    effect: OneLine
+    parameters: dict[OneLine, _Estimate]
+
+
+class _Coefficients(Part):
+    before: dict[OneLine, _Estimate]
+    after: dict[OneLine, _Estimate]
+
+
+class _Run(Part):
+    std: Annotated[float, Field(ge=0.0)]
+
+
+class _Maps(Part):
+    runs: list[_Run]
+
+
+class Document(Part):
+    """The fields that are compared."""
+
+    schema_version: int = Field(description="1")
+    campaign: OneLine = Field(description="the campaign's name")
+    causes: list[OneLine] = Field(description="effect names; empty: no gap; unknown: no effect explains it")
+    decided: bool = Field(
+        default=True, description="whether the answer has at least one half of the probability"
+    )
+    ambiguous_with: list[OneLine] = Field(
+        description="effects that the runs cannot distinguish from the causes"
+    )
+    gap: _Gap = Field(description="the gap before and after the causes are added")
+    candidates: list[_Candidate] = Field(min_length=1, description="answers, most probable first")
+    coefficients: _Coefficients = Field(description="estimates before and after, and a note")
+    maps: _Maps | None = Field(default=None, description="data of the figures")
+
+
+def read_diagnosis(path: Path) -> dict[str, Any]:
+    """Read the document of a diagnosis.
+
+    Args:
+        path: a file that ``tunnel diagnose --json`` wrote.
+
+    Returns:
+        The fields that are compared, in JSON's types.
+
+    Raises:
+        TunnelError: when it is missing, is not JSON, or is not a diagnosis.
+    """
+    document = read_json(path, remedy=REMEDY)
+    check_version(document, path)
+    return validate(Document, document, path).model_dump()
+
+
+class DiagnosisDocument(Document):
+    """What ``tunnel diagnose --json`` writes; excesses are in noise variances of a sample."""
+
+    credible: Annotated[
+        list[dict[str, Any]],
+        Field(description="effect and probability of the fewest answers that have 0.9 together"),
+    ]
+    common: Annotated[
+        dict[str, dict[str, float]],
+        Field(description="effects and channels that answers of 0.9 together have in common"),
+    ]
+    verdict: Annotated[str, Field(description="the answer in plain words")]
+    where: Annotated[
+        dict[str, Any],
+        Field(description="channel, condition, runs, time_s, amplitude_rad, frequency_hz, words"),
+    ]
+    inclusion: Annotated[
+        dict[str, float], Field(description="by effect, the probability that it is among the causes")
+    ]
+    waterfall: Annotated[
+        list[dict[str, Any]], Field(description="effect and excess, as the causes are added one by one")
+    ]
+    waterfall_on: Annotated[str, Field(description="what was held out of the fits for it")]
+    without: Annotated[dict[str, float], Field(description="by cause, the excess when it alone is taken out")]
+    rest: Annotated[dict[str, Any] | None, Field(description="what remains after the causes")]
+    closable: Annotated[
+        dict[str, Any] | None, Field(description="how much of what remains could be closed, and by what")
+    ]
+    model: Annotated[dict[str, Any] | None, Field(description="the patched model, with --model")]
+    next_run: Annotated[
+        dict[str, Any] | None,
+        Field(description="the run that would distinguish the causes from their rivals"),
+    ]
+    confirmation: Annotated[
+        dict[str, Any], Field(description="how far MuJoCo and the fits' integrator agree")
+    ]
+    noise: Annotated[dict[str, Any], Field(description="std and stated_std in rad, source, reason")]
+    blind_spots: Annotated[list[str], Field(description="what these runs cannot show")]
+    cautions: Annotated[list[str], Field(description="caveats")]
+    remarks: Annotated[
+        list[dict[str, Any]],
+        Field(description="of the examination: outcome, runs, what, remedy"),
+    ]
+    seconds: Annotated[dict[str, float], Field(description="wall time by step, s")]
+    provenance: Annotated[dict[str, Any], Field(description="versions, and SHA-256 of the records")]

@@ -1,0 +1,153 @@
+"""Helpers of the figures of a diagnosis, and the colours that change with the theme of the page."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Mapping, Sequence
+from html import unescape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tunnel_lab.plotting.style import figure_text, styled
+from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
+    from matplotlib.figure import Figure
+
+
+Document = Mapping[str, Any]
+BEFORE, AFTER, ACCENT, QUIET = "#d55e00", "#0072b2", "#009e73", "#77808a"
+INK, SOFT, LINE, NOISE, MARK, PAPER = "#1b1f24", "#59636e", "#d9dee3", "#e6e9ec", "#f0e442", "#ffffff"
+THEMED = {
+    INK: "ink", SOFT: "soft", LINE: "line", NOISE: "noise", PAPER: "paper", QUIET: "quiet", MARK: "mark",
+    BEFORE: "before", AFTER: "after", ACCENT: "accent",
+}  # fmt: skip
+"""Custom properties of the style sheet by colour of the figures."""
+NARROW = 4.4  # inches: legible on a phone without scrolling
+SIGMAS = 3.0
+"""Standard deviations within which values count as noise in the figures."""
+_FAINTEST = 0.12
+_NOT_HTML = (
+    re.compile(r"^.*?(?=<svg)", re.DOTALL),  # the XML declaration and document type, which name an address
+    re.compile(r"<metadata>.*?</metadata>\s*", re.DOTALL),
+)
+_TAG = re.compile(r"<[^>]+>")  # text between tags may hold any names of runs
+_NAMES = re.compile(r'\s+xmlns(:\w+)?="[^"]*"')  # HTML needs no namespace for SVG
+_OPENING = re.compile(r"<svg[^>]*>")
+_SIZE = re.compile(r' (width|height)="[^"]*"')
+_ID = re.compile(r'\bid="([^"]+)"')
+_COLOUR = re.compile("|".join(THEMED))
+_REFERENCE = re.compile(r'(href="#|url\(#)([^")]+)')
+
+
+def array(values: Sequence[float | None]) -> Array:
+    """Numbers of a JSON list, NaN where it says null, shape (n,)."""
+    return np.array([np.nan if v is None else v for v in values], dtype=np.float64)
+
+
+def faded(*colours: str) -> Colormap:
+    """A colour map that fades out instead of becoming white, so that it suits a light and a dark page.
+
+    Args:
+        colours: one, from faint to opaque; or two, opaque at the ends and transparent in the middle.
+    """
+    from matplotlib.colors import LinearSegmentedColormap, to_rgba
+
+    strong = [to_rgba(colour) for colour in colours]
+    if len(strong) == 1:
+        ramp = [(0.0, (*strong[0][:3], _FAINTEST)), (1.0, strong[0])]
+    else:
+        low, high = strong
+        ramp = [(0.0, low), (0.5, (*low[:3], 0.0)), (0.5, (*high[:3], 0.0)), (1.0, high)]
+    return LinearSegmentedColormap.from_list("faded", ramp)
+
+
+def run_label(run: Document) -> str:
+    """A run and its conditions in a few words.
+
+    Args:
+        run: an entry of ``maps.runs``.
+
+    Returns:
+        Text such as ``r02 · 16.1 N m/rad · 15 m/s``.
+    """
+    parts = [str(run["id"])]
+    if run["spring_stiffness"] is not None:
+        parts.append(f"{run['spring_stiffness']:.4g} N m/rad")
+        parts.append(f"{run['wind_speed']:g} m/s" if run["wind_speed"] > 0 else "wind off")
+    return " · ".join(parts)
+
+
+def drawn_label(run: Document) -> str:
+    """The same for matplotlib."""
+    return figure_text(run_label(run))
+
+
+def shade(axes: Axes, interval: Sequence[float] | None) -> None:
+    """Shade the interval that holds most of the gap.
+
+    Args:
+        interval: its ends, in the unit of the horizontal axis; None: nothing is shaded.
+    """
+    if interval is not None:
+        axes.axvspan(interval[0], interval[1], color=MARK, alpha=0.28, linewidth=0)
+
+
+def noise_axis(axes: Axes, noise: float, greatest: float) -> float:
+    """A logarithmic axis of excesses that begins below the noise, which is shaded.
+
+    Args:
+        axes: its horizontal axis is set.
+        noise: three standard deviations of an excess by chance, in noise variances, a ratio.
+        greatest: value shown, in noise variances, a ratio.
+
+    Returns:
+        The floor: smaller and negative excesses are drawn on it.
+    """
+    floor = 0.1 * noise
+    axes.set_xscale("log")
+    axes.axvspan(floor, noise, color=NOISE, linewidth=0, label="noise (3σ)")
+    axes.set_xlim(0.8 * floor, 1.6 * max(greatest, 10.0 * noise))
+    axes.set_xlabel("excess (noise variances)")
+    return floor
+
+
+@styled
+def inline_svg(figure: Figure, name: str, description: str) -> str:
+    """A figure as an SVG element.
+
+    Args:
+        figure: drawn by matplotlib; its text stays text. Colours of `THEMED` become the style sheet's.
+        name: unique in the page; every id in the element begins with it.
+
+    Returns:
+        The element; it is always the same for the same figure and has no address outside the page.
+    """
+    from matplotlib import rc_context
+
+    buffer = io.StringIO()
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=True)
+    text = buffer.getvalue()
+    for pattern in _NOT_HTML:
+        text = pattern.sub("", text)
+    text = _TAG.sub(lambda match: _in_page(match[0], name), text)
+    text = _OPENING.sub(lambda match: _SIZE.sub("", match[0]), text, count=1)
+    label = description.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
+    return text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
+
+
+def _in_page(tag: str, name: str) -> str:
+    """A tag with ids that are unique in the page, and with colours of the theme."""
+    tag = _ID.sub(rf'id="{name}-\1"', _NAMES.sub("", tag))
+    tag = _REFERENCE.sub(rf"\1{name}-\2", tag)
+    return _COLOUR.sub(lambda match: f"var(--{THEMED[match[0]]})", tag)
+
+
+def shown_text(svg: str) -> str:
+    """The characters that elements of `inline_svg` show, each once, in order."""
+    return "".join(sorted(set(unescape(_TAG.sub("", svg)))))

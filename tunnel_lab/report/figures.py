@@ -1,0 +1,383 @@
+"""All figures of a diagnosis, by name."""
+
+from __future__ import annotations
+
+import textwrap
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from diagnosis.names import plain
+from diagnosis.policy import LISTED_PROBABILITY
+from diagnosis.printing import excess_std, held_out_excess
+from identification.printing.numbers import coefficient_label
+from tunnel_lab.plotting.style import (
+    COLOURS,
+    INTERVAL,
+    MARKERS,
+    WIDTH,
+    figure,
+    figure_text,
+    grid,
+    limit_to_known,
+    log_axis,
+    styled,
+    with_breaks,
+)
+from tunnel_lab.report import where
+from tunnel_lab.report.drawing import (
+    ACCENT,
+    AFTER,
+    BEFORE,
+    INK,
+    LINE,
+    NARROW,
+    PAPER,
+    QUIET,
+    SIGMAS,
+    SOFT,
+    Document,
+    array,
+    drawn_label,
+    faded,
+    noise_axis,
+)
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SHOWN = 8
+"""Most answers drawn."""
+_DRAWN_TRACES = 2
+_LABEL = 40  # characters in a line of a label
+_LEAST_NOISE = 0.03  # noise variances, three standard deviations: where the document has no maps
+_MOST_CURVES = len(COLOURS)
+_LEGEND, _HANDLE = 108, 8  # characters: the width of the figure, and the line beside a label
+_AXES = {"angle": "angle [rad]", "rate": "rate [rad/s]", "time": "time since the start [s]"}
+_STEP_LABEL = 20  # characters in a line of a label
+_LEAST_STEP_NOISE = 1e-3  # noise powers: where the document has no maps, and so no noise of an excess
+
+
+def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figure]:
+    """All figures of a diagnosis.
+
+    Args:
+        document: the diagnosis as JSON's types; without ``maps`` those that need them are left out.
+
+    Returns:
+        Figures by name, in the order of the report.
+    """
+    figures: dict[str, Figure | None] = {"waterfall": waterfall_figure(document)}
+    if document.get("maps"):
+        figures["where-runs"] = where.runs_figure(document)
+        figures["where-profiles"] = where.profiles_figure(document)
+        figures["where-spectrum"] = where.spectrum_figure(document)
+        figures["where-backbones"] = backbone_figure(document)
+        figures["where-phase-plane"] = where.phase_plane_figure(document)
+        figures["where-moment"] = where.moment_figure(document)
+    figures["which"] = candidates_figure(document)
+    figures["how-far"] = closure_figure(document)
+    if document.get("maps"):
+        figures["residuals"] = traces_figure(document, campaign)
+    figures["law"] = law_figure(document)
+    figures["coefficients"] = coefficients_figure(document)
+    return {name: figure for name, figure in figures.items() if figure is not None}
+
+
+@styled
+def candidates_figure(document: Document) -> Figure | None:
+    """The answers by probability.
+
+    Returns:
+        A bar for each answer that is not improbable; None where there are fewer than two, which words say better.
+    """
+    shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= LISTED_PROBABILITY]
+    if len(shown) < 2:
+        return None
+    names = [textwrap.fill(plain(candidate["effect"]), _LABEL) for candidate in shown]
+    fig = figure(WIDTH, 0.7 + 0.3 * len(shown) + 0.15 * sum(name.count("\n") for name in names))
+    axes = fig.add_subplot()
+    values = [candidate["probability"] for candidate in shown]
+    axes.barh(range(len(shown)), values, color=[ACCENT, *[QUIET] * (len(shown) - 1)], height=0.6)
+    for index, value in enumerate(values):
+        axes.text(
+            value + 0.01, index, ("> 99.9 %" if value >= 0.9995 else f"{100.0 * value:.1f} %"), va="center"
+        )
+    axes.set_yticks(range(len(shown)), names)
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, 1.12)
+    axes.set_xticks(np.linspace(0.0, 1.0, 6), [f"{v:.0%}" for v in np.linspace(0.0, 1.0, 6)])
+    axes.set_xlabel("probability")
+    grid(axes, "x")
+    return fig
+
+
+@styled
+def closure_figure(document: Document) -> Figure:
+    """Excess of every run before and after the causes are added, on a logarithmic scale from below the noise.
+
+    Returns:
+        A pair of points per run; the second is filled where the run was held out of the fit.
+    """
+    runs = document["gap"]["runs"]
+    fig = figure(WIDTH, 1.2 + 0.22 * max(len(runs), 4))
+    axes = fig.add_subplot()
+    rows = np.arange(len(runs))
+    before = np.array([run["before"] for run in runs])
+    after = np.array([run["after"] for run in runs])
+    stds = [run["std"] for run in (document.get("maps") or {"runs": []})["runs"]]
+    noise = SIGMAS * max(stds) if stds else _LEAST_NOISE
+    floor = noise_axis(axes, noise, float(max(before.max(), after.max())))
+    shown, shown_after = np.maximum(before, floor), np.maximum(after, floor)
+    axes.hlines(rows, shown_after, shown, color=LINE, linewidth=2.5)
+    axes.plot(shown, rows, "s", color=BEFORE, ms=5, label="nominal model")
+    if not np.array_equal(before, after):
+        held_out = np.array([run["held_out"] for run in runs])
+        for chosen, face, words in ((held_out, AFTER, "held out"), (~held_out, PAPER, "fitted")):
+            if chosen.any():
+                label = f"with the causes, run {words}"
+                axes.plot(shown_after[chosen], rows[chosen], "o", color=AFTER, mfc=face, ms=5, label=label)
+    axes.set_yticks(rows, [figure_text(run["id"]) for run in runs])
+    axes.invert_yaxis()
+    fig.legend(loc="outside upper left", ncols=4)
+    grid(axes)
+    return fig
+
+
+@styled
+def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
+    """Reading and residuals of the runs with the largest gap.
+
+    Args:
+        document: a diagnosis with its maps.
+
+    Returns:
+        A column per run: the reading above, the residual before and after below; None without traces.
+    """
+    traces = document["maps"]["traces"]
+    records = {run.id: run.record for run in campaign.runs}
+    traces = [trace for trace in traces if trace["id"] in records][:_DRAWN_TRACES]
+    if not traces:
+        return None
+    fig = figure(WIDTH, 3.8)
+    panels = fig.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.2))
+    for column, trace in enumerate(traces):
+        top, bottom = panels[0, column], panels[1, column]
+        record = records[trace["id"]]
+        thin = slice(None, None, max(1, record.yaw_rad.size // 1500))
+        time, reading = with_breaks(record.time_s[thin] - record.time_s[0], record.yaw_rad[thin])
+        top.plot(time, reading, color=SOFT, linewidth=0.7)
+        top.set_title(f"{figure_text(trace['id'])}: reading [rad]")
+        for name, colour, label in (
+            ("before_rad", BEFORE, "nominal model"), ("after_rad", AFTER, "with the causes")
+        ):  # fmt: skip
+            if trace[name] is not None:
+                when, residual = with_breaks(array(trace["time_s"]), 1e3 * array(trace[name]))
+                bottom.plot(when, residual, color=colour, linewidth=0.8, label=label)
+        bottom.set_title("residual [10⁻³ rad]")
+        bottom.set_xlabel("time since the start of the record [s]")
+        bottom.margins(x=0.01)
+        grid(top)
+        grid(bottom)
+    handles, labels = panels[1, 0].get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside lower center", ncols=2)
+    return fig
+
+
+@styled
+def coefficients_figure(document: Document) -> Figure | None:
+    """The coefficients before and after, with 95 % intervals.
+
+    Returns:
+        A panel per coefficient that the runs determine; None where there is none.
+    """
+    before, after = (document["coefficients"][key] for key in ("before", "after"))
+    names = [
+        name
+        for name in before
+        if name in after and all(given[name].get("determined", True) for given in (before, after))
+    ]
+    if not names:
+        return None
+    fig = figure(WIDTH, 1.7)
+    for place, name in enumerate(names, 1):
+        axes = fig.add_subplot(1, len(names), place)
+        for row, (values, colour, marker) in enumerate(((before, BEFORE, "s"), (after, AFTER, "o"))):
+            std = values[name]["std"]
+            axes.errorbar(
+                values[name]["value"], row, xerr=None if std is None else INTERVAL * std, color=colour,
+                marker=marker, ms=6, capsize=4,
+            )  # fmt: skip
+        axes.set_yticks([0, 1], ["before", "after"])
+        axes.set_ylim(1.6, -0.6)
+        axes.set_xlabel(coefficient_label(name, before[name]["unit"]))
+        axes.locator_params(axis="x", nbins=5)
+        grid(axes)
+    return fig
+
+
+@styled
+def backbone_figure(document: Document) -> Figure:
+    """Frequency and damping of the runs that show the gap against amplitude, with 95 % bands.
+
+    Args:
+        document: a diagnosis with its maps.
+
+    Returns:
+        Two panels: frequency relative to the nominal model's, and damping ratio minus the nominal model's.
+    """
+    maps = document["maps"]
+    curves = [curve for curve in maps["backbones"] if len(curve["time_s"]) > 1]
+    named = [curve for curve in curves if curve["id"] in document["where"]["runs"]]
+    # the runs that show the gap first, in the campaign's order, and then the rest for comparison
+    chosen = (named + [curve for curve in curves if curve not in named])[:_MOST_CURVES]
+    labels = {run["id"]: drawn_label(run) for run in maps["runs"]}
+    fig = figure(WIDTH, 4.6)
+    frequency, damping = fig.subplots(1, 2)
+    shifts, changes = [], []
+    for index, curve in enumerate(chosen):
+        amplitude = array(curve["amplitude_rad"])
+        nominal = curve["nominal_frequency_hz"]
+        style = {"color": COLOURS[index], "marker": MARKERS[(index + index // len(MARKERS)) % len(MARKERS)]}
+        shift = 100.0 * (array(curve["frequency_hz"]) / nominal - 1.0)
+        shift_std = 100.0 * array(curve["frequency_std"]) / nominal
+        _curve(frequency, amplitude, shift, shift_std, style)
+        change = 1e3 * (array(curve["zeta"]) - curve["nominal_zeta"])
+        change_std = 1e3 * array(curve["zeta_std"])
+        _curve(damping, amplitude, change, change_std, style, labels[curve["id"]])
+        shifts.append((shift, shift_std))
+        changes.append((change, change_std))
+    for axes, name in ((frequency, "frequency against the nominal model [%]"),
+                       (damping, "damping ratio minus the nominal one [10⁻³]")):  # fmt: skip
+        axes.axhline(0.0, color=INK, linewidth=1.0)
+        axes.set_xlabel("amplitude [rad]")
+        axes.set_ylabel(name)
+        grid(axes)
+    for axes, pairs in ((frequency, shifts), (damping, changes)):
+        if pairs:
+            limit_to_known(axes, *(np.concatenate(column) for column in zip(*pairs, strict=True)))
+            log_axis(axes, "x")
+    if chosen:
+        longest = max(len(labels[curve["id"]]) for curve in chosen)
+        columns = min(3, _LEGEND // (longest + _HANDLE)) or 1
+        fig.legend(loc="outside lower center", ncols=columns)
+    return fig
+
+
+def _curve(
+    axes: Axes, x: Array, y: Array, std: Array, style: dict[str, Any], label: str | None = None
+) -> None:
+    order = np.argsort(x)
+    colour, marker = style["color"], str(style["marker"])
+    band = INTERVAL * std[order]
+    axes.fill_between(x[order], y[order] - band, y[order] + band, color=colour, alpha=0.15, linewidth=0)
+    axes.plot(x[order], y[order], color=colour, marker=marker, ms=3.5, lw=1.0, label=label)
+
+
+@styled
+def law_figure(document: Document) -> Figure | None:
+    """The law without a formula.
+
+    Returns:
+        A curve with its 95 % band, or a map in which white cells are within it; None where there is none.
+    """
+    curve = (document.get("closable") or {}).get("curve")
+    if curve is None:
+        return None
+    shape = [len(axis) for axis in curve["places"]]
+    values, std = (np.reshape(curve[name], shape) for name in ("values", "std"))
+    unit = "rad" if curve["unit"] == "rad" else "N m" if curve["unit"] == "N m" else "rad/s²"
+    name = f"{'error of the reading' if unit == 'rad' else 'missing moment'} [{unit}]"
+    fig = figure(WIDTH, 3.2)
+    axes = fig.add_subplot()
+    axes.set_xlabel(_AXES[curve["over"][0]])
+    if len(shape) == 1:
+        (place,) = curve["places"]
+        axes.fill_between(
+            place, values - INTERVAL * std, values + INTERVAL * std, color=AFTER, alpha=0.25, lw=0
+        )
+        axes.plot(place, values, color=AFTER)
+        axes.set_ylabel(name)
+        grid(axes)
+        return fig
+    reach = float(np.max(np.abs(values))) or 1.0
+    shown = np.where(np.abs(values) > INTERVAL * std, values, np.nan)
+    mesh = axes.pcolormesh(
+        *curve["places"],
+        shown.T,
+        cmap=faded(AFTER, BEFORE),
+        vmin=-reach,
+        vmax=reach,
+        shading="nearest",
+    )
+    axes.set_ylabel(_AXES[curve["over"][1]])
+    fig.colorbar(mesh, ax=axes, label=name)
+    return fig
+
+
+@styled
+def waterfall_figure(document: Document) -> Figure | None:
+    """What is left of the gap as the causes are added one after another.
+
+    Returns:
+        A dot for the nominal gap, a bar for each cause from what was left before it to what it leaves, and a dot
+        for the rest, on a logarithmic scale. None where no cause is named.
+    """
+    steps = document.get("waterfall", [])
+    if len(steps) < 2:
+        return None
+    noise = SIGMAS * (excess_std(document) or _LEAST_STEP_NOISE)
+    excesses = np.array([step["excess"] for step in steps], np.float64)
+    alone = np.array(list(document.get("without", {}).values()), np.float64)
+    fig = figure(NARROW, 1.2 + 0.4 * (excesses.size + 1))
+    axes = fig.add_subplot()
+    floor = noise_axis(axes, noise, float(np.concatenate([excesses, alone]).max()))
+    axes.set_xlim(None, 12.0 * axes.get_xlim()[1])  # room for the numbers
+    _steps(axes, excesses, floor)
+    _alone(axes, document, floor)
+    names = [textwrap.fill(f"+ {plain(str(step['effect']))}", _STEP_LABEL) for step in steps[1:]]
+    axes.set_yticks(
+        range(excesses.size + 1), ["nominal model", *names, textwrap.fill(_rest_name(document), _STEP_LABEL)]
+    )
+    axes.invert_yaxis()
+    fig.legend(loc="outside upper left", ncols=2)
+    grid(axes, "x")
+    return fig
+
+
+def _steps(axes: Axes, excesses: Array, floor: float) -> None:
+    """What each cause closes (or opens) as a bar between two values; the first and the last value as dots."""
+    shown = np.maximum(excesses, floor)
+    starts, ends = np.minimum(shown[:-1], shown[1:]), np.maximum(shown[:-1], shown[1:])
+    colours = [AFTER if after <= before else BEFORE for before, after in pairwise(excesses)]
+    rows = np.arange(excesses.size + 1)
+    axes.barh(rows[1:-1], ends - starts, left=starts, color=colours, height=0.55)
+    for row, value, colour in ((0, shown[0], BEFORE), (rows[-1], shown[-1], ACCENT)):
+        axes.plot(value, row, "o", color=colour, ms=8)
+    axes.vlines(shown, rows[:-1], rows[1:], color=QUIET, linewidth=0.8)
+    texts = [held_out_excess(value) for value in excesses.tolist()]
+    words = [texts[0], *(f"leaves {text}" for text in texts[1:]), texts[-1]]
+    for row, (text, end) in enumerate(zip(words, [shown[0], *ends, shown[-1]], strict=True)):
+        axes.annotate(text, (float(end), row), (7, 0), textcoords="offset points", va="center")
+
+
+def _alone(axes: Axes, document: Document, floor: float) -> None:
+    """Mark what is left without each cause alone, where there are several."""
+    without = document.get("without", {})
+    rows = {step["effect"]: row for row, step in enumerate(document["waterfall"])}
+    if len(without) < 2:
+        return
+    values = np.maximum(list(without.values()), floor)
+    places = [rows[name] for name in without]
+    axes.plot(values, places, "o", color=INK, mfc=PAPER, ms=5, label="without it alone")
+
+
+def _rest_name(document: Document) -> str:
+    rest = document.get("rest") or {}
+    if not rest.get("significant"):
+        return "the rest: within the noise"
+    return "the rest: material" if rest.get("material") else "the rest: immaterial"

@@ -1,0 +1,294 @@
+"""The report of a diagnosis as one HTML page: its parts put together, and its provenance."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from diagnosis.closable import closable_table, closable_words
+from diagnosis.names import plain
+from diagnosis.patch import patch_lines, patch_table
+from diagnosis.printing import inclusion_line
+from identification.printing.numbers import COEFFICIENTS, p_text, significant, unit_mark
+from tunnel_lab.report import view
+from tunnel_lab.report.drawing import inline_svg, shown_text
+from tunnel_lab.report.figures import diagnosis_figures
+from tunnel_lab.report.view import Document
+from tunnel_lab.report.where import charts
+from tunnel_sim.files.writing import write_encoded
+from tunnel_sim.vocabulary.campaign import Campaign
+
+DESCRIPTIONS = {
+    "waterfall": "What is left of the gap as the causes are added one after another.",
+    "where-runs": "Heat map of the excess of every run over time.",
+    "where-profiles": "Excess against time and against amplitude, and the missing moment against time.",
+    "where-spectrum": "Residual power against frequency, with the nominal model and with the causes added.",
+    "where-backbones": "Frequency and damping ratio of each run against amplitude, relative to the nominal model.",
+    "where-phase-plane": "Map of the missing moment over angle and rate.",
+    "where-moment": "Mean of the missing moment against the angle and against the rate.",
+    "which": "Bars: probability of each answer.",
+    "how-far": "Excess of every run with the nominal model and with the causes added.",
+    "residuals": "Reading and residuals of the runs with the largest gap against time.",
+    "law": "The missing moment, or error of the reading, as a curve with its band or as a map.",
+    "coefficients": "Coefficients before and after the causes are added, with 95 % intervals.",
+}
+"""Text alternatives of the figures."""
+TESTS = {
+    "below": "residual power below half the frequency f₀ of the oscillation",
+    "f0": "residual power at f₀, from 0.5 to 1.5 f₀: the oscillation itself",
+    "2f0": "residual power at its second harmonic, from 1.5 to 2.5 f₀",
+    "3f0": "residual power at its third harmonic, from 2.5 to 3.5 f₀",
+    "above": "residual power above 3.5 f₀",
+    "offset": "whether the runs have a common zero",
+    "noise against amplitude": "whether the noise grows or shrinks with the amplitude of the motion",
+    "noise against rate": "whether the noise grows or shrinks with the rate of the motion",
+    "noise in bursts": "whether the noise comes in bursts",
+    "noise level": "whether the noise is above the level that the campaign states",
+}
+"""What each test of a gap looks at."""
+SOURCES = {
+    "noise": "noise of the readings",
+    "misfit": "what the model leaves unexplained",
+    "air density": "rounding of the stated air density",
+    "unseen form": "form of the cause that no free decay shows",
+    "freed form": "freedom of the causes' forms",
+    "rivals": "other answers, by their probability",
+}
+"""What each share of a coefficient's variance comes from."""
+FAMILY = "DejaVu Sans"
+"""matplotlib places the text of a figure by the widths of this font, which it ships."""
+
+
+@dataclass(frozen=True)
+class Byline:
+    """What the page states and the document leaves out, because it would differ each time.
+
+    Args:
+        date: of the diagnosis, such as 2026-05-31; empty: none is shown.
+        author: who made it; empty: nobody is named.
+        notes: for the head of the page; empty: none.
+        patch: file of the patched model; empty: it was not written.
+    """
+
+    date: str = ""
+    author: str = ""
+    notes: str = ""
+    patch: str = ""
+
+
+def write_report(document: Document, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
+    """Write the report of a diagnosis.
+
+    Args:
+        document: the diagnosis as JSON's types (``Diagnosis.to_json_dict``), with its ``maps`` where there are any.
+        path: the HTML file; replaced when it exists, written completely or not at all.
+
+    Raises:
+        TunnelError: when the page cannot be drawn or the file cannot be written.
+    """
+    return write_encoded(
+        path, lambda stream: stream.write(render_report(document, campaign, byline).encode())
+    )
+
+
+def render_report(document: Document, campaign: Campaign, byline: Byline | None = None) -> str:
+    """The page as text.
+
+    Args:
+        document: as for `write_report`.
+
+    Returns:
+        HTML that needs no other file and no network; the same for the same document and byline.
+    """
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    environment = Environment(
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        loader=FunctionLoader(_resource),
+    )
+    answer, kind = view.headline(document)
+    context = {
+        "document": document,
+        "byline": (byline or Byline()),
+        "answer": answer,
+        "kind": kind,
+        "named": kind in ("open", "found"),
+        "facts": view.facts(document),
+        "coefficients": view.coefficient_rows(document),
+        "next_steps": view.next_steps(document),
+    } | _detail(document, campaign)
+    return environment.get_template("page.html.j2").render(context | _parts(document, campaign))
+
+
+def _resource(name: str) -> str:
+    return resources.files("tunnel_lab.report").joinpath(*name.split("/")).read_text("utf-8")
+
+
+def _parts(document: Document, campaign: Campaign) -> dict[str, Any]:
+    """Figures, styles and scripts: text that is part of the page as it is."""
+    from markupsafe import Markup
+
+    figures = {
+        name: inline_svg(figure, name, DESCRIPTIONS[name])  # the SVG is already escaped
+        for name, figure in diagnosis_figures(document, campaign).items()
+    }
+    font = font_face(shown_text("".join(figures.values())))
+    return {
+        "figures": {name: Markup(svg) for name, svg in figures.items()},
+        "style": Markup("\n".join([font, _resource("vendor/uPlot.min.css"), _resource("style.css")])),
+        "licence": Markup(_resource("vendor/uPlot-LICENSE.txt")),
+        "library": Markup(_resource("vendor/uPlot.iife.min.js")),
+        "script": Markup(_resource("page.js")),
+        "charts": charts(document, campaign),
+    }
+
+
+def _detail(document: Document, campaign: Campaign) -> dict[str, Any]:
+    return {
+        "campaign": campaign,
+        "place": view.place_rows(document),
+        "lines": view.line_rows(document),
+        "candidates": view.candidate_rows(document),
+        "more": view.others(document),
+        "causes": view.cause_paragraphs(document),
+        "inclusion": plain(inclusion_line(document)),
+        "steps": view.step_rows(document),
+        "closable": closable_table(document).rows,
+        "closable_words": closable_words(document),
+        "patch": patch_table(document),
+        "patch_lines": [line.removeprefix("- ") for line in patch_lines(document)],
+        "rivals": [plain(name) for name in document["ambiguous_with"]],
+        "next_run": view.next_run_rows(document),
+        "runs": view.run_rows(document, campaign),
+        "budget": budget(document),
+        "tests": test_rows(document),
+        "false_alarms": false_alarms(document),
+        "seconds": [(name, f"{value:.1f} s") for name, value in document["seconds"].items()],
+        "noise": noise_rows(document),
+        "versions": version_rows(document),
+        "hashes": hash_rows(document),
+    }
+
+
+def test_rows(document: Document) -> list[tuple[str, str, str]]:
+    """The tests of the gap: name, what each looks at, and its p-value."""
+    return [
+        (name, TESTS.get(name, "–"), p_text(value).removeprefix("= "))
+        for name, value in document["gap"]["tests"].items()
+    ]
+
+
+def false_alarms(document: Document) -> str:
+    """The false-alarm rate of all tests together, in words."""
+    return f"{significant(document['gap']['false_alarm_rate'], 2)} of the campaigns without a gap"
+
+
+def budget(document: Document) -> tuple[list[str], list[tuple[str, ...]]]:
+    """The uncertainty budget of the coefficients of the answer.
+
+    Returns:
+        Headings, and a row for each source: its standard deviation and its share of the variance, by coefficient.
+        No rows where the document has no shares.
+    """
+    coefficients = {
+        name: given
+        for name, given in document["coefficients"]["after"].items()
+        if given["std"] is not None and given.get("shares")
+    }
+    heads = [
+        f"{COEFFICIENTS.get(name, name)} [{unit_mark(given['unit'])}]" for name, given in coefficients.items()
+    ]
+    rows = [
+        (words, *(_part(given["std"], given["shares"].get(source, 0.0)) for given in coefficients.values()))
+        for source, words in SOURCES.items()
+    ]
+    whole = (
+        "combined standard deviation",
+        *(significant(given["std"], 2) for given in coefficients.values()),
+    )
+    return heads, [*rows, whole] if coefficients else []
+
+
+def _part(std: float, share: float) -> str:
+    if share < 5e-4:
+        return "–"
+    return f"{significant(std * math.sqrt(share), 2)} ({100.0 * share:.1f} %)"
+
+
+def noise_rows(document: Document) -> list[tuple[str, str]]:
+    """The noise that the gap is measured against, and the model behind the excesses."""
+    noise = document["noise"]
+    stated = noise["stated_std"]
+    return [
+        ("Noise of one sample", f"{1e3 * noise['std']:.4g} × 10⁻³ rad ({noise['source']})"),
+        ("Stated", "–" if stated is None else f"{1e3 * stated:.4g} × 10⁻³ rad"),
+        ("Why this one", str(noise["reason"])),
+        *_confirmation_rows(document["confirmation"]),
+    ]
+
+
+def _confirmation_rows(confirmation: Document) -> list[tuple[str, str]]:
+    """The model behind the excesses, and the difference of the integrator used for fitting."""
+    if confirmation["failure"]:
+        return [
+            (
+                "Excesses computed by",
+                f"the integrator used for fitting; MuJoCo failed: {confirmation['failure']}",
+            )
+        ]
+    apart = f"{confirmation['largest_difference_rad']:.1e} rad at most"
+    beside = "within" if confirmation["agrees"] else "beyond"
+    rms = f"{confirmation['rms_difference_rad']:.1e} rad root mean square in {confirmation['run']}"
+    return [
+        ("Excesses computed by", "the MuJoCo model"),
+        (
+            "Difference of the integrator used for fitting",
+            f"{apart}; {rms}, {beside} {confirmation['tolerance_rad']:.1e} rad",
+        ),
+    ]
+
+
+def version_rows(document: Document) -> list[tuple[str, str]]:
+    """Versions of the program and its libraries, and of the document's schema."""
+    versions = (document.get("provenance") or {}).get("versions", {})
+    return [*versions.items(), ("schema of the document", str(document["schema_version"]))]
+
+
+def hash_rows(document: Document) -> list[tuple[str, str]]:
+    """Files and their SHA-256."""
+    return list((document.get("provenance") or {}).get("sha256", {}).items())
+
+
+def font_face(characters: str) -> str:
+    """A rule of a style sheet that holds the font, reduced to some characters.
+
+    Args:
+        characters: those that the figures show; what the font lacks is left to the browser's fonts.
+
+    Returns:
+        The rule, with the font in WOFF; always the same for the same characters.
+    """
+    import matplotlib
+    from fontTools.subset import Options, Subsetter, load_font
+
+    file = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+    options = Options(
+        flavor="woff", layout_features=[], hinting=False, drop_tables=["FFTM", "GPOS", "GSUB", "GDEF", "kern"]
+    )
+    subsetter = Subsetter(options)
+    subsetter.populate(text=characters)
+    buffer = io.BytesIO()
+    with load_font(str(file), options) as font:
+        subsetter.subset(font)
+        font.flavor = "woff"
+        font.save(buffer)
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return f'@font-face {{ font-family: "{FAMILY}"; src: url(data:font/woff;base64,{data}) format("woff"); }}'

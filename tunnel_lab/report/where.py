@@ -1,0 +1,402 @@
+"""Where the gap is, as figures and as data of the page's charts: by run, time, amplitude and frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tunnel_lab.plotting.style import INTERVAL, WIDTH, figure, grid, styled, with_breaks
+from tunnel_lab.report.drawing import (
+    AFTER,
+    BEFORE,
+    NARROW,
+    NOISE,
+    QUIET,
+    SIGMAS,
+    Document,
+    array,
+    drawn_label,
+    faded,
+    run_label,
+    shade,
+)
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+_ANGLE, _RATE = "angle β [rad]", "rate β̇/ω [rad]"
+_UNITS: dict[str, str] = {"rad/s2": "rad/s²"}
+Chart = dict[str, Any]
+_POINTS = 1000  # of a reading: more than a screen shows
+_LEAST_POWER = 0.3  # of the noise: what is below is drawn at the edge of the axis
+_ALL = "all runs together"
+
+
+@styled
+def runs_figure(document: Document) -> Figure:
+    """Excess of every run over time.
+
+    Args:
+        document: a diagnosis with its maps.
+
+    Returns:
+        A heat map on a logarithmic scale, in which cells within the noise stay empty.
+    """
+    from matplotlib.colors import LogNorm
+
+    maps = document["maps"]
+    runs = maps["runs"]
+    fig = figure(WIDTH, 1.4 + 0.24 * max(len(runs), 4))
+    axes = fig.add_subplot()
+    edges = array(maps["time"]["edges_s"])
+    cells, floor, top = run_cells(maps)
+    extent = (float(edges[0]), float(edges[-1]), len(runs) - 0.5, -0.5)
+    scale = LogNorm(floor, top)
+    image = axes.imshow(
+        cells, aspect="auto", extent=extent, cmap=faded(BEFORE), norm=scale, interpolation="nearest"
+    )
+    if not np.isfinite(cells).any():
+        axes.text(0.5, 0.5, "every cell within the noise", transform=axes.transAxes, ha="center")
+    axes.set_yticks(range(len(runs)), [drawn_label(run) for run in runs])
+    axes.set_xlabel("time since the start of the record [s]")
+    fig.colorbar(image, ax=axes, location="top", label="excess (noise variances)", aspect=50)
+    return fig
+
+
+def run_cells(maps: Document) -> tuple[Array, float, float]:
+    """The map of runs over time.
+
+    Returns:
+        Excess by run and bin of time, shape (runs, n), NaN within the noise; the least and the greatest value of
+        the scale. In noise variances.
+    """
+    cells = np.stack([array(row) for row in maps["time"]["by_run"]])
+    times = array(maps["time"]["edges_s"])
+    run = min(maps["runs"], key=lambda entry: entry["std"])
+    floor = SIGMAS * float(run["std"] * np.sqrt(times.size - 1))
+    known = cells[np.isfinite(cells)]
+    return np.where(cells > floor, cells, np.nan), floor, max(float(known.max(initial=0.0)), 2.0 * floor)
+
+
+@styled
+def profiles_figure(document: Document) -> Figure:
+    """Excess over time and amplitude, all runs together, and when a moment is missing.
+
+    Args:
+        document: a diagnosis with its maps.
+
+    Returns:
+        Three panels; the shaded intervals hold four fifths of the gap.
+    """
+    maps, where = document["maps"], document["where"]
+    fig = figure(WIDTH, 3.4)
+    axes = fig.subplot_mosaic([["time", "amplitude"], ["moment", "amplitude"]], height_ratios=(1.3, 0.8))
+    _profile(axes["time"], maps["time"], "edges_s", where["time_s"])
+    axes["time"].tick_params(labelbottom=False)
+    _moment(axes["moment"], maps["time"])
+    _profile(axes["amplitude"], maps["amplitude"], "edges_rad", where["amplitude_rad"])
+    axes["amplitude"].set_xlabel("amplitude of the motion [rad]")
+    return fig
+
+
+def _profile(axes: Axes, values: Document, edges: str, interval: list[float] | None) -> None:
+    bounds, mean, std = array(values[edges]), array(values["excess"]), array(values["std"])
+    shade(axes, interval)
+    axes.stairs(SIGMAS * std, bounds, baseline=-SIGMAS * std, fill=True, color=NOISE)
+    axes.stairs(mean, bounds, color=BEFORE, linewidth=1.4)
+    axes.set_xlim(0.0, float(bounds[-1]))
+    axes.set_ylim(min(-4.0 * float(np.nanmedian(std)), 1.05 * float(np.nanmin(mean))), None)
+    axes.set_ylabel("excess (noise variances)")
+    grid(axes)
+
+
+def _moment(axes: Axes, values: Document) -> None:
+    """The missing moment's energy: it shows when a moment acts, not how long the motion after it lasts."""
+    edges, share = array(values["edges_s"]), 100.0 * array(values["moment_share"])
+    axes.stairs(share, edges, fill=True, color=AFTER, alpha=0.6)
+    axes.set_xlim(0.0, float(edges[-1]))
+    axes.set_ylim(0.0, 1.05 * max(float(share.max()), 20.0))
+    axes.set_ylabel("missing moment\n[% of its energy]")
+    axes.set_xlabel("time since the start of the record [s]")
+    grid(axes)
+
+
+@styled
+def spectrum_figure(document: Document) -> Figure:
+    """Residual power over frequency, all runs together, before and after.
+
+    Args:
+        document: a diagnosis with its maps.
+
+    Returns:
+        One panel with logarithmic axes; the shaded interval holds four fifths of the gap.
+    """
+    values = document["maps"]["frequency"]
+    fig = figure(WIDTH, 2.7)
+    axes = fig.add_subplot()
+    edges, centre = spectrum_axis(values)
+    before, std = array(values["excess"]) + 1.0, array(values["std"])
+    known = np.isfinite(before)
+    shade(axes, document["where"]["frequency_hz"])
+    low, high = values["resonance_hz"]
+    axes.axvspan(0.985 * low, 1.015 * high, ymax=0.035, color=QUIET, linewidth=0)
+    axes.fill_between(
+        centre[known],
+        np.maximum(1.0 - SIGMAS * std[known], 0.3),
+        1.0 + SIGMAS * std[known],
+        color=NOISE,
+        linewidth=0,
+        label="noise (3σ)",
+    )
+    floor = 0.3
+    axes.plot(centre[known], np.maximum(before[known], floor), color=BEFORE, label="nominal model")
+    if values["after"] is not None:
+        after = array(values["after"]) + 1.0
+        axes.plot(
+            centre[known], np.maximum(after[known], floor), color=AFTER, lw=1.2, label="with the causes"
+        )
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlim(float(edges[0]), float(edges[-1]))
+    axes.set_xlabel("frequency [Hz]; dark bar: the runs' own frequencies")
+    axes.set_ylabel("residual power over noise")
+    axes.legend(loc="upper right")
+    grid(axes)
+    return fig
+
+
+def spectrum_axis(values: Document) -> tuple[Array, Array]:
+    """The axis of a spectrum for a logarithmic scale.
+
+    Args:
+        values: ``frequency`` of the maps.
+
+    Returns:
+        Edges of the bins, the first one half the second instead of zero, shape (n + 1,), Hz; their centres,
+        shape (n,), Hz.
+    """
+    edges = array(values["edges_hz"])
+    positive = np.concatenate([[0.5 * edges[1]], edges[1:]])
+    return positive, np.sqrt(positive[:-1] * positive[1:])
+
+
+@styled
+def phase_plane_figure(document: Document) -> Figure | None:
+    """The missing moment over angle and rate.
+
+    Args:
+        document: a diagnosis with its maps.
+
+    Returns:
+        A map; None where the maps hold none.
+    """
+    plane = document["maps"]["phase_plane"]
+    if plane is None:
+        return None
+    edges = array(plane["edges_rad"])
+    clear, reach, unit, _ = plane_cells(plane)
+    fig = figure(NARROW, 4.4)
+    axes = fig.add_subplot()
+    extent = (float(edges[0]), float(edges[-1]), float(edges[0]), float(edges[-1]))
+    colours = faded(AFTER, BEFORE)
+    image = axes.imshow(
+        clear, origin="lower", extent=extent, cmap=colours, vmin=-reach, vmax=reach, interpolation="nearest"
+    )
+    axes.set_xlabel(_ANGLE)
+    axes.set_ylabel(_RATE)
+    fig.colorbar(image, ax=axes, location="top", label=f"missing moment [{unit}]", shrink=0.9, aspect=40)
+    return fig
+
+
+@styled
+def moment_figure(document: Document) -> Figure | None:
+    """Means of the missing moment over all rates and over all angles.
+
+    Args:
+        document: a diagnosis with its maps.
+
+    Returns:
+        Two profiles with their 95 % bands; None where the maps hold none.
+    """
+    plane = document["maps"]["phase_plane"]
+    if plane is None:
+        return None
+    edges = array(plane["edges_rad"])
+    _, _, unit, factor = plane_cells(plane)
+    fig = figure(WIDTH, 2.6)
+    centre = 0.5 * (edges[1:] + edges[:-1])
+    for axes, name, label in zip(fig.subplots(1, 2), ("by_angle", "by_rate"), (_ANGLE, _RATE), strict=True):
+        mean, spread = factor * array(plane[name]), factor * array(plane[f"{name}_std"])
+        axes.axhline(0.0, color=QUIET, linewidth=0.8)
+        axes.fill_between(
+            centre, mean - INTERVAL * spread, mean + INTERVAL * spread, color=BEFORE, alpha=0.2, lw=0
+        )
+        axes.plot(centre, mean, color=BEFORE, marker="o", ms=3)
+        axes.set_xlabel(label)
+        axes.set_ylabel(f"mean over all {'rates' if name == 'by_angle' else 'angles'} [{unit}]")
+        grid(axes)
+    return fig
+
+
+def plane_cells(plane: Document) -> tuple[Array, float, str, float]:
+    """The map of the missing moment.
+
+    Args:
+        plane: of the maps.
+
+    Returns:
+        The moment by rate (rows) and angle (columns), shape (n, n), NaN within three standard deviations of zero;
+        the greatest value of the scale; their unit; and the factor from the document's unit to it.
+    """
+    moment = np.stack([array(row) for row in plane["moment"]])
+    std = np.stack([array(row) for row in plane["std"]])
+    unit, factor = _readable(plane, np.abs(moment))
+    known = np.abs(moment[np.isfinite(moment)])
+    reach = float(np.quantile(known, 0.98)) * factor if known.size else 1.0
+    return np.where(np.abs(moment) > SIGMAS * std, moment * factor, np.nan), reach, unit, factor
+
+
+def _readable(plane: Document, size: Array) -> tuple[str, float]:
+    """A unit in which the values are neither thousands nor thousandths."""
+    unit = _UNITS.get(plane["unit"], str(plane["unit"]))
+    greatest = float(np.nanmax(size)) if np.isfinite(size).any() else 1.0
+    return (f"10⁻³ {unit}", 1e3) if greatest < 0.1 else (unit, 1.0)
+
+
+def charts(document: Document, campaign: Campaign) -> dict[str, list[Chart]]:
+    """The charts of a diagnosis.
+
+    Args:
+        document: the diagnosis as JSON's types; without ``maps`` there are none.
+
+    Returns:
+        Charts by the name of the figure that they replace on a screen.
+    """
+    maps = document.get("maps")
+    if not maps:
+        return {}
+    by_figure = {"where-runs": [_runs(maps)], "where-spectrum": [_spectrum(maps)]}
+    if maps["phase_plane"] is not None:
+        by_figure["where-phase-plane"] = [_plane(maps["phase_plane"])]
+    if traces := _traces(maps, campaign):
+        by_figure["residuals"] = traces
+    return by_figure
+
+
+def _runs(maps: Document) -> Chart:
+    cells, low, high = run_cells(maps)
+    ids = [str(run["id"]) for run in maps["runs"]]
+    return {
+        "kind": "cells",
+        "title": "Excess of every run over time",
+        "x": {"label": "time since the start of the record [s]", "edges": maps["time"]["edges_s"]},
+        "y": {"label": "run", "edges": np.arange(len(ids) + 1).tolist(), "names": ids},
+        "labels": [run_label(run) for run in maps["runs"]],
+        "values": [_rounded(row) for row in cells],
+        "unit": "noise variances",
+        "range": [low, high],
+        "log": True,
+    }
+
+
+def _plane(plane: Document) -> Chart:
+    cells, reach, unit, _ = plane_cells(plane)
+    edges = plane["edges_rad"]
+    return {
+        "kind": "cells",
+        "title": "Missing moment",
+        "x": {"label": "angle β [rad]", "edges": edges},
+        "y": {"label": "rate β̇/ω [rad]", "edges": edges},
+        "values": [_rounded(row) for row in cells],
+        "unit": unit,
+        "range": [-reach, reach],
+        "log": False,
+    }
+
+
+def _spectrum(maps: Document) -> Chart:
+    given = maps["frequency"]
+    centre = spectrum_axis(given)[1]
+    nothing = np.full(centre.size, np.nan)
+    excess, std = array(given["excess"]), SIGMAS * array(given["std"])
+    after = nothing if given["after"] is None else array(given["after"])
+    views = [_filled(_ALL, centre, -std, std, excess, after)]
+    for run, by_bin in zip(maps["runs"], given.get("by_run", []), strict=False):
+        views.append(_filled(run_label(run), centre, nothing, nothing, array(by_bin), nothing, run=run["id"]))
+    return {
+        "kind": "lines",
+        "title": "Residual power over noise against frequency",
+        "x": {"label": "frequency [Hz]", "log": True},
+        "y": {"label": "residual power over noise", "log": True},
+        "series": [
+            {"label": "noise −3σ", "role": "quiet"},
+            {"label": "noise +3σ", "role": "quiet"},
+            {"label": "nominal model", "role": "before"},
+            {"label": "with the causes", "role": "after"},
+        ],
+        "band": [2, 1],
+        "views": views,
+    }
+
+
+def _filled(label: str, centre: Array, *excesses: Array, run: str = "") -> Chart:
+    """A view of the bins that hold a value; the others are empty, and a null there would break the curves."""
+    filled = np.any(np.isfinite(excesses), axis=0)
+    power = (_rounded(np.maximum(1.0 + excess[filled], _LEAST_POWER)) for excess in excesses)
+    return _view(label, _rounded(centre[filled]), *power, run=run)
+
+
+def _traces(maps: Document, campaign: Campaign) -> list[Chart]:
+    """The reading and, below it on the same axis of time, the residuals."""
+    labels = {run["id"]: run_label(run) for run in maps["runs"]}
+    records = {run.id: run.record for run in campaign.runs}
+    readings, residuals = [], []
+    for trace in maps["traces"]:
+        if trace["id"] not in records:
+            continue
+        name, label = trace["id"], labels.get(trace["id"], str(trace["id"]))
+        record = records[name]
+        thin = slice(None, None, max(1, record.yaw_rad.size // _POINTS))
+        readings.append(
+            _broken(label, record.time_s[thin] - record.time_s[0], record.yaw_rad[thin], run=name)
+        )
+        before = 1e3 * array(trace["before_rad"])
+        after = (
+            np.full(before.size, np.nan) if trace["after_rad"] is None else 1e3 * array(trace["after_rad"])
+        )
+        residuals.append(_broken(label, array(trace["time_s"]), before, after, run=name))
+    if not readings:
+        return []
+    unit = campaign.sensor.unit
+    time_axis = {"label": "time since the start of the record [s]", "log": False}
+    series = [{"label": "nominal model", "role": "before"}, {"label": "with the causes", "role": "after"}]
+    return [
+        _lines("Reading", time_axis, unit, [{"label": "reading", "role": "soft"}], readings),
+        _lines("Residual", time_axis, f"10⁻³ {unit}", series, residuals),
+    ]
+
+
+def _lines(title: str, x: Chart, unit: str, series: list[Chart], views: list[Chart]) -> Chart:
+    y = {"label": f"{title.lower()} [{unit}]", "log": False}
+    return {"kind": "lines", "title": title, "x": x, "y": y, "series": series, "views": views}
+
+
+def _view(label: str, *data: Sequence[float | None], run: str = "") -> Chart:
+    return {"label": label, "run": run, "data": list(data)}
+
+
+def _broken(label: str, time: Array, *curves: Array, run: str) -> Chart:
+    """A view of curves over time, which break where samples are missing."""
+    when, *values = with_breaks(time, *curves)
+    return _view(label, _rounded(when, 6), *map(_rounded, values), run=run)
+
+
+def _rounded(values: Array, digits: int = 4) -> list[float | None]:
+    """Numbers for JSON, as many digits as a screen shows; null where a value is not known."""
+    return [float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in np.ravel(values).tolist()]

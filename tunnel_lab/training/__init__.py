@@ -1,1 +1,0 @@
-"""Training of `neural_posterior`: simulated campaigns as shards on disk, and the fit of the network to them."""
