@@ -120,7 +120,10 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         standard deviation is given at a bound and where the runs do not determine the coefficient.
     """
     fit = answers.possible[0].fit
-    return {name: _averaged(answers, campaign, name) for name in coefficient_names(fit.problem)}
+    names = [
+        name for name in coefficient_names(fit.problem) if _value(fit, name) is not None
+    ]  # the rest is held
+    return {name: _averaged(answers, campaign, name) for name in names}
 
 
 def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:

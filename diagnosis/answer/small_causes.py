@@ -151,9 +151,19 @@ def beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Beside:
 
 
 def _gradients(fit: Fit) -> Array:
-    """Derivatives of the coefficients with respect to the common parameters, shape (coefficients, common)."""
+    """Derivatives of the coefficients with respect to the common parameters, shape (coefficients, common).
+
+    Zero for a coefficient that a model of one's own holds.
+    """
     names, common = fit.problem.names, fit.point.common
-    return np.array([coefficient_gradient(names, common, name) for name in coefficient_names(fit.problem)])
+    held = np.zeros(len(names))
+    composed = {"omega_n", "zeta"}
+    return np.array(
+        [
+            coefficient_gradient(names, common, name) if name in names or name in composed else held
+            for name in coefficient_names(fit.problem)
+        ]
+    )
 
 
 def _formal(fit: Fit, gradients: Array) -> Array:

@@ -33,7 +33,7 @@ class Misfit:
     Args:
         chi2: by channel, shape (6,), dimensionless.
         count: of independent values by channel, which is what noise alone gives, shape (6,).
-        motion: sum of squares of the readings about their means in every cycle, in noise variances.
+        motion: sum of squares of the readings about their means in every cycle, in noise variances, dimensionless.
     """
 
     chi2: Array

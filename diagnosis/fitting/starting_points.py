@@ -120,7 +120,7 @@ def _frequency(run: RunData) -> float:
     return float(peak_of_swing(values, size) / (size * run.interval))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StartingPoint:
     """Where the fit of an effect starts, and how much linear theory predicts that it closes.
 

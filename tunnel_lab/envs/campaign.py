@@ -85,7 +85,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         sample_rate: float | None = None,
         severities: Mapping[str, tuple[float, float]] | None = None,
         targets: tuple[float, float] = (0.01, 0.05),
-        probability: float = 0.95,
+        probability: float = 0.9,
         costs: Costs | None = None,
         seconds_per_nat: float = 600.0,
         max_runs: int | None = None,
