@@ -10,7 +10,6 @@ import typer
 
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.options import EffectsFileOption
-from tunnel_lab.terminal.progress import step_display
 
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
@@ -187,6 +186,7 @@ def diagnose_with_progress(
         model: the nominal model; None: spring and damper.
     """
     from diagnosis import diagnose
+    from tunnel_lab.terminal.progress import step_display
 
     with step_display() as show_step:
         return diagnose(campaign, kinds=kinds, progress=show_step, model=model)
