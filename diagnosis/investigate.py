@@ -220,7 +220,7 @@ def _with_forms(found: Study, base: Fit) -> Study:
 
 
 def _weighed(found: Study, base: Fit) -> list[Weighed]:
-    """The answers with their probabilities, most probable first; shares of the gap that ``base`` leaves."""
+    """The answers with their probabilities, the answer first; shares of the gap that ``base`` leaves."""
     nominal = misfit(base)
     sets = [h.fitted_set(base) for h in found.hypotheses]
     sets += [answer.left for answer in found.random]

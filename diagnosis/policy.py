@@ -99,11 +99,14 @@ FREED_HYPOTHESES, FREED_FROM = 3, 0.02
 
 #: Exponent of what is left in a channel. Tuned.
 STEEPNESS = 1.25
-#: Logarithm of the weight that every further effect of a set costs, and every freed form. Tuned: an effect must
-#: leave less than an eleventh of one channel, or close as much of several together.
+#: Logarithm of the weight that every effect of a set costs, and every freed form and instant. Tuned: a further
+#: effect must leave less than an eleventh of one channel, or close as much of several together. That an instant
+#: costs as a form does is a judgement, made when skipped samples took the place of gravity on a measured record.
 SET_PRICE, FORM_PRICE = 3.0, 1.0
-#: Misfit that needs no cause, as a share of the motion in every channel. Convention: sensors and springs are linear
-#: and repeat to one part in a thousand. Fits of the true causes leave as much or more in every measured record.
+#: Misfit that needs no cause, as a share of the motion in every channel. Judgement: sensors and springs are linear
+#: and repeat to about one part in a thousand. Of the range from 4e-4 to 1e-3 the simulated campaigns of 0007 prefer
+#: the lower end, and the measured records do not say. The upper end was taken after a measured pendulum had been
+#: given a false sensor nonlinearity at 7e-4.
 MODEL_ERROR = 1e-3
 #: Share of what is left in the other channels that counts in a channel: an error of the phase, squared, is one of
 #: the amplitude. Tuned.
@@ -115,11 +118,11 @@ NEEDLESS_CHI2 = 20.0
 CHANCE_STDS = 2.0
 #: Logarithm of the odds that the effects of a set are the causes: a number, and by how much it rises with the
 #: significance of the gap, falls with the logarithm of what is left, and rises with that of the share closed. A
-#: logistic regression on fits with and without the true effects, of simulated campaigns and measured records.
+#: logistic regression on fits with and without the true effects, simulated and measured (0007).
 UNKNOWN_AT, UNKNOWN_GAP, UNKNOWN_LEFT, UNKNOWN_CLOSED = -0.3, 0.21, 2.0, 2.0
 #: Stiffness of an unstated spring beside gravity, as a share of both, below which the rig needs no spring. The set
-#: then counts as one with a number less: a spring would have to soften by chance as gravity does. Judgement, made
-#: when three simulated pendulums had been given a cubic spring (0018).
+#: then counts as one with two numbers less: a spring would have to soften by chance, and as much as gravity does.
+#: Judgement, made when three simulated pendulums and a measured one had been given a cubic spring (0018).
 NEEDLESS_SPRING = 0.05
 #: Share of the probability that is spread evenly over all answers. Tuned: how often an answer of overwhelming
 #: weight was wrong, where something was at work that neither fits nor rivals know.
@@ -178,7 +181,7 @@ LINE_CONTRAST = 8.0
 
 # ---- What is reported -----------------------------------------------------------------------------------------
 
-#: Probability from which the most probable answer is the answer; below, the diagnosis is undecided. Convention:
+#: Probability from which the answer is decided; below, the diagnosis is undecided. Convention:
 #: more probable than all others together.
 DECIDED_FROM = 0.5
 #: Probability of the smallest set of answers that is stated, and of what the likely answers have in common.

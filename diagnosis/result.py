@@ -242,7 +242,7 @@ class Diagnosis:
         verdict: the answer in plain words.
         gap: how large, before and after.
         where: where it is.
-        candidates: the answers considered, most probable first, ``none`` and ``unknown`` among them.
+        candidates: the answers considered, the answer first, ``none`` and ``unknown`` among them.
         ambiguous_with: effects that these runs cannot distinguish from the causes.
         next_run: the run expected to distinguish them; None where not needed.
         coefficients: before and after.

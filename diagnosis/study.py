@@ -43,7 +43,7 @@ class Study:
         rested: runs that end with a long rest, which the fits of effects leave out.
         place: where the gap is, from the residuals alone; None where it is not located yet.
         hypotheses: fitted sets of effects.
-        weighed: answers with probabilities, most probable first; empty where there is no gap.
+        weighed: answers with probabilities, the answer first; empty where there is no gap.
         random: answers with a random moment that passed its tests.
         seconds: wall time by step, s.
     """

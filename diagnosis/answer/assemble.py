@@ -49,8 +49,8 @@ _RESTED = (
     "says little about its motion."
 )
 _AS_IDENTIFIED = (
-    "With no cause these are the values of identify, whose standard deviations allow neither for the rounding of "
-    "the stated air density nor for the spectrum of the noise."
+    "With no cause these agree with the values of identify, whose standard deviations allow neither for the "
+    "rounding of the stated air density nor for the spectrum of the noise."
 )
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 

@@ -67,7 +67,7 @@ class FittedSet:
         effects: names, in any order.
         share: of the gap that it leaves open, a fraction; below 0 by chance.
         excess: χ² beyond that of noise by channel, shape (6,), dimensionless.
-        numbers: how many it has beside its own: freed forms, less a spring that gravity replaces.
+        numbers: how many it has beside its own: freed forms and instants, less two where gravity replaces a spring.
     """
 
     effects: tuple[str, ...]

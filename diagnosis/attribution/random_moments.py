@@ -39,8 +39,8 @@ class RandomAnswer:
         kind: of the random moment.
         process: its fit.
         beside: the fitted effects beside it with residuals in the sensor's noise alone, or None.
-        left: what remains in the noise that the response to the random moment is part of. The share is that of the
-            innovations' and the wind-off runs' excess in the nominal one's.
+        left: what remains. The share is that of the innovations' and the wind-off runs' excess in the nominal
+            one's, and the same in every channel.
     """
 
     kind: type[Effect]
