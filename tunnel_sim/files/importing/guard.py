@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import json
+import math
 import os
 import signal
 import subprocess
@@ -32,6 +33,7 @@ _SERVE = (
     "from tunnel_sim.files.importing.guard import serve; serve()"
 )
 _LATEST = 3.0  # times the allowed time
+_OUT_OF_TIME = -getattr(signal, "SIGXCPU", math.inf)  # exit status of a process that Linux or macOS ended for it
 _DAMAGED = "export it again, or as text"
 _lock = threading.Lock()
 _kept: list[_Server] = []
@@ -117,9 +119,10 @@ class _Server:
             answer, arrays = _received(self._answers)
         except (EOFError, OSError):
             status = self._process.wait()
+            too_long = late.is_set() or status == _OUT_OF_TIME
             ended = f"ends the program that reads it (exit status {status})"
             raise TunnelError(
-                f"takes longer than {allowed:.3g} s to read" if late.is_set() else ended,
+                f"takes longer than {allowed:.3g} s to read" if too_long else ended,
                 where=where,
                 remedy=f"it may be damaged: {_DAMAGED}",
             ) from None
@@ -142,7 +145,8 @@ def serve() -> None:
         while True:
             request, content = _received(asked)
             # The asking process ends this one earlier, unless it has been killed itself.
-            _limit("RLIMIT_CPU", int(time.process_time() + _LATEST * request["seconds"]))
+            # The limit counts whole seconds.
+            _limit("RLIMIT_CPU", math.ceil(time.process_time() + _LATEST * request["seconds"]) + 1)
             try:
                 tables = import_module(request["module"]).read(content.pop(), request["where"])
                 _send(answers, *_packed(tables))
