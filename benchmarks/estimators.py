@@ -18,9 +18,9 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.peers import Method, present
-from identification.decay.run_fit import NO_WINDOWS
 from identification.estimators import ALL_ESTIMATORS, make_estimator
 from identification.estimators.output_error import OutputError
+from identification.signal.run_fit import NO_WINDOWS
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record

@@ -19,7 +19,7 @@ from rich.table import Table
 from diagnosis.blind.files import KEY
 from diagnosis.investigate import investigate
 from diagnosis.law.explain import closable
-from identification.statistics.proportion import Proportion
+from identification.statistics import Proportion
 from tunnel_sim.files.campaign_io import read_campaign
 
 STATE = ("angle", "rate", "state")

@@ -23,9 +23,9 @@ from rich.console import Console
 
 from benchmarks.estimators import AMPLITUDE, records
 from benchmarks.neural_posterior import Row, show_clean
-from identification.decay.first_guess import starting_frequency
 from identification.neural.posterior.demodulated import WINDOWS, Demodulated, demodulate
 from identification.neural.posterior.features import record_features
+from identification.signal.frequency import starting_frequency
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_lab.experiments.training import FAR
 from tunnel_lab.experiments.training_samples import (

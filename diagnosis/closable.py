@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from identification.printing.table import TextTable
+from identification.printing import TextTable
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.json_text import as_json
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from identification.printing.numbers import significant, unit_mark
-from identification.printing.table import TextTable
+from identification.printing import TextTable, significant, unit_mark
 from tunnel_sim.files.json_text import as_json
 
 if TYPE_CHECKING:

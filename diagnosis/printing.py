@@ -9,9 +9,8 @@ from typing import Any
 from diagnosis.closable import closable_table, closable_words
 from diagnosis.patch import patch_lines, patch_table
 from diagnosis.policy import LISTED_PROBABILITY
-from identification.printing.numbers import coefficient_label, estimated, significant, unit_mark
-from identification.printing.table import TextTable
-from identification.remark import Remark
+from identification.printing import TextTable, coefficient_label, estimated, significant, unit_mark
+from identification.status import Remark
 
 SHOWN_PROBABILITY = 0.005
 """Answers less probable than this are counted, not listed."""

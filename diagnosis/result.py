@@ -13,9 +13,9 @@ from diagnosis.closure import Rest, Waterfall
 from diagnosis.decision import Decision, decision
 from diagnosis.patch import PatchedModel
 from diagnosis.printing import diagnosis_parts
-from identification.printing.frames import wide_frame
-from identification.printing.table import as_html, as_text
-from identification.remark import Remark
+from identification.estimate import wide_frame
+from identification.printing import as_html, as_text
+from identification.status import Remark
 from tunnel_sim.files.json_text import as_json
 
 SCHEMA_VERSION = 1

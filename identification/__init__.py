@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     )
     from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, WindowEstimate
     from identification.estimators import ALL_ESTIMATORS, Estimator, make_estimator
-    from identification.remark import Remark
-    from identification.status import Status
+    from identification.status import Remark, Status
 else:
     __getattr__, __dir__ = lazy_names(
         __name__,
@@ -28,8 +27,7 @@ else:
             ".datasets": "MEASURED_CAMPAIGNS measured_campaign paper_derivatives paper_springs paper_windows",
             ".estimate": "Estimate NoiseLevel Quantity RunEstimate WindowEstimate",
             ".estimators": "ALL_ESTIMATORS Estimator make_estimator",
-            ".remark": "Remark",
-            ".status": "Status",
+            ".status": "Remark Status",
         },
     )
 

@@ -6,11 +6,10 @@ from dataclasses import replace
 
 from identification.estimate import Estimate, RunEstimate, Status, by_gravity
 from identification.estimators import Estimator, make_estimator
-from identification.examination.examine import examine
-from identification.examination.rates import as_angles
+from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
-from identification.remark import Examined
-from identification.statistics.widening import widened_by_contradictions
+from identification.statistics import widened_by_contradictions
+from identification.status import Examined
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 

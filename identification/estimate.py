@@ -7,7 +7,7 @@ why and what to do.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any
@@ -16,10 +16,7 @@ import numpy as np
 import polars as pl
 from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter
 
-from identification.printing.estimate_tables import estimate_parts
-from identification.printing.frames import long_frame, wide_frame
-from identification.printing.table import as_html, as_text
-from identification.remark import Remark
+from identification.status import Remark
 from identification.status import Status as Status
 from identification.status import by_gravity as by_gravity
 from tunnel_sim.files.json_text import as_json
@@ -227,10 +224,14 @@ class Estimate:
 
     def __str__(self) -> str:
         """The coefficients and the first runs as short tables, and the notes on them."""
+        from identification.printing import as_text, estimate_parts
+
         return as_text(estimate_parts(self.to_json_dict()))
 
     def _repr_html_(self) -> str:
         """The same for notebooks."""
+        from identification.printing import as_html, estimate_parts
+
         return as_html(estimate_parts(self.to_json_dict()))
 
     def coefficients_frame(self) -> pl.DataFrame:
@@ -291,6 +292,58 @@ def estimate_schema() -> dict[str, Any]:
             "statuses": {"type": "array", "items": names},
         }
     return found
+
+
+_LONG = {
+    "quantity": pl.String,
+    "value": pl.Float64,
+    "std": pl.Float64,
+    "unit": pl.String,
+    "low": pl.Float64,
+    "high": pl.Float64,
+}
+
+
+def long_frame(quantities: Mapping[str, Mapping[str, Any] | None]) -> pl.DataFrame:
+    """A row for each quantity.
+
+    Args:
+        quantities: value, std, unit and perhaps interval by name; None where there is none.
+
+    Returns:
+        Columns quantity, value, std, unit, and low and high, the ends of the 95 % interval; null where there is
+        no quantity.
+    """
+    rows = []
+    for name, given in quantities.items():
+        row: dict[str, Any] = {"quantity": name}
+        if given is not None:
+            reach = 1.96 * given["std"]
+            low, high = given.get("interval") or (given["value"] - reach, given["value"] + reach)
+            row |= {key: given[key] for key in ("value", "std", "unit")} | {"low": low, "high": high}
+        rows.append(row)
+    return pl.DataFrame(rows, schema=_LONG)
+
+
+def wide_frame(
+    rows: Sequence[Mapping[str, Any]], plain: Mapping[str, type[pl.DataType]], quantities: Sequence[str]
+) -> pl.DataFrame:
+    """A row for each document, two columns for each quantity.
+
+    Args:
+        plain: keys whose values are taken as they are, with their types.
+        quantities: keys of quantities, which have a value and a std, or are None.
+
+    Returns:
+        The plain columns, then for each quantity its value under its name and its standard deviation under the
+        name with ``_std``; null where there is none.
+    """
+    columns: dict[str, list[Any]] = {name: [row[name] for row in rows] for name in plain}
+    for name in quantities:
+        given = [row[name] or {} for row in rows]
+        columns[name] = [quantity.get("value") for quantity in given]
+        columns[f"{name}_std"] = [quantity.get("std") for quantity in given]
+    return pl.DataFrame(columns, schema={name: plain.get(name, pl.Float64) for name in columns})
 
 
 @cache

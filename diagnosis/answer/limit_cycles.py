@@ -8,7 +8,7 @@ from dataclasses import replace
 from diagnosis.attribution.decide import UNKNOWN
 from diagnosis.result import Candidate, Coefficients, Diagnosis, Where
 from identification.examination.self_excited import in_limit_cycle
-from identification.remark import Remark
+from identification.status import Remark
 from tunnel_sim.vocabulary.errors import TunnelError
 
 _NOTE = "no damping ratio and no derivative is stated, since no run is a free decay"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.policy import SECOND_MODE_LEFT
-from identification.decay.first_guess import starting_frequency, thinned_reading
+from identification.signal.frequency import starting_frequency, thinned_reading
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 

@@ -14,7 +14,7 @@ from diagnosis.detection.rounding import rounding_errors
 from diagnosis.policy import GAP_FALSE_ALARM_RATE, MATERIAL_SHARE
 from diagnosis.result import ParameterEstimate
 from diagnosis.study import Study
-from identification.printing.numbers import COEFFICIENTS, significant, unit_mark
+from identification.printing import COEFFICIENTS, significant, unit_mark
 
 Estimates = Mapping[str, ParameterEstimate]
 

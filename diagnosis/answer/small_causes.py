@@ -16,7 +16,7 @@ from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.normal_equations import normal_equations
 from diagnosis.fitting.starting_points import StartingPoint, is_gross, project_out, starting_points
 from diagnosis.policy import CHANCE_STDS, FORM_CHANGE_STD, NEEDLESS_CHI2, OWN_EVIDENCE
-from identification.statistics.widening import scatter_of_runs
+from identification.statistics import scatter_of_runs
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
 

@@ -9,7 +9,7 @@ from diagnosis.closure import Rest
 from diagnosis.decision import Decision, undecided_words
 from diagnosis.names import plain
 from diagnosis.printing import share
-from identification.printing.numbers import significant
+from identification.printing import significant
 from tunnel_sim.effects import effect_class
 
 _CHANNEL_WORDS = {

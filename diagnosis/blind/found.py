@@ -8,7 +8,7 @@ from typing import Any
 
 from diagnosis.attribution.decide import UNKNOWN
 from diagnosis.blind.cases import Case
-from identification.statistics.proportion import Proportion
+from identification.statistics import Proportion
 
 MIDDLE = (1.0 / 3.0, 3.0)
 """Time scales of the middle rigs: about a third of those drawn evenly in the logarithm from 1/30 to 30."""

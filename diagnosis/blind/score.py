@@ -25,7 +25,7 @@ from diagnosis.blind.found import Found, found_by_group, inclusions
 from diagnosis.blind.smooth import SmoothCalibration, smooth_calibration
 from diagnosis.blind.statistics import CalibrationBin, calibration
 from diagnosis.policy import BLIND_CLOSED, BLIND_WITHIN
-from identification.statistics.proportion import Proportion
+from identification.statistics import Proportion
 from tunnel_sim.files.json_text import as_json
 from tunnel_sim.files.reading import as_described
 from tunnel_sim.vocabulary.errors import TunnelError, shown

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.statistics.proportion import Proportion
+from identification.statistics import Proportion
 
 BINS = 10
 

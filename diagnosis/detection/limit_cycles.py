@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from identification.examination.clock import with_clocks
 from identification.examination.examine import examine
 from identification.examination.self_excited import in_limit_cycle
-from identification.remark import Outcome, Remark
+from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 
 _LEFT_OUT = "left out of the diagnosis, which compares free decays"

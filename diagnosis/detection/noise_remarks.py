@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.detection.sensor_noise import Noise, NoiseTrend
-from identification.remark import Outcome, Remark
+from identification.status import Outcome, Remark
 
 
 def noise_remarks(noise: Noise, trend: NoiseTrend) -> tuple[Remark, ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
-from identification.decay.run_fit import NO_WINDOWS, identify_run
 from identification.estimate import Status
+from identification.signal.run_fit import NO_WINDOWS, identify_run
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 
-from identification.decay.thinning import mean_of_blocks
+from identification.signal.decay_fit import mean_of_blocks
 from tunnel_sim.vocabulary.record import Array, Record
 
 _ORDER = 5

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.decay.spectrum import peak_of_swing
+from identification.signal.frequency import peak_of_swing
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.record import Record, evenly_spaced

@@ -16,10 +16,9 @@ from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data, RunData, departure
 from diagnosis.fitting.spectra import Line, mains_line, shedding_line
 from diagnosis.policy import GROSS_MISFIT
-from identification.decay.damped_oscillation import Decay
-from identification.decay.decay_fit import Reading, fit_run
-from identification.decay.first_guess import starting_decay
-from identification.decay.spectrum import peak_of_swing
+from identification.signal.decay_fit import Reading, fit_run
+from identification.signal.free_decay import Decay
+from identification.signal.frequency import peak_of_swing, starting_decay
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.fitting import Circumstances, Trial
 from tunnel_sim.effects.parameters import ParameterInfo

@@ -21,7 +21,7 @@ from diagnosis.law.line import SteadyLine, steady_line
 from diagnosis.law.ridge import ratio
 from diagnosis.policy import AS_MUCH, COMMON_SHARE, LEAST_CLOSABLE, PLACE_FALSE_ALARM_RATE
 from diagnosis.study import Study
-from identification.printing.numbers import unit_mark, with_std
+from identification.printing import unit_mark, with_std
 
 _BESIDE = 2.0  # standard deviations
 

@@ -14,10 +14,10 @@ from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import RunData
 from diagnosis.fitting.spectra import linear_coefficients, resonance
 from diagnosis.policy import COLOURED_RUN
-from identification.decay.damped_oscillation import Decay
-from identification.decay.decay_fit import Reading, fit_run
-from identification.decay.windows import fit_windows
 from identification.estimate import NoiseLevel
+from identification.signal.decay_fit import Reading, fit_run
+from identification.signal.free_decay import Decay
+from identification.signal.windows import fit_windows
 from tunnel_sim.vocabulary.record import Array
 
 

@@ -9,7 +9,7 @@ from diagnosis.localisation.mapping import Survey
 from diagnosis.names import plain
 from diagnosis.policy import LISTED_BAND_SHARE, LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
 from diagnosis.result import Where
-from identification.printing.numbers import p_text
+from identification.printing import p_text
 from tunnel_sim.effects import Effect
 
 _LISTED = 12  # ids listed in a sentence at most

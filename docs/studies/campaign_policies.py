@@ -20,7 +20,7 @@ import numpy as np
 from scipy.stats import binom
 
 from identification.estimate import PARAMETERS
-from identification.statistics.proportion import Proportion
+from identification.statistics import Proportion
 from tunnel_lab.envs.campaign import CampaignEnv, reached
 from tunnel_lab.envs.policies import POLICIES, run_campaign
 from tunnel_lab.envs.session import Knowledge, answers, probabilities

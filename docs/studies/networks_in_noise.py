@@ -10,8 +10,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from identification import identify
-from identification.decay.damped_oscillation import Decay, free_decay
 from identification.estimate import Quantity
+from identification.signal.free_decay import Decay, free_decay
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_lab.paper.networks import METHODS, NETWORK
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

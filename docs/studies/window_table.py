@@ -15,8 +15,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from identification.datasets import WindowRow, paper_derivatives
-from identification.decay.damped_oscillation import Decay
-from identification.decay.decay_fit import Reading, fit_run
+from identification.signal.decay_fit import Reading, fit_run
+from identification.signal.free_decay import Decay
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion

@@ -22,12 +22,11 @@ from typing import Any
 
 import numpy as np
 
-from identification.campaign.assembly import wind_off
-from identification.campaign.derivatives import has_size
+from identification.campaign.derivatives import has_size, wind_off
 from identification.campaign.springs import inertia_of_springs
 from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, Status, by_gravity
 from identification.policy import LEAST_FOR_SCATTER
-from identification.statistics.widening import widened_covariance
+from identification.statistics import widened_covariance
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
 

@@ -1,7 +1,24 @@
 """Bayesian: the posterior of each run's decay, and of the campaign's coefficients under all of them.
 
+The posterior of one run's decay rate and stiffness on an adaptive grid, with all other unknowns integrated out.
+Initial angle and rate and the sensor's zero enter linearly, so they are integrated out in closed form, and so is
+an unknown noise level, which leaves Student's form (Bretthorst, Bayesian Spectrum Analysis and Parameter
+Estimation (1988), doi 10.1007/978-1-4684-9399-3). The prior is Jeffreys' rule over all unknowns, whose intervals
+have the stated coverage and do not depend on the choice of parameters (Jeffreys, Proc. R. Soc. A 186 (1946)
+453–461, doi 10.1098/rspa.1946.0056): with it
+
+    p(a, k | y) ∝ RSS(a, k)^(−ν/2) √|I(a, k)|,   or  exp(−RSS/2S²) √|I|  where the noise S is known,
+
+with RSS the sum of squares at the best state and zero, and I the information on (a, k) there. The two remaining
+unknowns are summed over a grid in units of the posterior's standard deviations, refined until it covers the
+posterior.
+
+Combination of runs: mean and covariance of the shared parameters under the product of the runs' likelihoods.
+Importance sampling from Student's distribution about the normal approximation, drawn in pairs of opposite sign,
+and repeated where it misses the posterior (Kloek & van Dijk, Econometrica 46 (1978) 1–19, doi 10.2307/1913641).
+
 The initial state, the zero and the noise level are integrated out in closed form and damping and frequency
-are summed over a grid (see `identification.decay.posterior`). So the logarithm of the likelihood need not be a
+are summed over a grid (see `identification.estimators.bayesian`). So the logarithm of the likelihood need not be a
 parabola, which it is not in records of one to three cycles or of few samples. Values are posterior means, with the
 posterior's standard deviations, and ωn and ζ carry their 95 % intervals. The campaign's coefficients are drawn from
 the product of the runs' likelihoods. Sources: Bretthorst, Bayesian Spectrum Analysis and Parameter Estimation
@@ -15,20 +32,286 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RectBivariateSpline
 
-from identification.campaign.assembly import Combination, RunDecay
-from identification.campaign.derivatives import Design
-from identification.decay.damped_oscillation import Decay
-from identification.decay.decay_fit import Reading, fit_run, project_run
-from identification.decay.first_guess import starting_decay
-from identification.decay.importance import shared_moments
-from identification.decay.posterior import NoiseKnowledge, Posterior, posterior_of
-from identification.decay.run_fit import decay_covariance_of, describe_run, judge
-from identification.decay.thinning import block_means
+from identification.campaign.derivatives import Combination, Design, RunDecay
 from identification.estimate import NoiseLevel, Quantity, Status
 from identification.estimators.run_by_run import Found, RunByRun
+from identification.signal.decay_fit import Reading, block_means, fit_run, project_run
+from identification.signal.free_decay import Decay
+from identification.signal.frequency import starting_decay
+from identification.signal.run_fit import decay_covariance_of, describe_run, judge
+from identification.statistics import determined
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
+
+# Half width and step in standard deviations: for a normal distribution the sum is exact to 1e-7.
+_FIRST = (5.6, 0.8)
+_FINER = (7.0, 0.35)
+_WIDENING = 1.25  # of the half width in each refinement after the first: Student's tails are long
+_MOST_REFINEMENTS = 7
+_BORDER_MASS = 1e-4
+_SCALE_BAND = (0.7, 1.4)  # of the standard deviations found over those the grid was made for
+_FLOOR = -60.0  # of the logarithm of the likelihood relative to its peak: smaller values are neglected
+_STEEPEST = 50.0  # |a| times the record's length: beyond it the record would not show the motion
+_RIDGE = 1e-13  # of a scaled Gram matrix, which is singular for a motion of only a few samples
+_FINE = 121  # points a side for the quantiles
+TAIL = 0.025
+
+
+@dataclass(frozen=True)
+class NoiseKnowledge:
+    """What is known of the noise.
+
+    Args:
+        variance: S² of one value of the reading, rad²; None where it is unknown and integrated out.
+        samples: number of samples behind one value.
+        within: sum of squares within the blocks, rad², which thinning removes from the residual.
+        freedom: ν, number of samples less that of linear unknowns.
+    """
+
+    variance: float | None
+    samples: int
+    within: float
+    freedom: float
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """A posterior of (a, k).
+
+    Args:
+        centre: of the grid, shape (2,), 1/s and 1/s².
+        scale: lower triangular: (a, k) = centre + scale z, shape (2, 2).
+        axis: of both coordinates z, shape (m,), dimensionless.
+        log_likelihood: over the grid without the prior, its largest 0, shape (m, m).
+        log_posterior: with it, shape (m, m).
+    """
+
+    centre: Array
+    scale: Array
+    axis: Array
+    log_likelihood: Array
+    log_posterior: Array
+
+    def moments(self) -> tuple[Array, Array]:
+        """Mean (2,) and covariance (2, 2) of (a, k)."""
+        weights = np.exp(self.log_posterior - self.log_posterior.max())
+        weights /= weights.sum()
+        points = _points(self.axis)
+        mean = points @ weights.ravel()
+        spread = points - mean[:, None]
+        covariance = (spread * weights.ravel()) @ spread.T
+        return self.centre + self.scale @ mean, self.scale @ covariance @ self.scale.T
+
+    def log_likelihood_at(self, decays: Array) -> Array:
+        """ℓ(a, k), for combining runs; beyond the grid it falls like a normal distribution.
+
+        Args:
+            decays: shape (n, 2), 1/s and 1/s².
+
+        Returns:
+            Shape (n,).
+        """
+        z = np.linalg.solve(self.scale, (decays - self.centre).T)
+        edge = float(self.axis[-1])
+        inside = np.clip(z, -edge, edge)
+        spline = _spline(self.axis, self.log_likelihood)
+        beyond = np.sum(z**2 - inside**2, axis=0)
+        return np.asarray(spline.ev(inside[0], inside[1]) - 0.5 * beyond)
+
+    def modal(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float, float]]:
+        """ωn in rad/s and ζ: mean, standard deviation, lower and upper end of the 95 % interval of each."""
+        fine = np.linspace(self.axis[0], self.axis[-1], _FINE)
+        spline = _spline(self.axis, self.log_posterior)
+        weights = np.exp(np.minimum(spline(fine, fine) - self.log_posterior.max(), 1.0)).ravel()
+        decays = self.centre[:, None] + self.scale @ _points(fine)
+        real = decays[1] > 0.0
+        omega = np.sqrt(decays[1][real])
+        return (
+            _summary(omega, weights[real]),
+            _summary(decays[0][real] / omega, weights[real]),
+        )
+
+
+def posterior_of(
+    thin: Reading, start: Decay, covariance: Array, knowledge: NoiseKnowledge
+) -> Posterior | None:
+    """Compute the posterior on a grid, and move the grid until it covers the posterior.
+
+    Args:
+        thin: the run, or block means of it.
+        start: of the grid, near the posterior's peak.
+        covariance: a guess at that of (a, k), shape (2, 2).
+
+    Returns:
+        The posterior; None where the record is too short to bound the decay.
+    """
+    centre, spread = np.array([start.rate, start.stiffness]), covariance
+    width, step = _FIRST
+    for _ in range(_MOST_REFINEMENTS):
+        try:
+            scale = np.asarray(np.linalg.cholesky(spread), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            return None
+        axis = np.arange(-width, width + 0.5 * step, step, dtype=np.float64)
+        decays = centre[:, None] + scale @ _points(axis)
+        likelihood, prior = _log_terms(thin, decays, knowledge)
+        shape = (axis.size, axis.size)
+        if not np.isfinite(likelihood.max()):
+            return None
+        likelihood = np.maximum(likelihood - likelihood.max(), _FLOOR)
+        found = Posterior(centre, scale, axis, likelihood.reshape(shape), (likelihood + prior).reshape(shape))
+        mean, spread = found.moments()
+        if _holds(found, mean, spread):
+            return found
+        centre = mean
+        width, step = _FINER if width == _FIRST[0] else (_WIDENING * width, _FINER[1])
+    return None
+
+
+def _spline(axis: Array, values: Array) -> RectBivariateSpline:
+    # A spline overshoots where the prior cuts off the posterior; linear interpolation does not.
+    degree = 1 if np.any(np.abs(np.diff(values, axis=0)) > -_FLOOR / 4.0) else 3
+    return RectBivariateSpline(axis, axis, values, kx=degree, ky=degree)
+
+
+def _holds(found: Posterior, mean: Array, covariance: Array) -> bool:
+    weights = np.exp(found.log_posterior - found.log_posterior.max())
+    inner = weights[1:-1, 1:-1].sum()
+    inverse = np.linalg.inv(found.scale)
+    own = np.sqrt(np.linalg.eigvalsh(inverse @ covariance @ inverse.T))
+    off = np.abs(inverse @ (mean - found.centre)).max()
+    low, high = _SCALE_BAND
+    return bool(
+        weights.sum() - inner <= _BORDER_MASS * weights.sum() and low < own[0] and own[1] < high and off < 1.0
+    )
+
+
+def _log_terms(thin: Reading, decays: Array, knowledge: NoiseKnowledge) -> tuple[Array, Array]:
+    # Log-likelihood and log-prior at each (a, k), in slices that stay in the cache.
+    count = decays.shape[1]
+    likelihood, prior = np.empty(count), np.empty(count)
+    slice_size = max(1, 60_000 // thin.time.size)
+    for begin in range(0, count, slice_size):
+        part = slice(begin, begin + slice_size)
+        squares, prior[part] = _squares_and_prior(thin, decays[0, part], decays[1, part])
+        squares = np.where(_possible(thin, decays[:, part]) & np.isfinite(squares), squares, np.inf)
+        total = knowledge.samples * squares + knowledge.within
+        if knowledge.variance is None:
+            likelihood[part] = -0.5 * knowledge.freedom * np.log(total)
+        else:
+            likelihood[part] = -0.5 * total / knowledge.variance
+    return likelihood, np.where(np.isfinite(prior), prior, 0.0)
+
+
+def _possible(thin: Reading, decays: Array) -> NDArray[np.bool_]:
+    # Positive stiffness, and neither decay nor growth within a sample.
+    return np.asarray((decays[1] > 0.0) & (np.abs(decays[0]) * float(thin.time[-1]) < _STEEPEST))
+
+
+def _squares_and_prior(thin: Reading, rate: Array, stiffness: Array) -> tuple[Array, Array]:
+    limit = _STEEPEST / float(thin.time[-1])
+    rows = _responses(
+        thin.time, np.clip(rate, -limit, limit), np.abs(stiffness)
+    )  # (points, 5, n): u, s, 1, w, t s
+    linear = rows[:, :3]
+    gram = linear @ linear.transpose(0, 2, 1)
+    unit = np.sqrt(np.einsum("gii->gi", gram))
+    moments = linear @ thin.yaw
+    scaled = gram / (unit[:, :, None] * unit[:, None, :]) + _RIDGE * np.eye(3)
+    solution = np.linalg.solve(scaled, (moments / unit)[:, :, None])[:, :, 0] / unit
+    residual = thin.yaw - np.einsum("gi,gin->gn", solution, linear)
+    squares = np.einsum("gn,gn->g", residual, residual)
+    angle, speed = solution[:, 0, None], solution[:, 1, None]
+    a, k = rate[:, None], stiffness[:, None]
+    by_rate = -2.0 * (k * angle + a * speed) * rows[:, 3] - speed * rows[:, 4]
+    by_stiffness = (a * angle + speed) * rows[:, 3] - 0.5 * angle * rows[:, 4]
+    full = np.concatenate((linear, by_rate[:, None], by_stiffness[:, None]), axis=1)
+    information = full @ full.transpose(0, 2, 1)
+    with np.errstate(invalid="ignore"):  # a motion of only a few samples gives no information
+        return squares, 0.5 * (np.linalg.slogdet(information)[1] - np.linalg.slogdet(gram)[1])
+
+
+def _responses(time: Array, rate: Array, stiffness: Array) -> Array:
+    # As `response_rows`, for many decays; complex, so one formula covers all but exactly critical damping.
+    delta = (stiffness - rate**2).astype(np.complex128)
+    delta[np.abs(delta) < 1e-9 * np.abs(stiffness)] += 1e-9 * np.abs(stiffness).max()
+    root = np.sqrt(delta)
+    decaying = np.exp(-np.outer(rate, time))
+    turning = np.exp(1j * np.outer(root, time))
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        cosine = decaying * (0.5 * (turning + 1.0 / turning)).real
+        sine = decaying * (0.5 * (turning - 1.0 / turning) / (1j * root[:, None])).real
+    slope = (time * cosine - sine) / (2.0 * delta.real[:, None])
+    unit = cosine + rate[:, None] * sine
+    return np.stack((unit, sine, np.ones_like(unit), slope, time * sine), axis=1)
+
+
+def _points(axis: Array) -> Array:
+    return np.array(np.meshgrid(axis, axis, indexing="ij")).reshape(2, -1)
+
+
+def _summary(values: Array, weights: Array) -> tuple[float, float, float, float]:
+    order = np.argsort(values)
+    values, weights = values[order], weights[order] / weights.sum()
+    mean = float(weights @ values)
+    std = float(np.sqrt(weights @ (values - mean) ** 2))
+    reached = np.cumsum(weights) - 0.5 * weights
+    low, high = np.interp((TAIL, 1.0 - TAIL), reached, values)
+    return mean, std, float(low), float(high)
+
+
+_PAIRS = 3000
+_TAILS = 6.0  # degrees of freedom of the proposal
+_ROUNDS = 4
+_LEAST_SHARE = 0.3  # of the draws: least effective number
+
+
+def shared_moments(
+    posteriors: Sequence[Posterior],
+    links: Sequence[Array],
+    centre: Array,
+    covariance: Array,
+    rng: np.random.Generator,
+) -> tuple[Array, Array]:
+    """Mean and covariance of φ, with a flat prior on it.
+
+    Args:
+        links: one (2, p) matrix per run: (a, k) = L φ.
+        centre: of the normal approximation, shape (p,).
+        covariance: of the same, shape (p, p).
+
+    Returns:
+        Mean, shape (p,), and covariance, shape (p, p).
+    """
+    size = centre.size
+    half = rng.standard_normal((_PAIRS, size))
+    half /= np.sqrt(rng.chisquare(_TAILS, (_PAIRS, 1)) / _TAILS)
+    draws = np.concatenate((half, -half))
+    proposal = -0.5 * (_TAILS + size) * np.log1p(np.sum(draws**2, axis=1) / _TAILS)
+    for _ in range(_ROUNDS):
+        if not determined(covariance):  # all the weight is on a few draws: the caller finds it not determined
+            break
+        unit = np.sqrt(np.diag(covariance))
+        factor = unit[:, None] * np.linalg.cholesky(covariance / np.outer(unit, unit))
+        points = centre + draws @ factor.T
+        logs = sum(
+            (p.log_likelihood_at(points @ link.T) for p, link in zip(posteriors, links, strict=True)),
+            np.zeros(draws.shape[0]),
+        )
+        logs = logs - proposal
+        weights = np.exp(logs - logs.max())
+        weights /= weights.sum()
+        mean = weights @ draws
+        spread = draws - mean
+        own = (spread * weights[:, None]).T @ spread
+        centre, covariance = centre + factor @ mean, factor @ own @ factor.T
+        if 1.0 / float(weights @ weights) > _LEAST_SHARE * draws.shape[0]:
+            break
+    return centre, covariance
+
 
 _LINEAR = 3  # initial angle and rate, zero
 

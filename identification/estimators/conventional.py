@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.campaign.assembly import departures
+from identification.campaign.derivatives import departures
 from identification.campaign.pairing import PairedRun
-from identification.decay.damped_oscillation import Decay
-from identification.decay.peaks import PeakDecay, peak_decay
-from identification.decay.residual_check import residual_check
-from identification.decay.spectrum import psd_peak
 from identification.estimate import NoiseLevel, Quantity, RunEstimate, Status, by_gravity
 from identification.estimators.run_by_run import Paired
 from identification.policy import LEAST_PROMINENCE
-from identification.statistics.weighted_line import decay_covariance, deviations
+from identification.signal.free_decay import Decay
+from identification.signal.frequency import psd_peak
+from identification.signal.peaks import PeakDecay, peak_decay
+from identification.signal.run_fit import residual_check
+from identification.statistics import decay_covariance, deviations
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
 

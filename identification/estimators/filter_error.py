@@ -15,20 +15,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay
-from identification.decay.decay_fit import project_run
-from identification.decay.filter_fit import DrivenFit, fit_driven
-from identification.decay.residual_noise import Residual, noise_level, white_noise
-from identification.decay.run_fit import (
+from identification.campaign.derivatives import RunDecay
+from identification.estimate import NoiseLevel, Quantity, Status
+from identification.estimators.run_by_run import Found, RunByRun
+from identification.signal.decay_fit import block_means, even_reading, project_run
+from identification.signal.filter import DrivenFit, fit_driven
+from identification.signal.noise import Residual, noise_level, white_noise
+from identification.signal.run_fit import (
     NO_WINDOWS,
     FittedRun,
     decay_covariance_of,
     describe_run,
     identify_run,
 )
-from identification.decay.thinning import block_means, even_reading
-from identification.estimate import NoiseLevel, Quantity, Status
-from identification.estimators.run_by_run import Found, RunByRun
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
 _DECIDED = 6  # parameters fitted to a run's data: decay, stiffness, intensity, initial state, zero

@@ -18,14 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.decay.damped_oscillation import Decay
-from identification.decay.first_guess import starting_frequency
-from identification.decay.peaks import PEAK_HALF_WIDTH, follow_peaks
-from identification.decay.residual_noise import reading_noise
 from identification.estimate import Status
 from identification.estimators.run_by_run import Found, RunByRun, described
 from identification.policy import LEAST_PEAK_HEIGHT
-from identification.statistics.weighted_line import decay_covariance, weighted_fit
+from identification.signal.free_decay import Decay
+from identification.signal.frequency import starting_frequency
+from identification.signal.noise import reading_noise
+from identification.signal.peaks import PEAK_HALF_WIDTH, follow_peaks
+from identification.statistics import decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 

@@ -3,7 +3,7 @@
 Every run is thinned to block means. Its two poles follow from the shift of their Hankel matrix, and a first-order
 perturbation gives their covariance. The campaign's coefficients are a least-squares fit to the poles of the runs.
 Sources: Hua & Sarkar, IEEE Trans. Acoust. Speech Signal Process. 38 (1990) 814–824, doi 10.1109/29.56027; see
-`identification.decay.pencil`.
+`identification.signal.pencil`.
 """
 
 from __future__ import annotations
@@ -12,14 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.campaign.assembly import RunDecay
-from identification.decay.decay_fit import Reading, project_run
-from identification.decay.first_guess import starting_frequency
-from identification.decay.pencil import PencilDecay, pencil_decay
-from identification.decay.run_fit import describe_run, judge
-from identification.decay.thinning import block_means, even_reading
+from identification.campaign.derivatives import RunDecay
 from identification.estimate import Status
 from identification.estimators.run_by_run import Found, RunByRun
+from identification.signal.decay_fit import Reading, block_means, even_reading, project_run
+from identification.signal.frequency import starting_frequency
+from identification.signal.pencil import PencilDecay, pencil_decay
+from identification.signal.run_fit import describe_run, judge
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
 _DECAY_TIMES = 8.0  # in units of 1/σ: later samples hold e^−16 of the energy, and noise

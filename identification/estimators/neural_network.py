@@ -24,20 +24,25 @@ from pathlib import Path
 import numpy as np
 from scipy.special import chdtri
 
-from identification.campaign.assembly import departures
+from identification.campaign.derivatives import departures
 from identification.campaign.pairing import PairedRun
-from identification.decay.damped_oscillation import Decay
-from identification.decay.readable import holds_motion
-from identification.decay.residual_check import residual_check
-from identification.decay.residual_noise import reading_noise
-from identification.decay.windows import modal_quantities
 from identification.estimate import Quantity, RunEstimate, Status, WindowEstimate, by_gravity
 from identification.estimators.run_by_run import Paired
-from identification.neural.files import read_networks, shipped_networks
-from identification.neural.networks import Networks
-from identification.neural.shape import CYCLES, network_inputs, normalise, response_points
-from identification.neural.three_cycles import ThreeCycles, find_windows
+from identification.neural.networks import Networks, read_networks, shipped_networks
+from identification.neural.three_cycles import (
+    CYCLES,
+    ThreeCycles,
+    find_windows,
+    network_inputs,
+    normalise,
+    response_points,
+)
 from identification.policy import GREATEST_NETWORK_DISTANCE, LEAST_FOR_SCATTER, MISFIT_RATE, SCATTER_TOLERANCE
+from identification.signal.free_decay import Decay
+from identification.signal.frequency import holds_motion
+from identification.signal.noise import reading_noise
+from identification.signal.run_fit import residual_check
+from identification.signal.windows import modal_quantities
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 

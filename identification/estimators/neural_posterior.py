@@ -19,8 +19,16 @@ from pathlib import Path
 import numpy as np
 from scipy.special import chdtri
 
-from identification.campaign.assembly import departures, filled, limits, statuses_of_runs
-from identification.campaign.derivatives import Derivatives, build_design, combine, loads
+from identification.campaign.derivatives import (
+    Derivatives,
+    build_design,
+    combine,
+    departures,
+    filled,
+    limits,
+    loads,
+    statuses_of_runs,
+)
 from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_gravity
 from identification.neural.posterior.demodulated import Demodulated, demodulate
 from identification.neural.posterior.features import (
@@ -29,11 +37,10 @@ from identification.neural.posterior.features import (
     campaign_features,
     record_features,
 )
-from identification.neural.posterior.files import Trained, read_trained, shipped
-from identification.neural.posterior.infer import Posterior, posteriors
+from identification.neural.posterior.network import Posterior, Trained, posteriors, read_trained, shipped
 from identification.neural.posterior.rivals import Rivals
 from identification.policy import MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
-from identification.statistics.information import inverse
+from identification.statistics import inverse
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 

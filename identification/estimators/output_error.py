@@ -15,15 +15,27 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.assembly import departures, filled, limits, statuses_of_runs
-from identification.campaign.derivatives import Design, build_design, combine, derivatives, loads
-from identification.decay.decay_fit import DecayFit, RunFit, fit_decays
-from identification.decay.residual_noise import noise_level
-from identification.decay.run_fit import FittedRun, identify_run, residuals_of
+from identification.campaign.derivatives import (
+    Design,
+    build_design,
+    combine,
+    departures,
+    derivatives,
+    filled,
+    limits,
+    loads,
+    statuses_of_runs,
+)
 from identification.estimate import Estimate, Quantity, Status, by_gravity
-from identification.statistics.information import determined, eliminate, embed, scaled_solve
-from identification.statistics.widening import (
+from identification.signal.decay_fit import DecayFit, RunFit, fit_decays
+from identification.signal.noise import noise_level
+from identification.signal.run_fit import FittedRun, identify_run, residuals_of
+from identification.statistics import (
+    determined,
+    eliminate,
+    embed,
     fisher_covariance,
+    scaled_solve,
     scatter_of_runs,
     widened_covariance,
 )

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar, TypeAlias
 
-from identification.campaign.assembly import Combination, RunDecay, combined_estimate
-from identification.campaign.derivatives import loads
+from identification.campaign.derivatives import Combination, RunDecay, combined_estimate, loads
 from identification.campaign.pairing import PairedRun, paired_estimate
-from identification.decay.damped_oscillation import Decay
-from identification.decay.decay_fit import Reading, project_run
-from identification.decay.residual_check import residual_check
-from identification.decay.run_fit import describe_run, judge
 from identification.estimate import Estimate, RunEstimate, Status, WindowEstimate
+from identification.signal.decay_fit import Reading, project_run
+from identification.signal.free_decay import Decay
+from identification.signal.run_fit import describe_run, judge, residual_check
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.remark import Outcome, Remark
+from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import CLOCK_TOLERANCE, Array, Record
 

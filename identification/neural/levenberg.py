@@ -1,9 +1,24 @@
-"""Full-batch Levenberg–Marquardt with the evidence's regularisation, in torch float64.
+"""Full-batch Levenberg–Marquardt in torch float64, with MacKay's evidence for the regularisation.
 
-Each step solves (βJᵀJ + (α + μ)I) δ = −(βJᵀe + αw) by the singular values of J, so that γ remains accurate where
-β is large. A step that lowers F = βE_D + αE_W is accepted and μ divided by ten; otherwise it is repeated with ten
-times the μ. After every step α and β are re-estimated. Sources: Hagan and Menhaj, IEEE Trans. Neural Networks 5
-(1994) 989–993, doi 10.1109/72.329697, and those of `identification.neural.evidence`.
+MacKay's evidence for the regularisation of a network, as Foresee and Hagan use it. The paper's F_reg = γ F_e + (1
+− γ) F_w (eq. 14), with F_e the sum of squared errors (eq. 13) and F_w the mean square of the n weights (eq. 15),
+is up to a factor
+
+    F = β E_D + α E_W,   E_D = Σ e²,   E_W = Σ w²,   performance ratio γ = β / (β + α n).
+
+With 1/(2β) the variance of the errors and 1/(2α) that of the weights, and λ the eigenvalues of JᵀJ,
+
+    effective number of parameters   γ = Σ βλ / (βλ + α),
+    α = γ / (2 E_W),   β = (N − γ) / (2 E_D).
+
+Sources: D. J. C. MacKay, Neural Computation 4 (1992) 415–447, doi 10.1162/neco.1992.4.3.415; F. D. Foresee and
+M. T. Hagan, Proc. ICNN'97, 1930–1935, doi 10.1109/ICNN.1997.614194.
+
+Full-batch Levenberg–Marquardt with the evidence's regularisation, in torch float64. Each step solves (βJᵀJ + (α +
+μ)I) δ = −(βJᵀe + αw) by the singular values of J, so that γ remains accurate where β is large. A step that lowers
+F = βE_D + αE_W is accepted and μ divided by ten; otherwise it is repeated with ten times the μ. After every step α
+and β are re-estimated. Sources: Hagan and Menhaj, IEEE Trans. Neural Networks 5 (1994) 989–993, doi
+10.1109/72.329697, and those of `identification.neural.levenberg`.
 
 With one thread and a fixed order of operations, the same start gives identical weights on the same machine and
 version of torch.
@@ -19,13 +34,91 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from identification.neural.evidence import Hyperparameters, log_evidence, updated
-from identification.neural.network import Network, Scaling, parameter_count, split
+from identification.neural.networks import Network, Scaling, parameter_count, split
 from identification.neural.training_set import Pairs
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
     from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Hyperparameters:
+    """The weights of the data and of the prior.
+
+    Args:
+        alpha: α, of the squared network weights; dimensionless, for scaled quantities.
+        beta: β, of the squared errors; dimensionless, for scaled quantities.
+    """
+
+    alpha: float
+    beta: float
+
+    def performance_ratio(self, weights: int) -> float:
+        """The paper's γ of eq. 14.
+
+        Args:
+            weights: number n of weights and biases.
+        """
+        return self.beta / (self.beta + self.alpha * weights)
+
+    def effective_parameters(self, eigenvalues: Array) -> float:
+        """γ, the effective number of parameters determined by the data.
+
+        Args:
+            eigenvalues: λ of JᵀJ, those that are not zero, shape (k,).
+        """
+        return float(np.sum(self.beta * eigenvalues / (self.beta * eigenvalues + self.alpha)))
+
+
+def updated(
+    held: Hyperparameters, eigenvalues: Array, squared_errors: float, squared_weights: float, samples: int
+) -> Hyperparameters:
+    """One re-estimation of α and β by the evidence.
+
+    Args:
+        eigenvalues: λ of JᵀJ, those that are not zero, shape (k,).
+        squared_errors: E_D, in squared units of the scaled output.
+        squared_weights: E_W, (1).
+        samples: number N of training pairs.
+    """
+    gamma = held.effective_parameters(eigenvalues)
+    tiny, epsilon = np.finfo(np.float64).tiny, np.finfo(np.float64).eps
+    left = max(samples - gamma, epsilon * samples)  # γ is below N, but rounding may make it N
+    return Hyperparameters(
+        gamma / (2.0 * max(squared_weights, tiny)), left / (2.0 * max(squared_errors, tiny))
+    )
+
+
+def log_evidence(
+    held: Hyperparameters,
+    eigenvalues: Array,
+    squared_errors: float,
+    squared_weights: float,
+    counts: tuple[int, int],
+) -> float:
+    """Logarithm of p(targets | α, β) by Laplace's approximation; exact for a network linear in its weights.
+
+    Args:
+        eigenvalues: λ of JᵀJ at the optimum, those that are not zero, shape (k,).
+        squared_errors: E_D there, in squared units of the scaled output.
+        squared_weights: E_W there, (1).
+        counts: numbers N of training pairs and n of weights.
+
+    Returns:
+        The logarithm; larger is better, among trainings on the same data.
+    """
+    samples, weights = counts
+    determinant = float(np.sum(np.log(2.0 * (held.beta * eigenvalues + held.alpha))))
+    determinant += (weights - eigenvalues.size) * float(np.log(2.0 * held.alpha))
+    return (
+        -held.beta * squared_errors
+        - held.alpha * squared_weights
+        + 0.5 * weights * float(np.log(2.0 * held.alpha))
+        + 0.5 * samples * float(np.log(held.beta / np.pi))
+        - 0.5 * determinant
+    )
+
 
 _FIRST = Hyperparameters(0.01, 1.0)
 _FIRST_DAMPING = 5e-3

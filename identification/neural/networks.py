@@ -1,17 +1,148 @@
-"""The trained pair of networks: from a shape and t3 to ζ and ωn, with errors and training range."""
+"""The paper's networks: one network in NumPy, the trained pair, and its files.
+
+A feed-forward network of tanh layers with a linear output, in NumPy: value, input gradient, weight Jacobian.
+Source of the architecture: the paper, section II.B (100-5-5-1 and 2-2-5-1); inputs and output are scaled to zero
+mean, the second network's inputs to unit deviation as well.
+
+The trained pair of networks: from a shape and t3 to ζ and ωn, with errors and training range. Weights as
+safetensors, with the training record beside them as JSON, without pickle. The packaged ones are
+``paper.safetensors`` and ``paper.json`` in ``identification/neural/weights``.
+"""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from safetensors.numpy import save
 
-from identification.neural.network import Network
-from identification.neural.shape import cycles_time, network_inputs
-from identification.neural.training_set import DataSpec, held_out_points
+from identification.neural.stored import opened, packaged, read_stored
+from identification.neural.three_cycles import cycles_time, network_inputs
+from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, held_out_points
 from tunnel_sim.vocabulary.record import Array
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """An affine scaling to zero mean and unit deviation.
+
+    Args:
+        mean: shape (n,).
+        deviation: shape (n,); 1 where only the mean is removed.
+    """
+
+    mean: tuple[float, ...]
+    deviation: tuple[float, ...]
+
+    @classmethod
+    def of(cls, values: Array) -> Scaling:
+        """The scaling of training values, shape (N, n)."""
+        return cls(tuple(values.mean(axis=0).tolist()), tuple(values.std(axis=0).tolist()))
+
+    def apply(self, values: Array) -> Array:
+        """Scaled values, same shape."""
+        return np.asarray((values - np.array(self.mean)) / np.array(self.deviation))
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """A trained network with the posterior of its weights.
+
+    Args:
+        sizes: units per layer, inputs first, one output.
+        weights: matrix (row by row) and bias of each layer in turn, shape (n,).
+        directions: eigenvectors of the data's information that stand out of the prior, shape (k, n).
+        precision: posterior precision along each of them, shape (k,).
+        prior_precision: of the weights along all others, 2α; dimensionless, as the scaled quantities are.
+    """
+
+    sizes: tuple[int, ...]
+    weights: Array
+    inputs: Scaling
+    output: Scaling
+    directions: Array
+    precision: Array
+    prior_precision: float
+
+    def value(self, inputs: Array) -> Array:
+        """The outputs, shape (N,), in their unit, for rows of inputs, shape (N, inputs)."""
+        hidden = self.inputs.apply(inputs)
+        layers = split(self.weights, self.sizes)
+        for matrix, bias in layers[:-1]:
+            hidden = np.tanh(hidden @ matrix.T + bias)
+        matrix, bias = layers[-1]
+        scaled = (hidden @ matrix.T + bias)[:, 0]
+        return np.asarray(scaled * self.output.deviation[0] + self.output.mean[0])
+
+    def input_gradient(self, inputs: Array) -> Array:
+        """Derivative of the output by its inputs at one point, shape (inputs,): the same shape."""
+        return self._backward(inputs)[0]
+
+    def posterior_std(self, inputs: Array) -> float:
+        """Standard deviation of the output from the weights' posterior at one point, in the output's unit.
+
+        Args:
+            inputs: shape (inputs,).
+
+        Returns:
+            √(gᵀ A⁻¹ g) with g the output's derivative by the weights and A = 2βJᵀJ + 2α (MacKay 1992).
+        """
+        jacobian = self._backward(inputs)[1]
+        along = self.directions @ jacobian
+        rest = jacobian - self.directions.T @ along
+        variance = float(np.sum(along**2 / self.precision)) + float(rest @ rest) / self.prior_precision
+        return float(np.sqrt(variance)) * self.output.deviation[0]
+
+    def _backward(self, inputs: Array) -> tuple[Array, Array]:
+        # Derivatives of the output by the inputs, in units, and of the scaled output by the weights.
+        layers = split(self.weights, self.sizes)
+        activations = [self.inputs.apply(inputs)]
+        for matrix, bias in layers[:-1]:
+            activations.append(np.tanh(matrix @ activations[-1] + bias))
+        slope: Array = np.ones(1)
+        parts: list[Array] = []
+        for (matrix, _), before in zip(reversed(layers), reversed(activations), strict=True):
+            parts[:0] = [np.outer(slope, before).ravel(), slope]
+            slope = matrix.T @ slope
+            if before is not activations[0]:
+                slope = slope * (1.0 - before**2)
+        by_inputs = slope / np.array(self.inputs.deviation) * self.output.deviation[0]
+        return by_inputs, np.concatenate(parts)
+
+
+def parameter_count(sizes: Sequence[int]) -> int:
+    """Number of weights and biases.
+
+    Args:
+        sizes: units per layer.
+    """
+    return sum((before + 1) * after for before, after in pairwise(sizes))
+
+
+def split(weights: Array, sizes: Sequence[int]) -> list[tuple[Array, Array]]:
+    """The vector of weights as matrices and biases.
+
+    Args:
+        weights: shape (n,).
+        sizes: units per layer.
+
+    Returns:
+        Matrix (after, before) and bias (after,) of each layer; views.
+    """
+    layers, place = [], 0
+    for before, after in pairwise(sizes):
+        matrix = weights[place : place + before * after].reshape(after, before)
+        place += before * after
+        layers.append((matrix, weights[place : place + after]))
+        place += after
+    return layers
 
 
 @dataclass(frozen=True)
@@ -128,4 +259,95 @@ def held_out_errors(networks: Networks, rng: np.random.Generator) -> Errors:
         zeta_relative=float(np.abs(error / zeta).max()),
         omega_relative=float(np.abs(relative).max()),
         omega_relative_rms=float(np.sqrt(np.mean(relative**2))),
+    )
+
+
+SHIPPED = "paper"
+_FIELDS = ("weights", "directions", "precision", "prior_precision", "inputs", "output")
+
+
+def weights_bytes(damping: Network, frequency: Network) -> bytes:
+    """Both networks with their posteriors and scalings as safetensors.
+
+    Args:
+        damping: the first.
+    """
+    tensors: dict[str, Array] = {}
+    for name, network in ((DAMPING, damping), (FREQUENCY, frequency)):
+        values = {
+            "weights": network.weights,
+            "directions": network.directions,
+            "precision": network.precision,
+            "prior_precision": np.array([network.prior_precision]),
+            "inputs": np.array([network.inputs.mean, network.inputs.deviation]),
+            "output": np.array([network.output.mean, network.output.deviation]),
+        }
+        tensors |= {f"{name}.{field}": np.ascontiguousarray(values[field]) for field in _FIELDS}
+    return save(tensors)
+
+
+def read_networks(weights: Path) -> Networks:
+    """Read networks written by ``tunnel train``.
+
+    Args:
+        weights: the safetensors file; its record is the ``.json`` of the same name beside it.
+
+    Raises:
+        TunnelError: when a file is missing or malformed, or the two do not belong together.
+    """
+    return networks_of(*read_stored(weights), str(weights))
+
+
+@cache
+def shipped_networks() -> Networks:
+    """The packaged networks."""
+    return networks_of(*packaged(SHIPPED), SHIPPED)
+
+
+def shipped_record() -> dict[str, Any]:
+    """The training record of the packaged networks."""
+    found: dict[str, Any] = json.loads(packaged(SHIPPED)[1])
+    return found
+
+
+def networks_of(weights: bytes, record: bytes | str, where: str) -> Networks:
+    """Networks from the contents of their two files.
+
+    Args:
+        weights: safetensors.
+        record: JSON.
+
+    Raises:
+        TunnelError: when they are malformed, or do not belong together.
+    """
+    with opened(weights, record, where, estimator="neural_network") as (tensors, document):
+        spec, errors = DataSpec.from_json_dict(document["data"]), Errors.from_json_dict(document["errors"])
+        return Networks(_network(tensors, DAMPING), _network(tensors, FREQUENCY), spec, errors)
+
+
+def _network(tensors: Mapping[str, Array], name: str) -> Network:
+    values = {field: np.asarray(tensors[f"{name}.{field}"], dtype=np.float64) for field in _FIELDS}
+    count = parameter_count(SIZES[name])
+    if values["weights"].shape != (count,) or values["directions"].shape != (values["precision"].size, count):
+        raise ValueError(name)
+    if not all(np.all(np.isfinite(value)) for value in values.values()):
+        raise ValueError(name)
+    ends = {"inputs": (2, SIZES[name][0]), "output": (2, 1), "prior_precision": (1,)}
+    if any(values[field].shape != shape for field, shape in ends.items()):
+        raise ValueError(name)
+    scales = (values["inputs"][1], values["output"][1], values["precision"], values["prior_precision"])
+    if not all(np.all(scale > 0.0) for scale in scales):
+        raise ValueError(name)
+    inputs, output = (
+        Scaling(tuple(values[end][0].tolist()), tuple(values[end][1].tolist()))
+        for end in ("inputs", "output")
+    )
+    return Network(
+        sizes=SIZES[name],
+        weights=values["weights"],
+        inputs=inputs,
+        output=output,
+        directions=values["directions"],
+        precision=values["precision"],
+        prior_precision=float(values["prior_precision"][0]),
     )

@@ -1,9 +1,21 @@
-"""Consecutive windows of three cycles in a record, from its zero crossings alone.
+"""The networks' input: windows of three cycles in a record, each as 100 numbers that depend on ζ alone.
 
-A window begins at a zero crossing and lasts t3, the time of three damped cycles: six half cycles. The seven
-crossings are t_k = t0 + k t3/6, fitted by least squares with weights from their slopes, so that the late
-ones, which are lost in noise where ζ is large, count little. The half cycles' means are z + m (−r)^k for any linear
-decay; their regression on one another gives the sensor's zero z and the decay per half cycle r, at any ζ.
+The input of the first network: three cycles of a free decay, as 100 numbers that depend on ζ alone. From a zero
+crossing on, every free decay is an impulse response (paper, eq. 12): e^{−ζωn t} sin ωd t. With time in units of
+t3, the time of three damped cycles, it no longer depends on ωn:
+
+    y(τ) = e^{−6πκτ} sin 6πτ,   κ = ζ/√(1 − ζ²),   τ = t/t3 from 0 to 1.
+
+Each of the 100 numbers is the mean over a hundredth of that axis. Their mean is removed, and they are divided by
+the largest value of the first half cycle, so that they depend neither on the amplitude nor on the sensor's zero.
+The largest value is that of a quartic through the points of the half cycle, which is less sensitive to noise than
+their maximum.
+
+Consecutive windows of three cycles in a record, from its zero crossings alone. A window begins at a zero crossing
+and lasts t3, the time of three damped cycles: six half cycles. The seven crossings are t_k = t0 + k t3/6, fitted
+by least squares with weights from their slopes, so that the late ones, which are lost in noise where ζ is large,
+count little. The half cycles' means are z + m (−r)^k for any linear decay; their regression on one another gives
+the sensor's zero z and the decay per half cycle r, at any ζ.
 
 Every step is linear in the reading once the crossings are known. So each result has the weights of the samples in
 it, and white noise is propagated through all steps by the delta method.
@@ -16,11 +28,96 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from identification.decay.first_guess import starting_decay
-from identification.decay.thinning import mean_of_blocks
-from identification.neural.shape import CYCLES, POINTS, Shape, normalise
 from identification.policy import LEAST_SAMPLES
+from identification.signal.decay_fit import mean_of_blocks
+from identification.signal.frequency import starting_decay
 from tunnel_sim.vocabulary.record import Array, Record
+
+POINTS = 100
+CYCLES = 3
+_FIRST_HALF = 17  # points of the first half cycle: 100/6, rounded up
+_QUARTIC = np.vander(np.linspace(-1.0, 1.0, _FIRST_HALF), 5)
+_SMOOTHER = np.linalg.pinv(_QUARTIC)
+_FINE = np.vander(np.linspace(-1.0, 1.0, 2001), 5) @ _SMOOTHER
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A normalised response.
+
+    Args:
+        inputs: the network's, shape (100,).
+        scale: divisor of the points, the amplitude, in the unit of the points.
+        peak_weights: weights of the points in the scale, shape (100,).
+    """
+
+    inputs: Array
+    scale: float
+    peak_weights: Array
+
+    def pull_back(self, gradient: Array) -> Array:
+        """The gradient by the points, from that by the inputs; both of shape (100,)."""
+        pulled = (gradient - self.peak_weights * float(gradient @ self.inputs)) / self.scale
+        return np.asarray(pulled - pulled.mean())
+
+
+def normalise(points: Array) -> Shape:
+    """Remove the mean and scale the first half cycle's largest value to 1.
+
+    Args:
+        points: means over the hundredths of three cycles from a zero crossing on, the first half cycle positive,
+            shape (100,).
+
+    Returns:
+        The shape; its scale is 0 or less where the first half cycle does not rise above the mean.
+    """
+    centred = points - points.mean()
+    place = int(np.argmax(_FINE @ centred[:_FIRST_HALF]))
+    weights = np.zeros(POINTS)
+    weights[:_FIRST_HALF] = _FINE[place]
+    scale = float(weights @ centred)
+    return Shape(centred / scale if scale > 0.0 else centred, scale, weights)
+
+
+def response_points(zeta: Array) -> Array:
+    """The 100 points of impulse responses in closed form.
+
+    Args:
+        zeta: damping ratios, below 1, shape (n,).
+
+    Returns:
+        Points before normalisation, shape (n, 100).
+    """
+    ratio = np.asarray(zeta, dtype=np.float64)[:, None]
+    pole = 2.0 * np.pi * CYCLES * (1j - ratio / np.sqrt(1.0 - ratio**2))
+    integral = (np.exp(pole * np.linspace(0.0, 1.0, POINTS + 1)) / pole).imag
+    return np.asarray(np.diff(integral, axis=1) * POINTS)
+
+
+def network_inputs(zeta: Array) -> Array:
+    """The first network's inputs for impulse responses.
+
+    Args:
+        zeta: damping ratios, below 1, shape (n,).
+
+    Returns:
+        Shape (n, 100).
+    """
+    return np.array([normalise(points).inputs for points in response_points(zeta)])
+
+
+def cycles_time(zeta: Array, omega_n: Array) -> Array:
+    """t3, the time of three damped cycles.
+
+    Args:
+        zeta: damping ratios, below 1, shape (n,).
+        omega_n: natural frequencies, rad/s, shape (n,).
+
+    Returns:
+        Shape (n,), s.
+    """
+    return np.asarray(2.0 * np.pi * CYCLES / (omega_n * np.sqrt(1.0 - zeta**2)))
+
 
 HALVES = 2 * CYCLES
 _SAMPLES_PER_CYCLE = 134  # a denser record is thinned to these; about four per point of the 100

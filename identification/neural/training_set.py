@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.neural.shape import cycles_time, network_inputs
+from identification.neural.three_cycles import cycles_time, network_inputs
 from tunnel_sim.vocabulary.record import Array
 
 DAMPING, FREQUENCY = "damping", "frequency"

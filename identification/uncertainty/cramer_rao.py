@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.campaign.derivatives import build_design, derivatives, has_size
-from identification.decay.damped_oscillation import Decay
-from identification.decay.decay_fit import information_at
 from identification.estimate import PARAMETERS
-from identification.statistics.information import eliminate, embed, inverse
+from identification.signal.decay_fit import information_at
+from identification.signal.free_decay import Decay
+from identification.statistics import eliminate, embed, inverse
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array

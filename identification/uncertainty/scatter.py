@@ -19,7 +19,7 @@ import numpy as np
 from identification.campaign.derivatives import Design, build_design, combine, derivatives
 from identification.estimate import RunEstimate
 from identification.policy import DIFFERENCE_RATE, LEAST_FREE_SHARE, LEAST_SCATTER_FREEDOM
-from identification.statistics.information import inverse
+from identification.statistics import inverse
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.record import Array
 

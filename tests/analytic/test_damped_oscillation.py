@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from identification.decay.damped_oscillation import (
+from identification.signal.free_decay import (
     Decay,
     envelope_amplitude,
     free_decay,

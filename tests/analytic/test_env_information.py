@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import tunnel_sim.envs  # noqa: F401  registers the environments
-from identification.decay.damped_oscillation import Decay
-from identification.decay.decay_fit import information_at
+from identification.signal.decay_fit import information_at
+from identification.signal.free_decay import Decay
 from identification.uncertainty.cramer_rao import campaign_bound
 from tunnel_sim.envs.information import UNKNOWNS, Prior, half_log_det
 from tunnel_sim.files.rig_file import load_rig

@@ -83,7 +83,7 @@ def test_the_import_contracts_hold() -> None:
         ("tunnel_sim/vocabulary/record.py", "import identification.estimate"),
         ("identification/estimate.py", "import tunnel_lab.terminal.tables"),
         ("tunnel_sim/physics/steps.py", "import tunnel_sim.effects.base"),
-        ("identification/statistics/weighted_line.py", "import identification.decay.peaks"),
+        ("identification/statistics.py", "import identification.signal.peaks"),
         ("diagnosis/result.py", "import diagnosis.study"),
         ("tunnel_reference/forms.py", "import tunnel_sim.physics.motion"),
         ("tunnel_lab/cli.py", "import tunnel_reference.forms"),

@@ -236,7 +236,7 @@ def model_file(folder: Path, rng: Rng) -> None:
 
 def uncertainties(folder: Path, rng: Rng) -> None:
     """A file of uncertainties changed."""
-    from identification.uncertainty.input_uncertainty import load_uncertainties
+    from identification.uncertainty.budget import load_uncertainties
 
     load_uncertainties(_written(folder / "known.toml", _toml(seeds.UNCERTAINTIES, rng), rng))
 
@@ -351,7 +351,7 @@ def score_baseline(folder: Path, rng: Rng) -> None:
 
 def weights(folder: Path, rng: Rng) -> None:
     """The networks' file, or its record, changed; the hash mostly agrees."""
-    from identification.neural.files import read_networks
+    from identification.neural.networks import read_networks
 
     content, record = seeds.weights()
     if rng.random() < 0.6:
@@ -402,8 +402,7 @@ def _changed_array(values: np.ndarray, rng: Rng) -> np.ndarray:
 
 def checkpoint(folder: Path, rng: Rng) -> None:
     """A training's checkpoint changed; the training goes on from what is accepted."""
-    from identification.neural.checkpoint import read_checkpoint
-    from identification.neural.train import train
+    from identification.neural.train import read_checkpoint, train
 
     spec, content = seeds.checkpoint()
     kind = rng.integers(3)

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.uncertainty.budget import make_budget
-from identification.uncertainty.input_uncertainty import InputUncertainties
+from identification.uncertainty.budget import InputUncertainties, make_budget
 from tests.reference.free_decays import RESOLUTION, Setting, campaign
 from tunnel_lab.experiments.score_grid import Cell, Grid
 from tunnel_lab.experiments.score_trials import Results, score_grid

@@ -13,9 +13,9 @@ import pytest
 from scipy.signal import StateSpace, lfilter
 from scipy.stats import binom, chi2
 
-from identification.decay.run_fit import NO_WINDOWS
 from identification.estimators import make_estimator
 from identification.estimators.output_error import OutputError
+from identification.signal.run_fit import NO_WINDOWS
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.forcings import turbulence

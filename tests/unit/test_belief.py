@@ -13,9 +13,9 @@ from identification.campaign.belief import (
     run_link,
     update_belief,
 )
-from identification.decay.decay_fit import Prior, Reading, fit_decays
-from identification.decay.run_fit import identify_run
 from identification.estimate import PARAMETERS
+from identification.signal.decay_fit import Prior, Reading, fit_decays
+from identification.signal.run_fit import identify_run
 from identification.uncertainty.cramer_rao import campaign_bound
 from tests.reference.free_decays import Setting, Truth, angle_of, campaign
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from diagnosis.blind import answer, answer_set, answers_folder, make_blind, score_set
-from identification.statistics.proportion import Proportion
+from identification.statistics import Proportion
 from tests.reference.rigs import rig
 from tests.unit.gone_reader import unheard
 from tests.unit.test_blind_score import document

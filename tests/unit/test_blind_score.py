@@ -12,7 +12,7 @@ from diagnosis import result
 from diagnosis.blind.cases import case
 from diagnosis.blind.score import Score
 from diagnosis.blind.statistics import calibration
-from identification.statistics.proportion import Proportion
+from identification.statistics import Proportion
 from tunnel_lab.report import blind
 
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.uncertainty.budget import _common, make_budget, with_budget
-from identification.uncertainty.input_uncertainty import InputUncertainties
+from identification.uncertainty.budget import InputUncertainties, _common, make_budget, with_budget
 from tests.reference.free_decays import TWELVE, Setting, campaign, with_records
 from tunnel_sim.vocabulary.record import Record
 

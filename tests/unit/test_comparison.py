@@ -7,8 +7,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from identification.scoring.accuracy import Trials
-from identification.scoring.comparison import Aspect, _rank_sum, changes, holm
+from identification.scoring import Aspect, Trials, _rank_sum, changes, holm
 
 CELLS, COUNT = 6, 60
 

@@ -11,7 +11,7 @@ from diagnosis.detection.mains import refine_frequency, remove_hum
 from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.result import ParameterEstimate
-from identification.printing.numbers import estimated
+from identification.printing import estimated
 from tests.unit.gap_campaigns import INTERVAL, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.record import Record

@@ -5,10 +5,9 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are
 
 from identification import Estimate, Status, identify
-from identification.decay.damped_oscillation import Decay, free_decay
-from identification.decay.decay_fit import Reading, projected_cost
-from identification.decay.filter_fit import fit_driven
-from identification.decay.innovations import Driven, innovations
+from identification.signal.decay_fit import Reading, projected_cost
+from identification.signal.filter import Driven, fit_driven, innovations
+from identification.signal.free_decay import Decay, free_decay
 from tests.reference.free_decays import TWELVE, Setting, campaign, with_records
 
 DECAY, INTERVAL, VARIANCE = Decay.from_modal(12.5, 0.015), 0.02, 1e-8

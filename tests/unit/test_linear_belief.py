@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.campaign.belief import prior_belief
-from identification.campaign.linear_belief import linear_belief, linear_run, shows_a_decay
-from identification.decay.damped_oscillation import Decay
-from identification.statistics.information import scaled_solve
+from identification.campaign.belief import linear_belief, linear_run, prior_belief, shows_a_decay
+from identification.signal.free_decay import Decay
+from identification.statistics import scaled_solve
 from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_lab.envs.session import MEAN, STD
 

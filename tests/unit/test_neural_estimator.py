@@ -11,7 +11,7 @@ import pytest
 
 from identification import Status, identify
 from identification.estimators.neural_network import NeuralNetwork, read_window
-from identification.neural.files import shipped_networks
+from identification.neural.networks import shipped_networks
 from identification.neural.three_cycles import _shares, find_windows
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

@@ -10,21 +10,26 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
-from identification.neural.checkpoint import Checkpoint
-from identification.neural.evidence import Hyperparameters, log_evidence, updated
-from identification.neural.files import networks_of, shipped_networks, shipped_record
 from identification.neural.levenberg import (
+    Hyperparameters,
     Problem,
     Progress,
     advance,
     first_weights,
+    log_evidence,
     one_thread,
     outputs_and_jacobian,
+    updated,
 )
-from identification.neural.network import parameter_count
-from identification.neural.networks import held_out_errors
-from identification.neural.shape import network_inputs, response_points
-from identification.neural.train import TrainingSpec, train
+from identification.neural.networks import (
+    held_out_errors,
+    networks_of,
+    parameter_count,
+    shipped_networks,
+    shipped_record,
+)
+from identification.neural.three_cycles import network_inputs, response_points
+from identification.neural.train import Checkpoint, TrainingSpec, train
 from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, training_pairs
 from tunnel_sim.vocabulary.errors import TunnelError
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from identification import Status, identify
-from identification.decay.damped_oscillation import Decay, free_decay
-from identification.decay.decay_fit import Reading, fit_run
-from identification.decay.first_guess import starting_decay
 from identification.estimators.output_error import OutputError
+from identification.signal.decay_fit import Reading, fit_run
+from identification.signal.free_decay import Decay, free_decay
+from identification.signal.frequency import starting_decay
 from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, campaign, with_records
 from tunnel_sim.vocabulary.record import Record
 

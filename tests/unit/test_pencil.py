@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from identification.decay import pencil
-from identification.decay.damped_oscillation import Decay, free_decay
-from identification.decay.pencil import pencil_decay
+from identification.signal import pencil
+from identification.signal.free_decay import Decay, free_decay
+from identification.signal.pencil import pencil_decay
 
 
 @pytest.mark.parametrize("zeta", [-0.01, 0.0, 0.002, 0.05, 0.4, 1.5])

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from identification import Estimate, identify
-from identification.decay.importance import shared_moments
 from identification.estimate import Quantity
-from identification.statistics.information import determined
+from identification.estimators.bayesian import shared_moments
+from identification.statistics import determined
 from tests.reference.free_decays import TWELVE, Setting, campaign, damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from identification.printing.numbers import (
+from identification.printing import (
     coefficient_label,
     concise,
     in_stds,

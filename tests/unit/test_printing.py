@@ -11,8 +11,8 @@ import pytest
 from diagnosis import Candidate, Coefficients, Diagnosis, GapSummary, ParameterEstimate, RunGap, Where
 from diagnosis.result import HELD_OUT, Confirmation, NoiseSummary
 from identification import Estimate, Quantity, Remark, RunEstimate, Status, WindowEstimate
-from identification.printing.table import TextTable, as_html, as_text
-from identification.remark import Outcome
+from identification.printing import TextTable, as_html, as_text
+from identification.status import Outcome
 
 ZETA = Quantity(0.0123, 0.00045, "1")
 OMEGA = Quantity(12.34, 0.056, "rad/s", (12.2, 12.5))

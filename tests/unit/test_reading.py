@@ -13,9 +13,9 @@ import pytest
 
 from diagnosis.blind.files import file_hash, read_document, read_hashes
 from identification.estimate import Estimate, Quantity, RunEstimate
-from identification.neural.checkpoint import Checkpoint, read_checkpoint
-from identification.neural.files import read_networks, shipped_record
-from identification.uncertainty.input_uncertainty import load_uncertainties
+from identification.neural.networks import read_networks, shipped_record
+from identification.neural.train import Checkpoint, read_checkpoint
+from identification.uncertainty.budget import load_uncertainties
 from tunnel_lab.commands.springs import read_spring_table
 from tunnel_lab.experiments.score_grid import load_grid
 from tunnel_lab.experiments.score_trials import read_trials

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from identification import NoiseLevel, identify
-from identification.decay.residual_check import ResidualCheck
 from identification.estimators.hilbert import Hilbert
+from identification.signal.run_fit import ResidualCheck
 from tests.reference.free_decays import TWELVE, Setting, campaign
 from tunnel_sim.vocabulary.record import Record
 

@@ -69,7 +69,7 @@ def test_the_label_of_a_cell_leaves_out_what_all_have() -> None:
 
 
 def test_points_of_the_score_are_those_of_the_table() -> None:
-    from identification.scoring.accuracy import score
+    from identification.scoring import score
 
     results = packaged_baseline()
     trials = results.trials()

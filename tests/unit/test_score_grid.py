@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.scoring.accuracy import score
+from identification.scoring import score
 from tests.reference.free_decays import damped_cosine
 from tunnel_lab.experiments import score_trials
 from tunnel_lab.experiments.score_grid import Cell, Grid, draw_trial, load_grid, packaged_grid

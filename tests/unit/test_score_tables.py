@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.scoring.accuracy import Trials, score
+from identification.scoring import Trials, score
 from tunnel_lab.experiments.score_view import cell_figures, pooled_figures
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from identification.estimate import Quantity
-from identification.scoring.accuracy import Outcome, collect, overall, score
-from identification.statistics.proportion import Proportion
+from identification.scoring import Outcome, collect, overall, score
+from identification.statistics import Proportion
 from tunnel_sim.files.json_text import as_json
 
 

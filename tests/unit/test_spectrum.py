@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.decay.spectrum import psd_peak
+from identification.signal.frequency import psd_peak
 from tunnel_sim.vocabulary.record import Record
 
 TIME = np.arange(1000) / 100.0

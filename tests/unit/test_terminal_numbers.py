@@ -15,8 +15,7 @@ from rich.table import Table
 
 from diagnosis import printing
 from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
-from identification.printing import estimate_tables
-from identification.printing.table import TextTable
+from identification.printing import TextTable, coefficients_table, status_lines
 from identification.status import Status
 from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.unit.shown_numbers import assert_shows
@@ -219,9 +218,7 @@ def estimate() -> Estimate:
 def test_coefficients_of_an_estimate() -> None:
     found = estimate()
     named = (found.cn_beta, found.cn_r, found.yaw_inertia, found.mechanical_damping, found.wind_off_inertia)
-    for cells, value in zip(
-        rows(estimate_tables.coefficients_table(found.to_json_dict())), named, strict=True
-    ):
+    for cells, value in zip(rows(coefficients_table(found.to_json_dict())), named, strict=True):
         assert value is not None
         assert_shows(cells[1], [value.value, value.std])
 
@@ -266,12 +263,10 @@ def test_windows_of_a_run() -> None:
 
 def test_notes_name_the_runs_they_concern() -> None:
     calm = estimate()
-    assert estimate_tables.status_lines(calm.to_json_dict()) == []
+    assert status_lines(calm.to_json_dict()) == []
     first = dataclasses.replace(calm.runs[0], statuses=(Status.NO_OSCILLATION,))
-    (line,) = estimate_tables.status_lines(
-        dataclasses.replace(calm, runs=(first, *calm.runs[1:])).to_json_dict()
-    )
+    (line,) = status_lines(dataclasses.replace(calm, runs=(first, *calm.runs[1:])).to_json_dict())
     assert line == f"{Status.NO_OSCILLATION.value} (alpha)"
     every = tuple(dataclasses.replace(run, statuses=(Status.NO_OSCILLATION,)) for run in calm.runs)
-    found = estimate_tables.status_lines(dataclasses.replace(calm, runs=every).to_json_dict())
+    found = status_lines(dataclasses.replace(calm, runs=every).to_json_dict())
     assert found == [Status.NO_OSCILLATION.value]

@@ -14,8 +14,7 @@ from nicegui import background_tasks, ui
 
 from identification.estimate import UNITS
 from identification.estimators import ALL_ESTIMATORS, SUMMARIES
-from identification.printing.numbers import SYMBOLS, unit, with_std
-from identification.printing.table import TextTable
+from identification.printing import SYMBOLS, TextTable, unit, with_std
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Fault, Frame, button, show_command, show_parts
 from tunnel_lab.bench.workspace import ESTIMATOR, Session, is_current, read_result
@@ -229,8 +228,8 @@ def _cell(quantity: Document | None) -> str:
 
 
 def _notes(document: Document) -> list[str]:
-    from identification.printing.estimate_tables import status_lines
-    from identification.remark import Remark
+    from identification.printing import status_lines
+    from identification.status import Remark
 
     notes = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
     return [*notes, *status_lines(document)]

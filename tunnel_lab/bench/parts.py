@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from nicegui import events, ui
 
-from identification.printing.table import TextTable, as_html
+from identification.printing import TextTable, as_html
 from tunnel_lab.bench.workspace import (
     STAGES,
     Session,

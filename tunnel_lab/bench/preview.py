@@ -199,8 +199,8 @@ def _rest(part: Part, unit: str) -> tuple[float, str]:
     """Where a run rests: as stated, at the centre of its oscillation, or at its end; and that in words."""
     import numpy as np
 
-    from identification.examination.zeros import centre_of
-    from identification.printing.numbers import significant, with_std
+    from identification.examination.free_motion import centre_of
+    from identification.printing import significant, with_std
 
     if part.rest is not None:
         return part.rest, f"{significant(part.rest)} {unit}, stated and subtracted"

@@ -9,8 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from identification.printing.numbers import coefficient_label, estimated, in_stds, unit_mark, with_std
-from identification.printing.table import TextTable
+from identification.printing import TextTable, coefficient_label, estimated, in_stds, unit_mark, with_std
 
 NAME = "compare"
 Document = Mapping[str, Any]

@@ -130,7 +130,7 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
 
 def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: CampaignPlan) -> None:
     """Print the comparison with the truth."""
-    from identification.printing.estimate_tables import status_lines
+    from identification.printing import status_lines
     from tunnel_lab.terminal.tables import say, show_tables, truth_table
 
     say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from identification.printing.numbers import unit_mark
+from identification.printing import unit_mark
 from tunnel_lab.terminal.options import EffectsFileOption
 
 if TYPE_CHECKING:

@@ -170,8 +170,12 @@ def budgeted(
     from rich.text import Text
 
     from identification import identify
-    from identification.uncertainty.budget import make_budget, with_budget
-    from identification.uncertainty.input_uncertainty import InputUncertainties, load_uncertainties
+    from identification.uncertainty.budget import (
+        InputUncertainties,
+        load_uncertainties,
+        make_budget,
+        with_budget,
+    )
     from tunnel_lab.terminal.tables import console
 
     inputs = InputUncertainties() if uncertainties is None else load_uncertainties(uncertainties)

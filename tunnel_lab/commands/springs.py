@@ -70,7 +70,7 @@ def show(springs: SpringTable, source: str) -> None:
     from math import pi
 
     from identification.campaign.springs import fit_springs
-    from identification.printing.numbers import with_std
+    from identification.printing import with_std
     from tunnel_lab.terminal import tables
 
     fit = fit_springs(springs.stiffness, springs.frequency_hz)

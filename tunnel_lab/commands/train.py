@@ -132,8 +132,7 @@ def _train_posterior(out: Path, seed: int, shards: int, steps: int, *, jobs: int
 def _train(out: Path, spec: TrainingSpec, *, restart: bool) -> None:
     from time import monotonic
 
-    from identification.neural.checkpoint import Checkpoint, read_checkpoint
-    from identification.neural.train import train
+    from identification.neural.train import Checkpoint, read_checkpoint, train
     from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.files.writing import refuse_unwritable, write_json, write_whole

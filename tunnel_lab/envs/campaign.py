@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from identification.campaign.belief import information_gain
 from identification.estimate import PARAMETERS
-from identification.printing.numbers import SYMBOLS
+from identification.printing import SYMBOLS
 from tunnel_lab.envs.menu import PRESETS, Costs, Preset, make_menu, preset_sensor
 from tunnel_lab.envs.session import (
     LARGE,

@@ -15,13 +15,22 @@ import numpy as np
 from diagnosis.investigate import investigate
 from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from diagnosis.study import Study
-from identification.campaign.belief import Belief, prior_belief, run_link, shared_parameters, update_belief
-from identification.campaign.linear_belief import LinearRun, linear_belief, linear_run, shows_a_decay
-from identification.decay.damped_oscillation import Decay, free_decay
-from identification.decay.decay_fit import Reading, RunFit
-from identification.decay.residual_noise import stated_noise
-from identification.decay.run_fit import identify_run
+from identification.campaign.belief import (
+    Belief,
+    LinearRun,
+    linear_belief,
+    linear_run,
+    prior_belief,
+    run_link,
+    shared_parameters,
+    shows_a_decay,
+    update_belief,
+)
 from identification.estimate import PARAMETERS, UNITS
+from identification.signal.decay_fit import Reading, RunFit
+from identification.signal.free_decay import Decay, free_decay
+from identification.signal.noise import stated_noise
+from identification.signal.run_fit import identify_run
 from tunnel_lab.envs.menu import Choice, Costs, Menu
 from tunnel_sim.effects import Effect, effect_class, effect_from
 from tunnel_sim.engine.simulate import simulate

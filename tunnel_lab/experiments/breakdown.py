@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.text import Text
 
-from identification.printing.numbers import significant
-from identification.scoring.accuracy import Score, collect, score
+from identification.printing import significant
+from identification.scoring import Score, collect, score
 from tunnel_lab.experiments.runner import Progress
 from tunnel_lab.experiments.score_trials import Row, estimate_rows, fingerprint, outcome, rows_of
 from tunnel_lab.experiments.score_view import NAMES

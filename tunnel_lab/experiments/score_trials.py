@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from identification.estimate import UNITS, Quantity
-from identification.scoring.accuracy import Outcome, Trials, collect
+from identification.scoring import Outcome, Trials, collect
 from tunnel_lab.experiments.runner import Progress, processes, run_tasks
 from tunnel_lab.experiments.score_grid import Cell, Grid, check_trials
 from tunnel_lab.terminal.inputs import NO_EFFECT

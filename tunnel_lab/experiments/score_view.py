@@ -11,18 +11,20 @@ from rich.text import Text
 
 from identification.estimate import Quantity
 from identification.policy import DIFFERENCE_RATE
-from identification.printing.numbers import SYMBOLS, concise, significant
-from identification.scoring.accuracy import (
+from identification.printing import SYMBOLS, concise, significant
+from identification.scoring import (
     INTERVAL,
     NOMINAL_COVERAGE,
+    Change,
     Score,
     Trials,
+    changes,
+    holm,
     mean_figure,
     overall,
     score,
 )
-from identification.scoring.comparison import Change, changes, holm
-from identification.statistics.proportion import Proportion
+from identification.statistics import Proportion
 from tunnel_lab.experiments.score_grid import Cell
 from tunnel_lab.experiments.score_trials import Key, Results, describe, groups_of
 from tunnel_lab.plotting.style import COLOURS, MARKERS, figure, grid, log_axis, styled

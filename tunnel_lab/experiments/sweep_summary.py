@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.printing.numbers import SYMBOLS, concise, significant, unit
-from identification.scoring.accuracy import Score, Trials, score
-from identification.statistics.proportion import Proportion
+from identification.printing import SYMBOLS, concise, significant, unit
+from identification.scoring import Score, Trials, score
+from identification.statistics import Proportion
 from tunnel_lab.experiments.sweep import TIMINGS, Store
 from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT

@@ -16,8 +16,15 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from identification.neural.posterior.files import KINDS, Trained, to_bytes
-from identification.neural.posterior.network import forward, initial, shapes, variances
+from identification.neural.posterior.network import (
+    KINDS,
+    Trained,
+    forward,
+    initial,
+    shapes,
+    to_bytes,
+    variances,
+)
 from tunnel_lab.experiments.runner import processes, run_tasks
 from tunnel_lab.experiments.training_samples import (
     PARTS,

@@ -12,13 +12,12 @@ import numpy as np
 
 from identification import identify
 from identification.datasets import paper_derivatives, paper_springs, paper_windows
-from identification.decay.damped_oscillation import Decay, response_rows
 from identification.estimate import Estimate, WindowEstimate
-from identification.neural.files import shipped_networks
-from identification.neural.networks import Networks
-from identification.neural.shape import cycles_time, network_inputs
+from identification.neural.networks import Networks, shipped_networks
+from identification.neural.three_cycles import cycles_time, network_inputs
 from identification.neural.training_set import held_out_points
-from identification.printing.numbers import concise, significant
+from identification.printing import concise, significant
+from identification.signal.free_decay import Decay, response_rows
 from tunnel_lab.paper.page import Picture, Section, signed
 from tunnel_lab.plotting.style import (
     BLUE,

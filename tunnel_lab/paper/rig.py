@@ -13,8 +13,8 @@ import numpy as np
 from identification import identify
 from identification.campaign.springs import SpringFit, fit_springs
 from identification.datasets import SpringRow, paper_springs
-from identification.decay.damped_oscillation import Decay, free_decay
-from identification.printing.numbers import concise, with_std
+from identification.printing import concise, with_std
+from identification.signal.free_decay import Decay, free_decay
 from tunnel_lab.paper.networks import paper_run_plan
 from tunnel_lab.paper.page import Picture, Section, scaled, signed
 from tunnel_lab.plotting.style import BLUE, COLOURS, VERMILION, WIDTH, figure, grid, save_both, styled

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.estimate import Quantity
-from identification.printing.numbers import SYMBOLS
+from identification.printing import SYMBOLS
 from tunnel_lab.plotting.style import (
     BLUE,
     COLOURS,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.names import plain
-from identification.printing.table import TextTable
+from identification.printing import TextTable
 from tunnel_lab.plotting.style import WIDTH, figure, grid, styled
 from tunnel_lab.report.drawing import AFTER, BEFORE, INK, PAPER, QUIET
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from diagnosis.blind import Score
     from diagnosis.blind.smooth import SmoothCalibration
     from diagnosis.blind.statistics import CalibrationBin
-    from identification.statistics.proportion import Proportion
+    from identification.statistics import Proportion
 
 
 INCLUSION = "Calibration of inclusion"

@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.names import plain
 from diagnosis.policy import LISTED_PROBABILITY
 from diagnosis.printing import excess_std, held_out_excess
-from identification.printing.numbers import coefficient_label
+from identification.printing import coefficient_label
 from tunnel_lab.plotting.style import (
     COLOURS,
     INTERVAL,

@@ -14,7 +14,7 @@ from diagnosis.closable import closable_table, closable_words
 from diagnosis.names import plain
 from diagnosis.patch import patch_lines, patch_table
 from diagnosis.printing import inclusion_line
-from identification.printing.numbers import COEFFICIENTS, p_text, significant, unit_mark
+from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
 from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figures

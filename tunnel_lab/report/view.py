@@ -9,7 +9,7 @@ from typing import Any
 from diagnosis.names import plain
 from diagnosis.policy import LISTED_PROBABILITY
 from diagnosis.printing import held_out_excess, run_words
-from identification.printing.numbers import (
+from identification.printing import (
     UNDETERMINED,
     at_bound,
     coefficient_label,

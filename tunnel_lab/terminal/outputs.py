@@ -8,10 +8,9 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from identification import printing
 from identification.estimate import UNITS
-from identification.printing import estimate_tables
-from identification.printing.numbers import SYMBOLS, significant, unit
-from identification.printing.table import TextTable
+from identification.printing import SYMBOLS, TextTable, significant, unit
 from tunnel_lab.terminal import tables
 
 if TYPE_CHECKING:
@@ -35,13 +34,13 @@ def show_estimate(
         source: what the campaign was read from, for commands to copy; None: nowhere.
     """
     document = estimate.to_json_dict()
-    coefficients = tables.rich_table(estimate_tables.coefficients_table(document))
+    coefficients = tables.rich_table(printing.coefficients_table(document))
     tables.show_tables(coefficients, tables.runs_table(campaign, estimate))
     if windows:
         tables.show_tables(*map(tables.windows_table, estimate.runs))
     tables.say(tables.BRACKETS)
     command = DIAGNOSE if source is None else f"run: tunnel diagnose {shlex.quote(str(source))}"
-    for line in (*map(str, estimate.remarks), *estimate_tables.status_lines(document)):
+    for line in (*map(str, estimate.remarks), *printing.status_lines(document)):
         tables.say(f"Note: {line.replace(DIAGNOSE, command)}")
 
 

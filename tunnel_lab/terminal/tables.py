@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from identification.printing.numbers import SYMBOLS, concise, in_stds, significant, unit, with_std
+from identification.printing import SYMBOLS, concise, in_stds, significant, unit, with_std
 from tunnel_lab.terminal.options import TableFormat, chosen, quiet, rendered
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rich.table import Column
 
     from identification.estimate import Estimate, Quantity, RunEstimate, Status
-    from identification.printing.table import TextTable
+    from identification.printing import TextTable
     from tunnel_sim.vocabulary.campaign import Campaign
 
 

@@ -14,10 +14,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.decay.decay_fit import Reading
-from identification.decay.first_guess import starting_frequency
-from identification.decay.thinning import block_means
 from identification.policy import LEAST_ENERGY
+from identification.signal.decay_fit import Reading, block_means
+from identification.signal.frequency import starting_frequency
 from identification.status import Status
 from tunnel_sim.vocabulary.record import Array, Record
 

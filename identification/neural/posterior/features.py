@@ -14,8 +14,15 @@ import numpy as np
 from identification.campaign.derivatives import Design, derivatives
 from identification.estimate import PARAMETERS
 from identification.neural.posterior.demodulated import Demodulated
-from identification.neural.posterior.rivals import Mask, Rivals, fit_rivals
-from identification.neural.posterior.shapes import Conditions, Windows, campaign_columns, record_columns
+from identification.neural.posterior.rivals import (
+    Conditions,
+    Mask,
+    Rivals,
+    Windows,
+    campaign_columns,
+    fit_rivals,
+    record_columns,
+)
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
 

@@ -1,22 +1,100 @@
-"""The network: a weight and a width for every rival, from all rivals and all runs.
+"""The network that weighs the rivals, its files, and the posterior it gives.
 
-Every rival goes through the same layers, and every run through others; runs are pooled, so their order and number
-do not matter. The posterior of each quantity is the mixture of the rivals' normal distributions, scaled and
-widened. The network only learns when to believe which rival, and how far.
+Quantiles and covariance of mixtures of normal distributions.
 
-The function runs in NumPy for an estimate and in torch for training.
+The network: a weight and a width for every rival, from all rivals and all runs. Every rival goes through the same
+layers, and every run through others; runs are pooled, so their order and number do not matter. The posterior of
+each quantity is the mixture of the rivals' normal distributions, scaled and widened. The network only learns when
+to believe which rival, and how far.
+
+The function runs in NumPy for an estimate and in torch for training. The trained networks as safetensors, with
+their record beside them as JSON, without pickle. From features to posteriors, many samples at a time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from safetensors.numpy import save
+from scipy.special import ndtr
 
+from identification.estimate import Quantity
+from identification.neural.posterior.features import LEVEL, Features
 from identification.neural.posterior.rivals import MORE, SETS
+from identification.neural.stored import opened, packaged, read_stored
 from tunnel_sim.vocabulary.record import Array
+
+LEVELS = (0.025, 0.5, 0.975)
+NORMAL_WIDTH = 3.92  # of a normal distribution's 95 % interval, in standard deviations
+_HALVINGS = 36
+_FAR = 12.0  # standard deviations beyond which no component has weight
+_NEGLIGIBLE = 1e-9  # weight of a component that moves no quantile
+
+
+def distribution(weights: Array, means: Array, stds: Array, values: Array) -> Array:
+    """Cumulative probability of mixtures.
+
+    Args:
+        weights: shape (b, r), each row sums to 1.
+        means: shape (b, r, d).
+        stds: shape (b, r, d).
+        values: shape (b, q, d).
+
+    Returns:
+        Shape (b, q, d).
+    """
+    away = (values[:, :, None, :] - means[:, None]) / stds[:, None]
+    return np.asarray((weights[:, None, :, None] * ndtr(away)).sum(axis=2))
+
+
+def quantiles(weights: Array, means: Array, stds: Array) -> Array:
+    """The quantiles at `LEVELS`, by bisection.
+
+    Args:
+        weights: shape (b, r).
+        means: shape (b, r, d).
+        stds: shape (b, r, d).
+
+    Returns:
+        Shape (b, 3, d).
+    """
+    there = (weights > _NEGLIGIBLE)[..., None]
+    low = np.where(there, means - _FAR * stds, np.inf).min(axis=1)[:, None, :]
+    high = np.where(there, means + _FAR * stds, -np.inf).max(axis=1)[:, None, :]
+    levels = np.array(LEVELS)[None, :, None]
+    low, high = (
+        np.broadcast_to(end, (len(weights), len(LEVELS), means.shape[2])).copy() for end in (low, high)
+    )
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        below = distribution(weights, means, stds, middle) < levels
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray(0.5 * (low + high))
+
+
+def correlation(weights: Array, means: Array, covariances: Array, extras: Array) -> Array:
+    """Correlations of one mixture.
+
+    Args:
+        weights: shape (r,).
+        means: shape (r, d).
+        covariances: of each component, shape (r, d, d).
+        extras: variances added to them, shape (r, d).
+
+    Returns:
+        Shape (d, d).
+    """
+    centred = means - weights @ means
+    spread = covariances + np.einsum("ri,rj->rij", centred, centred)
+    total = np.einsum("r,rij->ij", weights, spread) + np.diag(weights @ extras)
+    sizes = np.sqrt(np.diag(total))
+    return np.asarray(total / np.outer(sizes, sizes))
+
 
 Tensor = Any
 """An array of NumPy or a tensor of torch."""
@@ -158,3 +236,175 @@ def initial(sizes: Mapping[str, tuple[int, ...]], rng: np.random.Generator) -> d
     found["allowance"][1:] = _ALLOWANCE
     found["allowance"][-MORE + 1 :] = [_ALLOWANCE * number for number in (*SETS, 2 * SETS[-1])]
     return found
+
+
+SHIPPED = "posterior"
+KINDS = ("record", "campaign")
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """One network with its threshold.
+
+    Args:
+        weights: as `shapes`, and the scalings.
+        centre: mean context of the training samples, shape (c,).
+        precision: inverse covariance of it, shape (c, c).
+        threshold: squared distance above which a sample is unlike anything trained on.
+        effects: names of the effects in the order of their probabilities.
+    """
+
+    weights: Mapping[str, Array]
+    centre: Array
+    precision: Array
+    threshold: float
+    effects: tuple[str, ...]
+
+    def distance(self, context: Array) -> Array:
+        """Squared Mahalanobis distance of contexts from the training samples, shape (b,)."""
+        away = context - self.centre
+        return np.asarray(np.einsum("bi,ij,bj->b", away, self.precision, away))
+
+
+def to_bytes(networks: Mapping[str, Trained]) -> bytes:
+    """Both networks as safetensors, in single precision."""
+    tensors: dict[str, Array] = {}
+    for kind in KINDS:
+        one = networks[kind]
+        values = {**one.weights, "unlike.centre": one.centre, "unlike.precision": one.precision}
+        tensors |= {
+            f"{kind}/{name}": np.ascontiguousarray(value, np.float32) for name, value in values.items()
+        }
+    return save(tensors)
+
+
+def read_trained(path: Path) -> dict[str, Trained]:
+    """Read networks that ``tunnel train`` wrote.
+
+    Args:
+        path: the safetensors file; its record is the ``.json`` of the same name beside it.
+
+    Raises:
+        TunnelError: when a file is missing or malformed, or the two do not belong together.
+    """
+    return trained_of(*read_stored(path), str(path))
+
+
+@cache
+def shipped() -> dict[str, Trained]:
+    """The packaged networks."""
+    return trained_of(*packaged(SHIPPED), SHIPPED)
+
+
+def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, Trained]:
+    """Networks from the contents of their two files.
+
+    Raises:
+        TunnelError: when they are malformed, or do not belong together.
+    """
+    with opened(weights, record, where, estimator="neural_posterior") as (tensors, document):
+        return {kind: _one(tensors, kind, document) for kind in KINDS}
+
+
+def _one(tensors: Mapping[str, Array], kind: str, document: Mapping[str, Any]) -> Trained:
+    own = {
+        name.removeprefix(f"{kind}/"): np.asarray(value, dtype=np.float64)
+        for name, value in tensors.items()
+        if name.startswith(f"{kind}/")
+    }
+    stated = document["networks"][kind]
+    expected = shapes(
+        *(stated["sizes"][name] for name in ("rivals", "features", "runs", "quantities", "effects"))
+    )
+    for name, shape in expected.items():
+        if own[name].shape != shape:
+            raise ValueError(name)
+    if not all(np.all(np.isfinite(value)) for value in own.values()):
+        raise ValueError(kind)
+    centre, precision = own.pop("unlike.centre"), own.pop("unlike.precision")
+    return Trained(own, centre, precision, float(stated["threshold"]), tuple(document["effects"]))
+
+
+_NOISY = float(
+    np.log(0.5)
+)  # of χ² over its freedom: less is a record with hardly any noise, which nothing contradicts
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """The posterior of one record or campaign.
+
+    Args:
+        values: medians, SI, shape (d,).
+        intervals: 95 % intervals, SI, shape (d, 2).
+        covariance: of normal distributions with these intervals and the mixture's correlations, SI, shape (d, d).
+        effects: probability of each effect by name.
+        unlike: whether the sample is unlike anything trained on.
+    """
+
+    values: Array
+    intervals: Array
+    covariance: Array
+    effects: dict[str, float]
+    unlike: bool
+
+    def quantity(self, place: int, unit: str) -> Quantity:
+        """One of the values with its interval."""
+        low, high = self.intervals[place]
+        std = float(np.sqrt(self.covariance[place, place]))
+        return Quantity(float(self.values[place]), std, unit, (float(low), float(high)))
+
+
+def posteriors(samples: Sequence[Features], network: Trained) -> list[Posterior]:
+    """Put samples of one kind through its network."""
+    if not samples:
+        return []
+    shifts = np.stack([one.shifts for one in samples])
+    covariances = np.stack([one.covariances for one in samples])
+    known = np.stack([one.known for one in samples])
+    output = forward(
+        np,
+        network.weights,
+        np.stack([one.rivals for one in samples]),
+        padded([one.runs for one in samples]),
+        np.stack([one.valid for one in samples]).astype(np.float64),
+        shifts,
+    )
+    widths = np.sqrt(np.maximum(np.diagonal(covariances, axis1=2, axis2=3), 1e-12))
+    widths = np.where(known[:, None, :], np.minimum(widths, 1e9), 1.0)
+    weights, variance = np.exp(output.logarithms), variances(output, widths)
+    found = quantiles(weights, output.means, np.sqrt(variance))
+    distances = network.distance(output.context)
+    chances = 1.0 / (1.0 + np.exp(-np.clip(output.effects, -30.0, 30.0)))
+    result = []
+    for place, one in enumerate(samples):
+        low, middle, high = one.values + one.stds * found[place]
+        stds = (high - low) / NORMAL_WIDTH
+        scaled = covariances[place] * output.scales[place, :, :, None] ** 2
+        scaled = np.where(np.outer(one.known, one.known), scaled, np.eye(one.known.size))
+        related = correlation(weights[place], output.means[place], scaled, output.extras[place])
+        result.append(
+            Posterior(
+                middle,
+                np.column_stack((low, high)),
+                related * np.outer(stds, stds),
+                dict(zip(network.effects, chances[place].tolist(), strict=True)),
+                bool(distances[place] > network.threshold and one.rivals[0, LEVEL] > _NOISY),
+            )
+        )
+    return result
+
+
+def padded(runs: Sequence[Array]) -> Array:
+    """Features of the runs of several campaigns in one array, with 1 after those of a run and 0 after padding.
+
+    Args:
+        runs: shape (n, k) each.
+
+    Returns:
+        Shape (b, largest n, k + 1).
+    """
+    table = np.zeros((len(runs), max(len(one) for one in runs), runs[0].shape[1] + 1))
+    for place, one in enumerate(runs):
+        table[place, : len(one), :-1], table[place, : len(one), -1] = one, 1.0
+    return table

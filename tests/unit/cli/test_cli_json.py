@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.decay.residual_noise import Residual, noise_level
+from identification.signal.noise import Residual, noise_level
 from tests.reference.free_decays import Setting, campaign
 from tests.unit.cli.conftest import PROGRESS
 from tunnel_sim.files.campaign_io import write_campaign

@@ -28,7 +28,7 @@ from diagnosis.fitting.similarity import Similarity
 from diagnosis.fitting.starting_points import starting_points
 from diagnosis.policy import EVEN_SHARE, FORM_CHANGE_STD
 from diagnosis.result import ParameterEstimate
-from identification.printing.numbers import estimated
+from identification.printing import estimated
 from tests.unit.gap_campaigns import CN_BETA, CN_R, campaign, nominal, studied
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 

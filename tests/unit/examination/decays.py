@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.decay.damped_oscillation import Decay, free_decay
+from identification.signal.free_decay import Decay, free_decay
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 

@@ -12,7 +12,7 @@ from diagnosis import diagnose, vocabulary
 from identification import identify
 from identification.estimate import Estimate, Status
 from identification.examination.examine import examine
-from identification.remark import Outcome, Remark
+from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 

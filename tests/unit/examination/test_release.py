@@ -7,8 +7,8 @@ import pytest
 from decays import ANGLE, NOISE, RATE, grid, reading, run
 
 from identification.examination.examine import from_releases
-from identification.examination.release import find_release
-from identification.remark import Outcome
+from identification.examination.free_motion import find_release
+from identification.status import Outcome
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.record import Record
 

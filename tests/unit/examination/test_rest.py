@@ -9,8 +9,8 @@ import pytest
 from decays import NOISE, campaign, reading, run
 
 from identification import identify
-from identification.examination.rest import without_rest
-from identification.remark import Outcome
+from identification.examination.free_motion import without_rest
+from identification.status import Outcome
 
 RATE, DEAD, OMEGA = 500.0, 0.011, 12.6
 

@@ -15,7 +15,7 @@ from identification import identify
 from identification.estimate import Status
 from identification.examination.examine import examine
 from identification.examination.self_excited import in_limit_cycle
-from identification.remark import Outcome, Remark
+from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
 

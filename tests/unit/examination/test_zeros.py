@@ -15,7 +15,7 @@ from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.starting_points import nominal_start
 from identification import identify
 from identification.examination.examine import examine
-from identification.examination.zeros import centre_of, with_zeros
+from identification.examination.free_motion import centre_of, with_zeros
 from tunnel_sim.vocabulary.record import Record
 
 REPEATS = tuple((f"{letter}-v{speed:g}", speed) for letter in "abc" for speed in (0.0, 25.0))

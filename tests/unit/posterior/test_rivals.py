@@ -4,12 +4,18 @@ import numpy as np
 import pytest
 
 from identification.campaign.derivatives import build_design
-from identification.decay.damped_oscillation import Decay, free_decay
 from identification.neural.posterior.demodulated import Demodulated, demodulate
 from identification.neural.posterior.features import OWN, _conditions, record_features
-from identification.neural.posterior.mixture import distribution, quantiles
-from identification.neural.posterior.rivals import fit_rivals, forward
-from identification.neural.posterior.shapes import Conditions, Windows, best_step, campaign_columns
+from identification.neural.posterior.network import distribution, quantiles
+from identification.neural.posterior.rivals import (
+    Conditions,
+    Windows,
+    best_step,
+    campaign_columns,
+    fit_rivals,
+    forward,
+)
+from identification.signal.free_decay import Decay, free_decay
 from identification.status import Status
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tests.reference.free_decays import AREA, DENSITY, LENGTH, Setting, campaign

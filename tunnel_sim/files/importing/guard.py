@@ -33,7 +33,9 @@ _SERVE = (
     "from tunnel_sim.files.importing.guard import serve; serve()"
 )
 _LATEST = 3.0  # times the allowed time
-_OUT_OF_TIME = -getattr(signal, "SIGXCPU", math.inf)  # exit status of a process that Linux or macOS ended for it
+_OUT_OF_TIME = -getattr(
+    signal, "SIGXCPU", math.inf
+)  # exit status of a process that Linux or macOS ended for it
 _DAMAGED = "export it again, or as text"
 _lock = threading.Lock()
 _kept: list[_Server] = []

@@ -1,4 +1,10 @@
-"""Identification of one run: start, least squares, noise, standard deviations, windows."""
+"""Identification of one run: start, least squares, noise, standard deviations, windows.
+
+Whether one damped oscillation explains a record: one test for every method. On a record of little noise a method's
+own motion misses the record by the error of the method alone, so its residual does not judge the record. The
+least-squares motion nearest to the method's decay is tested instead, by `noise.noise_level`. The false-alarm rate
+is `identification.policy.MISFIT_RATE`.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.decay.damped_oscillation import Decay
-from identification.decay.decay_fit import (
+from identification.estimate import (
+    NoiseLevel,
+    Quantity,
+    RunEstimate,
+    Status,
+    WindowEstimate,
+    by_gravity,
+)
+from identification.policy import FEW_CYCLES, LEAST_ENERGY
+from identification.signal.decay_fit import (
     ANGLE,
     ANGULAR_RATE,
     RATE,
@@ -19,19 +33,11 @@ from identification.decay.decay_fit import (
     RunFit,
     fit_run,
 )
-from identification.decay.first_guess import starting_decay, thinned_reading
-from identification.decay.residual_noise import Residual, eighth_of_a_cycle, noise_level
-from identification.decay.windows import fit_windows, modal_quantities
-from identification.estimate import (
-    NoiseLevel,
-    Quantity,
-    RunEstimate,
-    Status,
-    WindowEstimate,
-    by_gravity,
-)
-from identification.policy import FEW_CYCLES, LEAST_ENERGY
-from identification.statistics.information import determined, inverse
+from identification.signal.free_decay import Decay
+from identification.signal.frequency import starting_decay, thinned_reading
+from identification.signal.noise import Residual, eighth_of_a_cycle, noise_level
+from identification.signal.windows import fit_windows, modal_quantities
+from identification.statistics import determined, inverse, widened_covariance
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
@@ -216,3 +222,45 @@ def _statuses(run: Run, reading: Reading, decay: Decay, noise: NoiseLevel | None
 
 def _failed(run: Run, reading: Reading, status: Status) -> FittedRun:
     return FittedRun(reading, None, None, RunEstimate(run.id, (status,)))
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualCheck:
+    """The verdict of the least-squares residual of a run.
+
+    Args:
+        covariance: of (a, k) by least squares, widened where the model departs, shape (2, 2), in 1/s and 1/s².
+    """
+
+    noise: NoiseLevel
+    covariance: Array
+
+    def widened(self, covariance: Array) -> Array:
+        """A method's covariance of (a, k), raised to that of least squares where the model departs.
+
+        Args:
+            covariance: the method's own, shape (2, 2), in 1/s and 1/s².
+
+        Returns:
+            Shape (2, 2); no standard deviation is smaller than that of the widened least squares.
+        """
+        if not self.noise.departs:
+            return covariance
+        return widened_covariance(covariance, np.sqrt(self.covariance.diagonal()))
+
+
+def residual_check(run: Run, decay: Decay, sensor: SensorProperties) -> ResidualCheck | None:
+    """Fit a run by least squares, starting from a method's decay, and test the residual.
+
+    Returns:
+        The verdict; None where the least squares do not converge to a decay that the record determines.
+    """
+    reading = Reading.from_record(run.record)
+    fit = fit_from(run, reading, decay)
+    if fit is None:
+        return None
+    noise, failure = judge(reading, fit.runs[0], fit.zero, sensor)
+    if failure is not None:
+        return None
+    covariance = decay_covariance_of(fit.runs[0]) * (noise.std**2 * noise.slow_ratio)
+    return ResidualCheck(noise, covariance)

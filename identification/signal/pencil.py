@@ -21,7 +21,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-from identification.decay.damped_oscillation import Decay
+from identification.signal.free_decay import Decay
 from tunnel_sim.vocabulary.record import Array
 
 _LENGTH = 0.35  # rows over blocks: a third is best at light damping, and more hardly helps elsewhere

@@ -1,11 +1,21 @@
-"""Formatting of numbers: two significant digits of the standard deviation determine the others."""
+"""How results are printed: numbers with their standard deviations, tables, and the parts of an estimate.
+
+Formatting of numbers: two significant digits of the standard deviation determine the others. Tables and paragraphs
+as plain text for a console and as HTML for a notebook. An estimate as tables and notes, from its JSON document.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from html import escape
+from itertools import zip_longest
 from typing import Any
+
+from identification.status import Remark, Status
 
 SYMBOLS: Mapping[str, str] = {
     "cn_beta": "Cnβ",
@@ -232,3 +242,166 @@ def p_text(value: float) -> str:
 
 
 _LEAST_P = 1e-300  # close to the smallest number that a computer represents
+
+
+WIDTH = 88
+"""Paragraphs are wrapped to this many characters."""
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table whose cells are texts.
+
+    Args:
+        columns: headings, with their units.
+        rows: one text for each column; lines of a cell are separated by line ends.
+        right: those headings whose columns are aligned to the right.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    right: tuple[str, ...] = ()
+
+    def text(self) -> str:
+        """The table in columns of a fixed width, with a rule below the headings."""
+        widths = [
+            max(len(line) for cell in column for line in cell.split("\n"))
+            for column in zip(self.columns, *self.rows, strict=True)
+        ]
+        rule = "-" * (sum(widths) + 2 * (len(widths) - 1))
+        body = [self._lines(row, widths) for row in self.rows]
+        return "\n".join([self.title, self._lines(self.columns, widths), rule, *body])
+
+    def html(self) -> str:
+        """The table as an HTML element."""
+        head = "".join(self._cell("th", heading, heading) for heading in self.columns)
+        rows = ("".join(map(self._cell, ("td",) * len(row), row, self.columns)) for row in self.rows)
+        body = "".join(f"<tr>{row}</tr>" for row in rows)
+        return (
+            f"<table><caption>{escape(self.title)}</caption>"
+            f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        )
+
+    def _lines(self, row: tuple[str, ...], widths: list[int]) -> str:
+        """One row, on as many lines as its tallest cell has."""
+        lines = zip_longest(*(cell.split("\n") for cell in row), fillvalue="")
+        return "\n".join(
+            "  ".join(
+                text.rjust(width) if heading in self.right else text.ljust(width)
+                for text, width, heading in zip(line, widths, self.columns, strict=True)
+            ).rstrip()
+            for line in lines
+        )
+
+    def _cell(self, tag: str, text: str, heading: str) -> str:
+        side = "right" if heading in self.right else "left"
+        style = f"text-align: {side}; padding: 0.15em 0.8em"
+        return f'<{tag} style="{style}">{escape(text).replace(chr(10), "<br>")}</{tag}>'
+
+
+def as_text(parts: Iterable[str | TextTable]) -> str:
+    """Paragraphs and tables as plain text, with an empty line around each table.
+
+    Args:
+        parts: in their order; tables without rows are left out.
+
+    Returns:
+        The text, without a line end at its end.
+    """
+    blocks = [
+        f"\n{part.text()}\n" if isinstance(part, TextTable) else textwrap.fill(part, WIDTH)
+        for part in _filled(parts)
+    ]
+    return "\n".join(blocks).strip("\n").replace("\n\n\n", "\n\n")
+
+
+def as_html(parts: Iterable[str | TextTable]) -> str:
+    """Paragraphs and tables as HTML.
+
+    Args:
+        parts: in their order; tables without rows are left out.
+
+    Returns:
+        One ``div``.
+    """
+    blocks = [
+        part.html() if isinstance(part, TextTable) else f"<p>{escape(part)}</p>" for part in _filled(parts)
+    ]
+    return f"<div>{''.join(blocks)}</div>"
+
+
+def _filled(parts: Iterable[str | TextTable]) -> list[str | TextTable]:
+    return [part for part in parts if (part.rows if isinstance(part, TextTable) else part)]
+
+
+Document = Mapping[str, Any]
+
+
+SHOWN_RUNS = 16
+"""At most this many runs are listed."""
+
+
+def estimate_parts(document: Document) -> list[str | TextTable]:
+    """What is printed of an estimate.
+
+    Returns:
+        The coefficients, the runs, and a paragraph for each note.
+    """
+    notes = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
+    notes += status_lines(document)
+    left = len(document["runs"]) - SHOWN_RUNS
+    more = f"and {left} more runs, which runs_frame() lists" if left > 0 else ""
+    return [coefficients_table(document), runs_table(document), more, *(f"Note: {note}" for note in notes)]
+
+
+def coefficients_table(document: Document) -> TextTable:
+    """The campaign's coefficients that could be identified.
+
+    Returns:
+        A table; without rows when the campaign gives normalised form only.
+    """
+    names = {**SYMBOLS, "wind_off_inertia": "Izz, gradient of Kr over ωn²"}
+    rows = tuple(
+        (f"{symbol} {unit(document[name]['unit'])}", _with_std(document[name]))
+        for name, symbol in names.items()
+        if document[name] is not None
+    )
+    title = f"{document['campaign']} by {document['estimator']}"
+    return TextTable(title, ("quantity", "estimate ± std"), rows)
+
+
+def runs_table(document: Document) -> TextTable:
+    """Natural frequency and damping ratio of the first runs.
+
+    Returns:
+        A table with a row for each run, `SHOWN_RUNS` of them at most.
+    """
+    rows = tuple(
+        (run["id"], _with_std(run["omega_n"]), _with_std(run["zeta"]), run["status"].replace("_", " "))
+        for run in document["runs"][:SHOWN_RUNS]
+    )
+    title = f"Runs of {document['campaign']} ± one standard deviation"
+    return TextTable(title, ("run", "ωn [rad/s]", "ζ [1]", "status"), rows)
+
+
+def status_lines(document: Document) -> list[str]:
+    """What the estimate and its runs have to say, each thing once.
+
+    Returns:
+        A line for each status other than "identified", with the runs it concerns and the remedy.
+    """
+    runs: dict[str, list[str]] = {name: [] for name in document["statuses"] if name != "ok"}
+    for run in document["runs"]:
+        for name in run["statuses"]:
+            if name != "ok":
+                runs.setdefault(name, []).append(run["id"])
+    count = len(document["runs"])
+    return [
+        Status[name.upper()].value + (f" ({', '.join(ids)})" if ids and len(ids) < count else "")
+        for name, ids in runs.items()
+    ]
+
+
+def _with_std(quantity: Document | None) -> str:
+    return "–" if quantity is None else with_std(quantity["value"], quantity["std"])

@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.decay.damped_oscillation import Decay, envelope_amplitude
-from identification.decay.decay_fit import (
+from identification.estimate import NoiseLevel, Quantity, WindowEstimate
+from identification.policy import LEAST_WINDOW_ENERGY
+from identification.signal.decay_fit import (
     ANGLE,
     ANGULAR_RATE,
     RATE,
@@ -20,11 +21,10 @@ from identification.decay.decay_fit import (
     RunFit,
     fit_run,
 )
-from identification.decay.first_guess import starting_decay
-from identification.decay.residual_noise import eighth_of_a_cycle
-from identification.estimate import NoiseLevel, Quantity, WindowEstimate
-from identification.policy import LEAST_WINDOW_ENERGY
-from identification.statistics.information import determined, inverse
+from identification.signal.free_decay import Decay, envelope_amplitude
+from identification.signal.frequency import starting_decay
+from identification.signal.noise import eighth_of_a_cycle
+from identification.statistics import determined, inverse
 from tunnel_sim.vocabulary.record import Array, Record
 
 CYCLES = 3

@@ -1,0 +1,293 @@
+"""A decay that a random moment drives: its likelihood by a steady Kalman filter, and the maximum of it.
+
+The likelihood of a decay that a random moment drives: steady Kalman filter as a recursive filter. State (β, β̇)
+with β̈ + 2aβ̇ + kβ = w(t); w is white with ⟨w(t)w(t′)⟩ = q δ(t − t′), or of corner frequency fb, ẇ = −2πfb (w −
+white), with the same q at low frequency; the reading adds white noise of variance R. In discrete time the reading
+obeys D(z) y = C(z) e: D is the characteristic polynomial of the motion, and C and the variance of the innovations
+e follow by spectral factorisation of R D(z)D(1/z) + γ(z), γ the covariance of the driven part. So innovations are
+one call of a recursive filter over the record, with no loop in Python.
+
+The initial state and the sensor's zero are unknown and enter linearly: their responses are filtered like the
+reading and fitted to it by least squares. The covariance that the steady filter assumes for the initial state
+then has no influence. Where q is 0, C is D and the innovations are output error's residual. Sources: Maine &
+Iliff, SIAM J. Appl. Math. 41 (1981) 558–579, doi 10.1137/0141046; Åström, Automatica 16 (1980) 551–574, doi
+10.1016/0005-1098(80)90078-3; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5, doi
+10.2514/4.102790.
+
+Maximum likelihood of a driven decay: decay rate, stiffness and the random moment's intensity, by scoring. The
+start is the optimum of output error with the best of a range of intensities. Each step solves Fisher's
+information, from central differences of the innovations and of their variance, against the gradient of the
+likelihood (Maine & Iliff, SIAM J. Appl. Math. 41 (1981) 558–579, doi 10.1137/0141046).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+from identification.policy import LEAST_CORNER_DROP, LEAST_MOMENT_DROP, MOMENT_DROP_FOR_CORNER
+from identification.signal.free_decay import Decay, response_rows
+from identification.statistics import inverse, scaled_solve
+from tunnel_sim.vocabulary.record import Array
+
+_GREATEST = 1e60  # of a growth or a variance over one interval: beyond it no filter is formed
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A decay and the random moment that drives it.
+
+    Args:
+        intensity: q, spectral intensity of the moment per inertia, rad²/s³; 0 where there is none.
+        corner: fb, Hz, of the moment's spectrum; None where it is white.
+    """
+
+    decay: Decay
+    intensity: float
+    corner: float | None = None
+
+    @property
+    def intensity_at_resonance(self) -> float:
+        """The moment's spectral intensity at ωn, which the motion shows best: q/(1 + (ωn/2πfb)²), rad²/s³."""
+        if self.corner is None:
+            return self.intensity
+        return self.intensity / (1.0 + self.decay.stiffness / (2.0 * np.pi * self.corner) ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Innovations:
+    """The prediction errors of a model.
+
+    Args:
+        values: shape (n,), rad.
+        variance: their expected variance, rad².
+        cost: −2 ln L up to a constant, dimensionless.
+    """
+
+    values: Array
+    variance: float
+    cost: float
+
+
+def innovations(values: Array, interval: float, model: Driven, noise_variance: float) -> Innovations | None:
+    """One-step prediction errors, with the initial state and the zero at their best.
+
+    Args:
+        values: readings or block means, shape (n,), rad.
+        interval: between them, s.
+        noise_variance: R, of one value, rad².
+
+    Returns:
+        The innovations; None where the model is out of range.
+    """
+    time = interval * np.arange(values.size, dtype=np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        motion = response_rows(time, model.decay)[:2]
+    columns = np.vstack((values, motion, np.ones_like(time), *_started_by_moment(time, model)))
+    if not np.isfinite(columns).all():
+        return None
+    variance = noise_variance
+    if model.intensity > 0.0:
+        from scipy.signal import lfilter  # only here: slow to load
+
+        factors = _factored(interval, model, noise_variance)
+        if factors is None:
+            return None
+        motion_polynomial, filter_polynomial, variance = factors
+        columns = lfilter(motion_polynomial, filter_polynomial, columns, axis=1)
+    lengths = np.linalg.norm(columns[1:], axis=1, keepdims=True)
+    if not (np.isfinite(columns[0]).all() and lengths.min() > 0.0 and lengths.max() < np.inf):
+        return None
+    regressors = columns[1:] / lengths
+    gram = regressors @ regressors.T
+    try:
+        solution = np.linalg.solve(gram, regressors @ columns[0])
+    except np.linalg.LinAlgError:
+        return None
+    left = columns[0] - solution @ regressors
+    return Innovations(left, variance, float(left.size * np.log(variance) + left @ left / variance))
+
+
+def _started_by_moment(time: Array, model: Driven) -> tuple[Array, ...]:
+    # A moment that is not white has an unknown initial value. Its response is e^(−ct) less a free motion, which is
+    # among the columns already.
+    if model.corner is None or model.intensity == 0.0:
+        return ()
+    return (np.exp(-2.0 * np.pi * model.corner * time),)
+
+
+def _factored(interval: float, model: Driven, noise_variance: float) -> tuple[Array, Array, float] | None:
+    # D, C and the innovations' variance.
+    transition, disturbance = _discrete(interval, model)
+    if not max(np.abs(transition).max(), np.abs(disturbance).max()) < _GREATEST:
+        return None
+    size = transition.shape[0]
+    characteristic = np.real(np.poly(transition))
+    # D(z) y = Σ mᵢ w(t−1−i) with mᵢ the first row of Φⁱ + d₁Φⁱ⁻¹ + … + dᵢ (Faddeev and LeVerrier).
+    matrix, rows = np.eye(size), []
+    for i in range(size):
+        rows.append(matrix[0])
+        matrix = transition @ matrix + characteristic[i + 1] * np.eye(size)
+    moving = np.array(rows)
+    covariance = moving @ disturbance @ moving.T
+    gammas = [float(np.trace(covariance, offset=j)) for j in range(size)] + [0.0]
+    own = np.correlate(characteristic, characteristic, "full")[size:]
+    lags = noise_variance * own + np.array(gammas)
+    roots = np.roots(np.concatenate((lags[:0:-1], lags)))
+    stable = roots[np.argsort(np.abs(roots))[:size]]
+    if not np.isfinite(roots).all() or roots.size != 2 * size or np.abs(stable).max() >= 1.0:
+        return None
+    filtering = np.real(np.poly(stable))
+    variance = float(lags[0] / (filtering @ filtering))
+    return (characteristic, filtering, variance) if variance > 0.0 else None
+
+
+def _discrete(interval: float, model: Driven) -> tuple[Array, Array]:
+    # Transition and covariance of the disturbance over one interval (Van Loan, IEEE Trans. Automat. Contr. 23
+    # (1978) 395–404, doi 10.1109/TAC.1978.1101743).
+    a, k = model.decay.rate, model.decay.stiffness
+    if model.corner is None:
+        dynamics = np.array([[0.0, 1.0], [-k, -2.0 * a]])
+        drive = np.diag([0.0, model.intensity])
+    else:
+        c = 2.0 * np.pi * model.corner
+        dynamics = np.array([[0.0, 1.0, 0.0], [-k, -2.0 * a, 1.0], [0.0, 0.0, -c]])
+        drive = np.diag([0.0, 0.0, model.intensity * c**2])
+    size = dynamics.shape[0]
+    block = np.zeros((2 * size, 2 * size))
+    block[:size, :size], block[:size, size:], block[size:, size:] = -dynamics, drive, dynamics.T
+    exponential = expm(block * interval)
+    transition = exponential[size:, size:].T
+    disturbance = transition @ exponential[:size, size:]
+    return transition, 0.5 * (disturbance + disturbance.T)
+
+
+_DECADES = np.arange(-7.0, 3.1, 1.0)  # of q over R ω³, the intensity that doubles R within a radian
+_CORNERS = (8.0, 3.0, 1.0, 0.3)  # Hz; above these, the moment of a rig of a few Hz looks white
+_MAX_STEPS = 25
+_SETTLED = 0.01  # standard deviations
+_NUDGE = 0.1  # standard deviations of a and k; of ln q outright
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenFit:
+    """A driven decay at the maximum of its likelihood.
+
+    Args:
+        covariance: of (a, k, ln q), shape (3, 3).
+        drop: of −2 ln L against no random moment at all, dimensionless.
+    """
+
+    model: Driven
+    covariance: Array
+    innovations: Innovations
+    drop: float
+
+
+def fit_driven(
+    values: Array, interval: float, start: Decay, deviations: Array, noise_variance: float
+) -> DrivenFit | None:
+    """Fit a driven decay.
+
+    Args:
+        values: block means of one run, shape (n,), rad.
+        interval: between them, s.
+        start: output error's decay.
+        deviations: its standard deviations of (a, k), shape (2,), in 1/s and 1/s².
+        noise_variance: of one block mean, rad².
+
+    Returns:
+        The fit; None where no random moment is needed to explain the run.
+    """
+    fit = _Fit(values, interval, noise_variance, deviations)
+    bare = fit.at(Driven(start, 0.0))
+    unit = noise_variance * start.omega_n**3
+    best = fit.best(Driven(start, float(unit * 10.0**decade)) for decade in _DECADES)
+    if bare is None or best is None:
+        return None
+    found = fit.maximise(best)
+    if found is None or bare.cost - found.innovations.cost < LEAST_MOMENT_DROP:
+        return None
+    if bare.cost - found.innovations.cost > MOMENT_DROP_FOR_CORNER:
+        found = fit.with_corner(found)
+    return DrivenFit(found.model, found.covariance, found.innovations, bare.cost - found.innovations.cost)
+
+
+class _Fit:
+    """The likelihood of one run, and its maximisation."""
+
+    def __init__(self, values: Array, interval: float, noise_variance: float, deviations: Array) -> None:
+        self.values, self.interval, self.noise_variance = values, interval, noise_variance
+        self.nudges = np.append(_NUDGE * deviations, _NUDGE)
+
+    def at(self, model: Driven) -> Innovations | None:
+        return innovations(self.values, self.interval, model, self.noise_variance)
+
+    def best(self, models: Iterable[Driven]) -> Driven | None:
+        costs = [(found.cost, model) for model in models if (found := self.at(model)) is not None]
+        return min(costs, key=lambda item: item[0])[1] if costs else None
+
+    def with_corner(self, white: DrivenFit) -> DrivenFit:
+        decay, intensity = white.model.decay, white.model.intensity
+        ladder = [
+            Driven(decay, intensity * factor, corner)
+            for corner in _CORNERS
+            for factor in (0.5, 1.0, 2.0, 5.0, 20.0)
+        ]
+        best = self.best(ladder)
+        found = None if best is None else self.maximise(best)
+        if found is None or white.innovations.cost - found.innovations.cost < LEAST_CORNER_DROP:
+            return white
+        return found
+
+    def maximise(self, model: Driven) -> DrivenFit | None:
+        here = self.at(model)
+        for _ in range(_MAX_STEPS):
+            system = None if here is None else self._system(model, here)
+            if here is None or system is None:
+                return None
+            information, gradient = system
+            try:
+                step = scaled_solve(information, gradient)
+                covariance = inverse(information)
+            except np.linalg.LinAlgError:
+                return None
+            step[2] = np.clip(step[2], -2.0, 2.0)
+            size = float(np.max(np.abs(step) / np.sqrt(np.diag(covariance))))
+            moved = self._search(model, here, step)
+            if moved is not None:
+                model, here = moved
+            if moved is None or size < _SETTLED:
+                return DrivenFit(model, covariance, here, 0.0)
+        return None
+
+    def _search(self, model: Driven, here: Innovations, step: Array) -> tuple[Driven, Innovations] | None:
+        for factor in (1.0, 0.5, 0.25, 0.0625):
+            trial = _moved(model, factor * step)
+            there = self.at(trial)
+            if there is not None and there.cost < here.cost:
+                return trial, there
+        return None
+
+    def _system(self, model: Driven, here: Innovations) -> tuple[Array, Array] | None:
+        # Fisher's information and minus half the gradient of −2 ln L.
+        slopes, logs = [], []
+        for i, nudge in enumerate(self.nudges):
+            away = nudge * np.eye(3)[i]
+            ahead, back = self.at(_moved(model, away)), self.at(_moved(model, -away))
+            if ahead is None or back is None:
+                return None
+            slopes.append((ahead.values - back.values) / (2.0 * nudge))
+            logs.append(np.log(ahead.variance / back.variance) / (2.0 * nudge))
+        slope, log = np.array(slopes), np.array(logs)
+        count, power = here.values.size, float(here.values @ here.values) / here.variance
+        information = slope @ slope.T / here.variance + 0.5 * count * np.outer(log, log)
+        return information, -slope @ here.values / here.variance + 0.5 * (power - count) * log
+
+
+def _moved(model: Driven, step: Array) -> Driven:
+    decay = Decay(model.decay.rate + float(step[0]), model.decay.stiffness + float(step[1]))
+    return Driven(decay, model.intensity * float(np.exp(step[2])), model.corner)

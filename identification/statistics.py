@@ -1,0 +1,350 @@
+"""Linear algebra and statistics that every estimator shares.
+
+Linear algebra of information matrices: solve, invert, eliminate, extend. Straight lines through points of known
+variance, with a test of their scatter. A share of trials with its confidence interval.
+
+Standard deviations that remain valid when the model does not explain the data. If it does, the covariance is the
+inverse of Fisher's information. If it does not, the residual is not white: the variances are widened by its power
+in the band of the oscillation, or to the scatter of the runs, whichever is larger. The diagnosis uses the same
+scatter.
+
+Where the statements of a campaign contradict its frequencies, no estimator can know which of them is wrong: the
+largest change that a correction makes is the half-width of a rectangular distribution (GUM 4.3.7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri, ndtri, stdtrit
+
+from identification.estimate import Estimate, NoiseLevel, Quantity
+from identification.policy import MISFIT_RATE
+from identification.status import Remark
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array
+
+_WORST_CONDITION = 1e13
+_SMALLEST = (
+    1e-290  # of a variance or an information: its square root and its inverse still have full precision
+)
+
+
+def eliminate(information: Array, score: Array, keep: int) -> tuple[Array, Array]:
+    """The information and score of the first unknowns with the others eliminated (Schur complement).
+
+    Args:
+        information: shape (m, m).
+        score: shape (m,).
+        keep: how many unknowns to keep.
+
+    Returns:
+        Shapes (keep, keep) and (keep,).
+    """
+    cross = information[keep:, :keep]
+    solved = scaled_solve(information[keep:, keep:], np.column_stack((cross, score[keep:])))
+    return information[:keep, :keep] - cross.T @ solved[:, :keep], score[:keep] - cross.T @ solved[:, keep]
+
+
+def scaled_solve(matrix: Array, right: Array) -> Array:
+    """Solve a symmetric positive system after scaling its diagonal to one (units differ by decades).
+
+    Args:
+        matrix: shape (m, m).
+        right: shape (m,) or (m, n).
+
+    Returns:
+        The solution, of the shape of ``right``.
+
+    Raises:
+        numpy.linalg.LinAlgError: when the matrix is singular.
+    """
+    diagonal = matrix.diagonal()
+    if not diagonal.min() > 0.0:
+        raise np.linalg.LinAlgError("an unknown does not influence the reading")
+    scale = np.sqrt(diagonal)
+    unit = scale if right.ndim == 1 else scale[:, None]
+    if scale.size == 2:
+        return _solve_two(float(matrix[0, 1] / (scale[0] * scale[1])), right / unit) / unit
+    solution = np.linalg.solve(matrix / (scale[:, None] * scale), right / unit)
+    return np.asarray(solution / unit)
+
+
+def _solve_two(correlation: float, right: Array) -> Array:
+    # Systems of two are by far the most common, and calling LAPACK costs ten times their solution.
+    pivot = 1.0 - correlation**2
+    if not pivot > 0.0:
+        raise np.linalg.LinAlgError("two unknowns have the same influence")
+    second = (right[1] - correlation * right[0]) / pivot
+    return np.array((right[0] - correlation * second, second))
+
+
+def inverse(information: Array) -> Array:
+    """The inverse of an information matrix that `determined` has passed, symmetric to the last bit.
+
+    Args:
+        information: shape (m, m).
+
+    Returns:
+        Shape (m, m).
+
+    Raises:
+        numpy.linalg.LinAlgError: when the matrix is singular.
+    """
+    result = scaled_solve(information, np.eye(information.shape[0]))
+    return np.asarray(0.5 * (result + result.T))
+
+
+def determined(matrix: Array) -> bool:
+    """Whether a symmetric matrix is positive definite to working precision, whatever the units of its unknowns.
+
+    An information matrix is checked before it is inverted, and a covariance before it is used. If it fails, the
+    data do not separate the unknowns, and a status says so instead of a number.
+
+    Args:
+        matrix: shape (m, m).
+
+    Returns:
+        False where an element is not finite, a diagonal one is not positive, or the matrix scaled to a unit
+        diagonal has a condition number above 1e13: its inverse then holds less than three correct digits.
+    """
+    diagonal = matrix.diagonal()
+    if not (np.isfinite(matrix).all() and diagonal.min() > _SMALLEST and diagonal.max() < 1.0 / _SMALLEST):
+        return False
+    scale = np.sqrt(diagonal)
+    sizes = np.linalg.eigvalsh(matrix / scale[:, None] / scale)
+    return bool(sizes[0] * _WORST_CONDITION > sizes[-1])
+
+
+def embed(link: Array, *, with_zero: bool) -> Array:
+    """A run's link extended by the common zero as last parameter.
+
+    Args:
+        link: from the shared parameters to (a, k), shape (2, p).
+        with_zero: whether the zero is among the shared parameters.
+
+    Returns:
+        Shape (3, p + 1); the link itself without the zero.
+    """
+    if not with_zero:
+        return link
+    # Not SciPy's block_diag, whose checks would take half the time of a belief.
+    extended = np.zeros((link.shape[0] + 1, link.shape[1] + 1))
+    extended[:-1, :-1] = link
+    extended[-1, -1] = 1.0
+    return extended
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedFit:
+    """Linear least squares.
+
+    Args:
+        values: of the unknowns, shape (p,).
+        covariance: shape (p, p); widened where the scatter is beyond chance.
+        residual: shape (n,).
+    """
+
+    values: Array
+    covariance: Array
+    residual: Array
+
+
+def weighted_fit(columns: Array, target: Array, variance: Array) -> WeightedFit:
+    """Least squares with known variances, which are raised where the scatter is beyond chance.
+
+    Args:
+        columns: one per unknown, shape (n, p) with n above p.
+        target: shape (n,).
+        variance: of the target's points, shape (n,).
+    """
+    weights = 1.0 / variance
+    normal = columns.T @ (columns * weights[:, None])
+    values = scaled_solve(normal, columns.T @ (weights * target))
+    residual = target - columns @ values
+    freedom = target.size - values.size
+    scatter = float(residual @ (weights * residual))
+    beyond = scatter > float(chdtri(freedom, MISFIT_RATE))
+    return WeightedFit(values, inverse(normal) * (scatter / freedom if beyond else 1.0), residual)
+
+
+def decay_covariance(rate: float, omega_d: float, rate_variance: float, omega_variance: float) -> Array:
+    """Covariance of (a, k) from independent decay rate and damped frequency: k = ωd² + a².
+
+    Args:
+        rate: a, 1/s.
+        omega_d: damped angular frequency, rad/s.
+        rate_variance: of a, (1/s)², square of a standard deviation in 1/s.
+        omega_variance: of ωd, square of a standard deviation in rad/s.
+
+    Returns:
+        Shape (2, 2).
+    """
+    slope = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega_d]])
+    return np.asarray(slope @ np.diag([rate_variance, omega_variance]) @ slope.T)
+
+
+def deviations(rate: float, omega_d: float, covariance: Array) -> tuple[float, float]:
+    """Standard deviations of decay rate and damped frequency, the inverse of `decay_covariance`.
+
+    Args:
+        rate: a, 1/s.
+        omega_d: damped angular frequency, rad/s, above 0.
+        covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
+
+    Returns:
+        Of a in 1/s and of ωd in rad/s.
+    """
+    slope = np.array([-rate, 0.5]) / omega_d
+    return float(np.sqrt(covariance[0, 0])), float(np.sqrt(slope @ covariance @ slope))
+
+
+@dataclass(frozen=True)
+class Proportion:
+    """How many of how many, such as the trials that failed.
+
+    Args:
+        total: number of all; the share is defined above 0 only.
+    """
+
+    count: int
+    total: int
+
+    @classmethod
+    def of(cls, flags: Sequence[bool]) -> Proportion:
+        """How many are true."""
+        return cls(sum(map(bool, flags)), len(flags))
+
+    @property
+    def value(self) -> float:
+        """The share."""
+        return self.count / self.total
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's interval of 95 % (J. Am. Stat. Assoc. 22 (1927) 209–212), as shares; 0 to 1 of none."""
+        from scipy.stats import binomtest
+
+        if not self.total:
+            return 0.0, 1.0
+        found = binomtest(self.count, self.total).proportion_ci(method="wilson")
+        return float(found.low), float(found.high)
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Count, total, share (None of none) and interval."""
+        share = self.value if self.total else None
+        return {"count": self.count, "total": self.total, "share": share, "wilson_95": list(self.interval)}
+
+
+def widened_covariance(covariance: Array, least_std: Array) -> Array:
+    """Raise standard deviations to a lower limit, keeping the correlations.
+
+    Args:
+        covariance: shape (p, p).
+        least_std: shape (p,).
+
+    Returns:
+        Shape (p, p).
+    """
+    factor = np.maximum(1.0, least_std / np.sqrt(np.diag(covariance)))
+    return np.asarray(covariance * np.outer(factor, factor))
+
+
+def fisher_covariance(normal: Array, noise: NoiseLevel) -> Array:
+    """Inverse information times the noise variance, widened by the slow ratio.
+
+    Args:
+        normal: JᵀJ, shape (p, p).
+        noise: the level and its slow ratio.
+
+    Returns:
+        Shape (p, p).
+    """
+    return inverse(normal) * (noise.std**2 * noise.slow_ratio)
+
+
+def scatter_of_runs(influences: Array, speaking: NDArray[np.int64]) -> Array:
+    """Standard deviations of parameters from the scatter of the runs, whatever the spectrum of the residuals.
+
+    The sandwich estimator with a run as the cluster (Liang & Zeger, Biometrika 73 (1986) 13,
+    doi 10.1093/biomet/73.1.13), widened by Student's t for the small number of runs that determine a parameter.
+
+    Args:
+        influences: contribution of every run's residual to the parameters, shape (runs, q).
+        speaking: number of runs that determine each parameter, shape (q,).
+
+    Returns:
+        Standard deviations, shape (q,): 1.96 of them on either side are a 95 % interval.
+    """
+    free = np.maximum(speaking - 2, 1)
+    spread = np.sqrt(np.sum(influences**2, axis=0) * speaking / free)
+    return np.asarray(spread * stdtrit(free, 0.975) / ndtri(0.975))
+
+
+def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: Sequence[Remark]) -> Estimate:
+    """Widen the coefficients to what corrections of contradictory statements would make of them.
+
+    Args:
+        estimate: by any method.
+        campaign: gives the conditions of the runs and the sizes.
+        remarks: of the examination; those on a contradiction hold what Izz and Ka over ½ρV² may be.
+
+    Returns:
+        The same values. Damping is not compared by the examination, so Cr and Cnr are as doubtful, relatively, as
+        the more doubtful of Izz and Cnβ.
+    """
+    inertias = [value for remark in remarks for value in remark.figures.get("inertias_kg_m2", ())]
+    moments = [value for remark in remarks for value in remark.figures.get("air_stiffnesses_m3", ()) if value]
+    if not inertias or estimate.yaw_inertia is None:
+        return estimate
+    scales = [inertia / estimate.yaw_inertia.value for inertia in inertias]
+    pressures = {run.id: 0.5 * (run.air_density or 0.0) * run.wind_speed**2 for run in campaign.runs}
+    seen = [
+        run.aerodynamic_stiffness.value / pressures[run.id]
+        for run in estimate.runs
+        if run.aerodynamic_stiffness is not None
+    ]
+    damping = [*scales, *(1.0 + abs(a - b) / max(abs(a), abs(b)) for a in moments for b in seen)]
+    size = (campaign.rig.frontal_area or 0.0) * (campaign.rig.reference_length or 0.0)
+    runs = tuple(
+        replace(
+            run,
+            aerodynamic_stiffness=_reaching(
+                run.aerodynamic_stiffness, scales, [moment * pressures[run.id] for moment in moments]
+            ),
+            aerodynamic_damping=_reaching(run.aerodynamic_damping, damping),
+        )
+        for run in estimate.runs
+    )
+    wider: dict[str, Any] = {
+        "cn_beta": _reaching(estimate.cn_beta, scales, [moment / size for moment in moments if size]),
+        "cn_r": _reaching(estimate.cn_r, damping),
+        "yaw_inertia": _reaching(estimate.yaw_inertia, (), inertias),
+        "mechanical_damping": _reaching(estimate.mechanical_damping, damping),
+        "wind_off_inertia": _reaching(estimate.wind_off_inertia, (), inertias),
+        "wind_off_intercept": _reaching(estimate.wind_off_intercept, (0.0,)),
+    }
+    least = np.array([one.std for name in estimate.parameters if (one := wider[name]) is not None])
+    covariance = widened_covariance(estimate.covariance_matrix, least)
+    return replace(estimate, runs=runs, covariance=tuple(map(tuple, covariance.tolist())), **wider)
+
+
+def _reaching(
+    found: Quantity | None, factors: Sequence[float], others: Sequence[float] = ()
+) -> Quantity | None:
+    """A quantity whose distribution reaches other values, and its own times factors."""
+    if found is None:
+        return None
+    away = [abs(factor - 1.0) * abs(found.value) for factor in factors]
+    away += [abs(other - found.value) for other in others]
+    std = max(found.std, max(away) / sqrt(3.0))
+    interval = found.interval
+    if interval is not None and std > found.std:
+        half = float(ndtri(0.975)) * std
+        interval = min(interval[0], found.value - half), max(interval[1], found.value + half)
+    return replace(found, std=std, interval=interval)

@@ -1,1 +1,0 @@
-"""Linear algebra and statistics that every estimator shares."""
