@@ -30,8 +30,7 @@ from diagnosis.fitting.starting_points import StartingPoint, nominal_start, star
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.engine.model import Model, build_model
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
-from tunnel_sim.physics.release import released_by_spring_end
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings, released_by_spring_end
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
 

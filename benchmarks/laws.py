@@ -20,7 +20,7 @@ from diagnosis.blind.files import KEY
 from diagnosis.investigate import investigate
 from diagnosis.law.explain import closable
 from identification.statistics import Proportion
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_folder import read_campaign
 
 STATE = ("angle", "rate", "state")
 TIME = ("time", "event")

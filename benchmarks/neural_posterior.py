@@ -27,7 +27,7 @@ from identification.neural.posterior.network import distribution, forward, varia
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_lab.experiments.training import INPUTS, FitSpec, fit, losses, start_state, usable
 from tunnel_lab.experiments.training_samples import read_shards
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
 
 NAMES = ("cn_beta", "cn_r")

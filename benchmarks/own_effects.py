@@ -24,8 +24,7 @@ from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.aero import AeroDerivatives
-from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, Truth
+from tunnel_sim.vocabulary.plan import AeroDerivatives, CampaignPlan, Condition, EffectSetting, Truth
 
 RUN = RunSettings(
     16.12, AeroDerivatives(0.35, -0.7), 0.1014, 0.018,

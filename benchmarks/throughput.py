@@ -21,7 +21,7 @@ from rich.table import Table
 from tunnel_sim.engine.model import build_model, build_spec
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
-from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.plan import AeroDerivatives
 
 LINEAR = RunSettings(
     16.12, AeroDerivatives(0.35, -0.7), 0.1014, 0.018, wind_speed=20.0, air_density=1.204, release_angle=0.3

@@ -10,7 +10,7 @@ import csv
 from dataclasses import dataclass
 from importlib import resources
 
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 

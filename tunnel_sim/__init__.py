@@ -12,14 +12,20 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.model import build_model
     from tunnel_sim.engine.simulate import simulate
     from tunnel_sim.engine.virtual_campaign import simulate_campaign, simulate_campaigns
-    from tunnel_sim.files.campaign_io import read_campaign, write_campaign
+    from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
     from tunnel_sim.files.plan_file import load_plan, paper_plan
     from tunnel_sim.files.rig_file import load_rig
     from tunnel_sim.physics.run_settings import RunSettings
-    from tunnel_sim.vocabulary.aero import AeroDerivatives
     from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
     from tunnel_sim.vocabulary.errors import TunnelError
-    from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
+    from tunnel_sim.vocabulary.plan import (
+        AeroDerivatives,
+        CampaignPlan,
+        Condition,
+        EffectSetting,
+        SensorModel,
+        Truth,
+    )
     from tunnel_sim.vocabulary.record import Record
     from tunnel_sim.vocabulary.rig import Rig
 else:
@@ -30,14 +36,13 @@ else:
             ".engine.model": "build_model",
             ".engine.simulate": "simulate",
             ".engine.virtual_campaign": "simulate_campaign simulate_campaigns",
-            ".files.campaign_io": "read_campaign write_campaign",
+            ".files.campaign_folder": "read_campaign write_campaign",
             ".files.plan_file": "load_plan paper_plan",
             ".files.rig_file": "load_rig",
             ".physics.run_settings": "RunSettings",
-            ".vocabulary.aero": "AeroDerivatives",
             ".vocabulary.campaign": "Campaign RigProperties Run SensorProperties",
             ".vocabulary.errors": "TunnelError",
-            ".vocabulary.plan": "CampaignPlan Condition EffectSetting SensorModel Truth",
+            ".vocabulary.plan": "AeroDerivatives CampaignPlan Condition EffectSetting SensorModel Truth",
             ".vocabulary.record": "Record",
             ".vocabulary.rig": "Rig",
         },

@@ -19,8 +19,7 @@ from diagnosis.fitting.problem import (
 from diagnosis.fitting.run_data import RunData
 from diagnosis.policy import CONFIRMATION_TOLERANCE
 from diagnosis.result import Confirmation
-from tunnel_sim.physics.motion import Motion
-from tunnel_sim.physics.release import released_by_spring_end
+from tunnel_sim.physics.run_settings import Motion, released_by_spring_end
 from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array

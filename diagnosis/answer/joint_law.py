@@ -9,10 +9,9 @@ import numpy as np
 
 from diagnosis.fitting.problem import Problem, condensed
 from tunnel_sim.engine.joint_patch import JointPatch, Start
-from tunnel_sim.physics.expression import Expression, parse
+from tunnel_sim.physics.expression import OF_ANGLE, OF_RATE, TEXTBOOK_POWERS, Expression, parse
 from tunnel_sim.physics.moment_law import operation_names
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.term_expressions import OF_ANGLE, OF_RATE, TEXTBOOK_POWERS
 from tunnel_sim.vocabulary.record import Array
 
 _FAITHFUL = 0.02  # of a moment's greatest value: what a polynomial may miss of it

@@ -14,7 +14,7 @@ from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.problem import Problem, blocks_beyond, sample_means
 from diagnosis.patch import NativeClosure
 from tunnel_sim.engine.joint_patch import Start
-from tunnel_sim.physics.motion import Motion
+from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 

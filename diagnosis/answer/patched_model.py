@@ -16,7 +16,7 @@ from diagnosis.patch import PatchedModel
 from diagnosis.study import Study
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import JointPatch, Start, patched, patched_xml, simulate_joint
-from tunnel_sim.physics.motion import Motion
+from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array

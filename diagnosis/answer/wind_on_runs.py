@@ -6,7 +6,7 @@ import math
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.spectra import linear_coefficients
-from tunnel_sim.effects.fitting import WindOnRun
+from tunnel_sim.effects.parameters import WindOnRun
 
 
 def wind_on_runs(fit: Fit) -> list[WindOnRun]:

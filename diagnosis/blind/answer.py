@@ -19,9 +19,9 @@ from diagnosis.blind.files import (
     write_document,
 )
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.effects_file import read_effects
+from tunnel_sim.effects.expression_effect import read_effects
 from tunnel_sim.effects.registry import answering_with
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.writing import output_folder
 from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError

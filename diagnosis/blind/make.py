@@ -12,9 +12,8 @@ from tunnel_reference.draw import DEFAULT_SHARES, Mixture, redraw
 from tunnel_reference.make import as_campaign, draw_set, simulate_set, truth_of
 from tunnel_reference.separable import ATTEMPTS
 from tunnel_reference.severity import Simulated
-from tunnel_sim.files.campaign_io import write_campaign
-from tunnel_sim.files.leftovers import clear_leftovers
-from tunnel_sim.files.writing import whole_folder
+from tunnel_sim.files.campaign_folder import write_campaign
+from tunnel_sim.files.writing import clear_leftovers, whole_folder
 from tunnel_sim.vocabulary.errors import TunnelError
 
 CHUNK = 100

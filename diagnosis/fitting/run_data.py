@@ -13,8 +13,8 @@ from diagnosis.fitting.similarity import AS_MEASURED, REFERENCE_FREQUENCY, Simil
 from diagnosis.fitting.whitening import WHITE, colour, colouring, response, whiten
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.aero import aerodynamic_stiffness
 from tunnel_sim.vocabulary.joint_law import JointLaw
+from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array
 
 

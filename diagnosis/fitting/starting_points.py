@@ -20,8 +20,7 @@ from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.free_decay import Decay
 from identification.signal.frequency import peak_of_swing, starting_decay
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.fitting import Circumstances, Trial
-from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
 from tunnel_sim.vocabulary.record import Array, Record
 
 _STILL = 0.02  # of the largest swing, below which a run or a stretch of it counts as at rest

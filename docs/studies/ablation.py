@@ -30,7 +30,7 @@ from diagnosis.attribution import decide
 from diagnosis.attribution.decide import UNKNOWN, FittedSet, Weighed
 from diagnosis.fitting.channels import Misfit
 from diagnosis.policy import DECIDED_FROM
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 WEIGHING = (

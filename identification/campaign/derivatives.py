@@ -34,9 +34,9 @@ from identification.estimate import (
 from identification.policy import LEAST_SPRING_SPREAD, MISFIT_RATE
 from identification.signal.free_decay import Decay
 from identification.statistics import determined, inverse, scaled_solve
-from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, needs_density
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array
 
 # Smallest singular value of two columns of unit length, for two runs whose springs or speeds just count as

@@ -11,7 +11,7 @@ from decay_oracle import Oracle
 
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
-from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.plan import AeroDerivatives
 
 RIG = load_rig()
 DURATION, SAMPLE_RATE = 4.0, 1000.0

@@ -128,7 +128,7 @@ def test_under_the_operator_the_sensitivities_are_those_of_differences() -> None
 
     def reading(**changes: float) -> np.ndarray:
         from tunnel_sim.physics.run_settings import RunSettings, Series
-        from tunnel_sim.vocabulary.aero import AeroDerivatives
+        from tunnel_sim.vocabulary.plan import AeroDerivatives
 
         truth = {**TRUTH, "release_angle": 0.25, "release_rate": 0.0, **changes}
         settings = RunSettings(

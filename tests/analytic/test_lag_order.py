@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.physics.moment_law import state_names, state_vector
-from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 
 STEPS = np.array([8e-3, 4e-3, 2e-3])
 

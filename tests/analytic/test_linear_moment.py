@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from decay_oracle import AREA, LENGTH, closed_form
 
-from tunnel_sim.engine.model import build_model
-from tunnel_sim.engine.plugin import load_plugin
+from tunnel_sim.engine.model import build_model, load_plugin
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.aero import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.plan import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
 
 RIG = load_rig()
 DERIVATIVES = AeroDerivatives(cn_beta=0.35, cn_r=-0.7)

@@ -16,9 +16,13 @@ from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.steps import BODY_TURN, FREQUENCY_ERROR, follow_fastest
-from tunnel_sim.vocabulary.aero import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.plan import (
+    AeroDerivatives,
+    SensorModel,
+    aerodynamic_damping,
+    aerodynamic_stiffness,
+)
 
 RIG = load_rig()
 AIR = AeroDerivatives(0.35, -0.7)

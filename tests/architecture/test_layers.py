@@ -85,7 +85,7 @@ def test_the_import_contracts_hold() -> None:
         ("tunnel_sim/physics/steps.py", "import tunnel_sim.effects.base"),
         ("identification/statistics.py", "import identification.signal.peaks"),
         ("diagnosis/result.py", "import diagnosis.study"),
-        ("tunnel_reference/forms.py", "import tunnel_sim.physics.motion"),
+        ("tunnel_reference/forms.py", "import tunnel_sim.physics.run_settings"),
         ("tunnel_lab/cli.py", "import tunnel_reference.forms"),
         ("tunnel_lab/bench/work.py", "import tunnel_lab.cli"),
     ],

@@ -122,7 +122,7 @@ def test_the_plan_shown_can_be_simulated(tmp_path: Path) -> None:
 
 
 def test_the_measured_campaign_shown_can_be_read(tmp_path: Path) -> None:
-    from tunnel_sim.files.campaign_io import read_campaign
+    from tunnel_sim.files.campaign_folder import read_campaign
 
     (tmp_path / "campaign.toml").write_text(toml_block("first-swing"), encoding="utf-8")
     (tmp_path / "runs").mkdir()

@@ -64,7 +64,7 @@ def _written(path: Path, content: bytes, rng: Rng) -> Path:
 
 def campaign_toml(folder: Path, rng: Rng) -> None:
     """``campaign.toml`` changed, its runs whole."""
-    from tunnel_sim.files.campaign_io import read_campaign
+    from tunnel_sim.files.campaign_folder import read_campaign
 
     for name in ("r1.csv", "r2.parquet"):
         (folder / name).write_bytes(seeds.run_file(name))
@@ -73,7 +73,7 @@ def campaign_toml(folder: Path, rng: Rng) -> None:
 
 
 def _campaign_of(folder: Path, name: str, content: bytes, rng: Rng) -> None:
-    from tunnel_sim.files.campaign_io import read_campaign
+    from tunnel_sim.files.campaign_folder import read_campaign
 
     document = seeds.campaign_document()
     run = next(one for one in document["runs"] if one["file"] == name)
@@ -125,7 +125,7 @@ def import_hdf5(folder: Path, rng: Rng) -> None:
 
 def _read_log(path: Path, **choices: Any) -> None:
     """Read a file of an instrument; a reader that ends its process by an exception is a finding."""
-    from tunnel_sim.files.importing.choices import ImportChoices
+    from tunnel_sim.files.importing.conditions import ImportChoices
     from tunnel_sim.files.importing.records import read_records
 
     try:
@@ -191,9 +191,9 @@ def kinds_option(_folder: Path, rng: Rng) -> None:
 
 def effects_file(folder: Path, rng: Rng) -> None:
     """An effects file changed, or a formula in it; what is accepted is made, weighed and compiled."""
-    from tunnel_sim.effects.effects_file import read_effects
+    from tunnel_sim.effects.expression_effect import read_effects
     from tunnel_sim.physics.run_settings import RunSettings
-    from tunnel_sim.vocabulary.aero import AeroDerivatives
+    from tunnel_sim.vocabulary.plan import AeroDerivatives
 
     document = seeds.effects_document()
     if rng.random() < 0.6:

@@ -23,7 +23,7 @@ def accepted_campaign(folder: Path, rng: Rng) -> Campaign:
     Raises:
         TunnelError: when the reader, or the writer for it, refuses the campaign.
     """
-    from tunnel_sim.files.campaign_io import read_campaign, write_campaign
+    from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 
     return read_campaign(write_campaign(degenerate(rng), folder / "campaign"))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from tests.reference.effect_oracle import Setting
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.plan import AeroDerivatives
 
 _PAGE = Path(__file__).parents[2] / "docs" / "reference" / "effects.md"
 _ROW = re.compile(r"^\| \[`(\w+)`\]\(#\w+\) \| (\w+) \| (\w+) \|", re.MULTILINE)

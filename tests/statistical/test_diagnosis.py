@@ -20,7 +20,7 @@ from tests.reference.free_decays import RESOLUTION, Setting, campaign, with_reco
 from tests.reference.rigs import rig
 from tunnel_reference import draw
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.vocabulary.plan import EffectSetting
 

@@ -21,8 +21,8 @@ from tunnel_reference.conditions import Conditions
 from tunnel_reference.forcings import turbulence
 from tunnel_sim.effects.buffeting import Buffeting
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Record
 
 pytestmark = pytest.mark.slow

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tunnel_sim.files.leftovers import temporary_names
+from tunnel_sim.files.writing import temporary_names
 
 
 def names_of_the_dead(target: Path) -> tuple[Path, Path]:

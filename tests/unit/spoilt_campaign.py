@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 HEAD = 'schema_version = 1\n[campaign]\nname = "c"\n'

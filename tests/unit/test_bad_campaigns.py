@@ -15,7 +15,7 @@ from tests.unit.spoilt_campaign import (
     refusal,
     swap,
 )
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 

@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from tests.unit.spoilt_campaign import GOOD, LINES, TIME, YAW, csv, good_campaign, in_run, refusal, swap
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_folder import read_campaign
 
 
 @pytest.fixture

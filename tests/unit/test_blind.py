@@ -18,7 +18,7 @@ from tests.unit.test_blind_score import document
 from tunnel_lab.cli import main
 from tunnel_reference import draw
 from tunnel_reference.draw import Mixture
-from tunnel_sim.files.campaign_io import read_campaign, write_campaign
+from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 

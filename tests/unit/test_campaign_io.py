@@ -12,8 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tunnel_sim.files import campaign_io
-from tunnel_sim.files.campaign_io import read_campaign, write_campaign
+from tunnel_sim.files import campaign_folder
+from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.run_files import read_table, table_bytes
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
@@ -290,7 +290,7 @@ def test_a_disk_that_fails_leaves_the_old_campaign_and_no_litter(
             raise OSError(28, "No space left on device")
         return table_bytes(record, path, quantity)
 
-    monkeypatch.setattr(campaign_io, "table_bytes", full)
+    monkeypatch.setattr(campaign_folder, "table_bytes", full)
     for target in (folder, tmp_path / "other"):
         with pytest.raises(TunnelError, match="no space left on device"):
             write_campaign(campaign(), target, overwrite=True)
@@ -302,11 +302,11 @@ def test_a_campaign_written_meanwhile_is_kept(tmp_path: Path, monkeypatch: pytes
     other = replace(campaign(), name="the other")
 
     def overtaken(record: Record, path: Path, quantity: Quantity) -> bytes:
-        monkeypatch.setattr(campaign_io, "table_bytes", table_bytes)
+        monkeypatch.setattr(campaign_folder, "table_bytes", table_bytes)
         write_campaign(other, tmp_path / "c")
         return table_bytes(record, path, quantity)
 
-    monkeypatch.setattr(campaign_io, "table_bytes", overtaken)
+    monkeypatch.setattr(campaign_folder, "table_bytes", overtaken)
     with pytest.raises(TunnelError, match="c: the folder exists"):
         write_campaign(campaign(), tmp_path / "c")
     assert read_campaign(tmp_path / "c").name == "the other"
@@ -351,7 +351,7 @@ def test_the_toml_itself_may_be_named(tmp_path: Path) -> None:
 
 def test_reading_imports_no_engine() -> None:
     code = (
-        "import sys, tunnel_sim.files.campaign_io, identification.datasets\n"
+        "import sys, tunnel_sim.files.campaign_folder, identification.datasets\n"
         "sys.exit(bool({'mujoco', 'torch', 'matplotlib'} & sys.modules.keys()))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

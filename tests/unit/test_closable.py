@@ -34,7 +34,7 @@ from tunnel_reference.outside import OUTSIDE_FORMS
 from tunnel_reference.outside_laws import LAW_FORMS
 from tunnel_reference.severity import read_and_fit, simulate_motions
 from tunnel_sim.effects import effect_class
-from tunnel_sim.effects.effects_file import read_effects
+from tunnel_sim.effects.expression_effect import read_effects
 from tunnel_sim.vocabulary.units import dimension, dimension_text
 
 RUNS = rig(

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunnel_sim.vocabulary.cycles import count_cycles
-from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.record import Record, count_cycles
 
 NOISE = np.random.default_rng(3).standard_normal(10000)
 SECONDS = np.arange(10000) / 1000.0

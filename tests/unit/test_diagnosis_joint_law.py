@@ -18,7 +18,7 @@ from diagnosis.fitting.similarity import similar_campaign
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
 from tunnel_sim.engine.joint_patch import Start, patched, simulate_joint
-from tunnel_sim.physics.motion import Motion
+from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 

@@ -21,7 +21,7 @@ from tunnel_sim.effects import ALL_EFFECTS, EffectChain, effect_from
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Record
 
 #: Effects of every channel and unit, of a size that shows. Their wind speeds and angles stay as they are.

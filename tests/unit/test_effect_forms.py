@@ -10,8 +10,7 @@ import pytest
 from tests.reference.effect_cases import VALUES, settings
 from tests.reference.effect_oracle import Setting
 from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
-from tunnel_sim.effects.fitting import WindOnRun
-from tunnel_sim.effects.parameters import SWING
+from tunnel_sim.effects.parameters import SWING, WindOnRun
 
 TIME = np.linspace(0.0, 10.0, 1001)
 ANGLE = 0.3 * np.exp(-0.1 * TIME) * np.cos(9.0 * TIME)

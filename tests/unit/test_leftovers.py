@@ -13,9 +13,8 @@ import pytest
 
 from tests.reference.free_decays import Setting, campaign
 from tests.unit.killed import names_of_the_dead
-from tunnel_sim.files.campaign_io import read_campaign, write_campaign
-from tunnel_sim.files.leftovers import clear_leftovers, temporary_names
-from tunnel_sim.files.writing import whole_folder, write_whole
+from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
+from tunnel_sim.files.writing import clear_leftovers, temporary_names, whole_folder, write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
 
 

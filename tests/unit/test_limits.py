@@ -20,9 +20,8 @@ from tunnel_lab.experiments.score_trials import score_grid
 from tunnel_lab.experiments.sweep import read_sweep
 from tunnel_lab.experiments.sweep_cases import Sweep
 from tunnel_sim.engine.virtual_campaign import run_settings
-from tunnel_sim.files.plan_file import load_plan, paper_plan
-from tunnel_sim.files.plan_schema import first_twice
-from tunnel_sim.physics.motion import sampling
+from tunnel_sim.files.plan_file import first_twice, load_plan, paper_plan
+from tunnel_sim.physics.run_settings import sampling
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 

@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from tunnel_sim.engine import scenery
+from tunnel_sim.engine import model
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.aero import AeroDerivatives
-from tunnel_sim.vocabulary.davis import davis_vertices
+from tunnel_sim.vocabulary.plan import AeroDerivatives
+from tunnel_sim.vocabulary.rig import davis_vertices
 
 RIG = load_rig()
 PIECES = {
-    "floor": scenery.floor(RIG.working_section),
-    "glass": scenery.glass(RIG.working_section),
-    "frame": scenery.frame(RIG),
-    "marks": scenery.marks(RIG),
-    "coil": scenery.coil(0.05, 0.005, 1.0, 1.2, 5),
+    "floor": model.floor(RIG.working_section),
+    "glass": model.glass(RIG.working_section),
+    "frame": model.frame(RIG),
+    "marks": model.marks(RIG),
+    "coil": model.coil(0.05, 0.005, 1.0, 1.2, 5),
 }
 
 
@@ -42,7 +42,7 @@ def test_rear_slant_has_its_angle() -> None:
 
 
 @pytest.mark.parametrize("piece", PIECES.values(), ids=PIECES)
-def test_surface_is_closed_and_faces_outward(piece: scenery.Mesh) -> None:
+def test_surface_is_closed_and_faces_outward(piece: model.Mesh) -> None:
     edges = Counter()
     for a, b, c in piece.faces.tolist():
         edges.update([(a, b), (b, c), (c, a)])
@@ -53,14 +53,14 @@ def test_surface_is_closed_and_faces_outward(piece: scenery.Mesh) -> None:
     assert volume > 0.0
 
 
-def ends(piece: scenery.Mesh) -> list[float]:
+def ends(piece: model.Mesh) -> list[float]:
     """Least x, y and z, then greatest x, y and z, m."""
     return [*piece.vertices.min(axis=0), *piece.vertices.max(axis=0)]
 
 
 def test_a_box_reaches_from_corner_to_corner() -> None:
-    assert ends(scenery.box((1.0, -2.0, 3.0), (1.5, 4.0, 7.0))) == [1.0, -2.0, 3.0, 1.5, 4.0, 7.0]
-    quarter = scenery.box((1.0, -2.0, 3.0), (1.5, 4.0, 7.0), np.pi / 2.0)
+    assert ends(model.box((1.0, -2.0, 3.0), (1.5, 4.0, 7.0))) == [1.0, -2.0, 3.0, 1.5, 4.0, 7.0]
+    quarter = model.box((1.0, -2.0, 3.0), (1.5, 4.0, 7.0), np.pi / 2.0)
     assert ends(quarter) == pytest.approx([-4.0, 1.0, 3.0, 2.0, 1.5, 7.0])
 
 

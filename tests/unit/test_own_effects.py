@@ -22,7 +22,7 @@ from tunnel_sim.effects import (
     register_effect,
     registry,
 )
-from tunnel_sim.effects.effects_file import read_effects
+from tunnel_sim.effects.expression_effect import read_effects
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.engine.effect_laws import WIND_ON

@@ -5,9 +5,8 @@ import pytest
 
 from tunnel_sim.files.plan_file import load_plan, paper_plan
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import EffectSetting, SensorModel
+from tunnel_sim.vocabulary.plan import EffectSetting, SensorModel, aerodynamic_damping, aerodynamic_stiffness
 
 SMALL = """
 name = "two"

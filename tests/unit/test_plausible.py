@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunnel_sim.files.campaign_io import read_campaign, write_campaign
+from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.plausible import RANGES, plausible_values
 from tunnel_sim.vocabulary.errors import TunnelError
 

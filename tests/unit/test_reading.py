@@ -20,7 +20,7 @@ from tunnel_lab.commands.springs import read_spring_table
 from tunnel_lab.experiments.score_grid import load_grid
 from tunnel_lab.experiments.score_trials import read_trials
 from tunnel_lab.experiments.sweep import open_store, read_sweep
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.reading import check_count, parse_json, read_json, read_regular
 from tunnel_sim.files.rig_file import load_rig

@@ -15,11 +15,9 @@ from tunnel_sim.engine.model import build_model, build_spec, numerics
 from tunnel_sim.engine.simulate import simulate, simulate_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.moment_law import parameter_names
-from tunnel_sim.physics.motion import Motion
-from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
-from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.physics.run_settings import Motion, RodTwist, RunSettings, Series
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel
 
 NOT_TERMS = {"air_density", "frontal_area", "reference_length", "width", "cn_beta", "cn_r"}
 NOT_TERMS |= {"spring_stiffness", "mechanical_damping", "yaw_inertia"}

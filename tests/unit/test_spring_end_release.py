@@ -2,9 +2,8 @@
 
 import pytest
 
-from tunnel_sim.physics.release import released_by_spring_end, spring_end_angle
-from tunnel_sim.physics.run_settings import RodTwist, RunSettings
-from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings, released_by_spring_end, spring_end_angle
+from tunnel_sim.vocabulary.plan import AeroDerivatives
 
 SPRING, COMPLIANCE = 44.84, 3e-3
 

@@ -24,8 +24,8 @@ from tunnel_sim.physics.steps import (
     report_substeps,
     whole_steps,
 )
-from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import AeroDerivatives
 
 RIG = load_rig()
 PLAIN = RunSettings(

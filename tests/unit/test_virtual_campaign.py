@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign, truth_document
-from tunnel_sim.files.campaign_io import read_campaign, write_campaign
+from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.campaign import Campaign

@@ -11,9 +11,9 @@ from nicegui import events, ui
 
 from tunnel_lab.bench.parts import Fault, Frame
 from tunnel_lab.bench.workspace import Session
-from tunnel_sim.files.campaign_schema import CAMPAIGN_FILE, NO_CAMPAIGN, parse_document
-from tunnel_sim.files.importing.choices import RIG_KEYS, RUN_KEYS, Conditions
-from tunnel_sim.files.importing.writing import ORIGINAL, campaign_text
+from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, NO_CAMPAIGN, parse_document
+from tunnel_sim.files.importing.conditions import RIG_KEYS, RUN_KEYS, Conditions
+from tunnel_sim.files.importing.records import ORIGINAL, campaign_text
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.toml_input import load_toml, one_line, validate

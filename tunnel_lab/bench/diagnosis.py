@@ -437,7 +437,7 @@ def write_session_report(session: Session, author: str, notes: str) -> None:
     """
     from diagnosis.detection.limit_cycles import diagnosable
     from tunnel_lab.report import Byline, write_report
-    from tunnel_sim.files.campaign_io import read_campaign
+    from tunnel_sim.files.campaign_folder import read_campaign
 
     document = read_result(session.diagnosis)
     assert document is not None  # else the stage is closed

@@ -13,7 +13,7 @@ from nicegui import events, ui
 
 from tunnel_lab.bench.parts import show_command
 from tunnel_lab.bench.workspace import Session
-from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
+from tunnel_sim.files.importing.conditions import ImportChoices, read_recipe
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -221,7 +221,7 @@ class ChoicesPart:
     """
 
     def __init__(self, session: Session, columns: list[str], changed: Changed) -> None:
-        from tunnel_sim.files.importing.units import UNITS
+        from tunnel_sim.files.importing.tables import UNITS
 
         self._now = choices_of(session)
         self._changed = changed

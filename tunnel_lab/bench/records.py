@@ -214,7 +214,7 @@ def write(session: Session, imported: Imported) -> None:
     """
     from tunnel_lab.bench import conditions
     from tunnel_lab.plotting.runs import import_picture
-    from tunnel_sim.files.importing.writing import write_imported
+    from tunnel_sim.files.importing.records import write_imported
 
     before = conditions.stated(session) if session.imported else None
     write_imported(imported, session.campaign, overwrite=True, picture=import_picture)
@@ -229,7 +229,7 @@ def _as_it_is(session: Session) -> None:
     place = ui.element("div")
 
     async def show() -> None:
-        from tunnel_sim.files.campaign_io import read_campaign
+        from tunnel_sim.files.campaign_folder import read_campaign
 
         with fault.around():
             campaign = await asyncio.to_thread(read_campaign, session.campaign)

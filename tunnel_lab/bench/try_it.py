@@ -14,15 +14,14 @@ from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Chart, Fault, address, button
 from tunnel_lab.bench.workspace import new_session
 from tunnel_sim.effects import Effect, EffectChain, effect_class
-from tunnel_sim.engine.sensor import read_motion
+from tunnel_sim.engine.simulate import read_motion
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.steps import follow_fastest
-from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel
 from tunnel_sim.vocabulary.record import Array
 
 _SLIDERS = {

@@ -226,7 +226,7 @@ def end_fits() -> None:
 @lru_cache(maxsize=2)
 def _by_hand(campaign: Path, state: State) -> ByHand:
     from diagnosis.by_hand import ByHand
-    from tunnel_sim.files.campaign_io import read_campaign
+    from tunnel_sim.files.campaign_folder import read_campaign
 
     del state  # part of the key only
     return ByHand(read_campaign(campaign))

@@ -38,7 +38,7 @@ def run(
     from importlib.util import find_spec
     from urllib.parse import quote
 
-    from tunnel_sim.files.campaign_schema import CAMPAIGN_FILE
+    from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE
     from tunnel_sim.files.writing import output_folder
     from tunnel_sim.vocabulary.errors import TunnelError
 

@@ -113,7 +113,7 @@ def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Es
     from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import console
     from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
-    from tunnel_sim.files.campaign_io import write_campaign
+    from tunnel_sim.files.campaign_folder import write_campaign
     from tunnel_sim.files.writing import write_json
 
     with bar("simulating runs", len(plan.conditions)) as progress:

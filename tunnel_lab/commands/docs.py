@@ -36,8 +36,7 @@ def run(
     """
     from tunnel_lab.terminal import tables
     from tunnel_sim.files.writing import output_folder
-    from tunnel_sim.vocabulary.errors import TunnelError, shown
-    from tunnel_sim.vocabulary.extras import library
+    from tunnel_sim.vocabulary.errors import TunnelError, library, shown
 
     if not (source / "conf.py").is_file():
         raise TunnelError(

@@ -70,7 +70,7 @@ def versions() -> Iterator[tuple[str, str]]:
 
 def native() -> Iterator[tuple[str, str]]:
     """Compiler and compiled libraries."""
-    from tunnel_sim.physics.native import native_library
+    from tunnel_sim.physics.moment_law import native_library
     from tunnel_sim.vocabulary.errors import TunnelError
 
     yield "C compiler", compiler()
@@ -106,7 +106,7 @@ def extras() -> Iterator[tuple[str, str]]:
     """The extras and what each lacks."""
     from importlib.util import find_spec
 
-    from tunnel_sim.vocabulary.extras import EXTRAS
+    from tunnel_sim.vocabulary.errors import EXTRAS
 
     for extra, modules in EXTRAS.items():
         missing = [name for name in modules if find_spec(name) is None]

@@ -45,7 +45,7 @@ def run(
       0 written, 2 bad input; the file is written completely or not at all.
     """
     from tunnel_lab.terminal.tables import say
-    from tunnel_sim.files.campaign_io import read_campaign
+    from tunnel_sim.files.campaign_folder import read_campaign
     from tunnel_sim.files.exporting import export_campaign
     from tunnel_sim.files.writing import refuse_unwritable
 

@@ -111,9 +111,8 @@ def run(
     from tunnel_lab.plotting.runs import import_picture
     from tunnel_lab.terminal.outputs import show_import
     from tunnel_lab.terminal.tables import say
-    from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
-    from tunnel_sim.files.importing.records import read_records
-    from tunnel_sim.files.importing.writing import write_imported
+    from tunnel_sim.files.importing.conditions import ImportChoices, read_recipe
+    from tunnel_sim.files.importing.records import read_records, write_imported
     from tunnel_sim.files.toml_input import validate
     from tunnel_sim.files.writing import refuse_unwritable, write_whole
     from tunnel_sim.vocabulary.errors import TunnelError
@@ -161,7 +160,7 @@ def settings_of(words: list[str]) -> dict[str, float]:
     Args:
         words: each of the form ``key=number``, or several of them with commas between.
     """
-    from tunnel_sim.files.importing.choices import parse_setting
+    from tunnel_sim.files.importing.conditions import parse_setting
 
     values: dict[str, float] = {}
     for word in words:

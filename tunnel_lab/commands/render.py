@@ -90,8 +90,7 @@ def _film(request: Request, look: Look, path: Path) -> None:
 def _targets(out: list[Path] | None) -> list[Path]:
     """The files to write; those that cannot be written are refused before the work."""
     from tunnel_sim.files.writing import output_folder
-    from tunnel_sim.vocabulary.errors import TunnelError
-    from tunnel_sim.vocabulary.extras import library
+    from tunnel_sim.vocabulary.errors import TunnelError, library
 
     targets = out if out else list(_DEFAULT)
     for path in targets:

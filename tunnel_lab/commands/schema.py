@@ -13,13 +13,13 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def _campaign() -> dict[str, Any]:
-    from tunnel_sim.files.campaign_schema import CampaignDocument
+    from tunnel_sim.files.campaign_folder import CampaignDocument
 
     return CampaignDocument.model_json_schema()
 
 
 def _plan() -> dict[str, Any]:
-    from tunnel_sim.files.plan_schema import PlanDocument
+    from tunnel_sim.files.plan_file import PlanDocument
 
     return PlanDocument.model_json_schema()
 

@@ -206,7 +206,7 @@ def _keep(out: Path, results: Results) -> list[Path]:
 
 def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
     """Refuse a folder that holds anything but an interrupted score, unless ``overwrite``."""
-    from tunnel_sim.files.leftovers import clear_leftovers
+    from tunnel_sim.files.writing import clear_leftovers
     from tunnel_sim.vocabulary.errors import TunnelError
 
     if out is None or not out.exists():

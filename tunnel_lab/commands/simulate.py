@@ -72,7 +72,7 @@ def run(
     from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign, truth_document
-    from tunnel_sim.files.campaign_io import write_campaign
+    from tunnel_sim.files.campaign_folder import write_campaign
     from tunnel_sim.files.plan_file import load_plan
 
     del effects_file  # its effects are known already
@@ -101,7 +101,7 @@ def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
     Raises:
         TunnelError: when it is a file, or exists and may not be replaced.
     """
-    from tunnel_sim.files.leftovers import clear_leftovers
+    from tunnel_sim.files.writing import clear_leftovers
     from tunnel_sim.vocabulary.errors import TunnelError
 
     clear_leftovers(folder.resolve().parent)  # restore what a killed command had set aside

@@ -17,8 +17,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from tunnel_sim.processes import in_processes
-from tunnel_sim.vocabulary.errors import TunnelError, one_line
-from tunnel_sim.vocabulary.extras import library
+from tunnel_sim.vocabulary.errors import TunnelError, library, one_line
 
 if TYPE_CHECKING:
     from distributed import Client

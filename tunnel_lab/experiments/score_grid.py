@@ -20,8 +20,8 @@ from pydantic import Field, TypeAdapter
 
 from tunnel_lab.terminal.inputs import NO_EFFECT, parse_effect
 from tunnel_sim.effects import Effect, EffectChain, effect_from
-from tunnel_sim.engine.sensor import read_motion
-from tunnel_sim.files.plan_schema import check_size, first_twice
+from tunnel_sim.engine.simulate import read_motion
+from tunnel_sim.files.plan_file import check_size, first_twice
 from tunnel_sim.files.reading import as_described, check_count, check_shape
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, read_document, shown
@@ -29,10 +29,9 @@ from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.steps import follow_fastest, whole_steps
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import SensorModel, Truth
+from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel, Truth
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
 

@@ -24,13 +24,12 @@ from tunnel_lab.experiments.runner import Progress, Workers, run_tasks
 from tunnel_lab.experiments.sweep_cases import Case, Sweep, SweepDocument, check_sweep_size
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.effects import effect_class
-from tunnel_sim.files.leftovers import clear_leftovers
-from tunnel_sim.files.plan_schema import check_conditions, first_twice
+from tunnel_sim.files.plan_file import check_conditions, first_twice
 from tunnel_sim.files.reading import as_described, frame_schema, read_frame, read_json, read_regular
 from tunnel_sim.files.rig_file import parse_rig, rig_document
 from tunnel_sim.files.toml_input import load_toml, shown, validate
-from tunnel_sim.files.writing import output_folder, write_json, write_whole
-from tunnel_sim.physics.motion import sampling
+from tunnel_sim.files.writing import clear_leftovers, output_folder, write_json, write_whole
+from tunnel_sim.physics.run_settings import sampling
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 

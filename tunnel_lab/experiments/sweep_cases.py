@@ -19,8 +19,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from tunnel_lab.terminal.inputs import NO_EFFECT
-from tunnel_sim.files.plan_file import plan_from
-from tunnel_sim.files.plan_schema import (
+from tunnel_sim.files.plan_file import (
     STEPS_PER_SECOND,
     EffectTable,
     NotNegative,
@@ -32,6 +31,7 @@ from tunnel_sim.files.plan_schema import (
     Stiffnesses,
     WindSpeeds,
     check_size,
+    plan_from,
     run_count,
 )
 from tunnel_sim.files.reading import as_described, check_count, parse_json

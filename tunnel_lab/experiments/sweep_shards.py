@@ -25,9 +25,8 @@ from tunnel_lab.experiments.sweep_cases import Case, Sweep
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.toml_input import one_line
-from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import Condition, EffectSetting
+from tunnel_sim.vocabulary.plan import Condition, EffectSetting, aerodynamic_damping, aerodynamic_stiffness
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate, Quantity, RunEstimate

@@ -35,9 +35,15 @@ from tunnel_lab.plotting.style import (
 from tunnel_lab.terminal.inputs import parse_effect
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.plan import CampaignPlan, EffectSetting, SensorModel, Truth
+from tunnel_sim.vocabulary.plan import (
+    CampaignPlan,
+    EffectSetting,
+    SensorModel,
+    Truth,
+    aerodynamic_damping,
+    aerodynamic_stiffness,
+)
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:

@@ -20,9 +20,8 @@ from tunnel_lab.paper.page import Picture, Section, scaled, signed
 from tunnel_lab.plotting.style import BLUE, COLOURS, VERMILION, WIDTH, figure, grid, save_both, styled
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import CampaignPlan
+from tunnel_sim.vocabulary.plan import CampaignPlan, aerodynamic_damping, aerodynamic_stiffness
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

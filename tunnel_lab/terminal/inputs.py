@@ -35,8 +35,7 @@ def given_campaign(path: Path) -> Campaign:
         TunnelError: for the first fault.
     """
     from tunnel_lab.terminal.tables import say
-    from tunnel_sim.files.campaign_io import read_campaign
-    from tunnel_sim.files.campaign_schema import CAMPAIGN_FILE
+    from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, read_campaign
     from tunnel_sim.vocabulary.errors import TunnelError, shown
 
     if not path.is_file() or path.name == CAMPAIGN_FILE:
@@ -68,7 +67,7 @@ def file_hashes(path: Path) -> dict[str, str]:
     Returns:
         Hexadecimal digests by name in the campaign's folder: ``campaign.toml`` and the runs, or the one file.
     """
-    from tunnel_sim.files.campaign_schema import CAMPAIGN_FILE, read_document
+    from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, read_document
     from tunnel_sim.vocabulary.errors import one_line
 
     if path.is_file() and path.name != CAMPAIGN_FILE:

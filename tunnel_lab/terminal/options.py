@@ -47,7 +47,7 @@ _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 def _know_effects(context: typer.Context, path: Path | None) -> Path | None:
     """Make the effects of a file known until the command ends."""
     if path is not None:
-        from tunnel_sim.effects.effects_file import read_effects
+        from tunnel_sim.effects.expression_effect import read_effects
         from tunnel_sim.effects.registry import answering_with
 
         context.with_resource(answering_with(read_effects(path)))

@@ -11,8 +11,7 @@ from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
 
-from tunnel_sim.effects.fitting import Circumstances, Trial, WindOnRun, moment_scale
-from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial, WindOnRun, moment_scale
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import SensorModel

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
-from tunnel_sim.physics.motion import Motion
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import Motion, RunSettings
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array
 

@@ -1,4 +1,8 @@
-"""Effects whose moment or reading is stated as an expression, with no class written for them."""
+"""Effects whose moment or reading is stated as an expression, in Python or in a TOML file.
+
+Effects whose moment or reading is stated as an expression, with no class written for them. Effects by expression,
+read from a TOML file.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +10,21 @@ import keyword
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, make_dataclass
-from typing import Any, ClassVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from tunnel_sim.effects.base import Channel, Condition, Drawn, Effect
-from tunnel_sim.effects.fitting import Circumstances, Trial, moment_scale
-from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.effects.parameters import Circumstances, Trial, moment_scale, parameter
 from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, shown
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.units import dimension, in_si
+
+if TYPE_CHECKING:
+    from tunnel_sim.files.effects_schema import OwnEffectTable
 
 #: What changes during a run: unit, and operation of the moment law.
 _INPUTS = {"b": ("rad", "angle"), "r": ("rad/s", "rate"), "t": ("s", "time"), "V": ("m/s", "speed")}
@@ -244,3 +251,51 @@ def _check_values(formula: Expression, parameters: Mapping[str, Quantity], null:
         )
     if np.all(np.abs(beyond - without) <= 1e-300):
         raise TunnelError(f"{formula.text!r} does nothing", remedy="correct the expression or the scale")
+
+
+def read_effects(path: Path) -> tuple[type[Effect], ...]:
+    """The effects of an effects file.
+
+    Args:
+        path: as described in docs/how-to/add-an-effect.md.
+
+    Returns:
+        Their classes in the file's order; they are not registered.
+
+    Raises:
+        TunnelError: for the first fault, with its place.
+    """
+    from tunnel_sim.files.effects_schema import read_effect_tables  # only here: slow to load
+
+    tables = read_effect_tables(path)
+    names = [table.name for table in tables]
+    found = []
+    for table in tables:
+        where = f"{shown(path)}, effect '{table.name}'"
+        if names.count(table.name) > 1:
+            raise TunnelError("is given twice", where=where, remedy="give every effect its own name")
+        try:
+            found.append(_effect(table))
+        except TunnelError as error:
+            raise TunnelError(error.what, where=where, remedy=error.remedy) from error
+    return tuple(found)
+
+
+def _effect(table: OwnEffectTable) -> type[Effect]:
+    severity = next(iter(table.parameters))
+    quantities = {}
+    for name, given in table.parameters.items():
+        usual = 0.0 if name == severity else given.scale
+        default = usual if given.default is None else given.default
+        quantities[name] = Quantity(
+            given.unit, given.scale, given.lower, given.upper, default, given.meaning or f"parameter {name}"
+        )
+    return expression_effect(
+        table.name,
+        channel=table.channel,
+        condition=table.condition,
+        moment=table.moment,
+        reading=table.reading,
+        summary=table.summary,
+        parameters=quantities,
+    )

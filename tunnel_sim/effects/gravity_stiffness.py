@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from math import cos
 
 from tunnel_sim.effects.base import Effect, Law
-from tunnel_sim.effects.fitting import Circumstances, Trial
-from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
 
 
 @dataclass(frozen=True)

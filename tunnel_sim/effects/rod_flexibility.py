@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tunnel_sim.effects.base import Drawn, Effect
-from tunnel_sim.effects.fitting import Circumstances, Trial
-from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Effect
-from tunnel_sim.effects.fitting import Circumstances, Trial
-from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
 from tunnel_sim.vocabulary.record import Array
 
 _FAR = 2.0  # rad: the other limit, where only one side clips

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tunnel_sim.effects.base import Drawn, Effect
-from tunnel_sim.effects.parameters import parameter
-from tunnel_sim.effects.ramp import EQUATION, ramp, settling
+from tunnel_sim.effects.parameters import EQUATION, parameter, ramp, settling
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 

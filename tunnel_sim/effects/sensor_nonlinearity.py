@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
-from tunnel_sim.effects.fitting import Circumstances, Trial
-from tunnel_sim.effects.parameters import exponent, parameter
+from tunnel_sim.effects.parameters import Circumstances, Trial, exponent, parameter
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 

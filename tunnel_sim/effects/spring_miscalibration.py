@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from math import isclose
 
 from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect
-from tunnel_sim.effects.fitting import Circumstances, Trial
-from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
 from tunnel_sim.physics.run_settings import RunSettings
 
 

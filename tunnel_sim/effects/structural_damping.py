@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from math import log, pi, sqrt
 
 from tunnel_sim.effects.base import Effect, Law
-from tunnel_sim.effects.fitting import WindOnRun
-from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.effects.parameters import WindOnRun, parameter
 
 
 @dataclass(frozen=True)

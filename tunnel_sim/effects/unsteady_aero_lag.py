@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tunnel_sim.effects.base import Effect, Law
-from tunnel_sim.effects.fitting import Circumstances, Trial, WindOnRun
-from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, parameter
 
 #: Uncertainty of Cnr as a share of the first-order effect a·Cnβ, chosen from the errors in the tuning sets.
 _UNSEEN_SHARE = 0.2

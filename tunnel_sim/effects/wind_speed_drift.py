@@ -9,9 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
-from tunnel_sim.effects.fitting import Circumstances, Trial
-from tunnel_sim.effects.parameters import parameter
-from tunnel_sim.effects.ramp import EQUATION, ramp, settling
+from tunnel_sim.effects.parameters import EQUATION, Circumstances, Trial, parameter, ramp, settling
 from tunnel_sim.physics.run_settings import RunSettings, Series
 
 _SAMPLES = 201  # of an exponential drift, linear in between: within 1e-4 of the drift up to k = 5

@@ -13,15 +13,18 @@ import numpy as np
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import make_effect
 from tunnel_sim.engine.model import build_model
-from tunnel_sim.engine.sensor import read_motion
-from tunnel_sim.engine.simulate import simulate, simulate_motion, simulate_motions
+from tunnel_sim.engine.simulate import read_motion, simulate, simulate_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.steps import follow_fastest
-from tunnel_sim.vocabulary.aero import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
-from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.plan import (
+    AeroDerivatives,
+    SensorModel,
+    aerodynamic_damping,
+    aerodynamic_stiffness,
+)
 from tunnel_sim.vocabulary.record import Array, Record
 
 INTEGRATION_TOLERANCE = 2e-5

@@ -12,8 +12,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from tunnel_sim.engine.model import load_plugin
 from tunnel_sim.engine.model_files import ModelFiles, engine_refusals, read_model_files
-from tunnel_sim.engine.plugin import load_plugin
 from tunnel_sim.engine.simulate import no_log
 from tunnel_sim.processes import LimitReached, in_limited_process
 from tunnel_sim.vocabulary import limits

@@ -58,7 +58,7 @@ class ModelFiles:
         """
         import mujoco  # only here: slow to load, and the limited process has it
 
-        from tunnel_sim.engine.plugin import load_plugin
+        from tunnel_sim.engine.model import load_plugin
 
         load_plugin()
         with engine_refusals("MuJoCo cannot load it", "correct the file"):

@@ -1,4 +1,8 @@
-"""Simulation of single runs and of many runs at once."""
+"""Simulation of single runs and of many runs at once, and what the sensor reads of them.
+
+From the angle of the rod's upper end to the reading of the potentiometer. Simulation of single runs and of many
+runs at once.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +17,52 @@ from mujoco import batch as mujoco_batch
 
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.engine.model import Model, build_model
-from tunnel_sim.engine.sensor import read_motion
 from tunnel_sim.physics.moment_law import forward_library
-from tunnel_sim.physics.motion import Motion, sampling
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import Motion, RunSettings, sampling
 from tunnel_sim.physics.steps import follow_fastest
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
+
+
+def read_motion(
+    motion: Motion, sensor: SensorModel, rng: np.random.Generator, chain: EffectChain | None = None
+) -> Record:
+    """The reading y = quantised(β + zero + noise), with the effects that act on sensor and reading.
+
+    Args:
+        motion: of the rod's upper end.
+        sensor: noise, zero and resolution; with a resolution of 0 the reading is not quantised.
+
+    Returns:
+        The record. The ideal converter has an unlimited range: clipping is an effect.
+    """
+    angle, time = motion.angle, motion.time_s
+    if chain is not None and chain.skips:
+        time = time[: round(chain.stated.duration / (time[1] - time[0]))]
+        angle = chain.seen(motion, time)
+    elif chain is not None:
+        angle = chain.angle(angle, time)
+    sensor = sensor if chain is None else chain.sensor(sensor)
+    reading = angle + sensor.zero + sensor.noise_std * rng.standard_normal(angle.shape)
+    if chain is not None:
+        reading = chain.reading(reading)
+    return Record(time, quantise(reading, sensor.resolution))
+
+
+def quantise(reading: Array, step: float) -> Array:
+    """Round to a multiple of the resolution.
+
+    Args:
+        reading: rad, any shape.
+        step: rad; 0 leaves the reading as it is.
+
+    Returns:
+        The rounded reading, rad.
+    """
+    return np.round(reading / step) * step if step > 0.0 else reading
+
 
 Progress = Callable[[int, int], None]
 _CHUNK_STEPS = 4_000_000  # steps recorded at once, to limit the memory of a large batch

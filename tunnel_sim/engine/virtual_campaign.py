@@ -12,15 +12,12 @@ import numpy as np
 
 from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.base import SPRING_TOLERANCE
-from tunnel_sim.engine.sensor import read_motion
-from tunnel_sim.engine.simulate import Progress, simulate_motions
+from tunnel_sim.engine.simulate import Progress, read_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.motion import Motion
-from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.physics.run_settings import Motion, RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, Truth
+from tunnel_sim.vocabulary.plan import AeroDerivatives, CampaignPlan, Condition, EffectSetting, Truth
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
 

@@ -14,7 +14,7 @@ from gymnasium.envs.registration import register, registry
 ENVIRONMENTS: dict[str, tuple[str, str | None]] = {
     "tunnel_sim/FreeDecay-v0": (
         "tunnel_sim.envs.free_decay:FreeDecayEnv",
-        "tunnel_sim.envs.free_decay_vector:FreeDecayVectorEnv",
+        "tunnel_sim.envs.free_decay:FreeDecayVectorEnv",
     ),
     "tunnel_sim/Campaign-v0": ("tunnel_lab.envs.campaign:CampaignEnv", None),
 }

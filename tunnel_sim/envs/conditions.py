@@ -14,10 +14,16 @@ from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings, state
 from tunnel_sim.envs.config import FreeDecayConfig, angle_limit
 from tunnel_sim.envs.errors import EnvError, as_env_error
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.aero import aerodynamic_stiffness
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
+from tunnel_sim.vocabulary.plan import (
+    CampaignPlan,
+    Condition,
+    EffectSetting,
+    SensorModel,
+    Truth,
+    aerodynamic_stiffness,
+)
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
 

@@ -10,8 +10,7 @@ import numpy as np
 from mujoco import batch as mujoco_batch
 
 from tunnel_sim.engine.model import Model, build_model
-from tunnel_sim.physics.motion import sampling
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings, sampling
 from tunnel_sim.physics.steps import follow_fastest
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig

@@ -1,9 +1,14 @@
-"""Parallel episodes: readings, information, end. An environment has one episode, a vector environment many."""
+"""Parallel episodes: readings, information, end, and the campaign they give.
+
+Parallel episodes: readings, information, end. An environment has one episode, a vector environment many.
+Converting finished episodes to a campaign.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,11 +21,10 @@ from tunnel_sim.envs.config import FreeDecayConfig, angle_limit
 from tunnel_sim.envs.controls import OperatorLog, WindAnswer, check_plain, decode
 from tunnel_sim.envs.engines import Operation
 from tunnel_sim.envs.errors import EnvError, as_env_error
-from tunnel_sim.envs.information import Information, Prior
-from tunnel_sim.envs.readings import Readings
-from tunnel_sim.envs.sensing import RunningSensor
-from tunnel_sim.envs.sensitivity import NominalRun
+from tunnel_sim.envs.information import Information, NominalRun, Prior
+from tunnel_sim.envs.readings import Readings, RunningSensor
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
@@ -261,3 +265,36 @@ class Episodes:
         self._speed[row], self._stated_speed[row] = state.arrays["speed"], state.plan.condition.wind_speed
         self.step_count[row], self.ended[row] = state.arrays["step_count"], state.arrays["ended"]
         return rng
+
+
+class _HasRig(Protocol):
+    """A free-decay environment or vector environment, unwrapped."""
+
+    config: FreeDecayConfig
+    rig: Rig
+
+
+def campaign_of(runs: Iterable[Run], env: _HasRig, *, name: str = "episodes") -> Campaign:
+    """The runs of finished episodes as one campaign.
+
+    Args:
+        runs: ``info["run"]`` of each, in the plain preset.
+
+    Returns:
+        The campaign. It states the rig's nominal inertia and the configured sensor, and contains no trace of the
+        truth. Runs with equal conditions are numbered.
+
+    Raises:
+        EnvError: when no run is given.
+    """
+    listed = list(runs)
+    if not listed:
+        raise EnvError("no run is given", where="campaign_of", remedy="give info['run'] of finished episodes")
+    repeated = {label for label, count in Counter(run.id for run in listed).items() if count > 1}
+    seen: Counter[str] = Counter()
+    numbered = []
+    for run in listed:
+        seen[run.id] += 1
+        numbered.append(replace(run, id=f"{run.id}-{seen[run.id]}") if run.id in repeated else run)
+    sensor = SensorProperties.of(env.config.sensor(0.0))
+    return Campaign(name, RigProperties.of(env.rig), sensor, tuple(numbered))

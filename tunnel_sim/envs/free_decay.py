@@ -1,15 +1,23 @@
-"""The environment ``tunnel_sim/FreeDecay-v0``: an episode is one run of the rig."""
+"""The environment ``tunnel_sim/FreeDecay-v0``: one run of the rig, and many at once on ``mujoco.batch``.
+
+The environment ``tunnel_sim/FreeDecay-v0``: an episode is one run of the rig. The native vector environment of
+``tunnel_sim/FreeDecay-v0``: many runs at once on ``mujoco.batch``.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
 
 from tunnel_sim.envs.config import free_decay_config
 from tunnel_sim.envs.controls import action_space, operator_action
-from tunnel_sim.envs.engines import Models, OneRun
+from tunnel_sim.envs.engines import ManyRuns, Models, OneRun
 from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.rendering import RENDER_MODES, RigView
@@ -178,3 +186,194 @@ def render_fps(control_period: float) -> float | int:
     """
     rate = 1.0 / control_period
     return round(rate) if abs(rate - round(rate)) < 1e-9 * rate else rate
+
+
+class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
+    """Parallel runs, each bit-identical to a `FreeDecayEnv` with the same seed.
+
+    A run that has ended is restarted in the next step (``AutoresetMode.NEXT_STEP``), with all properties drawn.
+
+    Args:
+        num_envs: number of runs.
+        render_mode: ``rgb_array`` or None.
+        max_episode_steps: number of steps after which runs are truncated; None: at their end only.
+        nthread: number of threads; 0 uses all processors. The result does not depend on it.
+        width, height, camera: as in `FreeDecayEnv`.
+        **arguments: fields of `FreeDecayConfig`.
+
+    Raises:
+        EnvError: when an argument is unknown or out of range.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": ["rgb_array"],
+        "render_fps": 100,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        render_mode: str | None = None,
+        max_episode_steps: int | None = None,
+        nthread: int = 0,
+        width: int = 640,
+        height: int = 480,
+        camera: str = "overview",
+        **arguments: Any,
+    ) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise EnvError(f"unknown mode {render_mode!r}", where="render_mode", remedy="use 'rgb_array'")
+        self.config = free_decay_config(arguments)
+        self.rig = self.config.rig()
+        self.metadata = {**self.metadata, "render_fps": render_fps(self.config.control_period)}  # type: ignore[misc]
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self._most_steps = max_episode_steps
+        self.single_observation_space = observation_space(self.config)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.single_action_space = action_space(self.config)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        models = Models(self.rig, self.config.sample_rate)
+        self._engine = ManyRuns(models, self.config.samples_per_step, num_envs, nthread)
+        self._episodes = Episodes(self.config, self.rig, self._engine, num_envs)
+        self._rngs: list[np.random.Generator | None] = [None] * num_envs
+        self._view = RigView(self.rig, render_mode, width, height, camera, self.config.control_period)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Array, dict[str, Any]]:
+        """Start all runs, or those selected by a mask.
+
+        Args:
+            seed: one per run, or the first of consecutive seeds, or None, as in ``SyncVectorEnv``.
+            options: as in `FreeDecayEnv.reset`, for all runs. ``reset_mask``, a boolean array, selects the runs to
+                start; ``runs``, a sequence of mappings, overrides the common options run by run.
+
+        Returns:
+            Observations of all runs (zeros where the mask excludes a run), and infos.
+
+        Raises:
+            EnvError: when an option, mask or seed is refused.
+        """
+        common = dict(options or {})
+        mask = self._mask(common.pop("reset_mask", None))
+        each = self._each(common.pop("runs", None))
+        seeds = self._seeds(seed)
+        observations = np.zeros(self.observation_space.shape or ())
+        infos: dict[str, Any] = {}
+        for row in np.flatnonzero(mask).tolist():
+            if seeds[row] is not None or self._rngs[row] is None:
+                self._rngs[row], _ = seeding.np_random(seeds[row])
+            observations[row], infos = self._start(row, {**common, **each[row]}, infos)
+        return observations, infos
+
+    def _start(
+        self, row: int, options: Mapping[str, Any] | None, infos: dict[str, Any]
+    ) -> tuple[Array, dict[str, Any]]:
+        rng = self._rngs[row]
+        assert rng is not None
+        observation, info = self._episodes.start(row, options, rng)
+        return observation, self._add_info(infos, info, row)
+
+    def _mask(self, mask: Any) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        if mask is None:
+            return np.ones(self.num_envs, dtype=np.bool_)
+        values = np.asarray(mask)
+        if values.shape != (self.num_envs,) or values.dtype != np.bool_ or not values.any():
+            raise EnvError(
+                f"reset_mask is not a boolean array of length {self.num_envs} with at least one True",
+                where="option reset_mask",
+                remedy="give one boolean per run",
+            )
+        return values
+
+    def _each(self, runs: Any) -> Sequence[Mapping[str, Any]]:
+        if runs is None:
+            return [{}] * self.num_envs
+        if not isinstance(runs, Sequence) or len(runs) != self.num_envs:
+            raise EnvError(
+                f"runs is not a sequence of length {self.num_envs}",
+                where="option runs",
+                remedy="give one mapping per run",
+            )
+        return runs
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + row for row in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise EnvError(
+                f"{len(seed)} seeds for {self.num_envs} runs", where="seed", remedy="give one per run"
+            )
+        return seed
+
+    def step(self, actions: Any) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
+        """Advance all runs by one control period; runs that ended in the previous step are restarted instead.
+
+        Args:
+            actions: from ``action_space``; the action of a run that is restarted is ignored.
+
+        Returns:
+            Observations, information gained (nats), terminations, truncations and infos.
+
+        Raises:
+            EnvError: when an action is outside the space, or before the first reset.
+        """
+        if any(rng is None for rng in self._rngs):
+            raise EnvError("no run is in progress", where="step", remedy="call reset() first")
+        renewed = np.flatnonzero(self._episodes.ended)
+        observations, rewards, terminated, truncated = self._episodes.advance(actions)
+        if self._most_steps is not None:
+            truncated |= self._episodes.step_count >= self._most_steps
+            self._episodes.ended |= truncated
+        infos: dict[str, Any] = {}
+        for row in renewed.tolist():
+            observations[row], infos = self._start(row, None, infos)
+            rewards[row], terminated[row], truncated[row] = 0.0, False, False
+        for row in np.flatnonzero(terminated | truncated).tolist():
+            infos = self._add_info(infos, self._episodes.outcome(row), row)
+        return observations, rewards, terminated, truncated, infos
+
+    def get_state(self, index: int) -> EpisodeState:
+        """The state of one run, also for `FreeDecayEnv.set_state`."""
+        return self._episodes.get_state(index)
+
+    def set_state(self, index: int, state: EpisodeState) -> None:
+        """Put one run into a state.
+
+        Args:
+            state: from an environment of the same configuration.
+
+        Raises:
+            EnvError: when the state belongs to a different configuration.
+        """
+        self._rngs[index] = self._episodes.set_state(index, state)
+
+    def information(self, index: int) -> Array:
+        """The Fisher information of one run so far.
+
+        Returns:
+            Shape (7, 7), as `FreeDecayEnv.information`.
+        """
+        return self._episodes.matrix(index)
+
+    def render(self) -> tuple[Any, ...] | None:
+        """A picture of every run; result and arguments as in `FreeDecayEnv.render`."""
+        if self.render_mode is None:
+            return None
+        return tuple(self._view.draw(*self._engine.pose(row)) for row in range(self.num_envs))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the rendering context.
+
+        Args:
+            **kwargs: not used.
+        """
+        del kwargs
+        if hasattr(self, "_view"):  # Gymnasium before 1.3 closes also what could not be made
+            self._view.close()

@@ -18,8 +18,8 @@ import numpy as np
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
-from tunnel_sim.vocabulary.aero import AeroDerivatives
 from tunnel_sim.vocabulary.errors import did_you_mean
+from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.rig import Rig
 
 RENDER_MODES = ("human", "rgb_array")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from tunnel_sim.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from tunnel_sim.files.importing.writing import import_records
+    from tunnel_sim.files.importing.records import import_records
 else:
-    __getattr__, __dir__ = lazy_names(__name__, {".importing.writing": "import_records"})
+    __getattr__, __dir__ = lazy_names(__name__, {".importing.records": "import_records"})
 
 __all__ = ["import_records"]

@@ -13,8 +13,7 @@ from tunnel_sim.files.run_table import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-from tunnel_sim.vocabulary.extras import library
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, library
 
 _CONDITIONS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
 _RIG = ("yaw_inertia", "frontal_area", "reference_length", "width")

@@ -1,21 +1,208 @@
-"""Reading the plan of a campaign from a TOML file.
+"""The plan of a campaign: the tables of its TOML file, and reading them.
 
-The packaged ``data/paper-campaign.toml`` is an example with a comment on every key.
+The tables of a campaign description. Reading the plan of a campaign from a TOML file. The packaged
+``data/paper-campaign.toml`` is an example with a comment on every key.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from importlib import resources
 from math import radians
 from pathlib import Path
+from typing import Annotated, Protocol, TypeVar
 
-from tunnel_sim.files.plan_schema import PlanDocument, read_plan
+from pydantic import AfterValidator, Field
+
+from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.files.toml_input import shown
+from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, load_toml, shown, validate
+from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
+from tunnel_sim.vocabulary.plan import (
+    DEFAULT_SAMPLE_RATE,
+    CampaignPlan,
+    Condition,
+    EffectSetting,
+    SensorModel,
+    Truth,
+)
 from tunnel_sim.vocabulary.rig import Rig
+
+STEPS_PER_SECOND = 1000.0
+"""Integration steps per second of a run."""
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+def _release_angle(angle: float) -> float:
+    if not 0.0 < abs(angle) <= 180.0:
+        raise ValueError("is not a release angle in degrees: it is zero or greater than 180")
+    return angle
+
+
+HashableT = TypeVar("HashableT", bound=Hashable)
+ReleaseAngle = Annotated[float, AfterValidator(_release_angle)]
+
+Springs = Annotated[list[int], Field(description="a list of spring numbers of Table II, such as [5, 6]")]
+Stiffnesses = Annotated[list[Positive], Field(description="a list of positive numbers in N m/rad")]
+WindSpeeds = Annotated[
+    list[NotNegative],
+    Field(min_length=1, description="a list of speeds in m/s, 0 for wind-off, such as [0, 10]"),
+]
+ReleaseAngles = Annotated[
+    list[ReleaseAngle], Field(min_length=1, description="a list of angles in degrees, such as [20]")
+]
+Repeats = Annotated[int, Field(ge=1, le=1000, description="a whole number from 1 to 1000")]
+
+
+class TruthTable(StrictModel):
+    """``[truth]``."""
+
+    cn_beta: float = Field(description="a number, 1/rad")
+    cn_r: float = Field(description="a number, 1/rad")
+    yaw_inertia: Positive | None = Field(default=None, description="a positive number in kg m2")
+    mechanical_damping: NotNegative | None = Field(
+        default=None, description="a number in N m s/rad, zero or more"
+    )
+
+
+class SensorModelTable(StrictModel):
+    """``[sensor]``; omitted keys take the defaults of ``SensorModel``."""
+
+    sample_rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
+    noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
+    resolution: NotNegative | None = Field(default=None, description="a number in rad, zero for none")
+    zero: float | None = Field(default=None, description="a number in rad")
+
+
+class EffectTable(StrictModel):
+    """``[[effects]]``."""
+
+    name: OneLine = Field(description="the name of an effect in quotes")
+    parameters: dict[str, float] = Field(default={}, description="a table of numbers, such as { x = 0.1 }")
+
+
+class PlanDocument(StrictModel):
+    """The whole of a campaign description: springs × speeds × release angles × repeats."""
+
+    name: OneLine = Field(description="a short name in quotes")
+    description: str = Field(default="", description="text in quotes, or leave it out")
+    seed: int = Field(ge=0, description="a whole number, zero or more")
+    springs: Springs = Field(default=[])
+    spring_stiffness: Stiffnesses = Field(default=[])
+    wind_speeds: WindSpeeds
+    release_angles_deg: ReleaseAngles
+    repeats: Repeats = 1
+    duration: Positive = Field(description="a positive number in s")
+    air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
+    truth: TruthTable = Field(description="a [truth] table with cn_beta and cn_r")
+    sensor: SensorModelTable = Field(default=SensorModelTable(), description="a [sensor] table")
+    effects: list[EffectTable] = Field(default=[], description="[[effects]] tables")
+
+
+def read_plan(path: Path) -> PlanDocument:
+    """Read and validate a campaign description.
+
+    Raises:
+        TunnelError: for the first fault, in one line that names file, key and remedy.
+    """
+    document = load_toml(path, missing="name a campaign description such as the packaged paper-campaign.toml")
+    plan = validate(PlanDocument, document, path)
+    check_conditions(plan, shown(path))
+    rate = DEFAULT_SAMPLE_RATE if plan.sensor.sample_rate is None else plan.sensor.sample_rate
+    check_size(run_count(plan), plan.duration, rate, shown(path))
+    return plan
+
+
+class ConditionKeys(Protocol):
+    """The keys whose values are combined into a campaign's runs."""
+
+    @property
+    def springs(self) -> list[int]:
+        """Numbers of springs."""
+
+    @property
+    def spring_stiffness(self) -> list[float]:
+        """Kr, N m/rad."""
+
+    @property
+    def wind_speeds(self) -> list[float]:
+        """V, m/s."""
+
+    @property
+    def release_angles_deg(self) -> list[float]:
+        """Degrees."""
+
+    @property
+    def repeats(self) -> int:
+        """Number of runs of each combination."""
+
+
+def run_count(keys: ConditionKeys) -> int:
+    """The number of runs, calculated from the lengths of the lists.
+
+    Args:
+        keys: a campaign description, or a table with the same keys.
+    """
+    springs = len(keys.springs) + len(keys.spring_stiffness)
+    return springs * len(keys.wind_speeds) * len(keys.release_angles_deg) * keys.repeats
+
+
+def check_size(runs: int, duration: float, sample_rate: float, where: str) -> None:
+    """Refuse a campaign that is too large to simulate or to read again, before it is expanded.
+
+    Args:
+        runs: number of runs.
+        duration: of each run, s.
+        sample_rate: Hz.
+
+    Raises:
+        TunnelError: too many runs, samples or integration steps, with their number and the limit.
+    """
+    check_count(runs, limits.CAMPAIGN_RUNS, "runs", where, "shorten a list, or make several campaigns")
+    # Even the shortest run has two samples.
+    samples = max(2.0, duration * sample_rate)
+    lower = "give a shorter duration or a lower sample_rate"
+    check_count(samples, limits.RUN_SAMPLES, "samples in a run", where, lower)
+    fewer = "make several campaigns, or give a shorter duration"
+    check_count(runs * samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", where, fewer)
+    steps = runs * samples / sample_rate * STEPS_PER_SECOND
+    check_count(steps, limits.CAMPAIGN_STEPS, "integration steps in the campaign", where, fewer)
+
+
+def first_twice(values: Iterable[HashableT]) -> HashableT | None:
+    """The first value that occurs a second time; None where all differ."""
+    seen: set[HashableT] = set()
+    for value in values:
+        if value in seen:
+            return value
+        seen.add(value)
+    return None
+
+
+def check_conditions(plan: ConditionKeys, where: str) -> None:
+    """Refuse conditions that give no runs, or the same run twice.
+
+    Args:
+        plan: a campaign description, or a table with the same keys.
+
+    Raises:
+        TunnelError: when no spring is given, or a value occurs twice.
+    """
+    if not plan.springs and not plan.spring_stiffness:
+        raise TunnelError(
+            "no spring", where=where, remedy="give springs (numbers) or spring_stiffness (N m/rad)"
+        )
+    for key in ("springs", "spring_stiffness", "wind_speeds", "release_angles_deg"):
+        twice = first_twice(getattr(plan, key))
+        if twice is not None:
+            raise TunnelError(
+                f"{key} holds {twice:g} twice",
+                where=where,
+                remedy="leave one out, and use repeats for more runs",
+            )
 
 
 def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:

@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.physics.moment_law import forward_library, parameter_names, parameter_vector, run_dtype
-from tunnel_sim.physics.motion import Motion, sampling
-from tunnel_sim.physics.release import spring_end_angle
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import Motion, RunSettings, sampling, spring_end_angle
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 

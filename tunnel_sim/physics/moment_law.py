@@ -1,18 +1,48 @@
-"""Names that the compiled library lists: parameters and operations of the moment law, the state, fields of a run.
+"""The compiled moment law: where its library lies, and the names of parameters, states and operations it lists.
 
-Python looks them up by name, so that it cannot disagree with C about their order (``mjcf/plugin/tables.c``).
+The location of the package's compiled libraries. Names that the compiled library lists: parameters and operations
+of the moment law, the state, fields of a run. Python looks them up by name, so that it cannot disagree with C
+about their order (``mjcf/plugin/tables.c``).
 """
 
 from __future__ import annotations
 
 import ctypes
 import functools
+import importlib.metadata
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
-from tunnel_sim.physics.native import native_library
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
+
+
+def native_library(stem: str) -> Path:
+    """The path of a compiled library of this package.
+
+    Args:
+        stem: its name without ``lib`` and suffix, such as ``vwt_plugin``.
+
+    Returns:
+        The file in the installed package, even when the Python sources run from a checkout.
+
+    Raises:
+        TunnelError: when the package was not built.
+    """
+    try:
+        distribution = importlib.metadata.distribution("virtual-wind-tunnel")
+    except importlib.metadata.PackageNotFoundError as error:
+        raise TunnelError("the package is not installed", remedy="install it with 'pip install .'") from error
+    folder = Path(str(distribution.locate_file("tunnel_sim/native")))
+    for ending in (".so", ".dylib", ".dll"):
+        path = folder / f"lib{stem}{ending}"
+        if path.is_file():
+            return path
+    raise TunnelError(
+        f"the compiled library {stem} is missing", where=str(folder), remedy="reinstall the package"
+    )
 
 
 @functools.cache

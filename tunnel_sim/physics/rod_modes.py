@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.physics.forward import forward_run
-from tunnel_sim.physics.release import spring_end_angle
-from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.physics.run_settings import RunSettings, spring_end_angle
+from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 

@@ -1,7 +1,14 @@
-"""The physics of one run as numbers, from which the MuJoCo model and the forward integrator are both built."""
+"""The physics of one run as numbers, its release and its motion.
+
+The physics of one run as numbers, from which the MuJoCo model and the forward integrator are both built. The
+balance at the release: the body is held at its angle, at rest, and its rod is in balance with the spring. With a
+rod of compliance c and a spring Kr, the body's angle is 1 + Kr c times that of the spring's end. The true motion
+of a run, and how it is sampled.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -9,8 +16,10 @@ from math import inf, isfinite, sqrt
 from types import MappingProxyType
 
 from tunnel_sim.physics.moment_law import operation_names, parameter_names
-from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.plan import AeroDerivatives
+from tunnel_sim.vocabulary.record import Array, read_only
 from tunnel_sim.vocabulary.rig import Rig
 
 _OWNED = frozenset(
@@ -231,3 +240,84 @@ class RunSettings:
             **self.parameters,
         }
         return {name: float(given.get(name, 0.0)) for name in parameter_names()}
+
+
+def spring_end_angle(run: RunSettings) -> float:
+    """Angle of the spring's and sensor's end at the release.
+
+    Args:
+        run: its release angle is the body's.
+
+    Returns:
+        rad; the body's own angle where the rod is rigid.
+    """
+    return run.release_angle / _body_per_end(run)
+
+
+def released_by_spring_end(run: RunSettings) -> RunSettings:
+    """The run with the body's release angle, given that of the spring's and sensor's end.
+
+    Args:
+        run: its release angle is that of the spring's end, which is what a record shows.
+
+    Returns:
+        The same run, its release angle that of the body.
+    """
+    if run.rod_twist is None:
+        return run
+    return dataclasses.replace(run, release_angle=run.release_angle * _body_per_end(run))
+
+
+def _body_per_end(run: RunSettings) -> float:
+    """The body's angle over that of the spring's end, in balance; 1 for a rigid rod."""
+    twist = run.rod_twist
+    return 1.0 if twist is None else 1.0 + run.spring_stiffness * twist.compliance
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The true motion of one run at the sensor's sample times.
+
+    Args:
+        time_s: shape (n,), s from the release.
+        angle: of the rod's upper end, which carries spring and sensor, shape (n,), rad.
+        rate: of the same end, shape (n,), rad/s.
+    """
+
+    time_s: Array
+    angle: Array
+    rate: Array = field(repr=False)
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        for name in ("time_s", "angle", "rate"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+def sampling(settings: RunSettings, sample_rate: float) -> tuple[int, int]:
+    """The number of samples in a run, and of integration steps between two samples.
+
+    Args:
+        settings: duration and timestep, s.
+        sample_rate: Hz.
+
+    Returns:
+        (samples, steps between samples).
+
+    Raises:
+        TunnelError: when the sample rate is outside its limits, or the sample interval is not a whole number of
+            timesteps.
+    """
+    if not limits.SLOWEST_RATE <= sample_rate <= limits.FASTEST_RATE:
+        raise TunnelError(
+            f"the sample rate of {sample_rate:g} Hz is not between {limits.SLOWEST_RATE:g} and "
+            f"{limits.FASTEST_RATE:g} Hz",
+            remedy="give it in Hz",
+        )
+    steps = 1.0 / (sample_rate * settings.timestep)
+    if abs(steps - round(steps)) > 1e-9 * steps or round(steps) < 1:
+        raise TunnelError(
+            f"the sample interval at {sample_rate:g} Hz is not a whole number of {settings.timestep:g} s steps",
+            remedy="choose a timestep that divides the sample interval",
+        )
+    return max(2, round(settings.duration * sample_rate)), round(steps)

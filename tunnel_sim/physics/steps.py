@@ -23,8 +23,8 @@ from collections.abc import Mapping
 from math import ceil, exp, inf, isfinite, log, pi, sqrt
 
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.aero import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.rig import Rig
 
 #: Greatest relative error of the body's frequency due to integration; the damping ratio is then wrong by 9e-8.

@@ -1,10 +1,16 @@
-"""The error shown to users: what is wrong, where, and the remedy."""
+"""The error shown to users: what is wrong, where, and the remedy; and the libraries that may be missing.
+
+The error shown to users: what is wrong, where, and the remedy. Libraries that the extras bring: which command
+needs which, and one line where one is missing.
+"""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 _LONGEST = 4096  # characters in one part of a message: the longest path
 
@@ -57,3 +63,35 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     names = sorted(known)
     close = difflib.get_close_matches(name, names, n=1)
     return f"did you mean '{close[0]}'?" if close else f"use one of {', '.join(names)}"
+
+
+EXTRAS = {
+    "import": ("fastexcel", "xlsxwriter", "h5py", "nptdms"),
+    "film": ("imageio", "imageio_ffmpeg"),
+    "cluster": ("dask", "distributed"),
+    "bench": ("nicegui",),
+    "docs": ("sphinx", "furo", "myst_nb"),
+    "train": ("stable_baselines3",),
+}
+"""The modules of each extra of ``pyproject.toml``."""
+
+
+def library(name: str, use: str, extra: str, where: str = "") -> Any:
+    """A library of an extra.
+
+    Args:
+        name: of its module.
+        use: what needs it, for the message.
+        extra: one of `EXTRAS`.
+
+    Raises:
+        TunnelError: when it is not installed; the remedy is the command that installs it.
+    """
+    try:
+        return import_module(name)
+    except ImportError:
+        raise TunnelError(
+            f"{use} needs the package {name.partition('.')[0]}",
+            where=where,
+            remedy=f"run: pip install 'virtual-wind-tunnel[{extra}]'",
+        ) from None

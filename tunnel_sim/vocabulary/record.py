@@ -1,4 +1,8 @@
-"""One run's reading of the yaw angle against time."""
+"""One run's reading of the yaw angle against time, and how many cycles it holds.
+
+One run's reading of the yaw angle against time. How many cycles of free oscillation a record holds, despite drift,
+hum and noise.
+"""
 
 from __future__ import annotations
 
@@ -118,3 +122,114 @@ def evenly_spaced(record: Record, *, bridged: bool = True) -> Record:
         + step * u * (1.0 - u) * ((1.0 - u) * first - u * last)
     )
     return Record(time, values if bridged else np.where(gap, reading.mean(), values))
+
+
+MAINS_HZ = (50.0, 60.0)
+# A spectral line counts when it exceeds the median of the spectrum by this factor. In white noise, where the bins
+# are exponentially distributed, about one record of 10 000 samples in thirty thousand has such a line. A record
+# shorter than SHORT_RECORD samples has too few bins to estimate a background: its strongest line counts.
+LINE_OVER_MEDIAN = 27.0
+SHORT_RECORD = 100
+# A crossing counts when the reading then moves beyond the centre by this share of the largest swing.
+HYSTERESIS = 0.03
+NOISE_MARGIN = 4.0  # or by this many standard deviations of the smoothed noise, whichever is larger
+
+
+def count_cycles(record: Record) -> float:
+    """Cycles of the dominant oscillation within the record.
+
+    Slow drift and mains hum are removed. The dominant spectral line gives the time scale; a moving average over a
+    quarter of its period removes faster components. The period follows from the crossings of the centre of
+    oscillation, with hysteresis. The number of cycles is the record's duration over that period, so the part of a
+    heavily damped run in which the swing is lost in noise counts as well.
+
+    Args:
+        record: the reading, with any zero, noise, resolution and clipping.
+
+    Returns:
+        The number of cycles; 0 when nothing oscillates.
+    """
+    record = evenly_spaced(record, bridged=False)
+    reading = _without_hum(record)
+    level = _without_trend(reading)
+    # Only rounding errors remain of a constant, a linear drift or pure hum.
+    if reading.size < 6 or float(np.ptp(level)) <= 1e-9 * float(np.abs(record.yaw_rad).max()):
+        return 0.0
+    frequency = _dominant_frequency(level, record.sample_rate)
+    if frequency is None:
+        return 0.0
+    width = max(1, round(0.25 * record.sample_rate / frequency))
+    # The first swing of a heavily damped run tilts the fitted trend, so the reading with its trend is counted too.
+    return max(_count(reading, width), _count(level, width))
+
+
+def _count(reading: Array, width: int) -> float:
+    """The record's length over the period of its crossings; 0 with fewer than two of them."""
+    crossings = _crossings(reading, width)
+    if crossings.size < 2:
+        return 0.0
+    # Whole periods where there are any, because half periods are unequal about a shifted centre. Their median,
+    # because the last crossing may be a late drift of the rest position.
+    whole = crossings[2:] - crossings[:-2]
+    period = float(np.median(whole)) if whole.size else 2.0 * float(crossings[1] - crossings[0])
+    return reading.size / period
+
+
+def _without_hum(record: Record) -> Array:
+    """The reading less a sinusoid at each mains frequency.
+
+    The sinusoids are fitted second by second, because the mains frequency varies by a few hundredths of a hertz.
+    """
+    reading: Array = record.yaw_rad - record.yaw_rad.mean()
+    block = round(record.sample_rate)
+    for mains in MAINS_HZ:
+        # In a record that is too short or sampled too slowly, hum cannot be separated from the motion.
+        if reading.size < block or mains > 0.45 * record.sample_rate:
+            continue
+        phase = 2.0 * np.pi * mains * np.arange(block) / record.sample_rate
+        # A level and a slope are fitted with the hum, so that slow motion is not mistaken for hum.
+        hum_basis = np.column_stack([np.cos(phase), np.sin(phase)])
+        basis = np.column_stack([hum_basis, np.ones(block), np.linspace(-1.0, 1.0, block)])
+        # The last block has full length too: it overlaps the one before and corrects only the rest.
+        starts = [*range(0, reading.size - block, block), reading.size - block]
+        pieces = np.stack([reading[start : start + block] for start in starts])
+        hum = pieces @ np.linalg.pinv(basis).T[:, :2] @ hum_basis.T
+        overlap = len(starts) * block - reading.size
+        reading = reading - np.concatenate([hum[:-1].ravel(), hum[-1, overlap:]])
+    return reading
+
+
+def _without_trend(reading: Array) -> Array:
+    """The reading less a fitted straight line, because a sensor's drift is not an oscillation."""
+    abscissa = np.linspace(-1.0, 1.0, reading.size)
+    slope = float(abscissa @ reading) / float(abscissa @ abscissa)
+    level: Array = reading - float(reading.mean()) - slope * abscissa
+    return level
+
+
+def _dominant_frequency(reading: Array, sample_rate: float) -> float | None:
+    """Frequency of the strongest spectral line, Hz; None when no line stands out from the noise."""
+    power = np.abs(np.fft.rfft(reading))[1:] ** 2
+    frequency = np.fft.rfftfreq(reading.size, 1.0 / sample_rate)[1:]
+    # Between power and power per octave, so that neither slow drift nor brief ringing hides the oscillation.
+    background = float(np.median(power)) if reading.size >= SHORT_RECORD else 0.0
+    share = np.where(power > LINE_OVER_MEDIAN * background, power * np.sqrt(frequency), 0.0)
+    best = int(np.argmax(share))
+    return float(frequency[best]) if share[best] > 0.0 else None
+
+
+def _crossings(reading: Array, width: int) -> Array:
+    """Where the smoothed reading crosses its centre, in samples, with hysteresis."""
+    total = np.concatenate([[0.0], np.cumsum(reading)])
+    smooth = (total[width:] - total[:-width]) / width
+    smooth = smooth - np.median(smooth)
+    # Differences of neighbouring samples contain the noise and little of the motion.
+    quartiles = np.percentile(np.diff(reading), [25.0, 75.0])
+    noise = float(quartiles[1] - quartiles[0]) / (1.349 * np.sqrt(2.0 * width))
+    largest = float(np.abs(smooth).max())
+    # With few samples per cycle the differences contain the motion as well, hence the upper limit.
+    band = min(max(HYSTERESIS * largest, NOISE_MARGIN * noise), 0.25 * largest)
+    outside = np.flatnonzero(np.abs(smooth) > band)
+    change = np.flatnonzero(np.diff(np.sign(smooth[outside])) != 0.0)
+    # Between the last sample on one side of the band and the first on the other.
+    return 0.5 * (outside[change] + outside[change + 1]).astype(np.float64)

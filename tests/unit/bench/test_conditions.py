@@ -11,7 +11,7 @@ from tunnel_lab.bench import conditions
 from tunnel_lab.bench.conditions import RIG
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files import import_records
-from tunnel_sim.files.campaign_io import read_campaign
+from tunnel_sim.files.campaign_folder import read_campaign
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tunnel_lab.bench.workspace import CAMPAIGN_FILE, new_session, open_session, safe_name, sessions
-from tunnel_sim.files import campaign_schema
+from tunnel_sim.files import campaign_folder
 from tunnel_sim.vocabulary.errors import TunnelError
 
 HOSTILE = {
@@ -65,4 +65,4 @@ def test_an_address_names_a_session_or_is_refused(tmp_path: Path, name: str) -> 
 
 
 def test_the_campaign_file_is_that_of_the_format() -> None:
-    assert CAMPAIGN_FILE == campaign_schema.CAMPAIGN_FILE
+    assert CAMPAIGN_FILE == campaign_folder.CAMPAIGN_FILE

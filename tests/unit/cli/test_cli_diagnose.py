@@ -17,7 +17,7 @@ from tests.reference.free_decays import Setting, campaign
 from tests.unit.cli.conftest import PROGRESS
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
-from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.files.plan_file import load_plan
 
 Tunnel = Callable[..., tuple[int, str, str]]

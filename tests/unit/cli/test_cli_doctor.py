@@ -17,9 +17,8 @@ from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.commands import doctor
 from tunnel_lab.commands.schema import SCHEMAS, schema
 from tunnel_sim.effects import effect_class
-from tunnel_sim.files.campaign_io import read_campaign
-from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.extras import EXTRAS, library
+from tunnel_sim.files.campaign_folder import read_campaign
+from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, library
 
 Tunnel = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[3]

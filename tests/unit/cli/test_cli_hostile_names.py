@@ -13,7 +13,7 @@ from tests.reference.free_decays import Setting, campaign
 from tests.unit.cli.conftest import PROGRESS
 from tunnel_lab.plotting.runs import run_label, spectrum_figure
 from tunnel_lab.plotting.style import figure_text
-from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 
 Tunnel = Callable[..., tuple[int, str, str]]

@@ -13,7 +13,7 @@ import pytest
 from identification.signal.noise import Residual, noise_level
 from tests.reference.free_decays import Setting, campaign
 from tests.unit.cli.conftest import PROGRESS
-from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import SensorProperties
 
 Tunnel = Callable[..., tuple[int, str, str]]

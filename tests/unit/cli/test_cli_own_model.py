@@ -16,7 +16,7 @@ import pytest
 from diagnosis.patch import UNPATCHED
 from tests.reference.free_decays import Setting, campaign
 from tunnel_lab.commands import diagnose as commands
-from tunnel_sim.files.campaign_io import write_campaign
+from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 Tunnel = Callable[..., tuple[int, str, str]]

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from tunnel_lab.terminal import progress
 from tunnel_lab.terminal.tables import is_too_wide, stacked, table
-from tunnel_sim.files.nearby import inside, nearest
+from tunnel_sim.files.reading import inside, nearest
 
 Tunnel = Callable[..., tuple[int, str, str]]
 

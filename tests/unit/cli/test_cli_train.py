@@ -64,7 +64,7 @@ def test_bad_input_is_one_line_and_nothing_written(words, said, tmp_path, monkey
 
 def test_identify_takes_weights_for_the_networks_only(tmp_path, capsys):
     from identification.datasets import measured_campaign
-    from tunnel_sim.files.campaign_io import write_campaign
+    from tunnel_sim.files.campaign_folder import write_campaign
 
     write_campaign(measured_campaign("rotary-pendulum"), tmp_path / "c")
     shipped = ["--weights", str(tmp_path / "none.safetensors")]

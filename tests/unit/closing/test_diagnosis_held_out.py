@@ -15,7 +15,7 @@ from diagnosis.fitting.starting_points import starting_points
 from tests.unit.gap_campaigns import nominal
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.joint_patch import Start
-from tunnel_sim.physics.motion import Motion
+from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 

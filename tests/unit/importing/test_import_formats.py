@@ -26,7 +26,7 @@ from tests.unit.importing.import_files import RATE, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing import matlab, workbook
 from tunnel_sim.files.importing import tdms as tdms_reader
-from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.matlab import _unpacked
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.vocabulary import limits

@@ -13,12 +13,11 @@ import pytest
 
 from tests.unit.importing.import_files import Text, any_dialect, csv, decay, written
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.columns import _blocks
+from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.records import _with_unique_ids, read_records
-from tunnel_sim.files.importing.tables import Channel
+from tunnel_sim.files.importing.tables import Channel, known_unit, split_unit
 from tunnel_sim.files.importing.text import find_dialect
-from tunnel_sim.files.importing.units import known_unit, split_unit
 
 
 @pytest.mark.parametrize("seed", range(20))

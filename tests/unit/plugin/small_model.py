@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tunnel_sim.engine.plugin import load_plugin
+from tunnel_sim.engine.model import load_plugin
 
 NUMERICS: Mapping[str, str] = {
     "air_density": "1.204",

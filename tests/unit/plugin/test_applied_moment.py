@@ -10,7 +10,7 @@ import pytest
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
-from tunnel_sim.vocabulary.aero import AeroDerivatives
+from tunnel_sim.vocabulary.plan import AeroDerivatives
 
 FRICTION = 0.05  # N m
 STILL = RunSettings(

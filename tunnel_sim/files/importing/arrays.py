@@ -8,8 +8,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.tables import Channel, Table
-from tunnel_sim.files.importing.units import split_unit
+from tunnel_sim.files.importing.tables import Channel, Table, split_unit
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
 

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.arrays import RUN_IDS, check_size, tables_of
 from tunnel_sim.files.importing.faults import faults
-from tunnel_sim.files.importing.tables import Table
-from tunnel_sim.files.importing.units import known_unit
+from tunnel_sim.files.importing.tables import Table, known_unit
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.extras import library
+from tunnel_sim.vocabulary.errors import library
 
 LIMIT = limits.DATA_BYTES
 """Largest file, bytes."""

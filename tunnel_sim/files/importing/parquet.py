@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import polars as pl
 
-from tunnel_sim.files.importing.tables import Channel, Table, by_texts, names_runs
-from tunnel_sim.files.importing.units import split_unit
+from tunnel_sim.files.importing.tables import Channel, Table, by_texts, names_runs, split_unit
 from tunnel_sim.files.reading import frame_schema, read_frame
 from tunnel_sim.vocabulary import limits
 

@@ -10,14 +10,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts, without_overflow
-from tunnel_sim.files.importing.columns import Pair, find_pairs
-from tunnel_sim.files.importing.conditions import condition_of, from_column, from_facts
-from tunnel_sim.files.importing.conversion import Calibration, in_radians, in_seconds, sample_interval
+from tunnel_sim.files.importing.columns import (
+    Calibration,
+    Pair,
+    find_pairs,
+    in_radians,
+    in_seconds,
+    sample_interval,
+)
+from tunnel_sim.files.importing.conditions import ImportChoices, condition_of, from_column, from_facts
 from tunnel_sim.files.importing.source import Source
-from tunnel_sim.files.importing.tables import Channel, Table
-from tunnel_sim.files.importing.units import kind_of
+from tunnel_sim.files.importing.tables import Channel, Table, kind_of
 from tunnel_sim.files.toml_input import one_line, shown
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError

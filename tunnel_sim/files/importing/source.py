@@ -12,7 +12,7 @@ from typing import Protocol, cast
 import numpy as np
 
 from tunnel_sim.files.importing import text
-from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.guard import read_guarded
 from tunnel_sim.files.importing.tables import Table, by_run
 from tunnel_sim.files.reading import check_count, read_regular

@@ -8,11 +8,10 @@ import numpy as np
 
 from tunnel_sim.files.importing.arrays import check_size
 from tunnel_sim.files.importing.faults import faults
-from tunnel_sim.files.importing.tables import Channel, Table
-from tunnel_sim.files.importing.units import known_unit, split_unit
+from tunnel_sim.files.importing.tables import Channel, Table, known_unit, split_unit
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.extras import library
+from tunnel_sim.vocabulary.errors import library
 
 LIMIT = limits.DATA_BYTES
 """Largest file, bytes."""

@@ -8,13 +8,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tunnel_sim.files.importing.faults import faults
-from tunnel_sim.files.importing.layout import find_layout, is_number
 from tunnel_sim.files.importing.tables import Table
-from tunnel_sim.files.importing.text import tables_of
+from tunnel_sim.files.importing.text import find_layout, is_number, tables_of
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.extras import library
+from tunnel_sim.vocabulary.errors import TunnelError, library
 
 LIMIT = limits.DATA_BYTES
 """Largest file, bytes."""
