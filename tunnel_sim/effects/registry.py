@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from importlib import import_module
-from importlib.metadata import entry_points
+from pathlib import Path
 from pkgutil import iter_modules
 from typing import TypeVar, get_args
 
-import tunnel_sim.effects as package
-from tunnel_sim.effects.base import Channel, Condition, Effect
+from tunnel_sim.effects.base import Channel, Condition, Effect, make_effect
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
+from tunnel_sim.vocabulary.plugins import added_to, loading
 from tunnel_sim.vocabulary.units import dimension
 
 ENTRY_POINTS = "tunnel.effects"
@@ -33,7 +33,8 @@ _under_way: ContextVar[tuple[type[Effect], ...]] = ContextVar(
 
 def _found() -> tuple[type[Effect], ...]:
     """The effects that the package's modules define, by their place."""
-    names = [f"{package.__name__}.{module.name}" for module in iter_modules(package.__path__)]
+    room = __name__.rpartition(".")[0]
+    names = [f"{room}.{module.name}" for module in iter_modules([str(Path(__file__).parent)])]
     modules = [import_module(name) for name in names if name != __name__]
     defined = {
         kind
@@ -130,16 +131,9 @@ def _has_null(kind: type[Effect]) -> bool:
 @functools.cache
 def _load_entry_points() -> None:
     """Register the effects of installed packages, once."""
-    for point in entry_points(group=ENTRY_POINTS):
-        try:
+    for name, point in added_to(ENTRY_POINTS).items():
+        with loading(ENTRY_POINTS, name):
             register_effect(point.load())
-        except Exception as error:  # whatever a foreign package does wrong is said in one line
-            said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
-            raise TunnelError(
-                f"cannot be loaded ({one_line(said)})",
-                where=f"entry point {ENTRY_POINTS}: {point.name}",
-                remedy="correct or uninstall its package",
-            ) from error
 
 
 @contextmanager
@@ -181,3 +175,31 @@ def effect_class(name: str) -> type[Effect]:
     raise TunnelError(
         f"unknown effect {name!r}", remedy=did_you_mean(name, [kind.name for kind in known_effects()])
     )
+
+
+def the_effect(**traits: object) -> type[Effect]:
+    """The class of the only built-in effect with given traits.
+
+    Args:
+        **traits: as listed in `Effect`.
+
+    Raises:
+        LookupError: when there is none, or more than one.
+    """
+    found = [kind for kind in ALL_EFFECTS if all(getattr(kind, t) == v for t, v in traits.items())]
+    if len(found) != 1:
+        raise LookupError(f"{len(found)} effects have the traits {traits}")
+    return found[0]
+
+
+def effect_from(name: str, parameters: Mapping[str, float]) -> Effect:
+    """An effect by name.
+
+    Args:
+        name: such as ``coulomb_friction``.
+        parameters: by name, in their units; the others take their defaults.
+
+    Raises:
+        TunnelError: when a name is unknown or a value out of range.
+    """
+    return make_effect(effect_class(name), parameters)
