@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.plugins import added_to, loading
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
@@ -54,18 +55,38 @@ SUMMARIES: Mapping[str, str] = {
 ALL_ESTIMATORS: tuple[str, ...] = tuple(SUMMARIES)
 
 
+ENTRY_POINTS = "tunnel.estimators"
+"""Group of the entry points by which an installed package adds estimators: the name, and a class that needs no
+arguments."""
+
+
+def known_estimators() -> tuple[str, ...]:
+    """The names of all estimators: the packaged ones, then those that installed packages add."""
+    return (*ALL_ESTIMATORS, *(name for name in added_to(ENTRY_POINTS) if name not in ALL_ESTIMATORS))
+
+
 def make_estimator(name: str) -> Estimator:
     """An estimator by name, with its default settings.
 
     Args:
-        name: one of `ALL_ESTIMATORS`.
+        name: one of `known_estimators`.
 
     Raises:
-        TunnelError: when there is no such estimator; the error names the closest one.
+        TunnelError: when there is no such estimator, naming the closest one; or when an installed package states
+            something else than an estimator of that name.
     """
-    if name not in SUMMARIES:
+    if name in SUMMARIES:
+        kind = name.title().replace("_", "")
+        return cast("Estimator", getattr(import_module(f"{__name__}.{name}"), kind)())
+    added = added_to(ENTRY_POINTS)
+    if name not in added:
         raise TunnelError(
-            f"no estimator {name!r}", where="identify", remedy=did_you_mean(name, ALL_ESTIMATORS)
+            f"no estimator {name!r}", where="identify", remedy=did_you_mean(name, known_estimators())
         )
-    kind = name.title().replace("_", "")
-    return cast("Estimator", getattr(import_module(f"{__name__}.{name}"), kind)())
+    with loading(ENTRY_POINTS, name):
+        estimator = added[name].load()()
+        if getattr(estimator, "name", None) != name or not callable(getattr(estimator, "estimate", None)):
+            raise TunnelError(
+                f"is not an estimator named {name}", remedy="state its name and its method estimate"
+            )
+    return cast("Estimator", estimator)

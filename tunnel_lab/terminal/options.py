@@ -76,12 +76,13 @@ def known_estimator(name: str) -> None:
     Raises:
         TunnelError: when there is no such estimator; it suggests the closest name.
     """
-    from identification.estimators import ALL_ESTIMATORS
+    from identification.estimators import known_estimators
     from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
-    if name not in ALL_ESTIMATORS:
+    known = known_estimators()
+    if name not in known:
         raise TunnelError(
-            f"there is no estimator {name!r}", where="--estimator", remedy=did_you_mean(name, ALL_ESTIMATORS)
+            f"there is no estimator {name!r}", where="--estimator", remedy=did_you_mean(name, known)
         )
 
 
