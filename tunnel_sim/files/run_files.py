@@ -3,35 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from importlib import import_module
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from tunnel_sim.files.reading import read_regular
-from tunnel_sim.files.run_table import COLUMNS
-from tunnel_sim.files.toml_input import one_line
+from tunnel_sim.files.readers import COLUMNS, USED_COLUMNS, FileTable, Reader, load_reader, run_endings
+from tunnel_sim.files.reading import check_count, decoded, read_regular
 from tunnel_sim.files.writing import encoded
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, one_line
 from tunnel_sim.vocabulary.record import Array, Record
-
-if TYPE_CHECKING:
-    from tunnel_sim.files.run_table import FileTable, RunReader
 
 RUN_FORMATS = ("parquet", "csv")
 """Formats that are written."""
-
-READERS: Mapping[str, str] = {
-    ".csv": "tunnel_sim.files.run_csv",
-    ".parquet": "tunnel_sim.files.run_parquet",
-}
-"""Modules that read a kind of run file (`RunReader`), by its ending. A new kind is one module and one line."""
 
 
 def read_table(
@@ -45,7 +33,7 @@ def read_table(
     """Read times and readings from a run file; other columns are ignored.
 
     Args:
-        path: a file with one of the endings in `READERS`.
+        path: a file with one of the endings of run files.
         timed: whether times are required because no ``sample_rate`` is stated.
         quantity: what the sensor measures, which names the column.
         most: greatest number of samples.
@@ -58,16 +46,15 @@ def read_table(
         TunnelError: no such file, not a regular file, too large, not a table, a missing or repeated column, a
             value that is missing or not a number.
     """
-    kinds = " or ".join(READERS)
-    module = READERS.get(path.suffix.lower())
-    if module is None:
+    kinds = " or ".join(run_endings())
+    reader = load_reader(path.suffix.lower())
+    if reader is None or reader.read_run is None:
         raise TunnelError(
             f"unsupported file type '{one_line(path.suffix)}'", where=where, remedy=f"use {kinds}"
         )
-    reader = cast("RunReader", import_module(module))
     content = read_regular(
         path,
-        reader.LIMIT,
+        reader.limit,
         where=where,
         missing="put the file there or correct 'file' in campaign.toml",
         readable=f"name a readable {kinds} file",
@@ -78,7 +65,7 @@ def read_table(
             where=where,
             remedy=f"give it {_named(quantity)}, and time_s unless [sensor] sample_rate is given",
         )
-    return _columns(reader.read(content, where, most), where, timed=timed, quantity=quantity)
+    return _columns(reader.read_run(content, where, most), where, timed=timed, quantity=quantity)
 
 
 def table_bytes(record: Record, path: Path, quantity: Quantity = "angle") -> bytes:
@@ -167,3 +154,47 @@ def _numbers(series: pl.Series, text: bool, where: str) -> Array:
             remedy="cut the record before it, or leave the run out",
         )
     return values
+
+
+def _read_csv(content: bytes, where: str, most: int) -> FileTable:
+    """A table as text; arguments as in `Reader`. Columns without a name of their own are under their position."""
+    if not content.isascii():  # which needs no second copy of a large file
+        decoded(content, where)
+    columns = content.partition(b"\n")[0].count(b",") + 1
+    check_count(columns, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
+    check_count(content.count(b"\n") - 1, most, "samples", where, "split the file, or thin it out")
+    try:
+        rows = pl.read_csv(content, has_header=False, infer_schema=False, quote_char=None)
+    except pl.exceptions.PolarsError as error:
+        raise TunnelError(
+            f"not a comma-separated table ({one_line(error, 60)})",
+            where=where,
+            remedy="give every line one value for each column, with commas between and decimal points",
+        ) from None
+    names = [str(name or "").strip().strip('"').strip() for name in rows.row(0)]
+    if any(_is_number(name) for name in names):
+        raise TunnelError(
+            "no header line", where=where, remedy="name the columns in the first line, such as time_s,yaw_rad"
+        )
+    if len(names) == 1 and re.search(r"[;\t]", names[0]):
+        raise TunnelError("not comma-separated", where=where, remedy="put commas between the columns")
+    twice = next((name for name in names if name in USED_COLUMNS and names.count(name) > 1), None)
+    if twice is not None:
+        raise TunnelError(f"the column {twice} occurs twice", where=where, remedy="leave one of them out")
+    # Other columns that have no name, or share one, are kept apart by their position; nobody asks for them.
+    rows.columns = [
+        name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)
+    ]
+    return FileTable(rows.slice(1), rows.columns, text=True)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+CSV = Reader("a comma-separated table", limits.CSV_BYTES, read_run=_read_csv)
+"""Run files as comma-separated text."""

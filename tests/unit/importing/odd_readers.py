@@ -8,6 +8,7 @@ import numpy as np
 
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.tables import Channel, Table
+from tunnel_sim.files.readers import Reader
 
 TABLES = [
     Table(
@@ -23,7 +24,7 @@ TABLES = [
 
 
 def read(content: bytes, where: str) -> list[Table]:
-    """As `source.LibraryReader`."""
+    """As `Reader` describes."""
     if content == b"spin":
         while True:
             pass
@@ -35,3 +36,6 @@ def read(content: bytes, where: str) -> list[Table]:
         raise TunnelError("is odd", where=where, remedy="mend it")
     print("a library that talks", flush=True)
     return TABLES
+
+
+ODD = Reader("an odd file", 100, read_tables=read)

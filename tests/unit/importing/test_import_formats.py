@@ -12,7 +12,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from datetime import datetime, timedelta
 from pathlib import Path
-from types import ModuleType
 
 import h5py
 import nptdms
@@ -24,11 +23,10 @@ import xlsxwriter
 
 from tests.unit.importing.import_files import RATE, decay, written
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing import matlab, workbook
-from tunnel_sim.files.importing import tdms as tdms_reader
+from tunnel_sim.files.importing.arrays import _unpacked_size
 from tunnel_sim.files.importing.conditions import ImportChoices
-from tunnel_sim.files.importing.matlab import _unpacked
 from tunnel_sim.files.importing.records import Imported, read_records
+from tunnel_sim.files.readers import load_reader
 from tunnel_sim.vocabulary import limits
 
 TIME, ANGLE = decay()
@@ -119,22 +117,18 @@ def test_a_format_is_read(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "reader", "module"),
-    [
-        ("excel.xlsx", workbook, "fastexcel"),
-        ("seven.mat", matlab, "h5py"),
-        ("labview.tdms", tdms_reader, "nptdms"),
-    ],
+    ("name", "module"),
+    [("excel.xlsx", "fastexcel"), ("seven.mat", "h5py"), ("labview.tdms", "nptdms")],
 )
 def test_a_missing_library_is_said(
-    name: str, reader: ModuleType, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     FILES[name](tmp_path / name)
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(
         TunnelError, match=rf"needs the package {module}.*pip install 'virtual-wind-tunnel\[import\]'"
     ):
-        reader.read((tmp_path / name).read_bytes(), name)
+        read_tables((tmp_path / name).read_bytes(), name)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -146,6 +140,14 @@ def test_half_a_file_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
         # What can still be read may be read.
         with suppress(TunnelError):
             read_records([path], ImportChoices(angle=("data[1]",)) if name == "five.mat" else ImportChoices())
+
+
+def read_tables(content: bytes, name: str) -> object:
+    """The tables of a file, read in this process."""
+    reader = load_reader(Path(name).suffix)
+    assert reader is not None
+    assert reader.read_tables is not None
+    return reader.read_tables(content, name)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -180,7 +182,7 @@ def archive(*names: str, size: int = 10) -> bytes:
 def test_dangerous_workbooks_are_refused(monkeypatch: pytest.MonkeyPatch, content: bytes, what: str) -> None:
     monkeypatch.setattr(limits, "DATA_BYTES", 2**20)
     with pytest.raises(TunnelError, match=what):
-        workbook.read(content, "book.xlsx")
+        read_tables(content, "book.xlsx")
 
 
 def test_sizes_are_counted_before_anything_is_unpacked(
@@ -193,14 +195,14 @@ def test_sizes_are_counted_before_anything_is_unpacked(
     scipy.io.savemat(tmp_path / "zeros.mat", {"a": np.zeros(2**18)}, do_compression=True)
     monkeypatch.setattr(limits, "DATA_BYTES", 2**20)
     with pytest.raises(TunnelError, match="numbers, more than"):
-        matlab.read((tmp_path / "zeros.mat").read_bytes(), "zeros.mat")
+        read_tables((tmp_path / "zeros.mat").read_bytes(), "zeros.mat")
 
 
 @pytest.mark.parametrize("compressed", [False, True])
 def test_the_size_of_a_mat_file_is_that_of_all_its_arrays(tmp_path: Path, compressed: bool) -> None:
     arrays = {name: np.zeros(1000) for name in ("a", "b", "c")}
     scipy.io.savemat(tmp_path / "three.mat", arrays, do_compression=compressed)
-    assert 3 * 8000 <= _unpacked((tmp_path / "three.mat").read_bytes()) < 3 * 8100
+    assert 3 * 8000 <= _unpacked_size((tmp_path / "three.mat").read_bytes()) < 3 * 8100
 
 
 @pytest.mark.parametrize("name", ["log.h5", "log.mat"])

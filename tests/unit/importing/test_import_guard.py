@@ -15,7 +15,7 @@ from tunnel_sim.files.importing.guard import read_guarded
 from tunnel_sim.files.importing.tables import Table
 from tunnel_sim.vocabulary import limits
 
-READER = "tests.unit.importing.odd_readers"
+READER = "tests.unit.importing.odd_readers:ODD"
 
 
 def read(content: bytes) -> list[Table]:

@@ -1,20 +1,27 @@
-"""Tables from arrays by name, as MAT and HDF5 files hold them."""
+"""Readers of files that hold arrays by name: MAT, HDF5 and TDMS."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import io
+import zlib
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.tables import Channel, Table, split_unit
+from tunnel_sim.files.importing.tables import Channel, Table, known_unit, split_unit
+from tunnel_sim.files.readers import Reader, faults
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import library
 
 RUN_IDS = ("id", "run", "run_id")
 """Members and attributes whose text is the name of the run that a group holds."""
 _LEAST = 16  # values: a shorter array is not a record
+_COMPRESSED = 15  # data type of an element that zlib has packed
+_HEADER = 128  # bytes before the first element of version 5
 _MOST_CHANNELS = 256  # rows of a matrix: it is turned so that they are fewer than its samples
 
 
@@ -60,15 +67,16 @@ def tables_of(
             groups.setdefault((group, matrix.shape[1]), []).append(
                 Channel(label, row.astype(np.float64), unit)
             )
+    several = len({name for name, _ in groups}) > 1
     return [
         Table(
             tuple(channels),
-            runs.get(group) or _part(group, groups),
+            runs.get(group) or (group.replace("/", "-") if several else ""),
             _facts_of(group, facts),
-            (f"{kind}: {_shape(channels)}",),
+            (f"{kind}: {len(channels)} channel{'s' if len(channels) > 1 else ''} of {length} samples",),
             named=bool(runs.get(group)),
         )
-        for (group, _), channels in groups.items()
+        for (group, length), channels in groups.items()
     ]
 
 
@@ -85,11 +93,6 @@ def check_size(count: int, where: str) -> None:
     check_count(count, most, "numbers", where, "split the file, or leave out arrays that are not needed")
 
 
-def _part(group: str, groups: Mapping[tuple[str, int], list[Channel]]) -> str:
-    """The name of a group where there are several."""
-    return group.replace("/", "-") if len({name for name, _ in groups}) > 1 else ""
-
-
 def _facts_of(group: str, facts: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
     found: dict[str, float] = {}
     for name, values in sorted(facts.items(), key=lambda item: len(item[0])):
@@ -98,6 +101,159 @@ def _facts_of(group: str, facts: Mapping[str, Mapping[str, float]]) -> dict[str,
     return found
 
 
-def _shape(channels: list[Channel]) -> str:
-    count = len(channels)
-    return f"{count} channel{'s' if count > 1 else ''} of {channels[0].values.size} samples"
+def _read_hdf5(content: bytes, where: str) -> list[Table]:
+    """The tables of an HDF5 file; arguments as in `Reader`."""
+    h5py = library("h5py", "HDF5 (also MAT 7.3)", "import", where)
+    with faults("an HDF5 file", where), h5py.File(io.BytesIO(content), "r") as file:
+        datasets: dict[str, Any] = {}
+        attributes: dict[str, NDArray[np.generic]] = {}
+        runs: dict[str, str] = {}
+
+        def visit(path: str, item: Any) -> None:
+            check_count(
+                len(datasets), limits.COLUMNS, "datasets", where, "leave out datasets that are not needed"
+            )
+            if (
+                isinstance(item, h5py.Dataset)
+                and not path.startswith("#refs#")
+                and not (item.attrs.get("MATLAB_class") in (b"char", "char") or "MATLAB_empty" in item.attrs)
+            ):
+                datasets[path] = item
+            group = isinstance(item, h5py.Group)
+            for name in item.attrs:
+                held = item.attrs.get_id(name)  # others are not read: a text may lie in a damaged heap
+                if held.dtype.kind in "iuf" and held.get_space().get_simple_extent_npoints() == 1:
+                    folder = path if group else path.rpartition("/")[0]
+                    attributes[f"{folder}/{name}".lstrip("/")] = np.asarray(item.attrs[name])
+                elif group and name in RUN_IDS and isinstance(text := item.attrs[name], str):
+                    runs[path] = text
+
+        visit("", file)
+        file.visititems(visit)  # does not follow links, so nothing outside the file is opened
+        check_size(sum(int(np.prod(item.shape, dtype=float)) for item in datasets.values()), where)
+        arrays = attributes | dict(_hdf5_columns(datasets))
+        units = {path: _hdf5_unit(item) for path, item in datasets.items() if _hdf5_unit(item)}
+    return tables_of(arrays, "HDF5 file", units, runs)
+
+
+def _hdf5_columns(datasets: dict[str, Any]) -> list[tuple[str, NDArray[np.generic]]]:
+    """Datasets as arrays; a compound one gives one array for each of its fields."""
+    found = []
+    for path, item in datasets.items():
+        if item.external or item.is_virtual or item.shape is None:
+            continue
+        if item.dtype.names:
+            table = item[()]
+            found += [(f"{path}/{name}", table[name]) for name in item.dtype.names]
+        elif item.dtype.kind in "iufb":
+            found.append((path, item[()]))
+    return found
+
+
+def _hdf5_unit(item: Any) -> str:
+    """The unit that an attribute of a dataset states."""
+    for name in ("unit", "units", "Unit", "Units"):
+        text = item.attrs.get(name, "")
+        found = known_unit(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
+        if found:
+            return found
+    return ""
+
+
+def _read_mat(content: bytes, where: str) -> list[Table]:
+    """The tables of a MAT file; arguments as in `Reader`."""
+    if content.startswith((b"MATLAB 7.3", b"\x89HDF")):
+        return _read_hdf5(content, where)
+    from scipy.io import loadmat
+
+    with faults("a MAT file", where):
+        check_size(_unpacked_size(content) // 8, where)
+        held = loadmat(cast(Any, io.BytesIO(content)), simplify_cells=True)  # the stubs know paths only
+    leaves = dict(_leaves({name: value for name, value in held.items() if not name.startswith("__")}))
+    arrays = {path: value for path, value in leaves.items() if not isinstance(value, str)}
+    texts = {path.rpartition("/"): value for path, value in leaves.items() if isinstance(value, str)}
+    runs = {group: text for (group, _, name), text in texts.items() if name in RUN_IDS}
+    return tables_of(arrays, "MAT file", runs=runs)
+
+
+def _unpacked_size(content: bytes) -> int:
+    """Bytes of all elements once unpacked, which each states in its first eight."""
+    if not content.startswith(b"MATLAB"):
+        return len(content)
+    order: Literal["little", "big"] = "little" if content[126:128] == b"IM" else "big"
+    at, total = _HEADER, 0
+    while at + 8 <= len(content):
+        kind, size = (int.from_bytes(content[at + i : at + i + 4], order) for i in (0, 4))
+        if kind == _COMPRESSED:
+            start = zlib.decompressobj().decompress(content[at + 8 : at + 8 + size], 8)
+            total += int.from_bytes(start[4:8], order)
+        else:
+            total += size
+        at += 8 + size
+    return total
+
+
+def _leaves(value: object, path: str = "") -> Iterator[tuple[str, NDArray[np.generic] | str]]:
+    """Arrays and texts of structures and cells, by path."""
+    if isinstance(value, dict):
+        for name, member in value.items():
+            yield from _leaves(member, f"{path}/{name}" if path else str(name))
+    elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
+        for i, member in enumerate(np.ravel(value) if isinstance(value, np.ndarray) else value, 1):
+            yield from _leaves(member, f"{path}[{i}]")
+    elif isinstance(value, str):
+        yield path, value
+    elif isinstance(value, int | float | np.ndarray | np.generic):
+        yield path, np.asarray(value)
+
+
+def _read_tdms(content: bytes, where: str) -> list[Table]:
+    """The tables of a TDMS file, one for each group; arguments as in `Reader`."""
+    nptdms = library("nptdms", "TDMS", "import", where)
+    tables = []
+    with faults("a TDMS file", where), nptdms.TdmsFile.open(io.BytesIO(content)) as file:
+        groups = file.groups()
+        channels = [channel for group in groups for channel in group.channels()]
+        check_count(
+            len(channels), limits.COLUMNS, "channels", where, "leave out channels that are not needed"
+        )
+        check_size(sum(len(channel) for channel in channels), where)
+        for group in groups:
+            numeric = [c for c in group.channels() if len(c) and np.dtype(c.dtype).kind in "iufb"]
+            for length in dict.fromkeys(len(channel) for channel in numeric):
+                facts = _tdms_numbers(file.properties) | _tdms_numbers(group.properties)
+                columns = []
+                for channel in numeric:
+                    if len(channel) == length:
+                        name, unit = split_unit(channel.name)
+                        stated = str(channel.properties.get("unit_string", ""))
+                        facts |= _tdms_numbers(channel.properties)
+                        columns.append(
+                            Channel(name, channel[:].astype(np.float64), known_unit(stated) or unit)
+                        )
+                part = group.name if len(groups) > 1 else ""
+                said = (f"TDMS file: group '{group.name}', {len(columns)} channels of {length} samples",)
+                tables.append(Table(tuple(columns), part, facts, said))
+    return tables
+
+
+def _tdms_numbers(properties: dict[str, object]) -> dict[str, float]:
+    return {
+        name: float(value) for name, value in properties.items() if isinstance(value, int | float | np.number)
+    }
+
+
+HDF5 = Reader("an HDF5 file", limits.DATA_BYTES, (b"\x89HDF",), read_tables=_read_hdf5)
+"""HDF5 files."""
+
+MAT = Reader(
+    "a MAT file",
+    limits.DATA_BYTES,
+    # Version 5, version 7.3 without its first block, and version 4.
+    (b"MATLAB", b"\x89HDF", b"\x00\x00\x00\x00", b"\x0a\x00\x00\x00"),
+    read_tables=_read_mat,
+)
+"""MAT files of versions 4 to 7.3."""
+
+TDMS = Reader("a TDMS file", limits.DATA_BYTES, (b"TDSm",), read_tables=_read_tdms)
+"""TDMS files of LabVIEW."""

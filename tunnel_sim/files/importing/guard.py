@@ -11,6 +11,7 @@ import atexit
 import json
 import math
 import os
+import pkgutil
 import signal
 import subprocess
 import sys
@@ -19,7 +20,6 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import fields
-from importlib import import_module
 from typing import Any, BinaryIO, cast
 
 import numpy as np
@@ -41,15 +41,15 @@ _lock = threading.Lock()
 _kept: list[_Server] = []
 
 
-def read_guarded(module: str, content: bytes, where: str) -> list[Table]:
+def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
     """The tables of a file, read in a process with limits.
 
     Args:
-        module: reads the format (`source.LibraryReader`).
+        reader: where the `Reader` of the format is, ``module:name``.
         content: of the file.
 
     Raises:
-        TunnelError: as the module, or when a limit is exceeded or the process dies.
+        TunnelError: as the reader, or when a limit is exceeded or the process dies.
     """
     with _lock:
         if _kept and not _kept[0].usable():
@@ -57,7 +57,7 @@ def read_guarded(module: str, content: bytes, where: str) -> list[Table]:
         if not _kept:
             _kept.append(_Server())
         try:
-            return _kept[0].read(module, content, where)
+            return _kept[0].read(reader, content, where)
         except BaseException as error:
             # What is left of an answer that nobody waits for would be taken for the next one.
             if not isinstance(error, TunnelError) or not _kept[0].usable():
@@ -103,7 +103,7 @@ class _Server:
             with suppress(OSError):  # what was left to be sent cannot be
                 stream.close()
 
-    def read(self, module: str, content: bytes, where: str) -> list[Table]:
+    def read(self, reader: str, content: bytes, where: str) -> list[Table]:
         """The tables of a file, as `read_guarded`."""
         allowed = limits.READER_SECONDS + len(content) / limits.READER_PACE
         late = threading.Event()
@@ -116,7 +116,7 @@ class _Server:
         watch.daemon = True
         watch.start()
         try:
-            request = {"module": module, "where": where, "seconds": allowed, "sizes": [len(content)]}
+            request = {"reader": reader, "where": where, "seconds": allowed, "sizes": [len(content)]}
             _send(self._asked, request, [content])
             answer, arrays = _received(self._answers)
         except (EOFError, OSError):
@@ -150,7 +150,7 @@ def serve() -> None:
             # The limit counts whole seconds.
             _limit("RLIMIT_CPU", math.ceil(time.process_time() + _LATEST * request["seconds"]) + 1)
             try:
-                tables = import_module(request["module"]).read(content.pop(), request["where"])
+                tables = pkgutil.resolve_name(request["reader"]).read_tables(content.pop(), request["where"])
                 _send(answers, *_packed(tables))
             except TunnelError as error:
                 _send(answers, {"error": error.what, "remedy": error.remedy, "sizes": []}, [])

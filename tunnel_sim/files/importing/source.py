@@ -5,16 +5,15 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from pathlib import Path
-from typing import Protocol, cast
 
 import numpy as np
 
-from tunnel_sim.files.importing import text
 from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.guard import read_guarded
 from tunnel_sim.files.importing.tables import Table, by_run
+from tunnel_sim.files.importing.text import TEXT, read_text_tables
+from tunnel_sim.files.readers import Reader, load_reader, reader_place
 from tunnel_sim.files.reading import check_count, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
@@ -36,41 +35,6 @@ class Source:
     tables: tuple[Table, ...]
     known: Mapping[str, str] = field(default_factory=dict)
 
-
-class Format(Protocol):
-    """A module that reads one format."""
-
-    LIMIT: int
-    """The largest file, bytes."""
-    MAGIC: tuple[bytes, ...]
-    """How such a file begins; empty where anything will do."""
-    KIND: str
-    """The name of the format, with its article."""
-
-
-class LibraryReader(Format, Protocol):
-    """A module that reads a format with a library, which `guard` therefore runs in a process with limits."""
-
-    def read(self, content: bytes, where: str) -> list[Table]:
-        """The tables.
-
-        Raises:
-            TunnelError: when it is not such a file, or too large.
-        """
-
-
-_ROOM = "tunnel_sim.files.importing."
-READERS: Mapping[str, str] = {
-    ".xlsx": _ROOM + "workbook",
-    ".xlsm": _ROOM + "workbook",
-    ".mat": _ROOM + "matlab",
-    ".h5": _ROOM + "hdf5",
-    ".hdf5": _ROOM + "hdf5",
-    ".hdf": _ROOM + "hdf5",
-    ".tdms": _ROOM + "tdms",
-    ".parquet": _ROOM + "parquet",
-}
-"""Modules that read a format (`LibraryReader`), by the ending of the name; any other file is read as text."""
 
 _BEGINNINGS = {
     b"PK\x03\x04": "an Excel workbook or another archive",
@@ -94,17 +58,19 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
         TunnelError: no such file, too large, or not of the format that its name says.
     """
     where = shown(path)
-    module = READERS.get(path.suffix.lower())
-    form = cast("Format", text if module is None else import_module(module))
-    content = read_regular(path, form.LIMIT)
+    ending = path.suffix.lower()
+    reader, place = load_reader(ending), reader_place(ending)
+    if reader is None or reader.read_tables is None:
+        reader, place = TEXT, None
+    content = read_regular(path, reader.limit)
     if not content.strip():
         raise TunnelError("the file is empty", where=where, remedy="name a file that holds a record")
-    _check_beginning(content, form, where)
+    _check_beginning(content, reader, where)
     known: dict[str, str] = {}
-    if module is None:
-        tables, known = text.read(content, where, choices)
+    if place is None:
+        tables, known = read_text_tables(content, where, choices)
     else:
-        tables = read_guarded(module, content, where)
+        tables = read_guarded(place, content, where)
     tables = [part for table in tables if table.channels for part in by_run(_computable(table))]
     if not tables:
         raise TunnelError(
@@ -127,14 +93,14 @@ def _computable(table: Table) -> Table:
     return replace(table, channels=tuple(channels), said=(*table.said, *said)) if said else table
 
 
-def _check_beginning(content: bytes, form: Format, where: str) -> None:
-    if form.MAGIC and content.startswith(form.MAGIC):
+def _check_beginning(content: bytes, reader: Reader, where: str) -> None:
+    if reader.magic and content.startswith(reader.magic):
         return
     really = next((kind for magic, kind in _BEGINNINGS.items() if content.startswith(magic)), None)
-    if really is not None or form.MAGIC:
+    if really is not None or reader.magic:
         remedy = "give the file the ending of its format, or export it again"
         raise TunnelError(
-            f"is not {form.KIND}" + (f": it begins like {really}" if really else ""),
+            f"is not {reader.kind}" + (f": it begins like {really}" if really else ""),
             where=where,
             remedy=remedy,
         )

@@ -24,6 +24,7 @@ from tunnel_sim.files.importing.tables import (
     names_runs,
     split_unit,
 )
+from tunnel_sim.files.readers import Reader
 from tunnel_sim.files.reading import check_count, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
@@ -184,12 +185,8 @@ def _facts(lines: Sequence[str]) -> dict[str, float]:
     return found
 
 
-LIMIT = limits.CSV_BYTES
-"""Largest file, bytes."""
-MAGIC: tuple[bytes, ...] = ()
-"""Text begins with anything."""
-KIND = "a table of text"
-"""As messages name it."""
+TEXT = Reader("a table of text", limits.CSV_BYTES)
+"""Any file without a reader of its own; `read_text_tables` takes what is known of its dialect."""
 _CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:\s*([AaPp])\.?[Mm]\.?|Z|[+-]\d{2}:?\d{2})?$"
 _DAY = 86400.0  # s
 _HEAD, _MIDDLE = 2**18, 2**14  # bytes that are looked at
@@ -222,7 +219,9 @@ class Dialect:
         return [cell.strip(' \t"') for cell in cells]
 
 
-def read(content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
+def read_text_tables(
+    content: bytes, where: str, choices: ImportChoices
+) -> tuple[list[Table], dict[str, str]]:
     """The table of a text file; and how it was read, for the recipe."""
     content, encoding = _as_utf8(content, where)
     head, body = _samples(content)

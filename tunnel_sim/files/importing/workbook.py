@@ -7,27 +7,21 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tunnel_sim.files.importing.faults import faults
 from tunnel_sim.files.importing.tables import Table
 from tunnel_sim.files.importing.text import find_layout, is_number, tables_of
+from tunnel_sim.files.readers import Reader, faults
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, library
 
-LIMIT = limits.DATA_BYTES
-"""Largest file, bytes."""
-MAGIC = (b"PK\x03\x04",)
-"""How such a file begins."""
-KIND = "an Excel workbook"
-"""As messages name it."""
 _HEAD = 400
 
 
-def read(content: bytes, where: str) -> list[Table]:
-    """The tables of a workbook, one for each sheet; arguments as in `source.LibraryReader`."""
+def _read(content: bytes, where: str) -> list[Table]:
+    """The tables of a workbook, one for each sheet; arguments as in `Reader`."""
     fastexcel = library("fastexcel", "Excel", "import", where)
     tables = []
-    with faults(KIND, where):
+    with faults("an Excel workbook", where):
         _check_archive(content, where)
         book = fastexcel.read_excel(content)
         rows = {
@@ -98,3 +92,7 @@ def _check_archive(content: bytes, where: str) -> None:
                 where=where,
                 remedy="save a copy with values only, as .xlsx or as text",
             )
+
+
+WORKBOOK = Reader("an Excel workbook", limits.DATA_BYTES, (b"PK\x03\x04",), read_tables=_read)
+"""Excel workbooks."""

@@ -1,0 +1,158 @@
+"""The readers of files, by the ending of the name: run files of a campaign, and files that an instrument wrote."""
+
+from __future__ import annotations
+
+import functools
+import pkgutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import polars as pl
+
+from tunnel_sim.vocabulary.errors import TunnelError, one_line
+from tunnel_sim.vocabulary.plugins import added_to, loading
+
+if TYPE_CHECKING:
+    from tunnel_sim.files.importing.tables import Table
+
+ENTRY_POINTS = "tunnel.readers"
+"""Group of the entry points by which an installed package adds readers: ending without its dot, and `Reader`."""
+
+COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "angle": ("yaw_rad", "yaw_deg"),
+    "rate": ("yaw_rate_rad_s", "yaw_rate_deg_s"),
+    "acceleration": ("yaw_acceleration_rad_s2",),
+}
+"""The columns that may hold the reading, by the sensor's quantity; the first one is written."""
+
+USED_COLUMNS = ("time_s", *(name for names in COLUMNS.values() for name in names))
+"""The columns of a run file that are read; others are left alone."""
+
+
+@dataclass(frozen=True)
+class FileTable:
+    """The table of a run file.
+
+    Args:
+        frame: at least those of `USED_COLUMNS` that the file has.
+        names: of all columns.
+        text: whether values are still texts, below a line of headings.
+    """
+
+    frame: pl.DataFrame
+    names: Sequence[str]
+    text: bool = False
+
+
+@dataclass(frozen=True)
+class Reader:
+    """How one format is read. Its functions raise `TunnelError` for content of another format, or too large.
+
+    Args:
+        kind: name of the format, with its article.
+        limit: largest file, bytes.
+        magic: how such a file begins; empty where anything will do.
+        read_run: the table of a campaign's run file, from its content, its name for messages, and the greatest
+            number of samples; None where such files are not run files.
+        read_tables: the tables of a file that an instrument wrote, from its content and its name for messages; it
+            runs in a process with limits. None where such files are imported as text.
+    """
+
+    kind: str
+    limit: int
+    magic: tuple[bytes, ...] = ()
+    read_run: Callable[[bytes, str, int], FileTable] | None = None
+    read_tables: Callable[[bytes, str], list[Table]] | None = None
+
+
+READERS: Mapping[str, str] = {
+    ".csv": "tunnel_sim.files.run_files:CSV",
+    ".parquet": "tunnel_sim.files.importing.parquet:PARQUET",
+    ".xlsx": "tunnel_sim.files.importing.workbook:WORKBOOK",
+    ".xlsm": "tunnel_sim.files.importing.workbook:WORKBOOK",
+    ".mat": "tunnel_sim.files.importing.arrays:MAT",
+    ".h5": "tunnel_sim.files.importing.arrays:HDF5",
+    ".hdf5": "tunnel_sim.files.importing.arrays:HDF5",
+    ".hdf": "tunnel_sim.files.importing.arrays:HDF5",
+    ".tdms": "tunnel_sim.files.importing.arrays:TDMS",
+}
+"""Where the `Reader` of each ending is. A new format is a reader and a line; other files are imported as text."""
+
+
+def reader_place(ending: str) -> str | None:
+    """Where the reader of an ending is, ``module:name``.
+
+    Args:
+        ending: with its dot, in small letters.
+
+    Returns:
+        None where there is none.
+    """
+    return READERS.get(ending) or _added_places().get(ending)
+
+
+def load_reader(ending: str) -> Reader | None:
+    """The reader of files with an ending.
+
+    Args:
+        ending: with its dot, in small letters.
+
+    Returns:
+        None where there is none.
+
+    Raises:
+        TunnelError: when an installed package states something that is not a reader.
+    """
+    place = reader_place(ending)
+    if place is None:
+        return None
+    if ending in READERS:
+        built_in: Reader = pkgutil.resolve_name(place)
+        return built_in
+    with loading(ENTRY_POINTS, ending[1:]):
+        added = pkgutil.resolve_name(place)
+        if not isinstance(added, Reader):
+            raise TunnelError("is not a Reader", remedy="see tunnel_sim.files.readers")
+    return added
+
+
+def run_endings() -> list[str]:
+    """The endings of a campaign's run files, with their dots."""
+    endings = (*READERS, *(ending for ending in _added_places() if ending not in READERS))
+    readers = {ending: load_reader(ending) for ending in endings}
+    return [
+        ending for ending, reader in readers.items() if reader is not None and reader.read_run is not None
+    ]
+
+
+@functools.cache
+def _added_places() -> dict[str, str]:
+    """Where the readers of installed packages are, by ending; read once."""
+    return {f".{name.lower()}": point.value for name, point in added_to(ENTRY_POINTS).items()}
+
+
+@contextmanager
+def faults(kind: str, where: str) -> Iterator[None]:
+    """Convert whatever a library raises on a malformed file, except `MemoryError`, to a `TunnelError`.
+
+    Args:
+        kind: what the file is not, with its article.
+
+    Raises:
+        TunnelError: instead of any other exception.
+    """
+    try:
+        yield
+    except (TunnelError, MemoryError):  # the guard reports memory
+        raise
+    except BaseException as error:
+        # A panic of a library in Rust is not a subclass of Exception, and has no name to import.
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+            raise
+        raise TunnelError(
+            f"is not {kind} that can be read ({one_line(error, 60)})",
+            where=where,
+            remedy="export it again, or as text",
+        ) from None
