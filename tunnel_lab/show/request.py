@@ -76,8 +76,9 @@ class ShownRun:
 
     def record(self) -> Record:
         """The potentiometer's reading, simulated at each call with the same bits."""
+        from tunnel_sim.effects.chain import read_motion
         from tunnel_sim.engine.model import build_model
-        from tunnel_sim.engine.simulate import read_motion, simulate_motion
+        from tunnel_sim.engine.simulate import simulate_motion
 
         plan, _ = _plan_and_condition(self.request, self.rig)
         motion = simulate_motion(build_model(self.rig, self.settings), self.sensor.sample_rate)

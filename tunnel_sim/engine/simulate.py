@@ -1,8 +1,4 @@
-"""Simulation of single runs and of many runs at once, and what the sensor reads of them.
-
-From the angle of the rod's upper end to the reading of the potentiometer. Simulation of single runs and of many
-runs at once.
-"""
+"""Simulation of single runs and of many runs at once."""
 
 from __future__ import annotations
 
@@ -10,12 +6,14 @@ import ctypes
 import functools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco import batch as mujoco_batch
 
 from tunnel_sim.effects import Effect, EffectChain
+from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.model import Model, build_model
 from tunnel_sim.physics.moment_law import forward_library
 from tunnel_sim.physics.run_settings import Motion, RunSettings, sampling
@@ -25,46 +23,12 @@ from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
 
-
-def read_motion(
-    motion: Motion, sensor: SensorModel, rng: np.random.Generator, chain: EffectChain | None = None
-) -> Record:
-    """The reading y = quantised(β + zero + noise), with the effects that act on sensor and reading.
-
-    Args:
-        motion: of the rod's upper end.
-        sensor: noise, zero and resolution; with a resolution of 0 the reading is not quantised.
-
-    Returns:
-        The record. The ideal converter has an unlimited range: clipping is an effect.
-    """
-    angle, time = motion.angle, motion.time_s
-    if chain is not None and chain.skips:
-        time = time[: round(chain.stated.duration / (time[1] - time[0]))]
-        angle = chain.seen(motion, time)
-    elif chain is not None:
-        angle = chain.angle(angle, time)
-    sensor = sensor if chain is None else chain.sensor(sensor)
-    reading = angle + sensor.zero + sensor.noise_std * rng.standard_normal(angle.shape)
-    if chain is not None:
-        reading = chain.reading(reading)
-    return Record(time, quantise(reading, sensor.resolution))
-
-
-def quantise(reading: Array, step: float) -> Array:
-    """Round to a multiple of the resolution.
-
-    Args:
-        reading: rad, any shape.
-        step: rad; 0 leaves the reading as it is.
-
-    Returns:
-        The rounded reading, rad.
-    """
-    return np.round(reading / step) * step if step > 0.0 else reading
-
-
 Progress = Callable[[int, int], None]
+STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""State for a bit-identical continuation: full physics with plugin state, inputs, and the solver's warm start."""
+
+_CONTROL = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED) | int(mujoco.mjtState.mjSTATE_USERDATA)
+_VARIED = ("jnt_stiffness", "dof_damping", "numeric_data", "body_inertia")
 _CHUNK_STEPS = 4_000_000  # steps recorded at once, to limit the memory of a large batch
 
 
@@ -160,31 +124,103 @@ def _groups(settings: Sequence[RunSettings]) -> list[list[int]]:
 
 def _integrate_chunk(rig: Rig, runs: list[RunSettings], sample_rate: float, nthread: int) -> list[Motion]:
     model = build_model(rig, runs[0], drawn=False)
-    batch = mujoco_batch.Batch(model.mj, nsim=len(runs), nthread=nthread)
-    fields = {
-        name: batch.expand(name) for name in ("jnt_stiffness", "dof_damping", "numeric_data", "body_inertia")
-    }
-    states = {name: batch.bind(name) for name in ("qpos", "qvel", "plugin_state")}
-    for i, run in enumerate(runs):
-        case = model.with_settings(run)
-        for name, values in fields.items():
-            values[i] = getattr(case.mj, name)
-        data = case.release_state()
-        for name, values in states.items():
-            values[i] = getattr(data, name)
-    batch.set_const()
     samples, steps = sampling(runs[0], sample_rate)
-    qpos, qvel = states["qpos"].copy(), states["qvel"].copy()
+    batch = RunBatch(model, len(runs), steps, nthread)
+    first = np.array([batch.start(row, model.with_settings(run)) for row, run in enumerate(runs)]).T
     with no_log(), no_timers():
-        recorded = batch.rollout(nstep=(samples - 1) * steps, record=("qpos", "qvel"))
-    at = model.yaw_address
+        angle, rate = batch.advance(samples - 1, first)
     time = np.arange(samples) / sample_rate
-    motions = []
-    for i in range(len(runs)):
-        angle = np.concatenate([qpos[i, at : at + 1], recorded["qpos"][i, steps - 1 :: steps, at]])
-        rate = np.concatenate([qvel[i, at : at + 1], recorded["qvel"][i, steps - 1 :: steps, at]])
-        motions.append(Motion(time, angle, rate))
-    return motions
+    return [Motion(time, angle[i], rate[i]) for i in range(len(runs))]
+
+
+class RunBatch:
+    """Runs of one layout on ``mujoco.batch``, each with numbers of its own; ``row`` is the index of a run.
+
+    Args:
+        model: of any of the runs.
+        count: number of runs.
+        steps: number of integration steps between two samples.
+        nthread: number of threads; 0 uses all processors. The result does not depend on it.
+    """
+
+    def __init__(self, model: Model, count: int, steps: int, nthread: int) -> None:
+        self._batch = mujoco_batch.Batch(model.mj, nsim=count, nthread=nthread)
+        self._address, self._steps = model.yaw_address, steps
+        self._fields = {name: self._batch.expand(name) for name in _VARIED}
+        self._states = {name: self._batch.bind(name) for name in ("qpos", "qvel")}
+        self._started: set[int] = set()
+        self._out: dict[str, Array] = {}
+
+    @property
+    def state(self) -> Array:
+        """MuJoCo's `STATE` of the runs, in SI units, shape (runs, n); a row that is written to sets its run."""
+        state: Array = self._batch.state
+        return state
+
+    def qpos(self, row: int) -> Array:
+        """Positions of a run's joints, rad."""
+        positions: Array = self._states["qpos"][row]
+        return positions
+
+    def now(self, row: int) -> tuple[float, float]:
+        """Angle (rad) and rate (rad/s) of the rod's upper end."""
+        return tuple(float(self._states[name][row, self._address]) for name in ("qpos", "qvel"))  # type: ignore[return-value]
+
+    def start(self, row: int, model: Model) -> tuple[float, float]:
+        """Start a run at its release; result as of `now`.
+
+        Args:
+            model: of the run, with the layout of the batch.
+        """
+        data = model.release_state()
+        for name in _VARIED:
+            self._fields[name][row] = getattr(model.mj, name)
+        mujoco.mj_getState(model.mj, data, self._batch.state[row], STATE)
+        self._started.add(row)
+        return float(data.qpos[self._address]), float(data.qvel[self._address])
+
+    def advance(
+        self,
+        samples: int,
+        first: Array,
+        rows: Any = None,
+        control: tuple[Array, Array] | None = None,
+    ) -> tuple[Array, Array]:
+        """Integrate runs over some samples.
+
+        Args:
+            samples: number of samples after the first.
+            first: angle (rad) and rate (rad/s) of the rod's upper end now, shape (2, runs).
+            rows: indices of the runs to be advanced; all where None.
+            control: departure of the wind speed in each sample interval, shape (runs, samples), m/s, and moment on
+                the rod's upper end, shape (runs,), N m, of the runs advanced; None: nothing acts.
+
+        Returns:
+            Angle (rad) and rate (rad/s) of the rod's upper end, now and at each sample, shape (runs, samples + 1).
+        """
+        if self._started:
+            self._batch.set_const(np.array(sorted(self._started), dtype=np.int32))
+            self._started.clear()
+        applied = None
+        if control is not None:
+            departure, moment = np.repeat(control[0], self._steps, axis=1), control[1]
+            joints = self._batch.model.nv
+            applied = np.zeros((*departure.shape, joints + self._batch.model.nuserdata))
+            applied[..., self._address] = moment[:, None]
+            applied[..., joints] = departure
+        out = self._out if rows is None else None
+        recorded = self._batch.rollout(
+            samples * self._steps, applied, _CONTROL, ("qpos", "qvel"), ids=rows, out=out
+        )
+        if rows is None:
+            self._out = recorded  # the same buffers again
+        angle, rate = (
+            np.concatenate(
+                (now[:, None], recorded[name][:, self._steps - 1 :: self._steps, self._address]), axis=1
+            )
+            for now, name in zip(first, ("qpos", "qvel"), strict=True)
+        )
+        return angle, rate
 
 
 @contextmanager

@@ -12,7 +12,8 @@ import numpy as np
 
 from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.base import SPRING_TOLERANCE
-from tunnel_sim.engine.simulate import Progress, read_motion, simulate_motions
+from tunnel_sim.effects.chain import read_motion
+from tunnel_sim.engine.simulate import Progress, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import Motion, RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

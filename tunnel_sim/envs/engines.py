@@ -7,19 +7,14 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from mujoco import batch as mujoco_batch
+from numpy.typing import NDArray
 
 from tunnel_sim.engine.model import Model, build_model
+from tunnel_sim.engine.simulate import STATE, RunBatch
 from tunnel_sim.physics.run_settings import RunSettings, sampling
 from tunnel_sim.physics.steps import follow_fastest
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
-
-STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-"""State for a bit-identical continuation: full physics with plugin state, inputs, and the solver's warm start."""
-
-_CONTROL = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED) | int(mujoco.mjtState.mjSTATE_USERDATA)
-_VARIED = ("jnt_stiffness", "dof_damping", "numeric_data", "body_inertia")
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,106 +146,57 @@ class ManyRuns:
 
     def __init__(self, models: Models, samples: int, count: int, nthread: int) -> None:
         self._models, self._samples, self._count, self._nthread = models, samples, count, nthread
-        self._groups: dict[tuple[object, ...], _Group] = {}
+        self._batches: dict[tuple[object, ...], RunBatch] = {}
         self._layout: list[tuple[object, ...]] = [()] * count
-        self._members: dict[tuple[object, ...], np.ndarray[Any, Any] | None] = {}
+        self._members: dict[tuple[object, ...], NDArray[np.intp]] = {}
         self._last = np.zeros((2, count))  # angle and rate at the last period's end
 
     def start(self, row: int, settings: RunSettings) -> float:
         """Start a run at its release; result and arguments as in `OneRun.start`."""
         layout, steps, model = self._models.of(settings)
-        if layout not in self._groups:
-            batch = mujoco_batch.Batch(model.mj, nsim=self._count, nthread=self._nthread)
-            self._groups[layout] = _Group(batch, model.yaw_address, steps, self._samples)
-        group = self._groups[layout]
-        data = model.release_state()
-        for name in _VARIED:
-            group.fields[name][row] = getattr(model.mj, name)
-        mujoco.mj_getState(model.mj, data, group.batch.state[row], STATE)
-        group.changed.append(row)
+        if layout not in self._batches:
+            self._batches[layout] = RunBatch(model, self._count, steps, self._nthread)
         if self._layout[row] != layout:
             self._layout[row] = layout
             self._members = {}
-        at = model.yaw_address
-        self._last[:, row] = data.qpos[at], data.qvel[at]
-        return float(data.qpos[at])
+        self._last[:, row] = self._batches[layout].start(row, model)
+        return float(self._last[0, row])
 
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
         """Integrate one control period of all runs; result and arguments as in `OneRun.advance`."""
         if not self._members:
-            self._members = self._sorted()
+            layouts = dict.fromkeys(self._layout)
+            self._members = {
+                layout: np.flatnonzero([other == layout for other in self._layout]) for layout in layouts
+            }
         if len(self._members) == 1:
             (layout,) = self._members
-            angle, rate = self._groups[layout].advance(None, self._last, operation)
+            control = None if operation is None else (operation.wind_departure, operation.moment)
+            angle, rate = self._batches[layout].advance(self._samples, self._last, None, control)
         else:
             angle, rate = (np.empty((self._count, self._samples + 1)) for _ in range(2))
             for layout, rows in self._members.items():
-                angle[rows], rate[rows] = self._groups[layout].advance(rows, self._last, operation)
+                control = (
+                    None if operation is None else (operation.wind_departure[rows], operation.moment[rows])
+                )
+                first = self._last[:, rows]
+                angle[rows], rate[rows] = self._batches[layout].advance(self._samples, first, rows, control)
         self._last = np.stack((angle[:, -1], rate[:, -1]))
         return angle, rate
 
-    def _sorted(self) -> dict[tuple[object, ...], np.ndarray[Any, Any] | None]:
-        layouts = dict.fromkeys(self._layout)
-        return {one: np.flatnonzero([at == one for at in self._layout]) for one in layouts}
-
     def get_state(self, row: int) -> Array:
         """MuJoCo's state of a run; result and arguments as in `OneRun.get_state`."""
-        return np.array(self._groups[self._layout[row]].batch.state[row])
+        return np.array(self._batches[self._layout[row]].state[row])
 
     def set_state(self, row: int, state: Array) -> None:
         """Put a run into a state; arguments as in `OneRun.set_state`."""
-        group = self._groups[self._layout[row]]
-        group.batch.state[row] = state
-        at = group.address
-        self._last[:, row] = group.states["qpos"][row, at], group.states["qvel"][row, at]
+        batch = self._batches[self._layout[row]]
+        batch.state[row] = state
+        self._last[:, row] = batch.now(row)
 
     def pose(self, row: int) -> tuple[float, float]:
         """Angles of the rod's upper end and of the body; result and arguments as in `OneRun.pose`."""
-        return _pose(self._groups[self._layout[row]].states["qpos"][row])
-
-
-class _Group:
-    """The batch of one layout; it has idle rows for the runs of other layouts."""
-
-    def __init__(self, batch: mujoco_batch.Batch, address: int, steps: int, samples: int) -> None:
-        self.batch, self.address, self._steps = batch, address, steps
-        self.fields = {name: batch.expand(name) for name in _VARIED}
-        self.states = {name: batch.bind(name) for name in ("qpos", "qvel")}
-        self.changed: list[int] = []
-        self._nstep = samples * steps
-        self._out: dict[str, Array] = {}
-
-    def advance(self, rows: Any, last: Array, operation: Operation | None) -> tuple[Array, Array]:
-        if self.changed:
-            self.batch.set_const(np.array(sorted(set(self.changed)), dtype=np.int32))
-            self.changed = []
-        chosen = slice(None) if rows is None else rows
-        control = self._control(chosen, operation) if operation is not None else None
-        recorded = self.batch.rollout(
-            self._nstep,
-            control,
-            _CONTROL,
-            ("qpos", "qvel"),
-            ids=rows,
-            out=self._out if rows is None else None,
-        )
-        if rows is None:
-            self._out = recorded  # the same buffers again
-        return tuple(
-            np.concatenate(
-                (last[i, chosen, None], recorded[name][:, self._steps - 1 :: self._steps, self.address]),
-                axis=1,
-            )
-            for i, name in enumerate(("qpos", "qvel"))
-        )  # type: ignore[return-value]
-
-    def _control(self, chosen: Any, operation: Operation) -> Array:
-        departure = np.repeat(operation.wind_departure[chosen], self._steps, axis=1)
-        joints = self.batch.model.nv
-        control = np.zeros((*departure.shape, joints + self.batch.model.nuserdata))
-        control[..., self.address] = operation.moment[chosen, None]
-        control[..., joints] = departure
-        return control
+        return _pose(self._batches[self._layout[row]].qpos(row))
 
 
 def _pose(qpos: Array) -> tuple[float, float]:

@@ -1,6 +1,6 @@
-"""The readings of runs in progress, block by block; bit-identical to `tunnel_sim.engine.simulate.read_motion`.
+"""The readings of runs in progress, block by block; bit-identical to `tunnel_sim.effects.chain.read_motion`.
 
-The reading of a run in progress, block by block; bit-identical to `tunnel_sim.engine.simulate.read_motion`. The
+The
 readings of many runs in progress; zero, noise and quantisation are vectorised, effects act run by run.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.effects import EffectChain
-from tunnel_sim.engine.simulate import quantise
+from tunnel_sim.effects.chain import quantise
 from tunnel_sim.envs.config import FreeDecayConfig
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.vocabulary.plan import SensorModel
@@ -107,7 +107,7 @@ class Readings:
         return quantise(chain.reading(held + sensor.zero + sensor.noise_std * noise), sensor.resolution)
 
     def take(self, angle: Array, step: NDArray[np.int64], running: NDArray[np.bool_]) -> Array:
-        """The next readings of all runs, bit-identical to `tunnel_sim.engine.simulate.read_motion`.
+        """The next readings of all runs, bit-identical to `tunnel_sim.effects.chain.read_motion`.
 
         Args:
             angle: of the rod's upper end at the samples, shape (runs, samples), rad.
