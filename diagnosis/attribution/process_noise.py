@@ -2,8 +2,7 @@
 
 There are two kinds: turbulence, broad or about one frequency, and vortex shedding with a wandering phase, about a
 frequency that follows the wind. Åström, Introduction to Stochastic Control Theory (1970); Maine & Iliff, NASA
-RP-1077 (1981), filter error; the filter's Riccati equation by doubling: Anderson, Int. J. Control 28 (1978) 295,
-doi 10.1080/00207177808922455.
+RP-1077 (1981), filter error.
 """
 
 from __future__ import annotations
@@ -12,12 +11,12 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import expm
 from scipy.optimize import minimize
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.spectra import linear_coefficients, resonance
+from identification.signal.filter import discretised, steady_filters
 from tunnel_sim.vocabulary.record import Array
 
 _INTERVAL = 0.012  # s between the residuals the filter sees: well above the rig's frequencies
@@ -27,7 +26,6 @@ _LEAST_STROUHAL = 0.05  # bluff bodies shed at 0.1 to 0.3
 _LINE_SPACING = 0.3  # Hz, in the search for a line
 _WIDEST_LINE = 0.5  # Hz: beyond it a wandering line is turbulence
 _HIGHEST_LINE = 30.0  # Hz
-_DOUBLINGS = 30  # of the Riccati equation: 2^30 steps of the filter
 _EVALUATIONS = 60  # of the likelihood beyond the starting grid
 
 
@@ -287,75 +285,27 @@ def _filters(
     each = [spectra] * len(channels) if isinstance(spectra, Spectrum) else spectra
     transition, disturbance = _discrete(channels, each)
     variance = np.array([c.variance for c in channels])
-    covariance = _steady_covariance(transition, disturbance, variance)
-    spread = covariance[:, 0, 0] + variance
-    gain = np.einsum("rij,rj->ri", transition, covariance[:, :, 0]) / spread[:, None]
-    closed = transition.copy()
-    closed[:, :, 0] -= gain
-    numerators, denominators = _characteristic(transition), _characteristic(closed)
-    return [
-        (numerators[i], denominators[i], float(spread[i]))
-        if np.isfinite(spread[i])
-        else (np.ones(1), np.ones(1), np.inf)
-        for i in range(len(channels))
-    ]
-
-
-def _characteristic(matrices: Array) -> Array:
-    """Coefficients of the characteristic polynomials, shape (runs, n + 1), by Faddeev and Le Verrier."""
-    runs, size, _ = matrices.shape
-    found, power = np.ones((runs, size + 1)), np.broadcast_to(np.eye(size), matrices.shape)
-    for k in range(1, size + 1):
-        product = matrices @ power
-        found[:, k] = -np.trace(product, axis1=1, axis2=2) / k
-        power = product + found[:, k, None, None] * np.eye(size)
-    return found
+    return steady_filters(transition, disturbance, variance)
 
 
 def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tuple[Array, Array]:
     """Transition and disturbance over one interval, shape (runs, n, n) each; all spectra have a centre, or none.
 
-    States: angle, rate, moment coefficient; about a centre, the coefficient's quadrature too. By one exponential:
-    Van Loan, IEEE Trans. Autom. Control 23 (1978) 395, doi 10.1109/TAC.1978.1101743.
+    States: angle, rate, moment coefficient; about a centre, the coefficient's quadrature too.
     """
     centred = spectra[0].centre > 0.0 or spectra[0].strouhal_number > 0.0
     size = 4 if centred else 3
-    blocks = np.zeros((len(channels), 2 * size, 2 * size))
-    for block, channel, spectrum in zip(blocks, channels, spectra, strict=True):
+    dynamics = np.zeros((len(channels), size, size))
+    drive = np.zeros_like(dynamics)
+    for own, noise, channel, spectrum in zip(dynamics, drive, channels, spectra, strict=True):
         corner = 2.0 * np.pi * spectrum.bandwidth
-        dynamics = np.zeros((size, size))
-        dynamics[:2, :2] = channel.oscillator
-        dynamics[1, 2] = channel.moment
-        dynamics[range(2, size), range(2, size)] = -corner
+        own[:2, :2] = channel.oscillator
+        own[1, 2] = channel.moment
+        own[range(2, size), range(2, size)] = -corner
         if centred:
             turn = 2.0 * np.pi * (spectrum.centre + spectrum.strouhal_number * channel.reduced)
-            dynamics[2, 3], dynamics[3, 2] = -turn, turn
-        block[:size, :size], block[size:, size:] = -dynamics, dynamics.T
-        block[range(2, size), range(size + 2, 2 * size)] = 2.0 * corner * spectrum.intensity**2
-    step = np.array([channel.interval for channel in channels])
-    exponential = expm(blocks * step[:, None, None])
-    transition = np.swapaxes(exponential[:, size:, size:], 1, 2)
-    disturbance = transition @ exponential[:, :size, size:]
-    return transition, 0.5 * (disturbance + np.swapaxes(disturbance, 1, 2)) + 1e-18 * np.eye(size)
-
-
-def _steady_covariance(transition: Array, disturbance: Array, variance: Array) -> Array:
-    """Prediction covariance of the steady filter that reads the first state, shape (runs, n, n)."""
-    size = transition.shape[1]
-    a = np.swapaxes(transition, 1, 2).copy()
-    g = np.zeros_like(a)
-    g[:, 0, 0] = 1.0 / variance
-    h = disturbance
-    identity = np.eye(size)
-    with np.errstate(all="ignore"):  # a diverging trial is refused by its spread
-        for _ in range(_DOUBLINGS):
-            inverse = np.linalg.inv(identity + g @ h)
-            left = a @ inverse
-            grown = h + np.swapaxes(a, 1, 2) @ h @ inverse @ a
-            g = g + left @ g @ np.swapaxes(a, 1, 2)
-            a = left @ a
-            done = np.max(np.abs(grown - h)) <= 1e-12 * np.max(np.abs(grown))
-            h = 0.5 * (grown + np.swapaxes(grown, 1, 2))
-            if done:
-                break
-    return h
+            own[2, 3], own[3, 2] = -turn, turn
+        noise[range(2, size), range(2, size)] = 2.0 * corner * spectrum.intensity**2
+    interval = np.array([channel.interval for channel in channels])
+    transition, disturbance = discretised(dynamics, drive, interval)
+    return transition, disturbance + 1e-18 * np.eye(size)

@@ -34,6 +34,94 @@ from identification.statistics import inverse, scaled_solve
 from tunnel_sim.vocabulary.record import Array
 
 _GREATEST = 1e60  # of a growth or a variance over one interval: beyond it no filter is formed
+_DOUBLINGS = 30  # of the Riccati equation: 2^30 steps of the filter
+
+
+def discretised(dynamics: Array, drive: Array, interval: float | Array) -> tuple[Array, Array]:
+    """Linear dynamics driven by white noise, over one sample interval: one system, or many at once.
+
+    Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395–404, doi 10.1109/TAC.1978.1101743.
+
+    Args:
+        dynamics: of the state, shape (n, n) or (systems, n, n), 1/s in SI units of the state.
+        drive: spectral intensity of the noise on the state, of the same shape, in SI units squared per s.
+        interval: s; shape (systems,) for many.
+
+    Returns:
+        Transition and covariance of the disturbance, in SI units, of the shape of ``dynamics``.
+    """
+    size = dynamics.shape[-1]
+    block = np.zeros((*dynamics.shape[:-2], 2 * size, 2 * size))
+    block[..., :size, :size], block[..., :size, size:] = -dynamics, drive
+    block[..., size:, size:] = np.swapaxes(dynamics, -1, -2)
+    exponential = expm(block * np.asarray(interval)[..., None, None])
+    transition = np.swapaxes(exponential[..., size:, size:], -1, -2)
+    disturbance = transition @ exponential[..., :size, size:]
+    return transition, 0.5 * (disturbance + np.swapaxes(disturbance, -1, -2))
+
+
+def steady_filters(
+    transition: Array, disturbance: Array, variance: Array
+) -> list[tuple[Array, Array, float]]:
+    """The steady Kalman filters of systems whose first state is read, as recursive filters.
+
+    Args:
+        transition: over one interval, shape (systems, n, n), in SI units.
+        disturbance: its covariance over one interval, shape (systems, n, n), in SI units.
+        variance: of the noise of a reading, shape (systems,), rad².
+
+    Returns:
+        For each system the filter from readings to innovations, numerator and denominator of shape (n + 1,) each, and
+        the variance of the innovations, rad²; infinite where the filter does not settle.
+    """
+    covariance = _steady_covariance(transition, disturbance, variance)
+    spread = covariance[:, 0, 0] + variance
+    gain = np.einsum("rij,rj->ri", transition, covariance[:, :, 0]) / spread[:, None]
+    closed = transition.copy()
+    closed[:, :, 0] -= gain
+    numerators, denominators = _characteristic(transition), _characteristic(closed)
+    return [
+        (numerators[i], denominators[i], float(spread[i]))
+        if np.isfinite(spread[i])
+        else (np.ones(1), np.ones(1), np.inf)
+        for i in range(variance.size)
+    ]
+
+
+def _characteristic(matrices: Array) -> Array:
+    """Coefficients of the characteristic polynomials, shape (systems, n + 1), by Faddeev and Le Verrier."""
+    count, size, _ = matrices.shape
+    found, power = np.ones((count, size + 1)), np.broadcast_to(np.eye(size), matrices.shape)
+    for k in range(1, size + 1):
+        product = matrices @ power
+        found[:, k] = -np.trace(product, axis1=1, axis2=2) / k
+        power = product + found[:, k, None, None] * np.eye(size)
+    return found
+
+
+def _steady_covariance(transition: Array, disturbance: Array, variance: Array) -> Array:
+    """Prediction covariance of the steady filters, shape (systems, n, n): their Riccati equation by doubling.
+
+    Anderson, Int. J. Control 28 (1978) 295–306, doi 10.1080/00207177808922455.
+    """
+    size = transition.shape[1]
+    a = np.swapaxes(transition, 1, 2).copy()
+    g = np.zeros_like(a)
+    g[:, 0, 0] = 1.0 / variance
+    h = disturbance
+    identity = np.eye(size)
+    with np.errstate(all="ignore"):  # a diverging trial is refused by its spread
+        for _ in range(_DOUBLINGS):
+            inverse = np.linalg.inv(identity + g @ h)
+            left = a @ inverse
+            grown = h + np.swapaxes(a, 1, 2) @ h @ inverse @ a
+            g = g + left @ g @ np.swapaxes(a, 1, 2)
+            a = left @ a
+            done = np.max(np.abs(grown - h)) <= 1e-12 * np.max(np.abs(grown))
+            h = 0.5 * (grown + np.swapaxes(grown, 1, 2))
+            if done:
+                break
+    return h
 
 
 @dataclass(frozen=True)
@@ -146,8 +234,7 @@ def _factored(interval: float, model: Driven, noise_variance: float) -> tuple[Ar
 
 
 def _discrete(interval: float, model: Driven) -> tuple[Array, Array]:
-    # Transition and covariance of the disturbance over one interval (Van Loan, IEEE Trans. Automat. Contr. 23
-    # (1978) 395–404, doi 10.1109/TAC.1978.1101743).
+    # Transition and covariance of the disturbance over one interval.
     a, k = model.decay.rate, model.decay.stiffness
     if model.corner is None:
         dynamics = np.array([[0.0, 1.0], [-k, -2.0 * a]])
@@ -156,13 +243,7 @@ def _discrete(interval: float, model: Driven) -> tuple[Array, Array]:
         c = 2.0 * np.pi * model.corner
         dynamics = np.array([[0.0, 1.0, 0.0], [-k, -2.0 * a, 1.0], [0.0, 0.0, -c]])
         drive = np.diag([0.0, 0.0, model.intensity * c**2])
-    size = dynamics.shape[0]
-    block = np.zeros((2 * size, 2 * size))
-    block[:size, :size], block[:size, size:], block[size:, size:] = -dynamics, drive, dynamics.T
-    exponential = expm(block * interval)
-    transition = exponential[size:, size:].T
-    disturbance = transition @ exponential[:size, size:]
-    return transition, 0.5 * (disturbance + disturbance.T)
+    return discretised(dynamics, drive, interval)
 
 
 _DECADES = np.arange(-7.0, 3.1, 1.0)  # of q over R ω³, the intensity that doubles R within a radian
