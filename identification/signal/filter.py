@@ -71,8 +71,8 @@ def steady_filters(
         variance: of the noise of a reading, shape (systems,), rad².
 
     Returns:
-        For each system the filter from readings to innovations, numerator and denominator of shape (n + 1,) each, and
-        the variance of the innovations, rad²; infinite where the filter does not settle.
+        For each system numerator and denominator, shape (n + 1,) each, of the filter from readings to innovations,
+        and the variance of the innovations, rad²; infinite where the filter does not settle.
     """
     covariance = _steady_covariance(transition, disturbance, variance)
     spread = covariance[:, 0, 0] + variance
