@@ -169,7 +169,7 @@ def paired_estimate(
             centre,
             moves,
             line["wind_off_inertia"],
-            _damping_scatter(pairing, seen, float(centre[0])),
+            _mean_std(2.0 * float(centre[0]) * np.array([seen[i].rate for i in pairing.off])),
             has_size(campaign.rig),
         ),
     )
@@ -187,10 +187,6 @@ def _propagated(pairing: _Pairing, seen: Sequence[PairedRun], *, with_line: bool
         moves.append(outcome(frequency + unit * one.frequency_std, rate) - centre)
         moves.append(outcome(frequency, rate + unit * one.rate_std) - centre)
     return centre, np.array(moves).T
-
-
-def _damping_scatter(pairing: _Pairing, seen: Sequence[PairedRun], inertia: float) -> float:
-    return _mean_std(2.0 * inertia * np.array([seen[i].rate for i in pairing.off]))
 
 
 def _mean_std(values: Array) -> float:

@@ -70,7 +70,21 @@ def fit_springs(
     """
     springs = np.asarray(stiffness, dtype=np.float64)
     omega_squared = (2.0 * np.pi * np.asarray(frequency_hz, dtype=np.float64)) ** 2
-    _check(springs, omega_squared)
+    where = "springs"
+    if springs.shape != omega_squared.shape or springs.ndim != 1:
+        raise TunnelError(
+            "the numbers of stiffnesses and frequencies differ", where=where, remedy="pair them"
+        )
+    if springs.size < 3:
+        raise TunnelError(
+            "fewer than three springs", where=where, remedy="add wind-off runs with other springs"
+        )
+    if not (np.all(np.isfinite(springs)) and np.all(springs > 0.0) and np.all(omega_squared > 0.0)):
+        raise TunnelError("stiffness and frequency must be positive", where=where, remedy="correct the table")
+    if np.unique(omega_squared).size < 2:
+        raise TunnelError(
+            "all frequencies are the same", where=where, remedy="use springs of different stiffness"
+        )
     line, covariance = _least_squares(np.column_stack((omega_squared, np.ones_like(springs))), springs)
     fitted = line[0] * omega_squared + line[1]
     generator = np.random.default_rng(1) if rng is None else rng
@@ -140,24 +154,6 @@ def inertia_of_springs(stiffness: Array, squared: Array, *, with_line: bool) -> 
     if not with_line:
         return float(np.mean(stiffness / squared))
     return float(_least_squares(np.column_stack((squared, np.ones_like(squared))), stiffness)[0][0])
-
-
-def _check(springs: Array, omega_squared: Array) -> None:
-    where = "springs"
-    if springs.shape != omega_squared.shape or springs.ndim != 1:
-        raise TunnelError(
-            "the numbers of stiffnesses and frequencies differ", where=where, remedy="pair them"
-        )
-    if springs.size < 3:
-        raise TunnelError(
-            "fewer than three springs", where=where, remedy="add wind-off runs with other springs"
-        )
-    if not (np.all(np.isfinite(springs)) and np.all(springs > 0.0) and np.all(omega_squared > 0.0)):
-        raise TunnelError("stiffness and frequency must be positive", where=where, remedy="correct the table")
-    if np.unique(omega_squared).size < 2:
-        raise TunnelError(
-            "all frequencies are the same", where=where, remedy="use springs of different stiffness"
-        )
 
 
 def _least_squares(columns: Array, values: Array) -> tuple[Array, Array]:

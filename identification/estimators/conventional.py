@@ -32,7 +32,29 @@ class Conventional(Paired):
     name = "conventional"
 
     def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunEstimate, PairedRun | None]:
-        return _described(_see(run, sensor))
+        seen = _see(run, sensor)
+        if seen.peaks is None:
+            return RunEstimate(seen.run.id, (Status.NO_OSCILLATION,)), None
+        peaks = seen.peaks
+        omega_d, omega_d_std = 2.0 * np.pi * seen.frequency, 2.0 * np.pi * peaks.frequency_std
+        omega = float(np.hypot(omega_d, peaks.rate))
+        omega_std = float(np.hypot(omega_d * omega_d_std, peaks.rate * peaks.rate_std)) / omega
+        zeta_std = float(np.hypot(omega_d * peaks.rate_std, peaks.rate * omega_d_std)) * omega_d / omega**3
+        statuses = departures([seen.noise])
+        if seen.run.spring_stiffness is None:
+            statuses.add(Status.NO_STIFFNESS)
+        omega_n = Quantity(omega, omega_std, "rad/s")
+        estimate = RunEstimate(
+            id=seen.run.id,
+            statuses=by_gravity(statuses),
+            omega_n=omega_n,
+            zeta=Quantity(peaks.rate / omega, zeta_std, "1"),
+            sensor_zero=Quantity(peaks.zero, peaks.zero_std, "rad"),
+            noise=seen.noise,
+        )
+        return estimate, PairedRun(
+            seen.run, seen.frequency, peaks.frequency_std, peaks.rate, peaks.rate_std, omega_n
+        )
 
 
 @dataclass(frozen=True)
@@ -60,28 +82,3 @@ def _see(run: Run, sensor: SensorProperties) -> _Seen:
         rate_std, omega_std = deviations(peaks.rate, omega_d, widened)
         peaks = replace(peaks, rate_std=rate_std, frequency_std=omega_std / (2.0 * np.pi))
     return _Seen(run, peak.frequency, peaks, check.noise)
-
-
-def _described(seen: _Seen) -> tuple[RunEstimate, PairedRun | None]:
-    if seen.peaks is None:
-        return RunEstimate(seen.run.id, (Status.NO_OSCILLATION,)), None
-    peaks = seen.peaks
-    omega_d, omega_d_std = 2.0 * np.pi * seen.frequency, 2.0 * np.pi * peaks.frequency_std
-    omega = float(np.hypot(omega_d, peaks.rate))
-    omega_std = float(np.hypot(omega_d * omega_d_std, peaks.rate * peaks.rate_std)) / omega
-    zeta_std = float(np.hypot(omega_d * peaks.rate_std, peaks.rate * omega_d_std)) * omega_d / omega**3
-    statuses = departures([seen.noise])
-    if seen.run.spring_stiffness is None:
-        statuses.add(Status.NO_STIFFNESS)
-    omega_n = Quantity(omega, omega_std, "rad/s")
-    estimate = RunEstimate(
-        id=seen.run.id,
-        statuses=by_gravity(statuses),
-        omega_n=omega_n,
-        zeta=Quantity(peaks.rate / omega, zeta_std, "1"),
-        sensor_zero=Quantity(peaks.zero, peaks.zero_std, "rad"),
-        noise=seen.noise,
-    )
-    return estimate, PairedRun(
-        seen.run, seen.frequency, peaks.frequency_std, peaks.rate, peaks.rate_std, omega_n
-    )

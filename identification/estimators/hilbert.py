@@ -80,7 +80,13 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
     omega = rough.decay.omega_d
     span = _CARRIED_ON * 2.0 * np.pi / omega
     margin = int(min(span, _GROWTH / max(rough.decay.rate, _GROWTH / span)) / interval)
-    extended = _carried_on(reading, rough, zero, interval, margin)
+    steps = interval * np.arange(1, margin + 1, dtype=np.float64)
+    share = steps / (steps[-1] + interval) if margin else steps
+    # From 1 to 0 with three zero derivatives at either end: a kink would be another discontinuity.
+    fade = 1.0 - share**4 * (35.0 - 84.0 * share + 70.0 * share**2 - 20.0 * share**3)
+    after = free_decay(reading.time[-1] + steps, rough.decay, rough.angle, rough.rate)
+    before = free_decay(-steps, rough.decay, rough.angle, rough.rate)
+    extended = np.concatenate(((fade * before)[::-1], reading.yaw - zero, fade * after))
     signal = hilbert(extended, next_fast_len(extended.size))[margin : margin + reading.time.size]
     block = max(1, round(np.pi / (omega * interval)))
     count = reading.time.size // block
@@ -88,16 +94,6 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
     means = turned.reshape(count, block).mean(axis=1)
     middles = reading.time[: count * block].reshape(count, block).mean(axis=1)
     return Envelope(middles, np.abs(means), np.unwrap(np.angle(means)), omega, block)
-
-
-def _carried_on(reading: Reading, rough: RunFit, zero: float, interval: float, margin: int) -> Array:
-    steps = interval * np.arange(1, margin + 1, dtype=np.float64)
-    share = steps / (steps[-1] + interval) if margin else steps
-    # From 1 to 0 with three zero derivatives at either end: a kink would be another discontinuity.
-    fade = 1.0 - share**4 * (35.0 - 84.0 * share + 70.0 * share**2 - 20.0 * share**3)
-    after = free_decay(reading.time[-1] + steps, rough.decay, rough.angle, rough.rate)
-    before = free_decay(-steps, rough.decay, rough.angle, rough.rate)
-    return np.concatenate(((fade * before)[::-1], reading.yaw - zero, fade * after))
 
 
 _PASSES = 3  # each extends the record with the decay of the previous one

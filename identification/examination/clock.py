@@ -49,7 +49,11 @@ def with_clocks(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         those whose samples are used at the uneven times given, one on those with missing samples.
     """
     found = [(run, None if run.record.uniform else find_clock(run.record.time_s)) for run in campaign.runs]
-    rounded = [(run, clock) for run, clock in found if clock is not None and _matters(clock)]
+    rounded = [
+        (run, clock)
+        for run, clock in found
+        if clock is not None and clock.away > CLOCK_TOLERANCE * clock.interval
+    ]
     uneven = [run for run, clock in found if clock is None and not run.record.uniform]
     gappy = [(run, clock) for run, clock in found if clock is not None and clock.missing]
     remarks = (
@@ -126,10 +130,6 @@ def _timer(steps: Array, decimal: float) -> float:
     whole = np.round(steps / changes.min())
     step = float(steps @ whole / (whole @ whole))
     return step if np.abs(steps - step * whole).max() < decimal + _ON_LATTICE * step else 0.0
-
-
-def _matters(clock: Clock) -> bool:
-    return clock.away > CLOCK_TOLERANCE * clock.interval
 
 
 def _on(run: Run, clock: Clock | None) -> Run:

@@ -57,7 +57,10 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
     if not record.uniform:
         even = evenly_spaced(record)
         return int(np.searchsorted(record.time_s, even.time_s[find_release(even, sensor)]))
-    free = _surely_free(record)
+    yaw = record.yaw_rad
+    away = np.abs(yaw - np.median(yaw[yaw.size // 2 :]))
+    # Under very light damping a large swing may come last: half the record is enough to know the motion.
+    free = min(int(np.flatnonzero(away >= _NEAR_LARGEST * away.max())[-1]), yaw.size // 2)
     if record.yaw_rad.size - free < _LEAST_SAMPLES:
         return 0
     later = Record(record.time_s[free:], record.yaw_rad[free:])
@@ -74,13 +77,6 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
     ):
         held = 0
     return 0 if held is None else _standstill(record, crossings, held)
-
-
-def _surely_free(record: Record) -> int:
-    yaw = record.yaw_rad
-    away = np.abs(yaw - np.median(yaw[yaw.size // 2 :]))
-    # Under very light damping a large swing may come last: half the record is enough to know the motion.
-    return min(int(np.flatnonzero(away >= _NEAR_LARGEST * away.max())[-1]), yaw.size // 2)
 
 
 def _crossings(

@@ -292,7 +292,11 @@ class _Springs:
         stiffness = sorted({float(s.run.spring_stiffness or 0.0) for s in swings})
         groups = [[s for s in swings if s.run.spring_stiffness == value] for value in stiffness]
         seen = [np.mean([np.log(s.stiffness) for s in group]) for group in groups]
-        std = [np.hypot(SPRING_TOLERANCE, _relative_std(group)) for group in groups]
+        # Of the mean of ln k: the effect of the amplitude on k is common to the runs of a spring.
+        std = [
+            np.hypot(SPRING_TOLERANCE, float(np.mean([s.stiffness_std / s.stiffness for s in group])))
+            for group in groups
+        ]
         return cls(
             np.array(stiffness),
             tuple(tuple(s.run.id for s in group) for group in groups),
@@ -371,11 +375,6 @@ def inertia_off_the_springs(swings: Sequence[Swing], campaign: Campaign) -> tupl
             {"inertias_kg_m2": [stated], "air_stiffnesses_m3": [None]},
         ),
     )
-
-
-def _relative_std(group: Sequence[Swing]) -> float:
-    """Of the mean of ln k: the effect of the amplitude on k is common to the runs of a spring."""
-    return float(np.mean([s.stiffness_std / s.stiffness for s in group]))
 
 
 def _the_one(springs: _Springs) -> int | None:

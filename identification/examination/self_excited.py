@@ -138,12 +138,8 @@ def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
 def _gains_energy(swing: Swing) -> bool:
     if swing.rate + REFUSAL_DEVIATIONS * swing.rate_std >= 0.0:
         return False
-    quarters = [_power(part) for part in np.array_split(swing.motion, 4)]
+    quarters = [float(part @ part) / max(part.size, 1) for part in np.array_split(swing.motion, 4)]
     return quarters[3] > quarters[2] > max(quarters[0], quarters[1])
-
-
-def _power(part: Array) -> float:
-    return float(part @ part) / max(part.size, 1)
 
 
 _CYCLES = 3.0  # of the strongest oscillation, in a window
@@ -197,13 +193,21 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
     windows = windows_of(run.record)
     if windows is None:
         return run, None
-    if _holds(windows):
+    # Whether the amplitude is constant along the whole record, by the upper end of its change's interval.
+    slope, std = _slope(windows.time, windows.amplitude)
+    length = float(np.ptp(windows.time))
+    cycles = length * float(np.median(windows.frequency))
+    changes = (abs(slope) + MISFIT_DEVIATIONS * std) * length
+    if cycles >= LEAST_STEADY_CYCLES and max(changes, np.log(windows.amplitude).std()) < STEADY_CHANGE:
         return None, _steady_remark(run, windows)
     if not _grows(windows.amplitude):
         return run, None
     settled = _settled_from(windows)
     limit = np.inf if settled is None else LINEAR_SHARE * _last(windows.amplitude)
-    part = _growing_part(windows, limit)
+    # From the smallest amplitude to the last window below the limit, rad.
+    above = np.flatnonzero(windows.amplitude > limit)
+    end = int(above[0]) if above.size else windows.time.size
+    part = slice(int(np.argmin(windows.amplitude[:end])) if end else 0, end)
     enough = part.stop - part.start >= LEAST_GROWTH_WINDOWS
     remark = _growth_remark(run, windows, part if enough else None, settled)
     if settled is None:
@@ -257,15 +261,6 @@ def _slope(time: Array, amplitude: Array) -> tuple[float, float]:
     return float(slope), float(np.sqrt(covariance[0, 0]))
 
 
-def _holds(windows: Windows) -> bool:
-    """Whether the amplitude is constant along the whole record, by the upper end of its change's interval."""
-    slope, std = _slope(windows.time, windows.amplitude)
-    length = float(np.ptp(windows.time))
-    cycles = length * float(np.median(windows.frequency))
-    changes = (abs(slope) + MISFIT_DEVIATIONS * std) * length
-    return cycles >= LEAST_STEADY_CYCLES and max(changes, np.log(windows.amplitude).std()) < STEADY_CHANGE
-
-
 def _grows(amplitude: Array) -> bool:
     """Whether the last quarter's power exceeds the first one's beyond what the envelope of a buffeted rig does.
 
@@ -288,13 +283,6 @@ def _settled_from(windows: Windows) -> int | None:
         if slope + MISFIT_DEVIATIONS * std < float(windows.growth_rate[:first].max(initial=0.0))
         else None
     )
-
-
-def _growing_part(windows: Windows, limit: float) -> slice:
-    """From the smallest amplitude to the last window below the limit, rad."""
-    above = np.flatnonzero(windows.amplitude > limit)
-    end = int(above[0]) if above.size else windows.time.size
-    return slice(int(np.argmin(windows.amplitude[:end])) if end else 0, end)
 
 
 def _cut(run: Run, windows: Windows, part: slice) -> Run:

@@ -260,7 +260,10 @@ def _rough_crossings(trace: _Trace, period: float) -> Array:
         return np.zeros(0)
     smooth = np.convolve(trace.yaw, np.full(width, 1.0 / width), mode="valid")
     time = trace.time[: smooth.size] + 0.5 * (width - 1) * trace.step
-    away = smooth - _level(trace, period)
+    # The mean over the last whole cycles: the zero to within a small share of the remaining amplitude.
+    cycles = max(1, int(0.5 * trace.yaw.size * trace.step / period))
+    count = min(trace.yaw.size, round(cycles * period / trace.step))
+    away = smooth - float(trace.yaw[-count:].mean())
     largest = float(np.abs(away).max())
     band = max(_BAND * trace.noise / np.sqrt(width), _SHARE * largest)
     outside = np.flatnonzero(np.abs(away) > band)
@@ -271,13 +274,6 @@ def _rough_crossings(trace: _Trace, period: float) -> Array:
     return np.asarray(time[before] + share * (time[after] - time[before]))
 
 
-def _level(trace: _Trace, period: float) -> float:
-    # The mean over the last whole cycles: the zero to within a small share of the remaining amplitude.
-    cycles = max(1, int(0.5 * trace.yaw.size * trace.step / period))
-    count = min(trace.yaw.size, round(cycles * period / trace.step))
-    return float(trace.yaw[-count:].mean())
-
-
 def _refined(trace: _Trace, place: _Place) -> _Place | None:
     # Crossings, zero and decay in turn; None where the decay is lost in noise.
     number = np.arange(HALVES + 1)
@@ -286,7 +282,12 @@ def _refined(trace: _Trace, place: _Place) -> _Place | None:
         zero, decay = _zero_and_decay(trace, instants)
         if not 0.0 < decay < 1.5:
             return None
-        levels, slopes = _crossing_fits(trace, instants, place.half)
+        # Level and slope at each instant.
+        found = [
+            rows @ trace.yaw[part]
+            for part, rows in (_fit_rows(trace, float(t), place.half) for t in instants)
+        ]
+        levels, slopes = (np.array(found)[:, 0], np.array(found)[:, 1])
         model = (-decay) ** number
         slope = float(slopes @ model) / float(model @ model)
         if slope == 0.0:
@@ -330,12 +331,6 @@ def _fit_rows(trace: _Trace, instant: float, half: float) -> tuple[slice, Array]
     return part, rows
 
 
-def _crossing_fits(trace: _Trace, instants: Array, half: float) -> tuple[Array, Array]:
-    # Level and slope at each instant.
-    found = [rows @ trace.yaw[part] for part, rows in (_fit_rows(trace, float(t), half) for t in instants)]
-    return np.array(found)[:, 0], np.array(found)[:, 1]
-
-
 def _level_weights(trace: _Trace, instants: Array, half: float, part: slice) -> Array:
     # The samples' weights in the level at each instant, shape (7, samples of the part).
     weights = np.zeros((instants.size, trace.time.size))
@@ -358,10 +353,16 @@ def _window(trace: _Trace, place: _Place) -> ThreeCycles | None:
     level_noise = trace.noise * float(np.linalg.norm(level_weights[0]))
     if shape.scale < _CLEAR * level_noise:
         return None
+    # A level dc above the zero moves its crossing by −dc/slope; the zero follows from the means of the half cycles.
+    means = _shares(trace, instants, part)
+    pairs = (means[1:] + place.decay * means[:-1]) / (1.0 + place.decay)
+    slopes = place.slope * (-place.decay) ** np.arange(HALVES + 1)
+    crossings = (pairs.mean(axis=0) - level_weights) / slopes[:, None]
+    start, half = _line_weights(place.decay) @ crossings
     noise = Propagation(
         trace.noise,
         sign * _shares(trace, edges, part),
-        _timing_weights(trace, place, instants, level_weights, part),
+        np.stack((start, HALVES * half)),
         sign * _by_timing(trace, edges, sign * points, t3),
         int(first),
     )
@@ -373,18 +374,6 @@ def _shares(trace: _Trace, edges: Array, part: slice) -> Array:
     left = trace.time[part] - 0.5 * trace.step
     covered = np.clip(edges[:, None] - left, 0.0, trace.step)
     return np.asarray(np.diff(covered, axis=0) / np.diff(edges)[:, None])
-
-
-def _timing_weights(
-    trace: _Trace, place: _Place, instants: Array, level_weights: Array, part: slice
-) -> Array:
-    # A level dc above the zero moves its crossing by −dc/slope; the zero follows from the means of the half cycles.
-    means = _shares(trace, instants, part)
-    pairs = (means[1:] + place.decay * means[:-1]) / (1.0 + place.decay)
-    slopes = place.slope * (-place.decay) ** np.arange(HALVES + 1)
-    crossings = (pairs.mean(axis=0) - level_weights) / slopes[:, None]
-    start, half = _line_weights(place.decay) @ crossings
-    return np.stack((start, HALVES * half))
 
 
 def _by_timing(trace: _Trace, edges: Array, points: Array, t3: float) -> Array:

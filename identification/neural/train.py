@@ -239,7 +239,8 @@ def _one_start(
         state = Progress(
             first_weights(problem.sizes, np.random.default_rng([spec.seed, _START, number, start]))
         )
-    before = _work_before(spec, number, start)
+    whole = sum(spec.starts * spec.steps(which) * spec.work(which) for which in NETWORKS[:number])
+    before = whole + start * spec.steps(NETWORKS[number]) * spec.work(NETWORKS[number])
     while state.iteration < spec.steps(which) and not state.finished:
         state = advance(state, problem)
         checkpoint = replace(checkpoint, running=state)
@@ -247,11 +248,6 @@ def _one_start(
         progress(before + state.iteration * spec.work(which), name)
     progress(before + spec.steps(which) * spec.work(which), name)
     return Checkpoint((*checkpoint.ended, state), None)
-
-
-def _work_before(spec: TrainingSpec, number: int, start: int) -> int:
-    whole = sum(spec.starts * spec.steps(which) * spec.work(which) for which in NETWORKS[:number])
-    return whole + start * spec.steps(NETWORKS[number]) * spec.work(NETWORKS[number])
 
 
 def _collect(spec: TrainingSpec, checkpoint: Checkpoint) -> Trained:

@@ -209,7 +209,16 @@ def _started_by_moment(time: Array, model: Driven) -> tuple[Array, ...]:
 
 def _factored(interval: float, model: Driven, noise_variance: float) -> tuple[Array, Array, float] | None:
     # D, C and the innovations' variance.
-    transition, disturbance = _discrete(interval, model)
+    # Transition and covariance of the disturbance over one interval.
+    a, k = model.decay.rate, model.decay.stiffness
+    if model.corner is None:
+        dynamics = np.array([[0.0, 1.0], [-k, -2.0 * a]])
+        drive = np.diag([0.0, model.intensity])
+    else:
+        c = 2.0 * np.pi * model.corner
+        dynamics = np.array([[0.0, 1.0, 0.0], [-k, -2.0 * a, 1.0], [0.0, 0.0, -c]])
+        drive = np.diag([0.0, 0.0, model.intensity * c**2])
+    transition, disturbance = discretised(dynamics, drive, interval)
     if not max(np.abs(transition).max(), np.abs(disturbance).max()) < _GREATEST:
         return None
     size = transition.shape[0]
@@ -231,19 +240,6 @@ def _factored(interval: float, model: Driven, noise_variance: float) -> tuple[Ar
     filtering = np.real(np.poly(stable))
     variance = float(lags[0] / (filtering @ filtering))
     return (characteristic, filtering, variance) if variance > 0.0 else None
-
-
-def _discrete(interval: float, model: Driven) -> tuple[Array, Array]:
-    # Transition and covariance of the disturbance over one interval.
-    a, k = model.decay.rate, model.decay.stiffness
-    if model.corner is None:
-        dynamics = np.array([[0.0, 1.0], [-k, -2.0 * a]])
-        drive = np.diag([0.0, model.intensity])
-    else:
-        c = 2.0 * np.pi * model.corner
-        dynamics = np.array([[0.0, 1.0, 0.0], [-k, -2.0 * a, 1.0], [0.0, 0.0, -c]])
-        drive = np.diag([0.0, 0.0, model.intensity * c**2])
-    return discretised(dynamics, drive, interval)
 
 
 _DECADES = np.arange(-7.0, 3.1, 1.0)  # of q over R ω³, the intensity that doubles R within a radian

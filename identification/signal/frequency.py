@@ -161,7 +161,14 @@ def starting_decay(record: Record) -> Decay | None:
     thin = thinned_reading(record, frequency)
     omega = 2.0 * np.pi * frequency
     candidates = [Decay.from_modal(omega / np.sqrt(1.0 - zeta**2), zeta) for zeta in _DAMPING_RATIOS]
-    integrated = _integrated_equation(thin)
+    # y + 2a∫y + k∬y = c₀ + c₁t + c₂t²: linear in a and k, and integration reduces the noise.
+    time, yaw = thin.time, thin.yaw
+    once = _integral(time, yaw)
+    twice = _integral(time, once)
+    columns = np.column_stack((once, twice, np.ones_like(time), time, time**2))
+    scale = np.linalg.norm(columns, axis=0)
+    solution = np.linalg.lstsq(columns / scale, -yaw, rcond=None)[0] / scale
+    integrated = Decay(float(solution[0]) / 2.0, float(solution[1]))
     if integrated.stiffness > 0.0:
         candidates.append(integrated)
     costs = [projected_cost(thin, candidate) for candidate in candidates]
@@ -198,17 +205,6 @@ def thinned_reading(record: Record, frequency: float) -> Reading:
     return Reading(
         mean_of_blocks(record.time_s - record.time_s[0], factor), mean_of_blocks(record.yaw_rad, factor)
     )
-
-
-def _integrated_equation(reading: Reading) -> Decay:
-    # y + 2a∫y + k∬y = c₀ + c₁t + c₂t²: linear in a and k, and integration reduces the noise.
-    time, yaw = reading.time, reading.yaw
-    once = _integral(time, yaw)
-    twice = _integral(time, once)
-    columns = np.column_stack((once, twice, np.ones_like(time), time, time**2))
-    scale = np.linalg.norm(columns, axis=0)
-    solution = np.linalg.lstsq(columns / scale, -yaw, rcond=None)[0] / scale
-    return Decay(float(solution[0]) / 2.0, float(solution[1]))
 
 
 def _integral(time: Array, values: Array) -> Array:

@@ -194,9 +194,18 @@ def describe_run(
     move = own @ fitted.information[np.ix_(rest, decay)]
     deviations = np.sqrt(np.diag(own * noise_variance + move @ covariance @ move.T))
     omega_n, zeta = modal_quantities(fitted.decay, covariance)
+    statuses = set()
+    if noise is not None and noise.departs:
+        statuses.add(Status.MODEL_DEPARTS)
+    if noise is not None and noise.disagrees:
+        statuses.add(Status.NOISE_DISAGREES)
+    if fitted.decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * FEW_CYCLES:
+        statuses.add(Status.FEW_CYCLES)
+    if run.spring_stiffness is None:
+        statuses.add(Status.NO_STIFFNESS)
     return RunEstimate(
         id=run.id,
-        statuses=by_gravity(_statuses(run, reading, fitted.decay, noise)),
+        statuses=by_gravity(statuses),
         omega_n=omega_n,
         zeta=zeta,
         initial_angle=Quantity(fitted.angle, float(deviations[1]), "rad"),
@@ -205,19 +214,6 @@ def describe_run(
         noise=noise,
         windows=windows,
     )
-
-
-def _statuses(run: Run, reading: Reading, decay: Decay, noise: NoiseLevel | None) -> set[Status]:
-    statuses = set()
-    if noise is not None and noise.departs:
-        statuses.add(Status.MODEL_DEPARTS)
-    if noise is not None and noise.disagrees:
-        statuses.add(Status.NOISE_DISAGREES)
-    if decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * FEW_CYCLES:
-        statuses.add(Status.FEW_CYCLES)
-    if run.spring_stiffness is None:
-        statuses.add(Status.NO_STIFFNESS)
-    return statuses
 
 
 def _failed(run: Run, reading: Reading, status: Status) -> FittedRun:

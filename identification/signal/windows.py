@@ -121,7 +121,10 @@ def _window_estimate(
     duration = count * interval
     decay = run.decay
     amplitude = envelope_amplitude(decay, run.angle, run.rate) * np.exp(-0.5 * decay.rate * duration)
-    variance = noise.std**2 * max(1.0, _slow_ratio(run.residual, decay, interval, noise.std))
+    block = eighth_of_a_cycle(decay.omega_n, interval)
+    blocks = run.residual.size // block
+    means = run.residual[: blocks * block].reshape(blocks, block).mean(axis=1)
+    variance = noise.std**2 * max(1.0, float(means @ means) * block / max(blocks - 4, 1) / noise.std**2)
     if not np.isfinite(amplitude) or 0.5 * count * amplitude**2 < LEAST_WINDOW_ENERGY * variance:
         return None
     order = [RATE, STIFFNESS, ANGLE, ANGULAR_RATE]
@@ -155,10 +158,3 @@ def modal_quantities(decay: Decay, covariance: Array) -> tuple[Quantity, Quantit
     omega_std = float(np.sqrt(covariance[1, 1])) / (2.0 * omega)
     zeta_std = float(np.sqrt(slope @ covariance @ slope))
     return Quantity(omega, omega_std, "rad/s"), Quantity(zeta, zeta_std, "1")
-
-
-def _slow_ratio(residual: Array, decay: Decay, interval: float, noise_std: float) -> float:
-    block = eighth_of_a_cycle(decay.omega_n, interval)
-    blocks = residual.size // block
-    means = residual[: blocks * block].reshape(blocks, block).mean(axis=1)
-    return float(means @ means) * block / max(blocks - 4, 1) / noise_std**2

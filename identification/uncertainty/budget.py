@@ -281,7 +281,10 @@ def make_budget(
         )
     quantities: list[Quantity] = [getattr(estimate, name) for name in names]
     budget = Budget(names, tuple(q.unit for q in quantities), np.array([q.value for q in quantities]))
-    noise = Component("noise of the readings", "A", _noise(estimate, budget))
+    covariance = np.diag([getattr(estimate, name).std ** 2 for name in budget.names])
+    places = [budget.names.index(name) for name in estimate.parameters]
+    covariance[np.ix_(places, places)] = estimate.covariance_matrix
+    noise = Component("noise of the readings", "A", covariance)
     common = _common(budget, inputs, any(run.wind_on for run in campaign.runs))
     individual = _individual(campaign, budget, identify, inputs, progress)
     scatter = _scatter(campaign, estimate, budget, inputs)
@@ -307,13 +310,6 @@ def with_budget(estimate: Estimate, budget: Budget) -> Estimate:
         name: replace(getattr(estimate, name), std=budget.std(name)) for name in budget.names
     }
     return replace(estimate, covariance=tuple(map(tuple, total.tolist())), **quantities)
-
-
-def _noise(estimate: Estimate, budget: Budget) -> Array:
-    covariance = np.diag([getattr(estimate, name).std ** 2 for name in budget.names])
-    places = [budget.names.index(name) for name in estimate.parameters]
-    covariance[np.ix_(places, places)] = estimate.covariance_matrix
-    return covariance
 
 
 def _common(budget: Budget, inputs: InputUncertainties, windy: bool) -> list[Component]:

@@ -81,12 +81,6 @@ def damped_sinusoid_bound(
     kept = [0, 1, 3, 4] if offset_known else [0, 1, 3, 4, 2]
     covariance = np.zeros((5, 5))
     covariance[: len(kept), : len(kept)] = inverse(information[np.ix_(kept, kept)]) * noise_std**2
-    jacobian = _modal_jacobian(decay, omega_d, amplitude, phase)
-    deviations = np.sqrt(np.diag(jacobian @ covariance @ jacobian.T))
-    return SinusoidBound(*map(float, deviations))
-
-
-def _modal_jacobian(decay: Decay, omega_d: float, amplitude: float, phase: float) -> Array:
     # Rows: amplitude, phase, f, ωn, ζ, offset. Columns: a, k, angle, rate, offset.
     a, omega = decay.rate, decay.omega_n
     omega_row = np.array([0.0, 0.5 / omega, 0.0, 0.0, 0.0])
@@ -96,7 +90,7 @@ def _modal_jacobian(decay: Decay, omega_d: float, amplitude: float, phase: float
     in_phase, quadrature = amplitude * np.cos(phase), amplitude * np.sin(phase)
     x_row = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
     q_row = np.array([-in_phase, 0.0, -a, -1.0, 0.0]) / omega_d - quadrature / omega_d * damped_row
-    return np.array(
+    jacobian = np.array(
         [
             (in_phase * x_row + quadrature * q_row) / amplitude,
             (in_phase * q_row - quadrature * x_row) / amplitude**2,
@@ -106,6 +100,8 @@ def _modal_jacobian(decay: Decay, omega_d: float, amplitude: float, phase: float
             np.array([0.0, 0.0, 0.0, 0.0, 1.0]),
         ]
     )
+    deviations = np.sqrt(np.diag(jacobian @ covariance @ jacobian.T))
+    return SinusoidBound(*map(float, deviations))
 
 
 @dataclass(frozen=True)

@@ -263,9 +263,21 @@ def build_spec(rig: Rig, settings: RunSettings) -> mujoco.MjSpec:
         spec = mujoco.MjSpec.from_file(str(path))
     spec.option.timestep = settings.timestep
     _place_scenery(spec, rig)
-    _place_rig(spec, rig)
+    body = rig.body
+    centre = body.ground_clearance + body.height / 2
+    top = rig.working_section.height + 1.2 * rig.rod.length_above_ceiling  # the pointer turns above the yoke
+    spec.body("davis").pos = (0.0, 0.0, centre)
+    spec.site("nose").pos = (body.length / 2, 0.0, 0.0)
+    spec.mesh("davis_body").uservert = davis_vertices(body).ravel()
+    rod = spec.geom("rod")
+    rod.size = (rig.rod.diameter / 2, (top - centre) / 2, 0.0)
+    rod.pos = (0.0, 0.0, (top + centre) / 2)
+    pointer = spec.geom("pointer")
+    pointer.size = (0.07, rig.rod.diameter / 5, rig.rod.diameter / 5)
+    pointer.pos = (0.07, 0.0, top)
     _set_dynamics(spec, rig, settings)
-    _set_numerics(spec, rig, settings)
+    for name, values in numerics(rig, settings).items():
+        spec.add_numeric(name=name, data=list(values), size=len(values))
     return spec
 
 
@@ -293,21 +305,6 @@ def _place_scenery(spec: mujoco.MjSpec, rig: Rig) -> None:
         mesh = spec.mesh(name)
         mesh.uservert, mesh.userface = piece.vertices.ravel(), piece.faces.ravel()
     spec.body("view_centre").pos = (0.0, 0.0, 0.45 * section.height)
-
-
-def _place_rig(spec: mujoco.MjSpec, rig: Rig) -> None:
-    body = rig.body
-    centre = body.ground_clearance + body.height / 2
-    top = rig.working_section.height + 1.2 * rig.rod.length_above_ceiling  # the pointer turns above the yoke
-    spec.body("davis").pos = (0.0, 0.0, centre)
-    spec.site("nose").pos = (body.length / 2, 0.0, 0.0)
-    spec.mesh("davis_body").uservert = davis_vertices(body).ravel()
-    rod = spec.geom("rod")
-    rod.size = (rig.rod.diameter / 2, (top - centre) / 2, 0.0)
-    rod.pos = (0.0, 0.0, (top + centre) / 2)
-    pointer = spec.geom("pointer")
-    pointer.size = (0.07, rig.rod.diameter / 5, rig.rod.diameter / 5)
-    pointer.pos = (0.07, 0.0, top)
 
 
 def _set_dynamics(spec: mujoco.MjSpec, rig: Rig, settings: RunSettings) -> None:
@@ -339,11 +336,6 @@ def _inertia(rig: Rig, yaw_inertia: float) -> tuple[float, float, float]:
     width = max(rig.body.width, _THINNEST * length)
     scale = yaw_inertia / (length**2 + width**2)
     return scale * (width**2 + height**2), scale * (length**2 + height**2), yaw_inertia
-
-
-def _set_numerics(spec: mujoco.MjSpec, rig: Rig, settings: RunSettings) -> None:
-    for name, values in numerics(rig, settings).items():
-        spec.add_numeric(name=name, data=list(values), size=len(values))
 
 
 def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:

@@ -113,7 +113,13 @@ def plan_run(
         one_run = CampaignPlan("episode", 0, truth, (condition,), plan.sensor, tuple(settings))
         effects = plan_effects(one_run)
         for effect in effects:
-            _check_time(effect)
+            # An episode reads the motion as it goes: none of it can be passed over.
+            if effect.skips and not effect.is_null:
+                raise TunnelError(
+                    "an episode cannot drop samples",
+                    where=f"effect {effect.name}",
+                    remedy="inject it with tunnel simulate, which makes whole records",
+                )
         return RunPlan(condition, truth, plan.sensor, effects)
     except TunnelError as error:
         raise as_env_error(error, "option effects") from error
@@ -218,16 +224,6 @@ def _effects(
         where="option effects",
         remedy="give {name: {parameter: value}}, or a list of tunnel_sim.effects",
     )
-
-
-def _check_time(effect: Effect) -> None:
-    """An episode reads the motion as it goes: none of it can be passed over."""
-    if effect.skips and not effect.is_null:
-        raise TunnelError(
-            "an episode cannot drop samples",
-            where=f"effect {effect.name}",
-            remedy="inject it with tunnel simulate, which makes whole records",
-        )
 
 
 def _drawn_effect(plan: RunPlan, rng: np.random.Generator) -> EffectSetting:

@@ -123,7 +123,9 @@ class Episodes:
         self._information.start(row, self._nominal(plan))
         self._stated_speed[row] = self._speed[row] = plan.condition.wind_speed
         self.step_count[row], self.ended[row] = 0, False
-        observation = self._observation(row, self._readings.held(row, end_angle))
+        time = self.step_count[row] * self._config.control_period
+        shown = np.clip(self._readings.held(row, end_angle), -READING_BOUND, READING_BOUND)
+        observation = np.concatenate((shown, (min(time, self._config.duration), self._speed[row])))
         info: dict[str, Any] = dict(plan.statement())
         if self._config.expose_truth:
             info["truth"] = plan
@@ -141,11 +143,6 @@ class Episodes:
             frontal_area=body.frontal_area,
             reference_length=body.length,
         )
-
-    def _observation(self, row: int, readings: Array) -> Array:
-        time = self.step_count[row] * self._config.control_period
-        shown = np.clip(readings, -READING_BOUND, READING_BOUND)
-        return np.concatenate((shown, (min(time, self._config.duration), self._speed[row])))
 
     def advance(self, actions: Any) -> tuple[Array, Array, Flags, Flags]:
         """Advance every episode by one control period, including those that have ended.

@@ -122,7 +122,13 @@ class Sensitivities:
             Sensitivities of the readings at the samples, shape (runs, 7, samples), in the order of `UNKNOWNS`.
         """
         if not np.array_equal(wind_speed, self._speed):
-            self._set_speed(wind_speed)
+            stiffness, damping, _, _, air_stiffness, air_damping, _ = self._runs
+            a = 0.5 * (damping - air_damping * wind_speed)
+            k = stiffness - air_stiffness * wind_speed**2
+            self._speed, self._decay = wind_speed.copy(), np.stack((a, k))
+            whole = propagator(a, k, self._interval)
+            half = propagator(a, k, 0.5 * self._interval)
+            self._propagator = np.stack((*whole, half[1], half[3]))
         kicks = self._kicks(angle, rate, wind_speed, moment)
         f00, f01, f10, f11 = (row[:, None] for row in self._propagator[:4])
         x, v = self._x
@@ -132,15 +138,6 @@ class Sensitivities:
             x, v = f00 * x + f01 * v + kicks[0, j], f10 * x + f11 * v + kicks[1, j]
         self._x = np.stack((x, v))
         return out.transpose(1, 2, 0)
-
-    def _set_speed(self, speed: Array) -> None:
-        stiffness, damping, _, _, air_stiffness, air_damping, _ = self._runs
-        a = 0.5 * (damping - air_damping * speed)
-        k = stiffness - air_stiffness * speed**2
-        self._speed, self._decay = speed.copy(), np.stack((a, k))
-        whole = propagator(a, k, self._interval)
-        half = propagator(a, k, 0.5 * self._interval)
-        self._propagator = np.stack((*whole, half[1], half[3]))
 
     def _kicks(self, angle: Array, rate: Array, speed: Array, moment: Array) -> Array:
         """What u adds to value and rate in each interval, shape (2, samples, runs, DYNAMIC)."""

@@ -132,15 +132,12 @@ class Readings:
             readings[row] = self._chain(row).reading(readings[row])
         size = np.where(resolution > 0.0, resolution, 1.0)
         readings = np.where(resolution > 0.0, np.round(readings / size) * size, readings)
-        self._keep(first, readings)
-        return readings
-
-    def _keep(self, first: NDArray[np.int64], readings: Array) -> None:
         if (first == first[0]).all():
             self._values[:, first[0] : first[0] + self._samples] = readings
         else:
             columns = first[:, None] + np.arange(self._samples)
             self._values[np.arange(len(first))[:, None], columns] = readings
+        return readings
 
     def record(self, row: int, steps: int) -> Record:
         """The record of a run so far.

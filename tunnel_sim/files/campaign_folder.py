@@ -138,7 +138,20 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
                 f"the id '{run.id}' is used twice", where=where, remedy="give every run its own id"
             )
         seen.add(run.id)
-        _check_run(run, parsed.rig, where)
+        scales = run.spring_stiffness, parsed.rig.frontal_area, parsed.rig.reference_length
+        if run.air_density is None and needs_density(run.wind_speed, *scales):
+            raise TunnelError(
+                f"wind-on (wind_speed = {run.wind_speed:g} m/s) without air_density",
+                where=where,
+                remedy="give air_density in kg/m3 (about 1.2 for air)",
+            )
+        windows, posix = PureWindowsPath(run.file), PurePosixPath(run.file)
+        if windows.drive or windows.root or posix.is_absolute() or ".." in windows.parts + posix.parts:
+            raise TunnelError(
+                f"the path '{run.file}' may lead outside the campaign's folder",
+                where=where,
+                remedy="put the file inside the folder and name it without '..' or a leading '/'",
+            )
     if parsed.sensor.plausible is not False:
         _check_sizes(parsed, path)
     return parsed
@@ -157,23 +170,6 @@ def _check_sizes(document: CampaignDocument, path: Path) -> None:
     plausible_values(document.rig.model_dump(), f"{shown(path)}, [rig]")
     for run in document.runs:
         plausible_values(run.model_dump(), run_place(path, run.id))
-
-
-def _check_run(run: RunTable, rig: RigTable, where: str) -> None:
-    scales = run.spring_stiffness, rig.frontal_area, rig.reference_length
-    if run.air_density is None and needs_density(run.wind_speed, *scales):
-        raise TunnelError(
-            f"wind-on (wind_speed = {run.wind_speed:g} m/s) without air_density",
-            where=where,
-            remedy="give air_density in kg/m3 (about 1.2 for air)",
-        )
-    windows, posix = PureWindowsPath(run.file), PurePosixPath(run.file)
-    if windows.drive or windows.root or posix.is_absolute() or ".." in windows.parts + posix.parts:
-        raise TunnelError(
-            f"the path '{run.file}' may lead outside the campaign's folder",
-            where=where,
-            remedy="put the file inside the folder and name it without '..' or a leading '/'",
-        )
 
 
 def rig_properties(table: RigTable) -> RigProperties:
@@ -327,7 +323,17 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
     sample_rate = sensor.sample_rate
     path = folder / run.file
     where = run_place(path, run.id)
-    _check_inside(folder, path, where)
+    # Refuse a run file outside the folder, also through a symbolic link.
+    try:
+        inside = path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):
+        raise TunnelError("the path cannot be resolved", where=where, remedy="correct 'file'") from None
+    if not inside:
+        raise TunnelError(
+            "a symbolic link leads outside the campaign's folder",
+            where=where,
+            remedy="copy the file into the folder",
+        )
     time_s, reading, column = read_table(
         path, where, timed=sample_rate is None, quantity=sensor.quantity or "angle"
     )
@@ -379,20 +385,6 @@ def checked_record(
     if judged:
         plausible_run(record, cycles, where, angle=angle)
     return record
-
-
-def _check_inside(folder: Path, path: Path, where: str) -> None:
-    """Refuse a run file outside the folder, also through a symbolic link."""
-    try:
-        inside = path.resolve().is_relative_to(folder.resolve())
-    except (OSError, RuntimeError, ValueError):
-        raise TunnelError("the path cannot be resolved", where=where, remedy="correct 'file'") from None
-    if not inside:
-        raise TunnelError(
-            "a symbolic link leads outside the campaign's folder",
-            where=where,
-            remedy="copy the file into the folder",
-        )
 
 
 def _check_records(campaign: Campaign, folder: Path) -> None:

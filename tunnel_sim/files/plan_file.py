@@ -234,12 +234,27 @@ def plan_from(document: PlanDocument, rig: Rig, where: str) -> CampaignPlan:
     """
     stated = document.truth.model_dump(exclude_none=True)
     inertia, damping = rig.dynamics.yaw_inertia, rig.dynamics.mechanical_damping
+    density = rig.air.density if document.air_density is None else document.air_density
     return CampaignPlan(
         name=document.name,
         description=document.description,
         seed=document.seed,
         truth=Truth(**({"yaw_inertia": inertia, "mechanical_damping": damping} | stated)),
-        conditions=_conditions(document, rig, where),
+        conditions=tuple(
+            Condition(
+                id=f"{label}-v{_short(speed)}-a{_short(angle)}"
+                + (f"-{repeat}" if document.repeats > 1 else ""),
+                spring_stiffness=stiffness,
+                wind_speed=speed,
+                air_density=density,
+                release_angle=radians(angle),
+                duration=document.duration,
+            )
+            for label, stiffness in _stiffnesses(document, rig.springs, where)
+            for speed in document.wind_speeds
+            for angle in document.release_angles_deg
+            for repeat in range(1, document.repeats + 1)
+        ),
         sensor=SensorModel(**document.sensor.model_dump(exclude_none=True)),
         effects=tuple(EffectSetting(effect.name, dict(effect.parameters)) for effect in document.effects),
     )
@@ -249,24 +264,6 @@ def paper_plan() -> CampaignPlan:
     """The paper's campaign (``data/paper-campaign.toml``): four springs, wind off and at three speeds."""
     with resources.as_file(resources.files("tunnel_sim") / "data" / "paper-campaign.toml") as path:
         return load_plan(path)
-
-
-def _conditions(document: PlanDocument, rig: Rig, where: str) -> tuple[Condition, ...]:
-    density = rig.air.density if document.air_density is None else document.air_density
-    return tuple(
-        Condition(
-            id=f"{label}-v{_short(speed)}-a{_short(angle)}" + (f"-{repeat}" if document.repeats > 1 else ""),
-            spring_stiffness=stiffness,
-            wind_speed=speed,
-            air_density=density,
-            release_angle=radians(angle),
-            duration=document.duration,
-        )
-        for label, stiffness in _stiffnesses(document, rig.springs, where)
-        for speed in document.wind_speeds
-        for angle in document.release_angles_deg
-        for repeat in range(1, document.repeats + 1)
-    )
 
 
 def _stiffnesses(document: PlanDocument, springs: Mapping[int, float], where: str) -> list[tuple[str, float]]:

@@ -114,8 +114,20 @@ def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", 
         raise _unreadable(error, where, readable) from None
     try:
         state = os.fstat(descriptor)
-        _check_kind(state, limit, where, (stat.S_ISDIR(state.st_mode) and inside(path)) or readable)
-        return _content(descriptor, limit, where)
+        if not stat.S_ISREG(state.st_mode):
+            kind = "it is a folder" if stat.S_ISDIR(state.st_mode) else "it is not a regular file"
+            raise TunnelError(
+                f"cannot be read ({kind})",
+                where=where,
+                remedy=(stat.S_ISDIR(state.st_mode) and inside(path)) or readable,
+            )
+        check_count(state.st_size, limit, "bytes", where, "split the file, or name the right one")
+        # The file's content, which may be longer than its stated size.
+        found = bytearray()
+        while part := os.read(descriptor, _CHUNK):
+            found += part
+            check_count(len(found), limit, "bytes", where, "split the file, or name the right one")
+        return bytes(found)
     except OSError as error:
         raise _unreadable(error, where, readable) from None
     finally:
@@ -313,22 +325,6 @@ def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
             raise
         reason = f"{type(error).__name__}: {one_line(error, 60)}"
         raise TunnelError(f"{what} ({reason})", where=where, remedy=remedy) from None
-
-
-def _check_kind(state: os.stat_result, limit: int, where: str, remedy: str) -> None:
-    if not stat.S_ISREG(state.st_mode):
-        kind = "it is a folder" if stat.S_ISDIR(state.st_mode) else "it is not a regular file"
-        raise TunnelError(f"cannot be read ({kind})", where=where, remedy=remedy)
-    check_count(state.st_size, limit, "bytes", where, "split the file, or name the right one")
-
-
-def _content(descriptor: int, limit: int, where: str) -> bytes:
-    """The file's content, which may be longer than its stated size."""
-    found = bytearray()
-    while part := os.read(descriptor, _CHUNK):
-        found += part
-        check_count(len(found), limit, "bytes", where, "split the file, or name the right one")
-    return bytes(found)
 
 
 def _unreadable(error: Exception, where: str, remedy: str) -> TunnelError:

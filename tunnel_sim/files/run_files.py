@@ -118,7 +118,10 @@ def _columns(
     used = [name for name in ("time_s", column) if name in names]
     table = held.frame.select(used)
     if held.text:
-        table = _without_blank_end(table)
+        # A text table without the blank lines at its end.
+        blank = table.select(pl.all_horizontal(pl.all().is_null())).to_series().to_numpy()
+        filled = np.flatnonzero(~blank)
+        table = table.head(int(filled[-1]) + 1 if filled.size else 0)
     if table.height == 0:
         raise TunnelError(
             "the file has no samples", where=where, remedy="record the run again or leave it out"
@@ -126,13 +129,6 @@ def _columns(
     values = {name: _numbers(table.get_column(name), held.text, where) for name in used}
     reading = np.deg2rad(values[column]) if "_deg" in column else values[column]
     return values.get("time_s"), reading, column
-
-
-def _without_blank_end(table: pl.DataFrame) -> pl.DataFrame:
-    """A text table without the blank lines at its end."""
-    blank = table.select(pl.all_horizontal(pl.all().is_null())).to_series().to_numpy()
-    filled = np.flatnonzero(~blank)
-    return table.head(int(filled[-1]) + 1 if filled.size else 0)
 
 
 def _numbers(series: pl.Series, text: bool, where: str) -> Array:

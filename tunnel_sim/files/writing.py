@@ -216,7 +216,14 @@ def write_whole(path: Path, content: bytes) -> Path:
         elif path.exists() and not path.is_file():
             _write_to(os.open(path, os.O_WRONLY), content)
         else:
-            _replace(target, content)
+            clear_leftovers_once(target.parent)
+            partial, _ = temporary_names(target)
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+            try:
+                _write_to(os.open(partial, flags, 0o666), content)
+                partial.replace(target)
+            finally:
+                partial.unlink(missing_ok=True)
     return path
 
 
@@ -313,7 +320,14 @@ def refusals(path: Path, kinds: tuple[type[BaseException], ...] = (BaseException
     except _PASSED_ON:
         raise
     except kinds as error:
-        raise _unwritable(path, error) from error
+        # The error for a file or folder that cannot be written.
+        reason = error.strerror if isinstance(error, OSError) else None
+        said = reason.lower() if reason else f"{type(error).__name__}: {error}".rstrip(": ")
+        raise TunnelError(
+            f"cannot be written ({one_line(said)})",
+            where=shown(path),
+            remedy="name a file or folder that can be written",
+        ) from error
 
 
 def _target(path: Path) -> Path:
@@ -347,17 +361,6 @@ def _write_to(descriptor: int, content: bytes) -> None:
         stream.write(content)
 
 
-def _replace(target: Path, content: bytes) -> None:
-    clear_leftovers_once(target.parent)
-    partial, _ = temporary_names(target)
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-    try:
-        _write_to(os.open(partial, flags, 0o666), content)
-        partial.replace(target)
-    finally:
-        partial.unlink(missing_ok=True)
-
-
 def _put_where_nothing_is(partial: Path, target: Path, where: str) -> None:
     with suppress(OSError):
         target.rmdir()  # an empty folder may be in the way
@@ -385,14 +388,3 @@ def _put_in_place(partial: Path, target: Path, replaced: Path) -> None:
         if replaced.exists():
             replaced.rename(target)
         raise
-
-
-def _unwritable(path: Path, error: BaseException) -> TunnelError:
-    """The error for a file or folder that cannot be written."""
-    reason = error.strerror if isinstance(error, OSError) else None
-    said = reason.lower() if reason else f"{type(error).__name__}: {error}".rstrip(": ")
-    return TunnelError(
-        f"cannot be written ({one_line(said)})",
-        where=shown(path),
-        remedy="name a file or folder that can be written",
-    )

@@ -140,7 +140,11 @@ def _node(tree: ast.expr, names: frozenset[str]) -> Node:
         ):
             return float(value)
         case ast.Name(id=name):
-            return _named(name, names)
+            if name == "pi":
+                return math.pi
+            if name not in names:
+                raise TunnelError(f"unknown name {one_line(name)!r}", remedy=did_you_mean(name, names))
+            return name
         case ast.UnaryOp(op=ast.USub() | ast.UAdd()):
             return _signed(tree, names)
         case ast.BinOp(op=operator, left=left, right=right) if type(operator) in _BINARY:
@@ -158,14 +162,6 @@ def _signed(tree: ast.expr, names: frozenset[str]) -> Node:
         negative ^= isinstance(tree.op, ast.USub)
         tree = tree.operand
     return ("negative", _node(tree, names)) if negative else _node(tree, names)
-
-
-def _named(name: str, names: frozenset[str]) -> Node:
-    if name == "pi":
-        return math.pi
-    if name not in names:
-        raise TunnelError(f"unknown name {one_line(name)!r}", remedy=did_you_mean(name, names))
-    return name
 
 
 def _names(node: Node) -> set[str]:

@@ -39,15 +39,14 @@ def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, 
     runs = np.ascontiguousarray(runs)
     runs["samples"] = samples
     angle, rate = np.zeros((count, samples)), np.zeros((count, samples))
-    pointers = [_row_pointers(array) for array in (angle, rate)]
+    pointers = [
+        (array.ctypes.data + np.arange(len(array)) * array.strides[0]).astype(np.uintp)
+        for array in (angle, rate)
+    ]
     status = forward_library().vwt_forward(
         count, law.ctypes.data, runs.ctypes.data, pointers[0].ctypes.data, pointers[1].ctypes.data
     )
     return angle, rate, int(status)
-
-
-def _row_pointers(array: Array) -> NDArray[np.uintp]:
-    return (array.ctypes.data + np.arange(len(array)) * array.strides[0]).astype(np.uintp)
 
 
 def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motion:

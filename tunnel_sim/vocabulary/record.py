@@ -151,7 +151,10 @@ def count_cycles(record: Record) -> float:
     """
     record = evenly_spaced(record, bridged=False)
     reading = _without_hum(record)
-    level = _without_trend(reading)
+    # The reading less a fitted straight line, because a sensor's drift is not an oscillation.
+    abscissa = np.linspace(-1.0, 1.0, reading.size)
+    slope = float(abscissa @ reading) / float(abscissa @ abscissa)
+    level: Array = reading - float(reading.mean()) - slope * abscissa
     # Only rounding errors remain of a constant, a linear drift or pure hum.
     if reading.size < 6 or float(np.ptp(level)) <= 1e-9 * float(np.abs(record.yaw_rad).max()):
         return 0.0
@@ -165,7 +168,20 @@ def count_cycles(record: Record) -> float:
 
 def _count(reading: Array, width: int) -> float:
     """The record's length over the period of its crossings; 0 with fewer than two of them."""
-    crossings = _crossings(reading, width)
+    # Where the smoothed reading crosses its centre, in samples, with hysteresis.
+    total = np.concatenate([[0.0], np.cumsum(reading)])
+    smooth = (total[width:] - total[:-width]) / width
+    smooth = smooth - np.median(smooth)
+    # Differences of neighbouring samples contain the noise and little of the motion.
+    quartiles = np.percentile(np.diff(reading), [25.0, 75.0])
+    noise = float(quartiles[1] - quartiles[0]) / (1.349 * np.sqrt(2.0 * width))
+    largest = float(np.abs(smooth).max())
+    # With few samples per cycle the differences contain the motion as well, hence the upper limit.
+    band = min(max(HYSTERESIS * largest, NOISE_MARGIN * noise), 0.25 * largest)
+    outside = np.flatnonzero(np.abs(smooth) > band)
+    change = np.flatnonzero(np.diff(np.sign(smooth[outside])) != 0.0)
+    # Between the last sample on one side of the band and the first on the other.
+    crossings = 0.5 * (outside[change] + outside[change + 1]).astype(np.float64)
     if crossings.size < 2:
         return 0.0
     # Whole periods where there are any, because half periods are unequal about a shifted centre. Their median,
@@ -199,14 +215,6 @@ def _without_hum(record: Record) -> Array:
     return reading
 
 
-def _without_trend(reading: Array) -> Array:
-    """The reading less a fitted straight line, because a sensor's drift is not an oscillation."""
-    abscissa = np.linspace(-1.0, 1.0, reading.size)
-    slope = float(abscissa @ reading) / float(abscissa @ abscissa)
-    level: Array = reading - float(reading.mean()) - slope * abscissa
-    return level
-
-
 def _dominant_frequency(reading: Array, sample_rate: float) -> float | None:
     """Frequency of the strongest spectral line, Hz; None when no line stands out from the noise."""
     power = np.abs(np.fft.rfft(reading))[1:] ** 2
@@ -216,20 +224,3 @@ def _dominant_frequency(reading: Array, sample_rate: float) -> float | None:
     share = np.where(power > LINE_OVER_MEDIAN * background, power * np.sqrt(frequency), 0.0)
     best = int(np.argmax(share))
     return float(frequency[best]) if share[best] > 0.0 else None
-
-
-def _crossings(reading: Array, width: int) -> Array:
-    """Where the smoothed reading crosses its centre, in samples, with hysteresis."""
-    total = np.concatenate([[0.0], np.cumsum(reading)])
-    smooth = (total[width:] - total[:-width]) / width
-    smooth = smooth - np.median(smooth)
-    # Differences of neighbouring samples contain the noise and little of the motion.
-    quartiles = np.percentile(np.diff(reading), [25.0, 75.0])
-    noise = float(quartiles[1] - quartiles[0]) / (1.349 * np.sqrt(2.0 * width))
-    largest = float(np.abs(smooth).max())
-    # With few samples per cycle the differences contain the motion as well, hence the upper limit.
-    band = min(max(HYSTERESIS * largest, NOISE_MARGIN * noise), 0.25 * largest)
-    outside = np.flatnonzero(np.abs(smooth) > band)
-    change = np.flatnonzero(np.diff(np.sign(smooth[outside])) != 0.0)
-    # Between the last sample on one side of the band and the first on the other.
-    return 0.5 * (outside[change] + outside[change + 1]).astype(np.float64)
