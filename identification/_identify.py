@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from identification.estimate import Estimate, RunEstimate, Status, by_gravity
+from identification.estimate import Estimate, RunEstimate, Status, by_severity
 from identification.estimators import Estimator, make_estimator
 from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
@@ -63,6 +63,6 @@ def _of_all_runs(campaign: Campaign, examined: Examined, estimate: Estimate) -> 
     return replace(
         estimate,
         runs=tuple(found.get(run.id) or left_out[run.id] for run in campaign.runs),
-        statuses=by_gravity({*estimate.statuses, *(run.status for run in left_out.values())}),
+        statuses=by_severity({*estimate.statuses, *(run.status for run in left_out.values())}),
         remarks=examined.remarks,
     )

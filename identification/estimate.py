@@ -18,7 +18,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter
 
 from identification.status import Remark
 from identification.status import Status as Status
-from identification.status import by_gravity as by_gravity
+from identification.status import by_severity as by_severity
 from tunnel_sim.files.json_text import as_json
 from tunnel_sim.files.reading import as_described, check_shape
 from tunnel_sim.vocabulary.record import Array

@@ -1,7 +1,7 @@
 """How results are printed: numbers with their standard deviations, tables, and the parts of an estimate.
 
-Formatting of numbers: two significant digits of the standard deviation determine the others. Tables and paragraphs
-as plain text for a console and as HTML for a notebook. An estimate as tables and notes, from its JSON document.
+Two significant digits of the standard deviation determine those of the value. Tables and paragraphs are printed as
+plain text for a console and as HTML for a notebook. An estimate is printed from its JSON document.
 """
 
 from __future__ import annotations

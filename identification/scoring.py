@@ -1,15 +1,14 @@
 """Estimates against the truth: accuracy, and whether a method got worse than a baseline.
 
-The accuracy of estimates: bias, RMSE, RMSE over the bound, coverage and failures. Every figure has the sampling
-error that follows from the number of trials. These are pure functions of numbers; the caller knows the estimators
-and the records. `identification.scoring` tests whether a method got worse. Standard errors of bias and RMSE are
-those of means (delta method for the root); shares have Wilson's intervals (E. B. Wilson, J. Am. Stat. Assoc. 22
-(1927) 209–212, doi 10.1080/01621459.1927.10502953).
+Accuracy is bias, RMSE, RMSE over the bound, coverage and failures, each with the sampling error that follows
+from the number of trials. These are pure functions of numbers; the caller knows the estimators and the records.
+Standard errors of bias and RMSE are those of means (delta method for the root); shares have Wilson's intervals
+(E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209–212, doi 10.1080/01621459.1927.10502953).
 
-Whether a method got worse than a baseline, at a stated false-alarm rate. The tests use only ranks and counts, so
-they are exact, or nearly so, for any distribution of the errors. If nothing changed, old and new trials are
-exchangeable, and so is any choice made from both together (a direction, a threshold). Many tests share one
-false-alarm rate by Holm's method.
+Whether a method got worse than a baseline is tested at a stated false-alarm rate. The tests use only ranks and
+counts, so they are exact, or nearly so, for any distribution of the errors. If nothing changed, old and new
+trials are exchangeable, and so is any choice made from both together (a direction, a threshold). Many tests
+share one false-alarm rate by Holm's method.
 
 Sources: rank sum over strata, P. van Elteren, Bull. Int. Stat. Inst. 37 (1960) 351–361; Fisher's exact test;
 S. Holm, Scand. J. Stat. 6 (1979) 65–70.
@@ -36,7 +35,7 @@ _LEAST = 2  # trials needed for a sampling error
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ScoredEstimate:
     """One estimate with its truth.
 
     Args:
@@ -59,7 +58,7 @@ class Trials:
         error: estimate − truth of those identified, shape (k,).
         std: as the method reports it, shape (k,).
         truth: shape (k,).
-        bound: see `Outcome`, shape (k,); None where it is not known for all.
+        bound: see `ScoredEstimate`, shape (k,); None where it is not known for all.
         failures: number of further trials that gave no estimate.
         unit: of error, std, truth and bound.
     """
@@ -87,7 +86,7 @@ class Trials:
         return self.error / (np.abs(self.truth) if self.bound is None else self.bound)
 
 
-def collect(outcomes: Iterable[Outcome]) -> Trials:
+def collect(outcomes: Iterable[ScoredEstimate]) -> Trials:
     """Outcomes as arrays.
 
     Args:

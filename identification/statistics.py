@@ -1,12 +1,11 @@
 """Linear algebra and statistics that every estimator shares.
 
-Linear algebra of information matrices: solve, invert, eliminate, extend. Straight lines through points of known
-variance, with a test of their scatter. A share of trials with its confidence interval.
+Information matrices are solved, inverted, extended, and rid of unknowns that nobody asks for. Straight lines go
+through points of known variance, with a test of their scatter. A share of trials has a confidence interval.
 
-Standard deviations that remain valid when the model does not explain the data. If it does, the covariance is the
-inverse of Fisher's information. If it does not, the residual is not white: the variances are widened by its power
-in the band of the oscillation, or to the scatter of the runs, whichever is larger. The diagnosis uses the same
-scatter.
+Where the model explains the data, the covariance is the inverse of Fisher's information. Where it does not, the
+residual is not white: the variances are widened by its power in the band of the oscillation, or to the scatter
+of the runs, whichever is larger. The diagnosis uses the same scatter.
 
 Where the statements of a campaign contradict its frequencies, no estimator can know which of them is wrong: the
 largest change that a correction makes is the half-width of a rectangular distribution (GUM 4.3.7).

@@ -1,7 +1,4 @@
-"""What is said of a campaign: the outcome of an estimate with its remedy, and the remarks of the examination.
-
-The outcome of an estimate, with what to do about it. The findings of the examination of a campaign.
-"""
+"""What is said of a campaign: the outcome of an estimate with its remedy, and the remarks of the examination."""
 
 from __future__ import annotations
 
@@ -80,7 +77,7 @@ _FAILED = (
 _GRAVITY = {status: rank for rank, status in enumerate(Status)}
 
 
-def by_gravity(statuses: set[Status]) -> tuple[Status, ...]:
+def by_severity(statuses: set[Status]) -> tuple[Status, ...]:
     """The statuses from the gravest to the least; OK alone where there are none.
 
     Args:

@@ -7,12 +7,12 @@ unknown and eliminated. The information of a future run is Fisher's, exact for i
 estimate of the parameters: Bayesian D-optimal design with the nuisance parameters marginalised. Source: Chaloner
 & Verdinelli, Statist. Sci. 10 (1995) 273–304, doi 10.1214/ss/1177009939, sec. 2.
 
-The belief of a campaign by linear theory: runs are replaced by what estimating them gives to first order. With the
-initial state eliminated, the maximum-likelihood estimate of a run's θ = (a, k, zero) is, to first order in the
-noise, θ̂ = θ + S⁻¹ s: S is the Schur complement of JᵀJ and s that of the score Jᵀ noise, both at the true decay.
-The posterior of φ and the zero is then a linear system. Its weights are Fisher's information at the likeliest φ,
-as in the joint fit of `belief.update_belief`. Source: S. M. Kay, Fundamentals of Statistical Signal Processing:
-Estimation Theory (1993), ch. 7.
+By linear theory runs are replaced by what estimating them gives to first order. With the initial state
+eliminated, the maximum-likelihood estimate of a run's θ = (a, k, zero) is, to first order in the noise, θ̂ = θ +
+S⁻¹ s: S is the Schur complement of JᵀJ and s that of the score Jᵀ noise, both at the true decay. The posterior
+of φ and the zero is then a linear system. Its weights are Fisher's information at the likeliest φ, as in the
+joint fit of `update_belief`. Source: S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory
+(1993), ch. 7.
 """
 
 from __future__ import annotations

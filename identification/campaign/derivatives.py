@@ -1,13 +1,13 @@
 """From decay rates and stiffnesses of the runs to Cnβ, Cnr, Izz and Cr, and to an `Estimate`.
 
-From decay rates and stiffnesses of the runs to Cnβ, Cnr, Izz and Cr, and which of them a campaign separates. With
-g = 1/Izz, n = Cnβ/Izz, d = Cr/Izz and m = Cnr/Izz the equation of motion (paper, eqs 2–6, signs as in eqs 7 and 8)
-gives for run i
+With g = 1/Izz, n = Cnβ/Izz, d = Cr/Izz and m = Cnr/Izz the equation of motion (paper, eqs 2–6, signs as in eqs 7
+and 8) gives for run i
 
     kᵢ = Krᵢ g − ½ρᵢVᵢ² A l n,    2aᵢ = d − ½ρᵢVᵢ A l² m,
 
 linear in (g, n, d, m). If a campaign does not separate the columns of a block, that block is fitted run by run.
-From runs and shared parameters to an `Estimate`: the steps that all estimators share. A method that identifies run
+
+The steps to an `Estimate` are common to all estimators. A method that identifies run
 by run calls `combined_estimate`; a joint method uses its parts.
 """
 
@@ -29,7 +29,7 @@ from identification.estimate import (
     Quantity,
     RunEstimate,
     Status,
-    by_gravity,
+    by_severity,
 )
 from identification.policy import LEAST_SPRING_SPREAD, MISFIT_RATE
 from identification.signal.free_decay import Decay
@@ -285,16 +285,16 @@ def combined_estimate(
         and item.estimate.omega_n is not None
         and run.spring_stiffness is not None
     ]
-    statuses |= departures([run.noise for run in estimate.runs])
+    statuses |= noise_statuses([run.noise for run in estimate.runs])
     if not pairs:
-        return replace(estimate, statuses=by_gravity(statuses))
+        return replace(estimate, statuses=by_severity(statuses))
     runs = [run for _, run, _, _ in pairs]
     design = build_design(runs, campaign.rig)
     decays = np.array([[decay.rate, decay.stiffness] for _, _, decay, _ in pairs])
     informations = [inverse(covariance) for _, _, _, covariance in pairs]
     combined = combine(design, decays, informations)
     if combined is None:
-        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
+        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
     parameters, covariance = combined
     ratio = _birge_ratio(design, parameters, decays, informations)
     if together is not None:
@@ -302,11 +302,13 @@ def combined_estimate(
     values = derivatives(design, parameters)
     own = values.jacobian @ (covariance * ratio) @ values.jacobian.T
     if values.names and not determined(own):
-        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
-    return filled(campaign, estimate, runs, design, values, own, statuses | limits(design, parameters))
+        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
+    return filled_estimate(
+        campaign, estimate, runs, design, values, own, statuses | design_statuses(design, parameters)
+    )
 
 
-def filled(
+def filled_estimate(
     campaign: Campaign,
     estimate: Estimate,
     runs: Sequence[Run],
@@ -324,10 +326,10 @@ def filled(
     air = air_of_runs(design, found, covariance, runs)
     return replace(
         estimate,
-        statuses=by_gravity(statuses),
+        statuses=by_severity(statuses),
         runs=tuple(replace(run, **air.get(run.id, {})) for run in estimate.runs),
         **wind_off(estimate.runs, campaign.runs),
-        **quantities(found, covariance, has_size=design.has_size),
+        **parameter_quantities(found, covariance, has_size=design.has_size),
     )
 
 
@@ -362,7 +364,7 @@ def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> se
     return statuses
 
 
-def departures(levels: Sequence[NoiseLevel | None]) -> set[Status]:
+def noise_statuses(levels: Sequence[NoiseLevel | None]) -> set[Status]:
     """The statuses that follow from noise levels.
 
     Args:
@@ -380,7 +382,7 @@ def departures(levels: Sequence[NoiseLevel | None]) -> set[Status]:
     return statuses
 
 
-def limits(design: Design, parameters: Array) -> set[Status]:
+def design_statuses(design: Design, parameters: Array) -> set[Status]:
     """The statuses of a campaign whose conditions do not separate parameters, or contradict them.
 
     Args:
@@ -400,7 +402,7 @@ def limits(design: Design, parameters: Array) -> set[Status]:
     return statuses
 
 
-def quantities(found: Derivatives, covariance: Array, *, has_size: bool) -> dict[str, Any]:
+def parameter_quantities(found: Derivatives, covariance: Array, *, has_size: bool) -> dict[str, Any]:
     """The coefficients as fields of an `Estimate`, with their covariance.
 
     Args:

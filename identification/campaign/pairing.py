@@ -24,7 +24,7 @@ import numpy as np
 
 from identification.campaign.derivatives import has_size, wind_off
 from identification.campaign.springs import inertia_of_springs
-from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, Status, by_gravity
+from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, Status, by_severity
 from identification.policy import LEAST_FOR_SCATTER
 from identification.statistics import widened_covariance
 from tunnel_sim.vocabulary.campaign import Campaign, Run
@@ -141,7 +141,7 @@ def paired_estimate(
     if any(run.spring_stiffness is None for run in campaign.runs):
         statuses = statuses | {Status.NO_STIFFNESS}
     if not sprung:
-        return replace(estimate, statuses=by_gravity(statuses))
+        return replace(estimate, statuses=by_severity(statuses))
     statuses = set(statuses)
     pairing = _pair(sprung)
     windy = sum(one.run.wind_on for one, _ in sprung)
@@ -152,16 +152,16 @@ def paired_estimate(
     if windy and not has_size(campaign.rig):
         statuses.add(Status.NO_REFERENCE_SIZE)
     if not pairing.off:
-        return replace(estimate, statuses=by_gravity(statuses))
+        return replace(estimate, statuses=by_severity(statuses))
     seen = [one for one, _ in sprung]
     line = wind_off(estimate.runs, campaign.runs)
     if line["wind_off_inertia"] is None:
-        return replace(estimate, statuses=by_gravity(statuses | {Status.INERTIA_NOT_POSITIVE}))
+        return replace(estimate, statuses=by_severity(statuses | {Status.INERTIA_NOT_POSITIVE}))
     centre, moves = _propagated(pairing, seen, with_line=line["wind_off_intercept"] is not None)
     air = _air_of_runs(pairing, seen, centre, np.linalg.norm(moves, axis=1))
     return replace(
         estimate,
-        statuses=by_gravity(statuses),
+        statuses=by_severity(statuses),
         runs=tuple(replace(run, **air.get(run.id, {})) for run in estimate.runs),
         **line,
         **_coefficients(

@@ -1,11 +1,11 @@
 """Bayesian: the posterior of each run's decay, and of the campaign's coefficients under all of them.
 
-The posterior of one run's decay rate and stiffness on an adaptive grid, with all other unknowns integrated out.
-Initial angle and rate and the sensor's zero enter linearly, so they are integrated out in closed form, and so is
-an unknown noise level, which leaves Student's form (Bretthorst, Bayesian Spectrum Analysis and Parameter
-Estimation (1988), doi 10.1007/978-1-4684-9399-3). The prior is Jeffreys' rule over all unknowns, whose intervals
-have the stated coverage and do not depend on the choice of parameters (Jeffreys, Proc. R. Soc. A 186 (1946)
-453–461, doi 10.1098/rspa.1946.0056): with it
+The posterior of one run's decay rate and stiffness is computed on an adaptive grid. Initial angle and rate and
+the sensor's zero enter linearly, so they are integrated out in closed form, and so is an unknown noise level,
+which leaves Student's form (Bretthorst, Bayesian Spectrum Analysis and Parameter Estimation (1988), doi
+10.1007/978-1-4684-9399-3). The prior is Jeffreys' rule over all unknowns, whose intervals have the stated
+coverage and do not depend on the choice of parameters (Jeffreys, Proc. R. Soc. A 186 (1946) 453–461, doi
+10.1098/rspa.1946.0056): with it
 
     p(a, k | y) ∝ RSS(a, k)^(−ν/2) √|I(a, k)|,   or  exp(−RSS/2S²) √|I|  where the noise S is known,
 
@@ -13,17 +13,13 @@ with RSS the sum of squares at the best state and zero, and I the information on
 unknowns are summed over a grid in units of the posterior's standard deviations, refined until it covers the
 posterior.
 
-Combination of runs: mean and covariance of the shared parameters under the product of the runs' likelihoods.
-Importance sampling from Student's distribution about the normal approximation, drawn in pairs of opposite sign,
-and repeated where it misses the posterior (Kloek & van Dijk, Econometrica 46 (1978) 1–19, doi 10.2307/1913641).
+So the logarithm of the likelihood need not be a parabola, which it is not in records of one to three cycles or of
+few samples. Values are posterior means, with the posterior's standard deviations, and ωn and ζ carry their 95 %
+intervals.
 
-The initial state, the zero and the noise level are integrated out in closed form and damping and frequency
-are summed over a grid (see `identification.estimators.bayesian`). So the logarithm of the likelihood need not be a
-parabola, which it is not in records of one to three cycles or of few samples. Values are posterior means, with the
-posterior's standard deviations, and ωn and ζ carry their 95 % intervals. The campaign's coefficients are drawn from
-the product of the runs' likelihoods. Sources: Bretthorst, Bayesian Spectrum Analysis and Parameter Estimation
-(1988), doi 10.1007/978-1-4684-9399-3; Jeffreys, Proc. R. Soc. A 186 (1946) 453–461,
-doi 10.1098/rspa.1946.0056.
+The campaign's coefficients are drawn from the product of the runs' likelihoods: importance sampling from Student's
+distribution about the normal approximation, drawn in pairs of opposite sign, and repeated where it misses the
+posterior (Kloek & van Dijk, Econometrica 46 (1978) 1–19, doi 10.2307/1913641).
 """
 
 from __future__ import annotations
@@ -41,7 +37,7 @@ from identification.estimators.run_by_run import Found, RunByRun
 from identification.signal.decay_fit import Reading, block_means, fit_run, project_run
 from identification.signal.free_decay import Decay
 from identification.signal.frequency import starting_decay
-from identification.signal.run_fit import decay_covariance_of, describe_run, judge
+from identification.signal.run_fit import decay_covariance_of, describe_run, noise_and_failure
 from identification.statistics import determined
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
@@ -78,7 +74,7 @@ class NoiseKnowledge:
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class DecayPosterior:
     """A posterior of (a, k).
 
     Args:
@@ -137,7 +133,7 @@ class Posterior:
 
 def posterior_of(
     thin: Reading, start: Decay, covariance: Array, knowledge: NoiseKnowledge
-) -> Posterior | None:
+) -> DecayPosterior | None:
     """Compute the posterior on a grid, and move the grid until it covers the posterior.
 
     Args:
@@ -162,7 +158,9 @@ def posterior_of(
         if not np.isfinite(likelihood.max()):
             return None
         likelihood = np.maximum(likelihood - likelihood.max(), _FLOOR)
-        found = Posterior(centre, scale, axis, likelihood.reshape(shape), (likelihood + prior).reshape(shape))
+        found = DecayPosterior(
+            centre, scale, axis, likelihood.reshape(shape), (likelihood + prior).reshape(shape)
+        )
         mean, spread = found.moments()
         if _holds(found, mean, spread):
             return found
@@ -177,7 +175,7 @@ def _spline(axis: Array, values: Array) -> RectBivariateSpline:
     return RectBivariateSpline(axis, axis, values, kx=degree, ky=degree)
 
 
-def _holds(found: Posterior, mean: Array, covariance: Array) -> bool:
+def _holds(found: DecayPosterior, mean: Array, covariance: Array) -> bool:
     weights = np.exp(found.log_posterior - found.log_posterior.max())
     inner = weights[1:-1, 1:-1].sum()
     inverse = np.linalg.inv(found.scale)
@@ -270,7 +268,7 @@ _LEAST_SHARE = 0.3  # of the draws: least effective number
 
 
 def shared_moments(
-    posteriors: Sequence[Posterior],
+    posteriors: Sequence[DecayPosterior],
     links: Sequence[Array],
     centre: Array,
     covariance: Array,
@@ -318,7 +316,7 @@ _LINEAR = 3  # initial angle and rate, zero
 
 @dataclass(frozen=True, eq=False)
 class _PosteriorDecay(RunDecay):
-    posterior: Posterior = field(kw_only=True)
+    posterior: DecayPosterior = field(kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -352,7 +350,7 @@ class Bayesian(RunByRun):
         fit = fit_run(reading, start)
         if not fit.runs or fit.runs[0].decay.stiffness <= 0.0:
             return Status.NOT_CONVERGED
-        noise, failure = judge(reading, fit.runs[0], fit.zero, sensor)
+        noise, failure = noise_and_failure(reading, fit.runs[0], fit.zero, sensor)
         if failure is not None:
             return failure
         variance = noise.std**2 * noise.slow_ratio
@@ -375,7 +373,7 @@ class Bayesian(RunByRun):
 
     def _posterior(
         self, reading: Reading, decay: Decay, residual: Array, guess: Array, noise: NoiseLevel
-    ) -> Posterior | None:
+    ) -> DecayPosterior | None:
         frequency = decay.omega_n / (2.0 * np.pi)
         thin, factor = block_means(reading, frequency, self.blocks_per_cycle)
         means, _ = block_means(Reading(reading.time, residual), frequency, self.blocks_per_cycle)

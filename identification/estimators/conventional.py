@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.campaign.derivatives import departures
+from identification.campaign.derivatives import noise_statuses
 from identification.campaign.pairing import PairedRun
-from identification.estimate import NoiseLevel, Quantity, RunEstimate, Status, by_gravity
+from identification.estimate import NoiseLevel, Quantity, RunEstimate, Status, by_severity
 from identification.estimators.run_by_run import Paired
 from identification.policy import LEAST_PROMINENCE
 from identification.signal.free_decay import Decay
@@ -32,7 +32,7 @@ class Conventional(Paired):
     name = "conventional"
 
     def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunEstimate, PairedRun | None]:
-        seen = _see(run, sensor)
+        seen = _peaks_of(run, sensor)
         if seen.peaks is None:
             return RunEstimate(seen.run.id, (Status.NO_OSCILLATION,)), None
         peaks = seen.peaks
@@ -40,13 +40,13 @@ class Conventional(Paired):
         omega = float(np.hypot(omega_d, peaks.rate))
         omega_std = float(np.hypot(omega_d * omega_d_std, peaks.rate * peaks.rate_std)) / omega
         zeta_std = float(np.hypot(omega_d * peaks.rate_std, peaks.rate * omega_d_std)) * omega_d / omega**3
-        statuses = departures([seen.noise])
+        statuses = noise_statuses([seen.noise])
         if seen.run.spring_stiffness is None:
             statuses.add(Status.NO_STIFFNESS)
         omega_n = Quantity(omega, omega_std, "rad/s")
         estimate = RunEstimate(
             id=seen.run.id,
-            statuses=by_gravity(statuses),
+            statuses=by_severity(statuses),
             omega_n=omega_n,
             zeta=Quantity(peaks.rate / omega, zeta_std, "1"),
             sensor_zero=Quantity(peaks.zero, peaks.zero_std, "rad"),
@@ -58,7 +58,7 @@ class Conventional(Paired):
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _PeakRun:
     """A run, its frequency in Hz and its peaks; None where it shows no oscillation."""
 
     run: Run
@@ -67,18 +67,18 @@ class _Seen:
     noise: NoiseLevel | None = None
 
 
-def _see(run: Run, sensor: SensorProperties) -> _Seen:
+def _peaks_of(run: Run, sensor: SensorProperties) -> _PeakRun:
     peak = psd_peak(run.record)
     peaks = peak_decay(run.record, peak.frequency) if peak.prominence > LEAST_PROMINENCE else None
     if peaks is None:
-        return _Seen(run, peak.frequency, None)
+        return _PeakRun(run, peak.frequency, None)
     omega_d = 2.0 * np.pi * peak.frequency
     check = residual_check(run, Decay(peaks.rate, omega_d**2 + peaks.rate**2), sensor)
     if check is None:
-        return _Seen(run, peak.frequency, peaks)
+        return _PeakRun(run, peak.frequency, peaks)
     own = decay_covariance(peaks.rate, omega_d, peaks.rate_std**2, (2.0 * np.pi * peaks.frequency_std) ** 2)
     widened = check.widened(own)
     if check.noise.departs:
         rate_std, omega_std = deviations(peaks.rate, omega_d, widened)
         peaks = replace(peaks, rate_std=rate_std, frequency_std=omega_std / (2.0 * np.pi))
-    return _Seen(run, peak.frequency, peaks, check.noise)
+    return _PeakRun(run, peak.frequency, peaks, check.noise)

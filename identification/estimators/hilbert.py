@@ -1,24 +1,19 @@
 """Hilbert envelope: decay rate from the logarithm of the envelope, frequency from the phase.
 
-Envelope and phase of a decaying oscillation, from its analytic signal. The analytic signal of a finite record is
-wrong near its ends, where the transform sees a discontinuity. So the record is first extended past both ends by a
-few cycles of an approximate decay that fades out; the remaining error is as small as that decay is accurate. The
-envelope is then demodulated with a fixed frequency and averaged over half cycles: for an exponential decay the
-averages are an exponential sequence again, and their errors are independent with 2 S²/m in each component for m
-samples.
-
-Source: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018 (the free
-decay by the Hilbert transform, and its end effects).
+The analytic signal of a finite record is wrong near its ends, where the transform sees a discontinuity. So the
+record is first extended past both ends by a few cycles of an approximate decay that fades out; the remaining
+error is as small as that decay is accurate. The envelope is then demodulated with a fixed frequency and averaged
+over half cycles: for an exponential decay the averages are an exponential sequence again, and their errors are
+independent with 2 S²/m in each component for m samples.
 
 Both are weighted lines over half-cycle averages of the analytic signal, whose deviations follow from the noise:
-√2 S/(√m A) for the logarithm and the phase alike. To reduce end effects the record is extended with the decay
-found so far (see `identification.estimators.hilbert`). Short parts of the same lines give ζ and ωn against the
+√2 S/(√m A) for the logarithm and the phase alike. Short parts of the same lines give ζ and ωn against the
 amplitude, the backbone of the rig, as the windows of the run. Where a line does not fit a run, its standard
 deviations are raised to the scatter about it.
 
-Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018; backbone
-from free decays: J. M. Londoño, S. A. Neild & J. E. Cooper, J. Sound Vib. 348 (2015) 224–238,
-doi 10.1016/j.jsv.2015.03.025.
+Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018 (free decay
+by the Hilbert transform, and its end effects); backbone from free decays: J. M. Londoño, S. A. Neild & J. E.
+Cooper, J. Sound Vib. 348 (2015) 224–238, doi 10.1016/j.jsv.2015.03.025.
 """
 
 from __future__ import annotations
@@ -29,7 +24,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from identification.estimate import Quantity, Status, WindowEstimate
-from identification.estimators.run_by_run import Found, RunByRun, described
+from identification.estimators.run_by_run import Found, RunByRun, run_estimate
 from identification.policy import LEAST_ENVELOPE, LEAST_WINDOW_ENERGY
 from identification.signal.decay_fit import Reading, RunFit, even_reading, project_run
 from identification.signal.free_decay import Decay, free_decay
@@ -132,7 +127,7 @@ class Hilbert(RunByRun):
         if seen is None or decay.stiffness <= 0.0:
             return Status.NOT_CONVERGED
         windows = () if covariance is None else _backbone(seen, noise_std, self.cycles_per_window)
-        return described(run, decay, covariance, noise_std, sensor, windows)
+        return run_estimate(run, decay, covariance, noise_std, sensor, windows)
 
 
 def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array] | None:

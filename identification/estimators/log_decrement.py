@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.estimate import Status
-from identification.estimators.run_by_run import Found, RunByRun, described
+from identification.estimators.run_by_run import Found, RunByRun, run_estimate
 from identification.policy import LEAST_PEAK_HEIGHT
 from identification.signal.free_decay import Decay
 from identification.signal.frequency import starting_frequency
@@ -50,7 +50,7 @@ class LogDecrement(RunByRun):
         found = _decay_of_peaks(times, heights, share, half_width)
         if found is None:
             return Status.NO_OSCILLATION if times.size < _LEAST_PEAKS else Status.NOT_CONVERGED
-        return described(run, *found, noise_std, sensor)
+        return run_estimate(run, *found, noise_std, sensor)
 
 
 def _decay_of_peaks(

@@ -18,7 +18,7 @@ from identification.estimators.run_by_run import Found, RunByRun
 from identification.signal.decay_fit import Reading, block_means, even_reading, project_run
 from identification.signal.frequency import starting_frequency
 from identification.signal.pencil import PencilDecay, pencil_decay
-from identification.signal.run_fit import describe_run, judge
+from identification.signal.run_fit import describe_run, noise_and_failure
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
 _DECAY_TIMES = 8.0  # in units of 1/σ: later samples hold e^−16 of the energy, and noise
@@ -46,7 +46,7 @@ class MatrixPencil(RunByRun):
         if found is None or projected is None or found[0].decay.stiffness <= 0.0:
             return Status.NOT_CONVERGED
         fitted, zero = projected
-        noise, failure = judge(reading, fitted, zero, sensor)
+        noise, failure = noise_and_failure(reading, fitted, zero, sensor)
         if failure is not None:
             return failure
         variance = noise.std**2 * noise.slow_ratio

@@ -24,9 +24,9 @@ from pathlib import Path
 import numpy as np
 from scipy.special import chdtri
 
-from identification.campaign.derivatives import departures
+from identification.campaign.derivatives import noise_statuses
 from identification.campaign.pairing import PairedRun
-from identification.estimate import Quantity, RunEstimate, Status, WindowEstimate, by_gravity
+from identification.estimate import Quantity, RunEstimate, Status, WindowEstimate, by_severity
 from identification.estimators.run_by_run import Paired
 from identification.neural.networks import Networks, read_networks, shipped_networks
 from identification.neural.three_cycles import (
@@ -144,7 +144,7 @@ def _identified(
     check = residual_check(run, Decay.from_modal(omega, zeta), sensor)
     statuses = {Status.MODEL_DEPARTS} if departs or drifts else set()
     if check is not None:
-        statuses |= departures([check.noise])
+        statuses |= noise_statuses([check.noise])
     if check is not None and check.noise.departs:
         least_omega, least_zeta = modal_quantities(Decay.from_modal(omega, zeta), check.covariance)
         zeta_std, omega_std = max(zeta_std, least_zeta.std), max(omega_std, least_omega.std)
@@ -153,7 +153,7 @@ def _identified(
     omega_n = Quantity(omega, omega_std, "rad/s")
     estimate = RunEstimate(
         id=run.id,
-        statuses=by_gravity(statuses),
+        statuses=by_severity(statuses),
         omega_n=omega_n,
         zeta=Quantity(zeta, zeta_std, "1"),
         noise=None if check is None else check.noise,

@@ -23,13 +23,13 @@ from identification.campaign.derivatives import (
     Derivatives,
     build_design,
     combine,
-    departures,
-    filled,
-    limits,
+    design_statuses,
+    filled_estimate,
     loads,
+    noise_statuses,
     statuses_of_runs,
 )
-from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_gravity
+from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_severity
 from identification.neural.posterior.demodulated import Demodulated, demodulate
 from identification.neural.posterior.features import (
     CAMPAIGN_NAMES,
@@ -37,7 +37,13 @@ from identification.neural.posterior.features import (
     campaign_features,
     record_features,
 )
-from identification.neural.posterior.network import Posterior, Trained, posteriors, read_trained, shipped
+from identification.neural.posterior.network import (
+    Posterior,
+    TrainedPosterior,
+    posteriors,
+    read_trained,
+    shipped_posteriors,
+)
 from identification.neural.posterior.rivals import Rivals
 from identification.policy import MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
 from identification.statistics import inverse
@@ -46,7 +52,7 @@ from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _DemodulatedRun:
     """A run that was identified."""
 
     run: Run
@@ -68,13 +74,13 @@ class NeuralPosterior:
     weights: Path | None = None
 
     @cached_property
-    def networks(self) -> dict[str, Trained]:
+    def networks(self) -> dict[str, TrainedPosterior]:
         """The networks of a record and of a campaign.
 
         Raises:
             TunnelError: when the weights cannot be read.
         """
-        return shipped() if self.weights is None else read_trained(self.weights)
+        return shipped_posteriors() if self.weights is None else read_trained(self.weights)
 
     def estimate(self, campaign: Campaign) -> Estimate:
         """Identify every run, then the campaign.
@@ -92,14 +98,18 @@ class NeuralPosterior:
             loads(run, campaign.rig)
         found = _runs(campaign.runs, self.networks["record"])
         runs = tuple(
-            _described(one, campaign.sensor) if isinstance(one, _Seen) else RunEstimate(run.id, (one,))
+            _described(one, campaign.sensor)
+            if isinstance(one, _DemodulatedRun)
+            else RunEstimate(run.id, (one,))
             for run, one in zip(campaign.runs, found, strict=True)
         )
         estimate = Estimate(campaign.name, self.name, runs)
-        statuses = statuses_of_runs(campaign, runs) | departures([run.noise for run in runs])
-        linked = [one for one in found if isinstance(one, _Seen) and one.run.spring_stiffness is not None]
+        statuses = statuses_of_runs(campaign, runs) | noise_statuses([run.noise for run in runs])
+        linked = [
+            one for one in found if isinstance(one, _DemodulatedRun) and one.run.spring_stiffness is not None
+        ]
         if not linked or Status.NO_RUN_IDENTIFIED in statuses:
-            return replace(estimate, statuses=by_gravity(statuses))
+            return replace(estimate, statuses=by_severity(statuses))
         return _of_campaign(campaign, estimate, linked, statuses, self.networks["campaign"])
 
     def effects(self, campaign: Campaign) -> dict[str, float]:
@@ -112,18 +122,20 @@ class NeuralPosterior:
             The probabilities; none where the campaign has no coefficients.
         """
         found = _runs(campaign.runs, self.networks["record"])
-        linked = [one for one in found if isinstance(one, _Seen) and one.run.spring_stiffness is not None]
+        linked = [
+            one for one in found if isinstance(one, _DemodulatedRun) and one.run.spring_stiffness is not None
+        ]
         features = _campaign_features(campaign, linked) if linked else None
         return {} if features is None else posteriors([features], self.networks["campaign"])[0].effects
 
 
-def _runs(runs: Sequence[Run], network: Trained) -> list[_Seen | Status]:
+def _runs(runs: Sequence[Run], network: TrainedPosterior) -> list[_DemodulatedRun | Status]:
     windows = [demodulate(run.record) for run in runs]
     places = [place for place, one in enumerate(windows) if isinstance(one, Demodulated)]
     shown = [one for one in windows if isinstance(one, Demodulated)]
     features = record_features(shown) if shown else []
     pairs = [(place, one) for place, one in zip(places, features, strict=True) if one is not None]
-    found: list[_Seen | Status] = [
+    found: list[_DemodulatedRun | Status] = [
         one if isinstance(one, Status) else Status.NOT_DETERMINED for one in windows
     ]
     for (place, (_, alone)), posterior in zip(
@@ -132,22 +144,24 @@ def _runs(runs: Sequence[Run], network: Trained) -> list[_Seen | Status]:
         seen = windows[place]
         assert isinstance(seen, Demodulated)
         found[place] = (
-            Status.UNLIKE_TRAINING if posterior.unlike else _Seen(runs[place], seen, alone, posterior)
+            Status.UNLIKE_TRAINING
+            if posterior.unlike
+            else _DemodulatedRun(runs[place], seen, alone, posterior)
         )
     return found
 
 
-def _described(seen: _Seen, sensor: SensorProperties) -> RunEstimate:
+def _described(seen: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
     noise = _noise(seen, sensor)
     zeta, omega_n = (seen.posterior.quantity(place, unit) for place, unit in enumerate(("1", "rad/s")))
     weight = seen.windows.samples
     zero = float(weight @ seen.windows.zero / weight.sum())
-    statuses = departures([noise])
+    statuses = noise_statuses([noise])
     if seen.run.spring_stiffness is None:
         statuses.add(Status.NO_STIFFNESS)
     return RunEstimate(
         seen.run.id,
-        by_gravity(statuses),
+        by_severity(statuses),
         omega_n=omega_n,
         zeta=zeta,
         sensor_zero=Quantity(zero, seen.windows.noise / float(np.sqrt(weight.sum())), "rad"),
@@ -155,7 +169,7 @@ def _described(seen: _Seen, sensor: SensorProperties) -> RunEstimate:
     )
 
 
-def _noise(seen: _Seen, sensor: SensorProperties) -> NoiseLevel:
+def _noise(seen: _DemodulatedRun, sensor: SensorProperties) -> NoiseLevel:
     """The noise within the windows; the χ² of envelope and phase and the largest harmonic judge the model."""
     total, freedom = float(seen.alone.remaining[0]), seen.alone.freedom
     std = seen.windows.noise * float(np.sqrt(seen.windows.block))
@@ -174,7 +188,7 @@ def _noise(seen: _Seen, sensor: SensorProperties) -> NoiseLevel:
     return NoiseLevel(std, "residual", std, slow, bool(departs), disagrees)
 
 
-def _campaign_features(campaign: Campaign, linked: Sequence[_Seen]) -> Features | None:
+def _campaign_features(campaign: Campaign, linked: Sequence[_DemodulatedRun]) -> Features | None:
     runs = [one.run for one in linked]
     design = build_design(runs, campaign.rig)
     return campaign_features(runs, [one.windows for one in linked], design, [one.alone for one in linked])
@@ -183,28 +197,28 @@ def _campaign_features(campaign: Campaign, linked: Sequence[_Seen]) -> Features 
 def _of_campaign(
     campaign: Campaign,
     estimate: Estimate,
-    linked: Sequence[_Seen],
+    linked: Sequence[_DemodulatedRun],
     statuses: set[Status],
-    network: Trained,
+    network: TrainedPosterior,
 ) -> Estimate:
     runs = [one.run for one in linked]
     design = build_design(runs, campaign.rig)
     combined = combine(design, *_decays(linked))
     if combined is None:
-        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
-    statuses = statuses | limits(design, combined[0])
+        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
+    statuses = statuses | design_statuses(design, combined[0])
     features = _campaign_features(campaign, linked)
     if features is None:
         nothing = Derivatives((), np.zeros(0), np.zeros((0, 0)))
-        return filled(campaign, estimate, runs, design, nothing, np.zeros((0, 0)), statuses)
+        return filled_estimate(campaign, estimate, runs, design, nothing, np.zeros((0, 0)), statuses)
     posterior = posteriors([features], network)[0]
     if posterior.unlike:
-        return replace(estimate, statuses=by_gravity(statuses | {Status.UNLIKE_TRAINING}))
+        return replace(estimate, statuses=by_severity(statuses | {Status.UNLIKE_TRAINING}))
     known = np.flatnonzero(features.known)
     names = tuple(CAMPAIGN_NAMES[place] for place in known)
     values = Derivatives(names, posterior.values[known], np.eye(known.size))
     covariance = posterior.covariance[np.ix_(known, known)]
-    result = filled(campaign, estimate, runs, design, values, covariance, statuses)
+    result = filled_estimate(campaign, estimate, runs, design, values, covariance, statuses)
     intervals = {
         name: replace(quantity, interval=posterior.quantity(int(place), "").interval)
         for name, place in zip(names, known, strict=True)
@@ -213,7 +227,7 @@ def _of_campaign(
     return replace(result, **intervals)
 
 
-def _decays(linked: Sequence[_Seen]) -> tuple[Array, list[Array]]:
+def _decays(linked: Sequence[_DemodulatedRun]) -> tuple[Array, list[Array]]:
     """The runs' (a, k) by their nominal fits, and the information on them."""
     decays, informations = [], []
     for one in linked:

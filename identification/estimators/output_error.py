@@ -19,14 +19,14 @@ from identification.campaign.derivatives import (
     Design,
     build_design,
     combine,
-    departures,
     derivatives,
-    filled,
-    limits,
+    design_statuses,
+    filled_estimate,
     loads,
+    noise_statuses,
     statuses_of_runs,
 )
-from identification.estimate import Estimate, Quantity, Status, by_gravity
+from identification.estimate import Estimate, Quantity, Status, by_severity
 from identification.signal.decay_fit import DecayFit, RunFit, fit_decays
 from identification.signal.noise import noise_level
 from identification.signal.run_fit import FittedRun, identify_run, residuals_of
@@ -79,14 +79,16 @@ class OutputError:
         estimate = Estimate(campaign.name, self.name, tuple(item.estimate for item in fitted))
         statuses = statuses_of_runs(campaign, estimate.runs)
         if Status.NO_RUN_IDENTIFIED in statuses:
-            return replace(estimate, statuses=by_gravity(statuses))
+            return replace(estimate, statuses=by_severity(statuses))
         pairs = [
             (run, item)
             for run, item in zip(campaign.runs, fitted, strict=True)
             if item.fit is not None and run.spring_stiffness is not None
         ]
         if not pairs:
-            return replace(estimate, statuses=by_gravity(statuses | departures([i.noise for i in fitted])))
+            return replace(
+                estimate, statuses=by_severity(statuses | noise_statuses([i.noise for i in fitted]))
+            )
         return _joint_estimate(campaign, estimate, pairs, statuses)
 
 
@@ -98,9 +100,9 @@ def _joint_estimate(
     own_zeros = campaign.sensor.zero == "per_run"
     fit = _joint_fit(design, [item for _, item in pairs], own_zeros)
     if fit is not None and not fit.converged:
-        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_CONVERGED}))
+        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_CONVERGED}))
     if fit is None or not determined(fit.normal):
-        return replace(estimate, statuses=by_gravity(statuses | {Status.NOT_DETERMINED}))
+        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
     readings = [item.reading for _, item in pairs]
     unknowns = _JOINT_UNKNOWNS + own_zeros
     noise = noise_level(residuals_of(readings, fit.runs, fit.zero, unknowns), campaign.sensor)
@@ -109,7 +111,9 @@ def _joint_estimate(
     size = fit.parameters.size
     own = found.jacobian @ covariance[:size, :size] @ found.jacobian.T
     statuses = (
-        statuses | departures([noise, *(item.noise for _, item in pairs)]) | limits(design, fit.parameters)
+        statuses
+        | noise_statuses([noise, *(item.noise for _, item in pairs)])
+        | design_statuses(design, fit.parameters)
     )
     if Status.MODEL_DEPARTS in statuses and found.names:
         windy = sum(run.wind_speed > 0.0 for run in runs)
@@ -118,7 +122,7 @@ def _joint_estimate(
         own = widened_covariance(own, scatter_of_runs(influences, speaking))
     zero = None if own_zeros else Quantity(fit.zero, float(np.sqrt(covariance[-1, -1])), "rad")
     return replace(
-        filled(campaign, estimate, runs, design, found, own, statuses), sensor_zero=zero, noise=noise
+        filled_estimate(campaign, estimate, runs, design, found, own, statuses), sensor_zero=zero, noise=noise
     )
 
 

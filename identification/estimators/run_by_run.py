@@ -12,7 +12,7 @@ from identification.campaign.pairing import PairedRun, paired_estimate
 from identification.estimate import Estimate, RunEstimate, Status, WindowEstimate
 from identification.signal.decay_fit import Reading, project_run
 from identification.signal.free_decay import Decay
-from identification.signal.run_fit import describe_run, judge, residual_check
+from identification.signal.run_fit import describe_run, noise_and_failure, residual_check
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
@@ -88,7 +88,7 @@ class Paired(ABC):
         """Identify one run."""
 
 
-def described(
+def run_estimate(
     run: Run,
     decay: Decay,
     covariance: Array | None,
@@ -106,7 +106,7 @@ def described(
     projected = project_run(reading, decay)
     if projected is None:
         return Status.NOT_CONVERGED
-    _, failure = judge(reading, *projected, sensor)
+    _, failure = noise_and_failure(reading, *projected, sensor)
     if failure is not None or covariance is None:
         return failure or Status.NOT_CONVERGED
     check = residual_check(run, decay, sensor)

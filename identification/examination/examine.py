@@ -1,7 +1,7 @@
 """The examination of a campaign before anything is estimated from it, the same for every command.
 
-The same record under several ids is counted once. Angles beyond half a turn, which may be degrees. What changes
-where the sensor measures the yaw rate or acceleration instead of the angle. Every derivative of a linear decay has
+The same record under several ids is counted once. Angles beyond half a turn may be degrees. The sensor may measure
+the yaw rate or acceleration instead of the angle: every derivative of a linear decay has
 its ωn and ζ, so that the estimators take it as they take an angle.
 """
 

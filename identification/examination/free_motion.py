@@ -1,15 +1,15 @@
 """Where the free motion of a record begins and ends, and about which zero it swings.
 
-Where the free motion of a record begins, after a hand, a latch or a sensor at rest. Free motion crosses its centre
-every half cycle, whatever its initial phase. In a longer interval between two crossings (or between the start of
-the record and the first one) the body was held, moved by hand, or at rest. The release is then the turning point
-of the motion that follows, extrapolated backwards. A hold in mid-record that is shorter than about three quarters
-of a cycle leaves no such interval and is not detected. At the start of a record a hand that pulls the body aside
-is also known by its slowness: a free swing takes no longer out than back.
+It begins after a hand, a latch or a sensor at rest. Free motion crosses its centre every half cycle, whatever
+its initial phase. In a longer interval between two crossings (or between the start of the record and the first
+one) the body was held, moved by hand, or at rest. The release is then the turning point of the motion that
+follows, extrapolated backwards. A hold in mid-record that is shorter than about three quarters of a cycle leaves
+no such interval and is not detected. At the start of a record a hand that pulls the body aside is also known by
+its slowness: a free swing takes no longer out than back.
 
-Whether the runs have a common zero or one each, as where the sensor is set to zero before every run. The end of a
-record in which the body rests beside its centre, held by dry friction. A model without friction takes the place of
-rest for the sensor's zero if the rest is longer than the motion.
+The runs have a common zero, or one each where the sensor is set to zero before every run. At the end of a record
+the body may rest beside its centre, held by dry friction. A model without friction takes the place of rest for
+the sensor's zero if the rest is longer than the motion.
 """
 
 from __future__ import annotations

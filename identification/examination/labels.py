@@ -1,11 +1,10 @@
 """Whether the stated springs and wind speeds fit the frequencies.
 
-Whether the stated springs and wind speeds fit the frequencies, and which two may have been exchanged. Every run
-obeys Kr = Izz ωn² + Ka with a common Izz and with Ka proportional to ½ρV². The runs of one spring lie on a
-straight line of ωn² against ½ρV², whatever the error of the spring. If the statements contradict the frequencies
-beyond chance, and exchanging those of two runs makes them agree, they were exchanged.
+Every run obeys Kr = Izz ωn² + Ka with a common Izz and with Ka proportional to ½ρV². The runs of one spring lie
+on a straight line of ωn² against ½ρV², whatever the error of the spring. If the statements contradict the
+frequencies beyond chance, and exchanging those of two runs makes them agree, they were exchanged.
 
-Whether the stated springs agree: with the wind off, Kr/ωn² is the same inertia for all, and the stated one.
+The stated springs agree where, with the wind off, Kr/ωn² is the same inertia for all, and the stated one.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """The growth and decay of each run, and runs that excite themselves, which are not free decays.
 
-Stiffness over inertia and decay rate of each run, with standard deviations. Motion that grows with the wind off. A
-passive rig cannot do that, so the record or its labels are wrong. Wind-on runs that excite themselves: motion that
-grows, and limit cycles, which are not free decays.
+Motion that grows with the wind off is impossible for a passive rig, so the record or its labels are wrong. With the
+wind on a run may excite itself: its motion grows, or is a limit cycle.
 """
 
 from __future__ import annotations
@@ -147,7 +146,7 @@ _KEYS = ("time_s", "amplitude_rad", "growth_rate", "frequency_hz")
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class AmplitudeWindows:
     """The oscillation in consecutive windows.
 
     Args:
@@ -215,7 +214,7 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
     return (_cut(run, windows, part) if enough else None), remark
 
 
-def windows_of(record: Record) -> Windows | None:
+def windows_of(record: Record) -> AmplitudeWindows | None:
     """Amplitude and frequency in windows of about three cycles.
 
     Returns:
@@ -232,7 +231,7 @@ def windows_of(record: Record) -> Windows | None:
     found = [values for part in parts if (values := _window(reading, part, frequency)) is not None]
     if len(found) < max(2 * LEAST_GROWTH_WINDOWS, count // 2):
         return None
-    return Windows(*np.array(found).T)
+    return AmplitudeWindows(*np.array(found).T)
 
 
 def _window(reading: Reading, part: NDArray[np.intp], frequency: float) -> tuple[float, float, float] | None:
@@ -271,7 +270,7 @@ def _grows(amplitude: Array) -> bool:
     return bool(fdtrc(2 * quarter, 2 * quarter, last / first) < REFUSAL_RATE)
 
 
-def _settled_from(windows: Windows) -> int | None:
+def _settled_from(windows: AmplitudeWindows) -> int | None:
     """First window of the limit cycle; None where the amplitude still grows at the end."""
     below = np.flatnonzero(windows.amplitude < SETTLED_SHARE * _last(windows.amplitude))
     first = int(below[-1]) + 1 if below.size else 0
@@ -285,14 +284,14 @@ def _settled_from(windows: Windows) -> int | None:
     )
 
 
-def _cut(run: Run, windows: Windows, part: slice) -> Run:
+def _cut(run: Run, windows: AmplitudeWindows, part: slice) -> Run:
     half = 0.5 * float(windows.time[1] - windows.time[0])
     time = run.record.time_s - run.record.time_s[0]
     inside = (time >= windows.time[part][0] - half) & (time <= windows.time[part][-1] + half)
     return replace(run, record=Record(run.record.time_s[inside], run.record.yaw_rad[inside]))
 
 
-def _steady_remark(run: Run, windows: Windows) -> Remark:
+def _steady_remark(run: Run, windows: AmplitudeWindows) -> Remark:
     slope, std = _slope(windows.time, windows.amplitude)
     amplitude, frequency = float(np.median(windows.amplitude)), float(np.median(windows.frequency))
     cycles = np.ptp(windows.time) * frequency
@@ -308,7 +307,7 @@ def _steady_remark(run: Run, windows: Windows) -> Remark:
     )
 
 
-def _growth_remark(run: Run, windows: Windows, part: slice | None, settled: int | None) -> Remark:
+def _growth_remark(run: Run, windows: AmplitudeWindows, part: slice | None, settled: int | None) -> Remark:
     amplitude, frequency = windows.amplitude, windows.frequency
     shown = slice(int(np.argmin(amplitude[: settled or None])), settled) if part is None else part
     rate, std = _slope(windows.time[shown], amplitude[shown]) if part is not None else (None, None)

@@ -34,8 +34,8 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from identification.neural.networks import Network, Scaling, parameter_count, split
-from identification.neural.training_set import Pairs
+from identification.neural.networks import Network, Scaling, parameter_count, split_weights
+from identification.neural.training_set import TrainingPairs
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Hyperparameters:
         return float(np.sum(self.beta * eigenvalues / (self.beta * eigenvalues + self.alpha)))
 
 
-def updated(
+def updated_hyperparameters(
     held: Hyperparameters, eigenvalues: Array, squared_errors: float, squared_weights: float, samples: int
 ) -> Hyperparameters:
     """One re-estimation of α and β by the evidence.
@@ -164,7 +164,7 @@ class Problem:
     output_scaling: Scaling
 
     @classmethod
-    def of(cls, pairs: Pairs, sizes: tuple[int, ...], *, unit_deviation: bool) -> Problem:
+    def of(cls, pairs: TrainingPairs, sizes: tuple[int, ...], *, unit_deviation: bool) -> Problem:
         """Scale pairs: zero mean, and unit deviation of the inputs where asked for; of the targets always."""
         inputs, output = Scaling.of(pairs.inputs), Scaling.of(pairs.targets[:, None])
         if not unit_deviation:
@@ -174,7 +174,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TrainingResult:
     """The result of a training.
 
     Args:
@@ -218,7 +218,7 @@ def one_thread() -> Iterator[None]:
 
 def _layers(weights: Tensor, sizes: tuple[int, ...]) -> list[tuple[Tensor, Tensor]]:
     # Slicing and reshaping are the same in torch and NumPy.
-    return cast("list[tuple[Tensor, Tensor]]", split(cast("Array", weights), sizes))
+    return cast("list[tuple[Tensor, Tensor]]", split_weights(cast("Array", weights), sizes))
 
 
 def outputs_and_jacobian(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor) -> tuple[Tensor, Tensor]:
@@ -261,7 +261,7 @@ def outputs_only(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor) -> Ten
     return (hidden @ matrix.T + bias)[:, 0]
 
 
-def advance(progress: Progress, problem: Problem) -> Progress:
+def advance_training(progress: Progress, problem: Problem) -> Progress:
     """One step of Levenberg–Marquardt, after a re-estimation of α and β.
 
     Returns:
@@ -278,7 +278,9 @@ def advance(progress: Progress, problem: Problem) -> Progress:
     squared_errors, squared_weights = float(errors @ errors), float(weights @ weights)
     held = progress.held
     if progress.iteration:
-        held = updated(held, eigenvalues.numpy(), squared_errors, squared_weights, problem.targets.size)
+        held = updated_hyperparameters(
+            held, eigenvalues.numpy(), squared_errors, squared_weights, problem.targets.size
+        )
     gradient = held.beta * (jacobian.T @ errors) + held.alpha * weights
     along = right @ gradient
     rest = gradient - right.T @ along
@@ -294,7 +296,7 @@ def advance(progress: Progress, problem: Problem) -> Progress:
     return replace(progress, held=held, iteration=progress.iteration + 1, finished=True)
 
 
-def conclude(progress: Progress, problem: Problem) -> tuple[Network, Outcome]:
+def conclude_training(progress: Progress, problem: Problem) -> tuple[Network, TrainingResult]:
     """The trained network with its posterior, and the result of the training."""
     import torch
 
@@ -315,7 +317,7 @@ def conclude(progress: Progress, problem: Problem) -> tuple[Network, Outcome]:
     )
     squares = float(errors @ errors), float(progress.weights @ progress.weights)
     counts = problem.targets.size, parameter_count(problem.sizes)
-    return network, Outcome(
+    return network, TrainingResult(
         held,
         held.effective_parameters(eigenvalues),
         float(np.sqrt(squares[0] / errors.size)),

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from safetensors.numpy import save
 
-from identification.neural.stored import opened, packaged, read_stored
+from identification.neural.stored import open_stored, read_packaged, read_stored
 from identification.neural.three_cycles import cycles_time, network_inputs
 from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, held_out_points
 from tunnel_sim.vocabulary.record import Array
@@ -74,7 +74,7 @@ class Network:
     def value(self, inputs: Array) -> Array:
         """The outputs, shape (N,), in their unit, for rows of inputs, shape (N, inputs)."""
         hidden = self.inputs.apply(inputs)
-        layers = split(self.weights, self.sizes)
+        layers = split_weights(self.weights, self.sizes)
         for matrix, bias in layers[:-1]:
             hidden = np.tanh(hidden @ matrix.T + bias)
         matrix, bias = layers[-1]
@@ -102,7 +102,7 @@ class Network:
 
     def _backward(self, inputs: Array) -> tuple[Array, Array]:
         # Derivatives of the output by the inputs, in units, and of the scaled output by the weights.
-        layers = split(self.weights, self.sizes)
+        layers = split_weights(self.weights, self.sizes)
         activations = [self.inputs.apply(inputs)]
         for matrix, bias in layers[:-1]:
             activations.append(np.tanh(matrix @ activations[-1] + bias))
@@ -126,7 +126,7 @@ def parameter_count(sizes: Sequence[int]) -> int:
     return sum((before + 1) * after for before, after in pairwise(sizes))
 
 
-def split(weights: Array, sizes: Sequence[int]) -> list[tuple[Array, Array]]:
+def split_weights(weights: Array, sizes: Sequence[int]) -> list[tuple[Array, Array]]:
     """The vector of weights as matrices and biases.
 
     Args:
@@ -146,7 +146,7 @@ def split(weights: Array, sizes: Sequence[int]) -> list[tuple[Array, Array]]:
 
 
 @dataclass(frozen=True)
-class Errors:
+class NetworkErrors:
     """The errors of the networks over their range, noise-free.
 
     Args:
@@ -164,7 +164,7 @@ class Errors:
     omega_relative_rms: float
 
     @classmethod
-    def from_json_dict(cls, data: dict[str, Any]) -> Errors:
+    def from_json_dict(cls, data: dict[str, Any]) -> NetworkErrors:
         """From the fields by name; raises ValueError or TypeError for a malformed document."""
         if not all(isinstance(value, float | int) and isfinite(value) for value in data.values()):
             raise ValueError("an error that is not a finite number")
@@ -183,7 +183,7 @@ class Networks:
     damping: Network
     frequency: Network
     spec: DataSpec
-    errors: Errors
+    errors: NetworkErrors
 
     def zeta(self, inputs: Array) -> Array:
         """ζ of normalised shapes, shape (n, 100): shape (n,)."""
@@ -243,7 +243,7 @@ class Networks:
         return low <= zeta <= high and slow <= omega_n <= fast
 
 
-def held_out_errors(networks: Networks, rng: np.random.Generator) -> Errors:
+def held_out_errors(networks: Networks, rng: np.random.Generator) -> NetworkErrors:
     """Errors on responses outside the training set.
 
     Args:
@@ -253,7 +253,7 @@ def held_out_errors(networks: Networks, rng: np.random.Generator) -> Errors:
     found = networks.zeta(network_inputs(zeta))
     error = found - zeta
     relative = networks.omega_n(found, cycles_time(zeta, omega)) / omega - 1.0
-    return Errors(
+    return NetworkErrors(
         zeta=float(np.abs(error).max()),
         zeta_rms=float(np.sqrt(np.mean(error**2))),
         zeta_relative=float(np.abs(error / zeta).max()),
@@ -301,12 +301,12 @@ def read_networks(weights: Path) -> Networks:
 @cache
 def shipped_networks() -> Networks:
     """The packaged networks."""
-    return networks_of(*packaged(SHIPPED), SHIPPED)
+    return networks_of(*read_packaged(SHIPPED), SHIPPED)
 
 
 def shipped_record() -> dict[str, Any]:
     """The training record of the packaged networks."""
-    found: dict[str, Any] = json.loads(packaged(SHIPPED)[1])
+    found: dict[str, Any] = json.loads(read_packaged(SHIPPED)[1])
     return found
 
 
@@ -320,8 +320,11 @@ def networks_of(weights: bytes, record: bytes | str, where: str) -> Networks:
     Raises:
         TunnelError: when they are malformed, or do not belong together.
     """
-    with opened(weights, record, where, estimator="neural_network") as (tensors, document):
-        spec, errors = DataSpec.from_json_dict(document["data"]), Errors.from_json_dict(document["errors"])
+    with open_stored(weights, record, where, estimator="neural_network") as (tensors, document):
+        spec, errors = (
+            DataSpec.from_json_dict(document["data"]),
+            NetworkErrors.from_json_dict(document["errors"]),
+        )
         return Networks(_network(tensors, DAMPING), _network(tensors, FREQUENCY), spec, errors)
 
 

@@ -33,14 +33,14 @@ def read_stored(weights: Path) -> tuple[bytes, bytes]:
     return content, record
 
 
-def packaged(name: str) -> tuple[bytes, bytes]:
+def read_packaged(name: str) -> tuple[bytes, bytes]:
     """Weights and record that come with the package."""
     folder = resources.files("identification") / "neural" / "weights"
     return (folder / f"{name}.safetensors").read_bytes(), (folder / f"{name}.json").read_bytes()
 
 
 @contextmanager
-def opened(
+def open_stored(
     weights: bytes, record: bytes | str, where: str, *, estimator: str
 ) -> Iterator[tuple[Mapping[str, Array], dict[str, Any]]]:
     """The tensors and the record of two files; what they hold is checked inside the block.

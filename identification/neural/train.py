@@ -20,17 +20,17 @@ from safetensors.numpy import load, save
 
 from identification.neural.levenberg import (
     Hyperparameters,
-    Outcome,
     Problem,
     Progress,
-    advance,
-    conclude,
+    TrainingResult,
+    advance_training,
+    conclude_training,
     first_weights,
     one_thread,
 )
 from identification.neural.networks import (
-    Errors,
     Network,
+    NetworkErrors,
     Networks,
     held_out_errors,
     parameter_count,
@@ -136,7 +136,7 @@ def read_checkpoint(path: Path, spec: dict[str, Any]) -> Checkpoint | None:
 NETWORKS = (DAMPING, FREQUENCY)
 _START, _TEST = 0, 2  # purposes of the random generators
 _DATA = DataSpec()
-_NO_ERRORS = Errors(0.0, 0.0, 0.0, 0.0, 0.0)
+_NO_ERRORS = NetworkErrors(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class TrainingSpec:
 
 
 @dataclass(frozen=True)
-class Trained:
+class TrainedNetworks:
     """The result of a training.
 
     Args:
@@ -196,7 +196,7 @@ def train(
     resume: Checkpoint | None = None,
     progress: Callable[[int, str], None] = lambda _done, _text: None,
     keep: Callable[[Checkpoint], None] = lambda _checkpoint: None,
-) -> Trained:
+) -> TrainedNetworks:
     """Train both networks.
 
     Args:
@@ -242,7 +242,7 @@ def _one_start(
     whole = sum(spec.starts * spec.steps(which) * spec.work(which) for which in NETWORKS[:number])
     before = whole + start * spec.steps(NETWORKS[number]) * spec.work(NETWORKS[number])
     while state.iteration < spec.steps(which) and not state.finished:
-        state = advance(state, problem)
+        state = advance_training(state, problem)
         checkpoint = replace(checkpoint, running=state)
         keep(checkpoint)
         progress(before + state.iteration * spec.work(which), name)
@@ -250,13 +250,13 @@ def _one_start(
     return Checkpoint((*checkpoint.ended, state), None)
 
 
-def _collect(spec: TrainingSpec, checkpoint: Checkpoint) -> Trained:
+def _collect(spec: TrainingSpec, checkpoint: Checkpoint) -> TrainedNetworks:
     best: dict[str, Network] = {}
     described: dict[str, Any] = {}
     for number, which in enumerate(NETWORKS):
         problem = problem_of(spec, which)
         ended = checkpoint.ended[number * spec.starts : (number + 1) * spec.starts]
-        concluded = [conclude(progress, problem) for progress in ended]
+        concluded = [conclude_training(progress, problem) for progress in ended]
         chosen = int(np.argmax([outcome.log_evidence for _, outcome in concluded]))
         best[which] = concluded[chosen][0]
         described[which] = {
@@ -278,10 +278,10 @@ def _collect(spec: TrainingSpec, checkpoint: Checkpoint) -> Trained:
         },
         "weights_sha256": hashlib.sha256(weights).hexdigest(),
     }
-    return Trained(networks, weights, json.loads(json_line(record)))
+    return TrainedNetworks(networks, weights, json.loads(json_line(record)))
 
 
-def _described(progress: Progress, outcome: Outcome) -> dict[str, Any]:
+def _described(progress: Progress, outcome: TrainingResult) -> dict[str, Any]:
     return {
         "steps": progress.iteration,
         "stopped_because": "no step lowers F" if progress.finished else "all steps taken",

@@ -58,7 +58,7 @@ class DataSpec:
 
 
 @dataclass(frozen=True, eq=False)
-class Pairs:
+class TrainingPairs:
     """Inputs and targets of one network.
 
     Args:
@@ -70,7 +70,7 @@ class Pairs:
     targets: Array
 
 
-def training_pairs(spec: DataSpec, which: str) -> Pairs:
+def training_pairs(spec: DataSpec, which: str) -> TrainingPairs:
     """The training set of a network.
 
     Args:
@@ -81,7 +81,7 @@ def training_pairs(spec: DataSpec, which: str) -> Pairs:
     """
     if which == DAMPING:
         zeta = np.linspace(*spec.zeta_range, spec.zeta_count)
-        return Pairs(network_inputs(zeta), zeta)
+        return TrainingPairs(network_inputs(zeta), zeta)
     lowest, highest = spec.omega_range
     space = np.geomspace if spec.frequency_scale == LOGARITHMIC else np.linspace
     zeta, omega = (
@@ -90,7 +90,9 @@ def training_pairs(spec: DataSpec, which: str) -> Pairs:
             np.linspace(*spec.zeta_range, spec.grid[0]), space(lowest, highest, spec.grid[1])
         )
     )
-    return Pairs(np.column_stack((zeta, spec.to_network(cycles_time(zeta, omega)))), spec.to_network(omega))
+    return TrainingPairs(
+        np.column_stack((zeta, spec.to_network(cycles_time(zeta, omega)))), spec.to_network(omega)
+    )
 
 
 def held_out_points(spec: DataSpec, rng: np.random.Generator) -> tuple[Array, Array]:

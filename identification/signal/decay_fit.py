@@ -5,7 +5,8 @@ sensor's zero enter linearly, so they are eliminated in closed form and only φ 
 Gaussian noise this is maximum likelihood. Sources: Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413–432,
 doi 10.1137/0710036; the Jacobian is Kaufman's, BIT 15 (1975) 49–57, doi 10.1007/BF01932995.
 
-Block means of a reading. They keep the rate and frequency of a decay and reduce its amplitude a little.
+Long readings are thinned to block means, which keep the rate and frequency of a decay and reduce its amplitude a
+little.
 """
 
 from __future__ import annotations

@@ -1,11 +1,10 @@
 """A decay that a random moment drives: its likelihood by a steady Kalman filter, and the maximum of it.
 
-The likelihood of a decay that a random moment drives: steady Kalman filter as a recursive filter. State (β, β̇)
-with β̈ + 2aβ̇ + kβ = w(t); w is white with ⟨w(t)w(t′)⟩ = q δ(t − t′), or of corner frequency fb, ẇ = −2πfb (w −
-white), with the same q at low frequency; the reading adds white noise of variance R. In discrete time the reading
-obeys D(z) y = C(z) e: D is the characteristic polynomial of the motion, and C and the variance of the innovations
-e follow by spectral factorisation of R D(z)D(1/z) + γ(z), γ the covariance of the driven part. So innovations are
-one call of a recursive filter over the record, with no loop in Python.
+State (β, β̇) with β̈ + 2aβ̇ + kβ = w(t); w is white with ⟨w(t)w(t′)⟩ = q δ(t − t′), or of corner frequency fb, ẇ
+= −2πfb (w − white), with the same q at low frequency; the reading adds white noise of variance R. In discrete
+time the reading obeys D(z) y = C(z) e: D is the characteristic polynomial of the motion, and C and the variance
+of the innovations e follow by spectral factorisation of R D(z)D(1/z) + γ(z), γ the covariance of the driven
+part. So innovations are one call of a recursive filter over the record, with no loop in Python.
 
 The initial state and the sensor's zero are unknown and enter linearly: their responses are filtered like the
 reading and fitted to it by least squares. The covariance that the steady filter assumes for the initial state
@@ -14,10 +13,10 @@ Iliff, SIAM J. Appl. Math. 41 (1981) 558–579, doi 10.1137/0141046; Åström, A
 10.1016/0005-1098(80)90078-3; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5, doi
 10.2514/4.102790.
 
-Maximum likelihood of a driven decay: decay rate, stiffness and the random moment's intensity, by scoring. The
-start is the optimum of output error with the best of a range of intensities. Each step solves Fisher's
-information, from central differences of the innovations and of their variance, against the gradient of the
-likelihood (Maine & Iliff, SIAM J. Appl. Math. 41 (1981) 558–579, doi 10.1137/0141046).
+Decay rate, stiffness and the random moment's intensity are found by scoring. The start is the optimum of output
+error with the best of a range of intensities. Each step solves Fisher's information, from central differences of
+the innovations and of their variance, against the gradient of the likelihood (Maine & Iliff, SIAM J. Appl. Math.
+41 (1981) 558–579, doi 10.1137/0141046).
 """
 
 from __future__ import annotations
@@ -279,7 +278,7 @@ def fit_driven(
     Returns:
         The fit; None where no random moment is needed to explain the run.
     """
-    fit = _Fit(values, interval, noise_variance, deviations)
+    fit = _DrivenLikelihood(values, interval, noise_variance, deviations)
     bare = fit.at(Driven(start, 0.0))
     unit = noise_variance * start.omega_n**3
     best = fit.best(Driven(start, float(unit * 10.0**decade)) for decade in _DECADES)
@@ -293,7 +292,7 @@ def fit_driven(
     return DrivenFit(found.model, found.covariance, found.innovations, bare.cost - found.innovations.cost)
 
 
-class _Fit:
+class _DrivenLikelihood:
     """The likelihood of one run, and its maximisation."""
 
     def __init__(self, values: Array, interval: float, noise_variance: float, deviations: Array) -> None:

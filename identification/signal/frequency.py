@@ -1,7 +1,8 @@
 """The frequency of a record, and with it the decay that a fit starts from.
 
-What a record must fulfil for numerical reasons; the methods judge everything else. The frequency of a damped
-oscillation from its power spectral density. Starting values of a fit, from the record alone, at any damping.
+The frequency is that of the highest peak of the power spectral density. From it and the record alone follow
+starting values of a fit at any damping. A record is refused here for numerical reasons only; the methods judge
+everything else.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Identification of one run: start, least squares, noise, standard deviations, windows.
 
-Whether one damped oscillation explains a record: one test for every method. On a record of little noise a method's
-own motion misses the record by the error of the method alone, so its residual does not judge the record. The
-least-squares motion nearest to the method's decay is tested instead, by `noise.noise_level`. The false-alarm rate
-is `identification.policy.MISFIT_RATE`.
+One test for every method says whether one damped oscillation explains a record. On a record of little noise a
+method's own motion misses the record by the error of the method alone, so its residual does not judge the
+record. The least-squares motion nearest to the method's decay is tested instead, by `noise.noise_level`. The
+false-alarm rate is `identification.policy.MISFIT_RATE`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from identification.estimate import (
     RunEstimate,
     Status,
     WindowEstimate,
-    by_gravity,
+    by_severity,
 )
 from identification.policy import FEW_CYCLES, LEAST_ENERGY
 from identification.signal.decay_fit import (
@@ -78,7 +78,7 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     if fit is None:
         return _failed(run, reading, Status.NOT_CONVERGED)
     fitted = fit.runs[0]
-    noise, failure = judge(reading, fitted, fit.zero, sensor)
+    noise, failure = noise_and_failure(reading, fitted, fit.zero, sensor)
     if failure is not None:
         return _failed(run, reading, failure)
     variance = noise.std**2 * noise.slow_ratio
@@ -143,7 +143,7 @@ def decay_covariance_of(fitted: RunFit) -> Array:
     return inverse(fitted.information)[np.ix_([RATE, STIFFNESS], [RATE, STIFFNESS])]
 
 
-def judge(
+def noise_and_failure(
     reading: Reading, fitted: RunFit, zero: float, sensor: SensorProperties
 ) -> tuple[NoiseLevel, Status | None]:
     """The noise level from the residual of one run's fit, and whether the run shows a decay at all.
@@ -205,7 +205,7 @@ def describe_run(
         statuses.add(Status.NO_STIFFNESS)
     return RunEstimate(
         id=run.id,
-        statuses=by_gravity(statuses),
+        statuses=by_severity(statuses),
         omega_n=omega_n,
         zeta=zeta,
         initial_angle=Quantity(fitted.angle, float(deviations[1]), "rad"),
@@ -255,7 +255,7 @@ def residual_check(run: Run, decay: Decay, sensor: SensorProperties) -> Residual
     fit = fit_from(run, reading, decay)
     if fit is None:
         return None
-    noise, failure = judge(reading, fit.runs[0], fit.zero, sensor)
+    noise, failure = noise_and_failure(reading, fit.runs[0], fit.zero, sensor)
     if failure is not None:
         return None
     covariance = decay_covariance_of(fit.runs[0]) * (noise.std**2 * noise.slow_ratio)

@@ -50,7 +50,7 @@ from pydantic import Field
 
 from identification.estimate import PARAMETERS, Estimate, Quantity
 from identification.policy import DIFFERENCE_DEVIATIONS
-from identification.uncertainty.scatter import error_groups, scaled, side_scatter
+from identification.uncertainty.scatter import error_groups, side_scatter, with_scaled_input
 from tunnel_sim.files.toml_input import StrictModel, read_document, shown
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
@@ -343,7 +343,8 @@ def _individual(
         for number, group in enumerate(groups, 1):
             progress(f"{name}, {number} of {len(groups)}")
             runs = tuple(
-                scaled(run, name, 1.0 + size) if i in group else run for i, run in enumerate(campaign.runs)
+                with_scaled_input(run, name, 1.0 + size) if i in group else run
+                for i, run in enumerate(campaign.runs)
             )
             values = _values(identify(replace(campaign, runs=runs)), budget)
             if values is None:

@@ -42,7 +42,7 @@ class SideScatter:
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
+class _SideFit:
     """The runs' (a, k), stacked as one vector of length 2n."""
 
     residual: Array
@@ -84,7 +84,7 @@ def side_scatter(
     return _side(fit, covariance, ~windy), _side(fit, covariance, windy)
 
 
-def _fit(design: Design, estimates: Sequence[RunEstimate]) -> tuple[_Fit, Array] | None:
+def _fit(design: Design, estimates: Sequence[RunEstimate]) -> tuple[_SideFit, Array] | None:
     decays, blocks = [], []
     for found in estimates:
         assert found.omega_n is not None
@@ -103,7 +103,7 @@ def _fit(design: Design, estimates: Sequence[RunEstimate]) -> tuple[_Fit, Array]
     weight = _diagonal(informations)
     gain = inverse_normal @ links.T @ weight
     found_values = derivatives(design, shared)
-    fit = _Fit(
+    fit = _SideFit(
         residual=np.concatenate(decays) - links @ shared,
         weight=weight,
         hat=links @ gain,
@@ -130,7 +130,9 @@ def _input_covariance(
     before = np.concatenate(design.links) @ shared
     for name, size in individual.items():
         for group in error_groups(runs, name):
-            moved = [scaled(run, name, 1.0 + _STEP) if i in group else run for i, run in enumerate(runs)]
+            moved = [
+                with_scaled_input(run, name, 1.0 + _STEP) if i in group else run for i, run in enumerate(runs)
+            ]
             links = build_design(moved, rig).links
             if links[0].shape != design.links[0].shape:
                 continue
@@ -150,7 +152,7 @@ def error_groups(runs: Sequence[Run], name: str) -> list[list[int]]:
     return list(springs.values())
 
 
-def scaled(run: Run, name: str, factor: float) -> Run:
+def with_scaled_input(run: Run, name: str, factor: float) -> Run:
     """A run with one stated input changed.
 
     Args:
@@ -165,7 +167,7 @@ def scaled(run: Run, name: str, factor: float) -> Run:
     return replace(run, spring_stiffness=None if spring is None else spring * factor)
 
 
-def _side(fit: _Fit, covariance: Array, mine: Array) -> SideScatter:
+def _side(fit: _SideFit, covariance: Array, mine: Array) -> SideScatter:
     from scipy.special import chdtri
 
     size = fit.residual.size

@@ -18,11 +18,11 @@ from tunnel_sim.vocabulary.rig import davis_vertices
 
 RIG = load_rig()
 PIECES = {
-    "floor": model.floor(RIG.working_section),
-    "glass": model.glass(RIG.working_section),
-    "frame": model.frame(RIG),
-    "marks": model.marks(RIG),
-    "coil": model.coil(0.05, 0.005, 1.0, 1.2, 5),
+    "floor": model.floor_mesh(RIG.working_section),
+    "glass": model.glass_mesh(RIG.working_section),
+    "frame": model.frame_mesh(RIG),
+    "marks": model.marks_mesh(RIG),
+    "coil": model.coil_mesh(0.05, 0.005, 1.0, 1.2, 5),
 }
 
 
@@ -59,8 +59,8 @@ def ends(piece: model.Mesh) -> list[float]:
 
 
 def test_a_box_reaches_from_corner_to_corner() -> None:
-    assert ends(model.box((1.0, -2.0, 3.0), (1.5, 4.0, 7.0))) == [1.0, -2.0, 3.0, 1.5, 4.0, 7.0]
-    quarter = model.box((1.0, -2.0, 3.0), (1.5, 4.0, 7.0), np.pi / 2.0)
+    assert ends(model.box_mesh((1.0, -2.0, 3.0), (1.5, 4.0, 7.0))) == [1.0, -2.0, 3.0, 1.5, 4.0, 7.0]
+    quarter = model.box_mesh((1.0, -2.0, 3.0), (1.5, 4.0, 7.0), np.pi / 2.0)
     assert ends(quarter) == pytest.approx([-4.0, 1.0, 3.0, 2.0, 1.5, 7.0])
 
 

@@ -14,12 +14,12 @@ from identification.neural.levenberg import (
     Hyperparameters,
     Problem,
     Progress,
-    advance,
+    advance_training,
     first_weights,
     log_evidence,
     one_thread,
     outputs_and_jacobian,
-    updated,
+    updated_hyperparameters,
 )
 from identification.neural.networks import (
     held_out_errors,
@@ -91,7 +91,7 @@ def test_the_updates_end_where_the_exact_marginal_likelihood_is_largest():
     eigenvalues = np.linalg.svd(design, compute_uv=False) ** 2
     held = Hyperparameters(0.01, 1.0)
     for _ in range(500):
-        held = updated(held, eigenvalues, *optimum(design, targets, held), 60)
+        held = updated_hyperparameters(held, eigenvalues, *optimum(design, targets, held), 60)
     best = minimize(
         lambda x: -marginal(design, targets, Hyperparameters(*np.exp(x))),
         np.log([held.alpha, held.beta]) + 0.3,
@@ -111,7 +111,7 @@ def quiet_torch():
 
 def test_the_weight_of_the_errors_stays_above_zero_where_every_pair_is_used_up():
     """As many pairs as directions, a prior far below: N − γ is below the rounding error of N."""
-    new = updated(Hyperparameters(1e-20, 1.0), np.ones(8), 1e-3, 1.0, 8)
+    new = updated_hyperparameters(Hyperparameters(1e-20, 1.0), np.ones(8), 1e-3, 1.0, 8)
     assert new.beta > 0.0
     assert np.isfinite(log_evidence(new, np.ones(8), 1e-3, 1.0, (8, 541)))
 
@@ -130,7 +130,7 @@ def test_every_step_lowers_the_cost_it_was_taken_for():
         return held.beta * errors @ errors + held.alpha * weights @ weights
 
     for _ in range(5):
-        after = advance(progress, problem)
+        after = advance_training(progress, problem)
         assert cost(after.weights, after.held) < cost(progress.weights, after.held)
         progress = after
     assert progress.iteration == 5

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from identification.estimate import Quantity
-from identification.scoring import Outcome, collect, overall, score
+from identification.scoring import ScoredEstimate, collect, overall, score
 from identification.statistics import Proportion
 from tunnel_sim.files.json_text import as_json
 
 
 def outcomes(errors, *, std=1.0, truth=10.0, bound=1.0):
-    return [Outcome(truth, Quantity(truth + e, std, "kg m2"), bound) for e in errors]
+    return [ScoredEstimate(truth, Quantity(truth + e, std, "kg m2"), bound) for e in errors]
 
 
 def test_figures_are_the_sums_done_by_hand():
-    found = score(collect([*outcomes([1.0, -2.0, 4.0]), Outcome(10.0, None, 1.0)]))
+    found = score(collect([*outcomes([1.0, -2.0, 4.0]), ScoredEstimate(10.0, None, 1.0)]))
     assert (found.count, found.failures.count) == (4, 1)
     assert found.bias.value == pytest.approx(1.0)
     assert found.bias.std == pytest.approx(3.0 / np.sqrt(3.0))  # s = 3 of 1, −2, 4
@@ -49,7 +49,7 @@ def test_wilsons_interval_is_the_librarys():
 
 
 def test_failures_and_single_trials_have_no_figures():
-    found = score(collect([Outcome(1.0, None)] * 3))
+    found = score(collect([ScoredEstimate(1.0, None)] * 3))
     assert (found.failures.value, found.bias, found.rmse, found.coverage) == (1.0, None, None, None)
     found = score(collect(outcomes([0.5])))
     assert found.rmse is None
@@ -73,12 +73,12 @@ def test_tiny_errors_do_not_underflow():
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_what_is_not_finite_is_refused(value):
     with pytest.raises(ValueError, match="not finite"):
-        collect([Outcome(1.0, Quantity(value, 1.0, "1"))])
+        collect([ScoredEstimate(1.0, Quantity(value, 1.0, "1"))])
 
 
 def test_units_are_not_mixed():
     with pytest.raises(ValueError, match="mixed"):
-        collect([Outcome(1.0, Quantity(1.0, 1.0, unit)) for unit in ("1", "rad")])
+        collect([ScoredEstimate(1.0, Quantity(1.0, 1.0, unit)) for unit in ("1", "rad")])
 
 
 def test_cells_are_added_in_squares():
@@ -87,4 +87,4 @@ def test_cells_are_added_in_squares():
     root = np.sqrt((a**2 + b**2) / 2.0)
     assert overall([one, other]).value == pytest.approx(root)
     assert overall([one, other]).std == pytest.approx(np.hypot(a * u, b * v) / 2.0 / root)
-    assert overall([score(collect([Outcome(1.0, None)]))]) is None
+    assert overall([score(collect([ScoredEstimate(1.0, None)]))]) is None

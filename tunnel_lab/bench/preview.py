@@ -19,8 +19,8 @@ from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from tunnel_sim.files.importing.raw_records import Raw
-    from tunnel_sim.files.importing.records import Imported, Part
+    from tunnel_sim.files.importing.raw_records import RawRecord
+    from tunnel_sim.files.importing.records import Imported, ImportedRun
     from tunnel_sim.vocabulary.record import Array
 
 
@@ -162,7 +162,7 @@ def drawn(imported: Imported) -> list[Drawn]:
     ]
 
 
-def _drawn(raw: Raw, parts: list[Part], unit: str) -> Drawn:
+def _drawn(raw: RawRecord, parts: list[ImportedRun], unit: str) -> Drawn:
     marks = tuple(_mark(part, unit) for part in parts)
     return Drawn(raw.id, unit, *points(raw.cleaned.time_s, raw.cleaned.reading), marks)
 
@@ -183,7 +183,7 @@ def points(time: Array, reading: Array) -> tuple[list[float], list[float | None]
     return when.tolist(), [None if isnan(value) else value for value in values.tolist()]
 
 
-def _mark(part: Part, unit: str) -> Mark:
+def _mark(part: ImportedRun, unit: str) -> Mark:
     time = part.raw.cleaned.time_s
     return Mark(
         part.id,
@@ -195,7 +195,7 @@ def _mark(part: Part, unit: str) -> Mark:
     )
 
 
-def _rest(part: Part, unit: str) -> tuple[float, str]:
+def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
     """Where a run rests: as stated, at the centre of its oscillation, or at its end; and that in words."""
     import numpy as np
 

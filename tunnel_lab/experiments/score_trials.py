@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from identification.estimate import UNITS, Quantity
-from identification.scoring import Outcome, Trials, collect
+from identification.scoring import ScoredEstimate, Trials, collect
 from tunnel_lab.experiments.runner import Progress, processes, run_tasks
 from tunnel_lab.experiments.score_grid import Cell, Grid, check_trials
 from tunnel_lab.terminal.inputs import NO_EFFECT
@@ -163,10 +163,10 @@ def estimate_rows(
     return rows
 
 
-def outcome(row: Row) -> Outcome:
+def outcome(row: Row) -> ScoredEstimate:
     """A row as it is scored."""
     quantity = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
-    return Outcome(row["truth"], quantity, row["bound"])
+    return ScoredEstimate(row["truth"], quantity, row["bound"])
 
 
 def unit_of(quantity: str) -> str:
@@ -327,7 +327,7 @@ class Results:
 
     def trials(self) -> dict[Key, Trials]:
         """The trials of every estimator, cell and quantity."""
-        outcomes: dict[Key, list[Outcome]] = {}
+        outcomes: dict[Key, list[ScoredEstimate]] = {}
         for row in self.rows:
             key = (row["estimator"], row["cell"], row["quantity"])
             outcomes.setdefault(key, []).append(outcome(row))

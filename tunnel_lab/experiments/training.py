@@ -18,12 +18,12 @@ from safetensors.numpy import load, save
 
 from identification.neural.posterior.network import (
     KINDS,
-    Trained,
+    TrainedPosterior,
     forward,
-    initial,
-    shapes,
+    initial_weights,
     to_bytes,
     variances,
+    weight_shapes,
 )
 from tunnel_lab.experiments.runner import processes, run_tasks
 from tunnel_lab.experiments.training_samples import (
@@ -187,12 +187,14 @@ def contexts(weights: Mapping[str, Array], samples: Mapping[str, Array]) -> Arra
     return np.asarray(output.context, dtype=np.float64)
 
 
-def judged(weights: dict[str, Array], samples: Mapping[str, Array], apart: Mapping[str, Array]) -> Trained:
+def judged(
+    weights: dict[str, Array], samples: Mapping[str, Array], apart: Mapping[str, Array]
+) -> TrainedPosterior:
     """The network with its threshold, from samples it was not fitted to."""
     seen = contexts(weights, samples)
     covariance = np.cov(seen.T)
     covariance += _SHRINK * float(np.trace(covariance)) / len(covariance) * np.eye(len(covariance))
-    trained = Trained(
+    trained = TrainedPosterior(
         weights, seen.mean(axis=0), np.asarray(np.linalg.inv(covariance), np.float64), np.inf, FAMILIES
     )
     distances = trained.distance(contexts(weights, apart))
@@ -201,7 +203,7 @@ def judged(weights: dict[str, Array], samples: Mapping[str, Array], apart: Mappi
 
 def _record(
     spec: TrainingSpec,
-    trained: Mapping[str, Trained],
+    trained: Mapping[str, TrainedPosterior],
     parts: Mapping[str, Mapping[str, Array]],
     weights: bytes,
 ) -> dict[str, Any]:
@@ -256,7 +258,7 @@ class State:
     """Progress of a fit: everything that the next step depends on.
 
     Args:
-        weights: as `shapes`, and the scalings.
+        weights: as `weight_shapes`, and the scalings.
         moments: first and second moments of the gradients by Adam, by name.
         step: number of finished steps.
     """
@@ -278,14 +280,14 @@ def usable(samples: Mapping[str, Array], kind: str) -> dict[str, Array]:
 def start_state(samples: Mapping[str, Array], spec: FitSpec) -> State:
     """Initial weights, and scalings from the training samples."""
     rivals, runs = samples["rivals"], samples["runs"]
-    sizes = shapes(
+    sizes = weight_shapes(
         rivals.shape[1],
         rivals.shape[2],
         runs.shape[2] - 1,
         samples["target"].shape[1],
         samples["labels"].shape[1],
     )
-    weights = initial(sizes, np.random.default_rng([spec.seed, 0]))
+    weights = initial_weights(sizes, np.random.default_rng([spec.seed, 0]))
     moments = {f"{order}.{name}": np.zeros(shape) for name, shape in sizes.items() for order in "12"}
     there = runs[..., -1] > 0.0
     weights |= {

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from identification.estimate import Estimate, RunEstimate
-    from tunnel_sim.files.importing.records import Imported, Part
+    from tunnel_sim.files.importing.records import Imported, ImportedRun
 
 
 WIND_OFF, WIND_ON = BLUE, VERMILION
@@ -323,7 +323,7 @@ def import_picture(imported: Imported) -> bytes:
     return stream.getvalue()
 
 
-def _draw(axes: Axes, parts: list[Part], unit: str) -> None:
+def _draw(axes: Axes, parts: list[ImportedRun], unit: str) -> None:
     """One record with its runs."""
     raw = parts[0].raw
     time, reading = raw.cleaned.time_s, raw.cleaned.reading

@@ -15,7 +15,7 @@ from tunnel_lab.terminal import tables
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
-    from tunnel_sim.files.importing.records import Imported, Part
+    from tunnel_sim.files.importing.records import Imported, ImportedRun
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
@@ -74,7 +74,7 @@ def parts_table(imported: Imported) -> TextTable:
     return TextTable("Read", ("run", *(["file"] if several else []), *headings), rows, right=headings)
 
 
-def _figures(part: Part) -> tuple[str, ...]:
+def _figures(part: ImportedRun) -> tuple[str, ...]:
     time = part.raw.cleaned.time_s[part.piece.first : part.piece.last]
     run = part.run
     if run is None:

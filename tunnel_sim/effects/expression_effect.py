@@ -1,8 +1,4 @@
-"""Effects whose moment or reading is stated as an expression, in Python or in a TOML file.
-
-Effects whose moment or reading is stated as an expression, with no class written for them. Effects by expression,
-read from a TOML file.
-"""
+"""Effects whose moment or reading is stated as an expression, in Python or in a TOML file."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """The parameters of effects, and what a fit passes to an effect about the runs.
 
-The parameters of effects: dataclass fields with their units, sizes and ranges. How a drift develops over a run:
-linearly, or exponentially towards a final value. What a fit passes to an effect about the runs, and the starting
-values that the effect returns.
+Parameters are dataclass fields with their units, sizes and ranges. Drifts of several effects share one form:
+linear, or exponential towards a final value. An effect returns starting values to the fit.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """The rig's MuJoCo model: the structure comes from ``mjcf/rig.xml``, the numbers from the rig description.
 
-Loading the compiled engine plugin into MuJoCo, once. Shapes that are drawn but do not affect the motion: the
-working section, its marks, the spring. Each is a single mesh, because MuJoCo computes the pose of every geom in
-every step.
+Shapes that are drawn do not affect the motion: the working section, its marks, the spring. Each is a single
+mesh, because MuJoCo computes the pose of every geom in every step.
 """
 
 from __future__ import annotations
@@ -59,7 +58,7 @@ class Mesh:
     faces: NDArray[np.int64]
 
 
-def box(low: tuple[float, float, float], high: tuple[float, float, float], turn: float = 0.0) -> Mesh:
+def box_mesh(low: tuple[float, float, float], high: tuple[float, float, float], turn: float = 0.0) -> Mesh:
     """A box between two corners, rotated about the vertical axis.
 
     Args:
@@ -72,14 +71,14 @@ def box(low: tuple[float, float, float], high: tuple[float, float, float], turn:
     return Mesh(vertices @ rotation.T, np.array(_BOX_FACES))
 
 
-def merged(parts: list[Mesh]) -> Mesh:
+def merged_mesh(parts: list[Mesh]) -> Mesh:
     """Several surfaces as one mesh."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
     return Mesh(np.concatenate([part.vertices for part in parts]), np.concatenate(faces))
 
 
-def coil(radius: float, wire: float, low: float, high: float, turns: int) -> Mesh:
+def coil_mesh(radius: float, wire: float, low: float, high: float, turns: int) -> Mesh:
     """A coil spring about the vertical axis.
 
     Args:
@@ -106,47 +105,49 @@ def coil(radius: float, wire: float, low: float, high: float, turns: int) -> Mes
     return Mesh(grid.reshape(-1, 3), np.array(faces))
 
 
-def floor(section: WorkingSection) -> Mesh:
+def floor_mesh(section: WorkingSection) -> Mesh:
     """The floor: a slab with its top at height 0."""
     x, y = section.length / 2, section.width / 2
-    return box((-x, -y, -_BEAM), (x, y, 0.0))
+    return box_mesh((-x, -y, -_BEAM), (x, y, 0.0))
 
 
-def glass(section: WorkingSection) -> Mesh:
+def glass_mesh(section: WorkingSection) -> Mesh:
     """Two walls and the ceiling; the section is open along the flow."""
     x, y, z = section.length / 2, section.width / 2, section.height
-    left, right = box((-x, y, 0.0), (x, y + _GLASS, z)), box((-x, -y - _GLASS, 0.0), (x, -y, z))
-    return merged([left, right, box((-x, -y, z), (x, y, z + _GLASS))])
+    left, right = box_mesh((-x, y, 0.0), (x, y + _GLASS, z)), box_mesh((-x, -y - _GLASS, 0.0), (x, -y, z))
+    return merged_mesh([left, right, box_mesh((-x, -y, z), (x, y, z + _GLASS))])
 
 
-def frame(rig: Rig) -> Mesh:
+def frame_mesh(rig: Rig) -> Mesh:
     """The beams along the edges of the working section, and the yoke above it that carries spring and sensor."""
     section = rig.working_section
     x, y, z = section.length / 2, section.width / 2, section.height
     b, parts = _BEAM, []
     for side in (-y - b, y):
         for end in (-x, x - b):
-            parts.append(box((end, side, -b), (end + b, side + b, z + b)))
-        parts += [box((-x, side, low), (x, side + b, low + b)) for low in (-b, z)]
-    parts += [box((end, -y, low), (end + b, y, low + b)) for end in (-x, x - b) for low in (-b, z)]
+            parts.append(box_mesh((end, side, -b), (end + b, side + b, z + b)))
+        parts += [box_mesh((-x, side, low), (x, side + b, low + b)) for low in (-b, z)]
+    parts += [box_mesh((end, -y, low), (end + b, y, low + b)) for end in (-x, x - b) for low in (-b, z)]
     half, top = 0.14, z + rig.rod.length_above_ceiling
     for side in (-half, half - b):
-        parts.append(box((-b / 2, side, z + _GLASS), (b / 2, side + b, top)))
-    parts.append(box((-b / 2, -y, z), (b / 2, y, z + b)))  # the beam across the ceiling below it
-    return merged([*parts, box((-b, -half, top), (b, half, top + b / 2))])
+        parts.append(box_mesh((-b / 2, side, z + _GLASS), (b / 2, side + b, top)))
+    parts.append(box_mesh((-b / 2, -y, z), (b / 2, y, z + b)))  # the beam across the ceiling below it
+    return merged_mesh([*parts, box_mesh((-b, -half, top), (b, half, top + b / 2))])
 
 
-def marks(rig: Rig) -> Mesh:
+def marks_mesh(rig: Rig) -> Mesh:
     """Lines on the floor: the wind direction, and a mark every ten degrees of yaw around the body."""
     reach, height = 0.62 * rig.body.length, 0.002
     parts = [
-        box((-rig.working_section.length / 2, -0.003, 0.0), (rig.working_section.length / 2, 0.003, height))
+        box_mesh(
+            (-rig.working_section.length / 2, -0.003, 0.0), (rig.working_section.length / 2, 0.003, height)
+        )
     ]
     for degrees in range(-60, 61, 10):
         length = 0.07 if degrees % 30 == 0 else 0.04
         for turn in (radians(degrees), radians(degrees) + pi):
-            parts.append(box((reach, -0.003, 0.0), (reach + length, 0.003, height), turn))
-    return merged(parts)
+            parts.append(box_mesh((reach, -0.003, 0.0), (reach + length, 0.003, height), turn))
+    return merged_mesh(parts)
 
 
 _SERIES = ("wind_speed", "forcing")
@@ -290,15 +291,15 @@ def _undraw(spec: mujoco.MjSpec) -> None:
 
 def _place_scenery(spec: mujoco.MjSpec, rig: Rig) -> None:
     section, rod = rig.working_section, rig.rod
-    spring = coil(
+    spring = coil_mesh(
         2.4 * rod.diameter, rod.diameter / 4, section.height + 0.25 * rod.length_above_ceiling,
         section.height + 0.9 * rod.length_above_ceiling, turns=7,
     )  # fmt: skip
     pieces = {
-        "floor": floor(section),
-        "glass": glass(section),
-        "frame": frame(rig),
-        "marks": marks(rig),
+        "floor": floor_mesh(section),
+        "glass": glass_mesh(section),
+        "frame": frame_mesh(rig),
+        "marks": marks_mesh(rig),
         "spring": spring,
     }
     for name, piece in pieces.items():

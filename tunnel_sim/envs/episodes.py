@@ -1,7 +1,6 @@
 """Parallel episodes: readings, information, end, and the campaign they give.
 
-Parallel episodes: readings, information, end. An environment has one episode, a vector environment many.
-Converting finished episodes to a campaign.
+An environment has one episode, a vector environment many.
 """
 
 from __future__ import annotations

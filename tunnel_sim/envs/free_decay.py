@@ -1,8 +1,4 @@
-"""The environment ``tunnel_sim/FreeDecay-v0``: one run of the rig, and many at once on ``mujoco.batch``.
-
-The environment ``tunnel_sim/FreeDecay-v0``: an episode is one run of the rig. The native vector environment of
-``tunnel_sim/FreeDecay-v0``: many runs at once on ``mujoco.batch``.
-"""
+"""The environment ``tunnel_sim/FreeDecay-v0``: one run of the rig, and many at once on ``mujoco.batch``."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The information that a run gives about Cnβ and Cnr, sample by sample, from the sensitivities along its motion.
 
-Sensitivities of the nominal model along the motion of many runs. In the nominal model Izz β̈ + (Cr − Ca) β̇ + (Kr
+In the nominal model Izz β̈ + (Cr − Ca) β̇ + (Kr
 − Ka) β = M(t) the sensitivity x = ∂β/∂p to an unknown p obeys
 
     ẍ + 2a ẋ + k x = u(t),   2a = (Cr − Ca)/Izz,   k = (Kr − Ka)/Izz.
@@ -11,7 +11,7 @@ homogeneous part is propagated exactly; u is integrated by Simpson's rule, with 
 through both ends. The wind speed is replaced by its mean over a control period. Where effects act that the nominal
 model does not include, the motion is the real one, and the sensitivities are those of the nominal model.
 
-The information that a run gives about Cnβ and Cnr, sample by sample. The reading of a run is y = β(t; p) + zero +
+The reading of a run is y = β(t; p) + zero +
 noise of variance σ². With the sensitivities s = ∂y/∂p of the nominal model, the Fisher information of all unknowns
 is
 

@@ -1,7 +1,6 @@
 """The readings of runs in progress, block by block; bit-identical to `tunnel_sim.effects.chain.read_motion`.
 
-The
-readings of many runs in progress; zero, noise and quantisation are vectorised, effects act run by run.
+Zero, noise and quantisation are vectorised, effects act run by run.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """A campaign as a folder: ``campaign.toml`` and one CSV or Parquet file per run.
 
-The tables of ``campaign.toml``, and their conversion to and from `Campaign`. Reading and writing of a campaign: a
-folder with ``campaign.toml`` and one CSV or Parquet file per run. The reader never opens ``truth.json``. The
+The reader never opens ``truth.json``. The
 writer writes the whole campaign or nothing.
 """
 

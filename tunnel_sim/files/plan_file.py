@@ -1,7 +1,6 @@
 """The plan of a campaign: the tables of its TOML file, and reading them.
 
-The tables of a campaign description. Reading the plan of a campaign from a TOML file. The packaged
-``data/paper-campaign.toml`` is an example with a comment on every key.
+The packaged ``data/paper-campaign.toml`` is an example with a comment on every key.
 """
 
 from __future__ import annotations

@@ -1,12 +1,10 @@
 """Whether a run can be what it is said to be: plausible ranges, increasing times, angles in radians, three cycles.
 
-Plausible ranges for a rig, its air and its clock; outside them a wrong unit is more likely than such a rig. The
+Outside the plausible ranges of a rig, its air and its clock a wrong unit is more likely than such a rig. The
 ranges are wide enough for towing carriages, pressurised tunnels and models of a few centimetres, so only a wrong
 unit that leaves them is detected. Speeds in km/h, wrong by a factor of 3.6, mostly remain inside: a free decay
 cannot distinguish an error of V from a factor on Cnβ and Cnr. Stiffness and inertia have no range, because both
 scale with the fifth power of a rig's size.
-
-Checks of a run before anything is estimated from it: increasing times, angles in radians, three cycles.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Reading of regular files of limited size; every fault is a `TunnelError`.
 
-What lies beside a path that is wrong, for the remedy of an error. All packages read files through this module. A
+All packages read files through this module. A
 FIFO or a device is refused without waiting for it, and a file that is too large is refused before it is loaded
 into memory.
 """

@@ -1,9 +1,9 @@
 """Atomic writing of files and folders. No other module writes files; every error is one line.
 
-Temporary files and folders of killed commands: how they are named, and how they are removed. While a file or
+While a file or
 folder is being written, it has the temporary name ``.NAME.MARK.partial`` next to its target. A folder that is
 about to be replaced is renamed ``.NAME.MARK.replaced``. The mark contains the machine, the process and its start
-time, so that another command can tell whether the writer is still running.
+time, so that another command can tell whether the writer is still running, and remove what a killed one left.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The compiled moment law: where its library lies, and the names of parameters, states and operations it lists.
 
-The location of the package's compiled libraries. Names that the compiled library lists: parameters and operations
-of the moment law, the state, fields of a run. Python looks them up by name, so that it cannot disagree with C
+Python looks the names up, so that it cannot disagree with C
 about their order (``mjcf/plugin/tables.c``).
 """
 

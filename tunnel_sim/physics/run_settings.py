@@ -1,9 +1,8 @@
 """The physics of one run as numbers, its release and its motion.
 
-The physics of one run as numbers, from which the MuJoCo model and the forward integrator are both built. The
-balance at the release: the body is held at its angle, at rest, and its rod is in balance with the spring. With a
-rod of compliance c and a spring Kr, the body's angle is 1 + Kr c times that of the spring's end. The true motion
-of a run, and how it is sampled.
+The MuJoCo model and the forward integrator are both built from these numbers. At the release the body is held at
+its angle, at rest, and its rod is in balance with the spring. With a rod of compliance c and a spring Kr, the
+body's angle is 1 + Kr c times that of the spring's end.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""The error shown to users: what is wrong, where, and the remedy; and the libraries that may be missing.
-
-The error shown to users: what is wrong, where, and the remedy. Libraries that the extras bring: which command
-needs which, and one line where one is missing.
-"""
+"""The error shown to users: what is wrong, where, and the remedy; and the libraries that may be missing."""
 
 from __future__ import annotations
 

@@ -1,11 +1,9 @@
 """What to simulate: aerodynamic derivatives, the plan of a campaign and its runs.
 
-Aerodynamic derivatives, and the stiffness and damping that follow from them. Sign convention: yaw angle β and yaw
+Sign convention: yaw angle β and yaw
 rate r = β̇ have the same positive direction about the rod's axis; the aerodynamic moment is N = Ka β + Ca r on the
 right-hand side of Izz β̈ + Cr β̇ + Kr β = N. A positive Cnβ lowers the frequency; a negative Cnr adds damping. A
 is the frontal area and l the model's length.
-
-What to simulate: the plan of a campaign and its runs.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""One run's reading of the yaw angle against time, and how many cycles it holds.
-
-One run's reading of the yaw angle against time. How many cycles of free oscillation a record holds, despite drift,
-hum and noise.
-"""
+"""One run's reading of the yaw angle against time, and how many cycles it holds."""
 
 from __future__ import annotations
 

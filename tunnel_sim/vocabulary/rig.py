@@ -1,8 +1,4 @@
-"""The rig's dimensions and properties, and the shape of its body.
-
-The shape of the Davis model: a box with a slanted rear and a rounded front, as mesh vertices. The rig's dimensions
-and properties.
-"""
+"""The rig's dimensions and properties, and the shape of its body."""
 
 from __future__ import annotations
 

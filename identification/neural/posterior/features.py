@@ -15,10 +15,10 @@ from identification.campaign.derivatives import Design, derivatives
 from identification.estimate import PARAMETERS
 from identification.neural.posterior.demodulated import Demodulated
 from identification.neural.posterior.rivals import (
-    Conditions,
     Mask,
+    RivalConditions,
     Rivals,
-    Windows,
+    RivalWindows,
     campaign_columns,
     fit_rivals,
     record_columns,
@@ -65,7 +65,7 @@ def record_features(runs: Sequence[Demodulated]) -> list[tuple[Features, Rivals]
     Returns:
         For each, the features and the fits behind them; None where the windows determine no decay.
     """
-    windows = Windows.of(runs)
+    windows = RivalWindows.of(runs)
     nominal = windows.joined([(-windows.time, None), (None, windows.time)])
     columns = record_columns(windows)
     ends = 2 * np.cumsum(windows.sizes)
@@ -112,7 +112,7 @@ def campaign_features(
         return None
     start = derivatives(design, first.parameters)
     air = (start.get("cn_beta") or 0.0, start.get("cn_r") or 0.0)
-    columns = campaign_columns(Windows.of(seen), _conditions(runs, design, air))
+    columns = campaign_columns(RivalWindows.of(seen), _conditions(runs, design, air))
     found = _fit(seen, *nominal, columns)
     if found is None or not start.names:
         return None
@@ -149,10 +149,10 @@ def _campaign_design(windows: Sequence[Demodulated], design: Design) -> tuple[Ar
     return np.concatenate(values), np.concatenate(blocks)
 
 
-def _conditions(runs: Sequence[Run], design: Design, air: tuple[float, float]) -> Conditions:
+def _conditions(runs: Sequence[Run], design: Design, air: tuple[float, float]) -> RivalConditions:
     springs = np.array([run.spring_stiffness for run in runs], dtype=np.float64)
     speeds = np.array([run.wind_speed for run in runs])
-    return Conditions(
+    return RivalConditions(
         springs,
         design.stiffness_loads,
         design.damping_loads,

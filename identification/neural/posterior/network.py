@@ -1,14 +1,12 @@
 """The network that weighs the rivals, its files, and the posterior it gives.
 
-Quantiles and covariance of mixtures of normal distributions.
+The network gives a weight and a width to every rival, from all rivals and all runs. Every rival goes through the
+same layers, and every run through others; runs are pooled, so their order and number do not matter. The
+posterior of each quantity is the mixture of the rivals' normal distributions, scaled and widened. The network
+only learns when to believe which rival, and how far.
 
-The network: a weight and a width for every rival, from all rivals and all runs. Every rival goes through the same
-layers, and every run through others; runs are pooled, so their order and number do not matter. The posterior of
-each quantity is the mixture of the rivals' normal distributions, scaled and widened. The network only learns when
-to believe which rival, and how far.
-
-The function runs in NumPy for an estimate and in torch for training. The trained networks as safetensors, with
-their record beside them as JSON, without pickle. From features to posteriors, many samples at a time.
+The function runs in NumPy for an estimate and in torch for training. Trained networks are kept as safetensors,
+with their record beside them as JSON, without pickle.
 """
 
 from __future__ import annotations
@@ -26,7 +24,7 @@ from scipy.special import ndtr
 from identification.estimate import Quantity
 from identification.neural.posterior.features import LEVEL, Features
 from identification.neural.posterior.rivals import MORE, SETS
-from identification.neural.stored import opened, packaged, read_stored
+from identification.neural.stored import open_stored, read_packaged, read_stored
 from tunnel_sim.vocabulary.record import Array
 
 LEVELS = (0.025, 0.5, 0.975)
@@ -127,7 +125,7 @@ class Output:
     context: Tensor
 
 
-def shapes(
+def weight_shapes(
     rivals: int, features: int, runs: int, quantities: int, effects: int
 ) -> dict[str, tuple[int, ...]]:
     """Shapes of the trained weights by name; a matrix ends in ``.w`` and its bias in ``.b``.
@@ -166,7 +164,7 @@ def forward(
 
     Args:
         xp: numpy or torch.
-        weights: as `shapes`, with the scalings ``rivals.mean``, ``rivals.std``, ``runs.mean`` and ``runs.std``.
+        weights: as `weight_shapes`, with the scalings ``rivals.mean``, ``rivals.std``, ``runs.mean``, ``runs.std``.
         rivals: features, shape (b, r, f).
         runs: features, shape (b, n, k); after them 1 for a run and 0 for padding.
         valid: 1 for rivals that apply, shape (b, r).
@@ -224,7 +222,7 @@ def variances(output: Output, widths: Tensor) -> Tensor:
     return (output.scales * widths) ** 2 + output.extras
 
 
-def initial(sizes: Mapping[str, tuple[int, ...]], rng: np.random.Generator) -> dict[str, Array]:
+def initial_weights(sizes: Mapping[str, tuple[int, ...]], rng: np.random.Generator) -> dict[str, Array]:
     """Weights before training: rivals keep their shifts and widths, and their weights follow from their fits."""
     found = {}
     for name, shape in sizes.items():
@@ -243,11 +241,11 @@ KINDS = ("record", "campaign")
 
 
 @dataclass(frozen=True, eq=False)
-class Trained:
+class TrainedPosterior:
     """One network with its threshold.
 
     Args:
-        weights: as `shapes`, and the scalings.
+        weights: as `weight_shapes`, and the scalings.
         centre: mean context of the training samples, shape (c,).
         precision: inverse covariance of it, shape (c, c).
         threshold: squared distance above which a sample is unlike anything trained on.
@@ -266,7 +264,7 @@ class Trained:
         return np.asarray(np.einsum("bi,ij,bj->b", away, self.precision, away))
 
 
-def to_bytes(networks: Mapping[str, Trained]) -> bytes:
+def to_bytes(networks: Mapping[str, TrainedPosterior]) -> bytes:
     """Both networks as safetensors, in single precision."""
     tensors: dict[str, Array] = {}
     for kind in KINDS:
@@ -278,7 +276,7 @@ def to_bytes(networks: Mapping[str, Trained]) -> bytes:
     return save(tensors)
 
 
-def read_trained(path: Path) -> dict[str, Trained]:
+def read_trained(path: Path) -> dict[str, TrainedPosterior]:
     """Read networks that ``tunnel train`` wrote.
 
     Args:
@@ -291,29 +289,29 @@ def read_trained(path: Path) -> dict[str, Trained]:
 
 
 @cache
-def shipped() -> dict[str, Trained]:
+def shipped_posteriors() -> dict[str, TrainedPosterior]:
     """The packaged networks."""
-    return trained_of(*packaged(SHIPPED), SHIPPED)
+    return trained_of(*read_packaged(SHIPPED), SHIPPED)
 
 
-def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, Trained]:
+def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, TrainedPosterior]:
     """Networks from the contents of their two files.
 
     Raises:
         TunnelError: when they are malformed, or do not belong together.
     """
-    with opened(weights, record, where, estimator="neural_posterior") as (tensors, document):
+    with open_stored(weights, record, where, estimator="neural_posterior") as (tensors, document):
         return {kind: _one(tensors, kind, document) for kind in KINDS}
 
 
-def _one(tensors: Mapping[str, Array], kind: str, document: Mapping[str, Any]) -> Trained:
+def _one(tensors: Mapping[str, Array], kind: str, document: Mapping[str, Any]) -> TrainedPosterior:
     own = {
         name.removeprefix(f"{kind}/"): np.asarray(value, dtype=np.float64)
         for name, value in tensors.items()
         if name.startswith(f"{kind}/")
     }
     stated = document["networks"][kind]
-    expected = shapes(
+    expected = weight_shapes(
         *(stated["sizes"][name] for name in ("rivals", "features", "runs", "quantities", "effects"))
     )
     for name, shape in expected.items():
@@ -322,7 +320,7 @@ def _one(tensors: Mapping[str, Array], kind: str, document: Mapping[str, Any]) -
     if not all(np.all(np.isfinite(value)) for value in own.values()):
         raise ValueError(kind)
     centre, precision = own.pop("unlike.centre"), own.pop("unlike.precision")
-    return Trained(own, centre, precision, float(stated["threshold"]), tuple(document["effects"]))
+    return TrainedPosterior(own, centre, precision, float(stated["threshold"]), tuple(document["effects"]))
 
 
 _NOISY = float(
@@ -355,7 +353,7 @@ class Posterior:
         return Quantity(float(self.values[place]), std, unit, (float(low), float(high)))
 
 
-def posteriors(samples: Sequence[Features], network: Trained) -> list[Posterior]:
+def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[Posterior]:
     """Put samples of one kind through its network."""
     if not samples:
         return []
@@ -366,7 +364,7 @@ def posteriors(samples: Sequence[Features], network: Trained) -> list[Posterior]
         np,
         network.weights,
         np.stack([one.rivals for one in samples]),
-        padded([one.runs for one in samples]),
+        padded_runs([one.runs for one in samples]),
         np.stack([one.valid for one in samples]).astype(np.float64),
         shifts,
     )
@@ -395,7 +393,7 @@ def posteriors(samples: Sequence[Features], network: Trained) -> list[Posterior]
     return result
 
 
-def padded(runs: Sequence[Array]) -> Array:
+def padded_runs(runs: Sequence[Array]) -> Array:
     """Features of the runs of several campaigns in one array, with 1 after those of a run and 0 after padding.
 
     Args:

@@ -1,6 +1,6 @@
 """Rival linear models of the windows: the nominal model and, beside it, each of many shapes, by least squares.
 
-What rival models add to envelope and phase of the windows, to first order in their size. By averaging over a
+A rival acts on envelope and phase of the windows to first order in its size. By averaging over a
 cycle, a moment changes the decay rate or the frequency by an amount that depends on the amplitude as a power. A
 rival is such a power with a factor that says how it depends on spring, wind and frequency, a change of the reading
 that depends on the amplitude, or an exact change of a stated number. All windows of all runs are treated in one
@@ -36,7 +36,7 @@ SPRINGS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Conditions:
+class RivalConditions:
     """What is stated of the runs, and what the nominal model makes of them.
 
     Args:
@@ -57,7 +57,7 @@ class Conditions:
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class RivalWindows:
     """The windows of all runs, one after the other.
 
     Args:
@@ -84,7 +84,7 @@ class Windows:
     settling: Array
 
     @classmethod
-    def of(cls, runs: Sequence[Demodulated]) -> Windows:
+    def of(cls, runs: Sequence[Demodulated]) -> RivalWindows:
         """Integrals over time, from each run's first window, by the trapezium rule."""
         sizes = np.array([run.time.size for run in runs])
         place = np.repeat(np.arange(len(runs)), sizes)
@@ -134,13 +134,13 @@ class Windows:
         return np.asarray(table.reshape(2 * self.time.size, -1)[order])
 
 
-def _readings(w: Windows) -> list[tuple[Array | None, Array | None]]:
+def _readings(w: RivalWindows) -> list[tuple[Array | None, Array | None]]:
     """A reading whose amplitude or phase depends on the amplitude."""
     logarithms = [(w.powers[power], None) for power in (-1.0, 2.0, 4.0)]
     return [*logarithms, *((None, w.powers[power]) for power in (-1.0, 2.0))]
 
 
-def _drifts_and_steps(w: Windows, stiffness: Array | float) -> list[tuple[Array | None, Array | None]]:
+def _drifts_and_steps(w: RivalWindows, stiffness: Array | float) -> list[tuple[Array | None, Array | None]]:
     """A spring or a damper that changes along the run, and steps at the instants where the runs show them best."""
     turning = (stiffness / w.omega)[w.run]
     phase = np.concatenate([best_step(run, run.phase) for run in w.runs]) * w.omega[w.run]
@@ -154,14 +154,14 @@ def _drifts_and_steps(w: Windows, stiffness: Array | float) -> list[tuple[Array 
     ]
 
 
-def record_columns(w: Windows) -> Array:
+def record_columns(w: RivalWindows) -> Array:
     """The columns of the rivals of records by themselves, shape (2 w, 22)."""
     free: list[tuple[Array | None, Array | None]] = [(-w.integrals[power], None) for power in _ANY]
     free += [(None, w.integrals[power]) for power in _ANY]
     return w.joined([*free, *_readings(w), *_drifts_and_steps(w, 1.0)])
 
 
-def campaign_columns(w: Windows, c: Conditions) -> Array:
+def campaign_columns(w: RivalWindows, c: RivalConditions) -> Array:
     """The columns of the rivals of a campaign, shape (2 w, 51)."""
     one = np.ones_like(c.stiffness)
     on = (c.speed > 0.0).astype(np.float64)
@@ -191,7 +191,7 @@ def campaign_columns(w: Windows, c: Conditions) -> Array:
     )
 
 
-def _wind(w: Windows, c: Conditions) -> list[tuple[Array, Array]]:
+def _wind(w: RivalWindows, c: RivalConditions) -> list[tuple[Array, Array]]:
     """A wind speed that is not as stated or drifts, and an air moment behind the motion."""
     on = c.speed > 0.0
     speed, ones = np.where(on, c.speed, 1.0), np.ones(w.time.size)
@@ -299,7 +299,7 @@ def fit_rivals(values: Array, design: Array, columns: Array, weights: Array, tak
     outer = moves.T[:, :, None] * moves.T[:, None, :]
     covariances += list(covariance + outer / (alone + _PRIOR)[:, None, None])
     found_scores, remaining = [0.0, *scores], [total, *(total - scores**2)]
-    places = forward(gram, aim, max(SETS))
+    places = forward_selection(gram, aim, max(SETS))
     sets = [(np.array(places[:number], dtype=np.intp), _PRIOR) for number in SETS]
     for chosen, prior in [*sets, (np.flatnonzero(valid), _PRIOR_ALL)]:
         inner = gram[np.ix_(chosen, chosen)] + prior * np.eye(chosen.size)
@@ -321,7 +321,7 @@ def fit_rivals(values: Array, design: Array, columns: Array, weights: Array, tak
     )
 
 
-def forward(gram: Array, aim: Array, number: int) -> list[int]:
+def forward_selection(gram: Array, aim: Array, number: int) -> list[int]:
     """Forward selection: each column lowers χ² most beside those before it.
 
     Args:

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from identification.neural.posterior.network import Trained, forward, to_bytes, trained_of
+from identification.neural.posterior.network import TrainedPosterior, forward, to_bytes, trained_of
 from tunnel_lab.experiments.training import INPUTS, FitSpec, contexts, fit, judged, losses, start_state
 from tunnel_reference.forms import FAMILIES
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -106,7 +106,7 @@ def test_files_are_read_back_and_checked(fitted):
         "networks": {kind: {"sizes": sizes, "threshold": one.threshold} for kind in ("record", "campaign")},
     }
     found = trained_of(content, json.dumps(record).encode(), "here")
-    assert isinstance(found["record"], Trained)
+    assert isinstance(found["record"], TrainedPosterior)
     np.testing.assert_allclose(
         contexts(found["record"].weights, samples), contexts(one.weights, samples), rtol=1e-5
     )

@@ -8,12 +8,12 @@ from identification.neural.posterior.demodulated import Demodulated, demodulate
 from identification.neural.posterior.features import OWN, _conditions, record_features
 from identification.neural.posterior.network import distribution, quantiles
 from identification.neural.posterior.rivals import (
-    Conditions,
-    Windows,
+    RivalConditions,
+    RivalWindows,
     best_step,
     campaign_columns,
     fit_rivals,
-    forward,
+    forward_selection,
 )
 from identification.signal.free_decay import Decay, free_decay
 from identification.status import Status
@@ -126,8 +126,8 @@ def test_an_error_of_the_wind_speed_that_is_a_power_of_it_is_a_rival(power):
     change = (faster - slower) / 2e-6
     decays = [Decay.from_modal(o, r / o) for r, o in zip(rate, omega, strict=True)]
     seen = [demodulate(Record(TIME, free_decay(TIME, decay, 0.3, 0.0))) for decay in decays]
-    w = Windows.of(seen)
-    given = Conditions(np.full(4, stiffness), *loads(speed), share, np.zeros(4, int), (cn_beta, cn_r))
+    w = RivalWindows.of(seen)
+    given = RivalConditions(np.full(4, stiffness), *loads(speed), share, np.zeros(4, int), (cn_beta, cn_r))
     expected = w.joined([(-change[0][w.run] * w.time, change[1][w.run] * w.time)])
     distances = np.abs(campaign_columns(w, given) / inertia - expected).max(axis=0)
     assert distances.min() < 0.01 * np.abs(expected).max()
@@ -178,8 +178,10 @@ def test_a_moment_of_the_air_that_lags_is_a_rival(lag):
         change.append(nearest - root)
         decays.append(Decay(-root.real, abs(root) ** 2))
     seen = [demodulate(Record(TIME, free_decay(TIME, decay, 0.3, 0.0))) for decay in decays]
-    w = Windows.of(seen)
-    given = Conditions(np.full(3, stiffness), moment, loss, speed / 25.0, np.zeros(3, int), (cn_beta, -0.3))
+    w = RivalWindows.of(seen)
+    given = RivalConditions(
+        np.full(3, stiffness), moment, loss, speed / 25.0, np.zeros(3, int), (cn_beta, -0.3)
+    )
     shift = np.array(change)[w.run] * w.time
     expected = w.joined([(shift.real, shift.imag)])
     distances = np.abs(campaign_columns(w, given) / inertia - expected).max(axis=0)
@@ -214,7 +216,7 @@ def test_forward_selection_takes_the_columns_that_matter():
     rng = np.random.default_rng(7)
     columns = rng.standard_normal((200, 8))
     values = 3.0 * columns[:, 5] - 2.0 * columns[:, 1] + 0.1 * rng.standard_normal(200)
-    assert forward(columns.T @ columns, columns.T @ values, 2) == [5, 1]
+    assert forward_selection(columns.T @ columns, columns.T @ values, 2) == [5, 1]
 
 
 def test_the_best_step_is_where_it_is():
@@ -222,7 +224,7 @@ def test_the_best_step_is_where_it_is():
     assert isinstance(seen, Demodulated)
     jump = (np.arange(seen.time.size) > 6).astype(float)
     assert best_step(seen, 0.1 * seen.time + jump) == pytest.approx(jump)
-    assert Windows.of([seen, seen]).integrals[0.0][seen.time.size :] == pytest.approx(
+    assert RivalWindows.of([seen, seen]).integrals[0.0][seen.time.size :] == pytest.approx(
         seen.time - seen.time[0]
     )
 

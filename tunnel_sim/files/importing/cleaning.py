@@ -1,8 +1,6 @@
 """Clean-up of times and readings, and where runs begin and end in a record; every change is said.
 
-Clean-up of times and readings; every change is said.
-
-Where runs begin and end in a record: the releases, and the rest after the motion. A free decay crosses its centre
+A free decay crosses its centre
 every half cycle and never grows much from one half cycle to the next. Where a crossing takes longer and the
 excursions after it are larger than before, a hand has moved the body or held it, and a run begins at the turning
 point before the free motion. Any other record is one run: motion that grows or does not decay is left whole.
@@ -251,7 +249,7 @@ _HELD = 0.5  # of a half cycle: a free turning point is not that flat for longer
 
 
 @dataclass(frozen=True)
-class Piece:
+class RecordPiece:
     """A run in a record.
 
     Args:
@@ -263,7 +261,7 @@ class Piece:
     last: int
 
 
-def find_runs(time_s: Array, reading: Array) -> list[Piece]:
+def find_runs(time_s: Array, reading: Array) -> list[RecordPiece]:
     """The runs of a record.
 
     Args:
@@ -273,7 +271,7 @@ def find_runs(time_s: Array, reading: Array) -> list[Piece]:
     Returns:
         One piece for each release; the whole record where no hand is seen in it.
     """
-    whole = [Piece(0, reading.size)]
+    whole = [RecordPiece(0, reading.size)]
     away = reading - np.median(reading)
     noise = _NOISES * _noise(reading[:_NOISE_OF])
     for _ in range(_CENTRED):
@@ -301,7 +299,7 @@ def find_runs(time_s: Array, reading: Array) -> list[Piece]:
     moved = int(starts[-1] if time_s[ends[-1] - 1] - time_s[starts[-1]] > _LONGER * usual else ends[-1])
     found = _released(lengths, peaks, usual)
     if not found:
-        return [Piece(0, _without_long_rest(time_s, 0, moved, clear=clear))]
+        return [RecordPiece(0, _without_long_rest(time_s, 0, moved, clear=clear))]
     pieces = []
     for place, (_, released) in enumerate(found):
         first = _turning_point(time_s, away, starts[released], ends[released], usual)
@@ -315,11 +313,11 @@ def find_runs(time_s: Array, reading: Array) -> list[Piece]:
                 peaks.size - released,
             )
         if halves >= _LEAST_HALVES:
-            pieces.append(Piece(first, last))
+            pieces.append(RecordPiece(first, last))
     return pieces or whole
 
 
-def stated_piece(time_s: Array, found: Piece, stated: Stretch, where: str) -> Piece:
+def stated_piece(time_s: Array, found: RecordPiece, stated: Stretch, where: str) -> RecordPiece:
     """A run with the start and the end that are stated.
 
     Args:
@@ -344,7 +342,7 @@ def stated_piece(time_s: Array, found: Piece, stated: Stretch, where: str) -> Pi
             where=where,
             remedy="state a start before the end, within the record",
         )
-    return Piece(first, last)
+    return RecordPiece(first, last)
 
 
 def _noise(reading: Array) -> float:

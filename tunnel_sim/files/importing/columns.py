@@ -1,8 +1,4 @@
-"""Which columns are times and angles, and their numbers in seconds and radians.
-
-Which columns are times and angles, and which belong to the same run. From the numbers of a column to seconds and
-radians.
-"""
+"""Which columns are times and angles, and their numbers in seconds and radians."""
 
 from __future__ import annotations
 
@@ -44,7 +40,7 @@ _DERIVATIVE = 0.9  # correlation with the derivative of another column, from whi
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class ColumnPair:
     """The columns of one run.
 
     Args:
@@ -65,7 +61,7 @@ def stem(name: str) -> str:
     return RUN_MARK.sub("", name)
 
 
-def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[Pair]:
+def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnPair]:
     """The columns of each run.
 
     Args:
@@ -82,7 +78,9 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[Pair]:
         said: list[str] = []
         time = _time(block, choices, said, where, headed=table.headed)
         readings = _readings(block, time, choices, said, where)
-        pairs += [Pair(_run_name(reading, len(readings)), time, reading, tuple(said)) for reading in readings]
+        pairs += [
+            ColumnPair(_run_name(reading, len(readings)), time, reading, tuple(said)) for reading in readings
+        ]
     if not pairs:
         raise TunnelError(
             f"no column of angles (columns found: {_listed(table.channels)})",

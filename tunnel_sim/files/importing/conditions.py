@@ -1,7 +1,7 @@
 """What a user states about files, and the conditions of runs that files, names and tables state.
 
-What a user may state about files, and the recipe that keeps it. Conditions of runs: from a table, from the names
-of files, from the files themselves, or stated for all.
+The recipe keeps what a user states. Conditions come from a table, from the names of files, from the files
+themselves, or are stated for all.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts, without_overflow
 from tunnel_sim.files.importing.columns import (
     Calibration,
-    Pair,
+    ColumnPair,
     find_pairs,
     in_radians,
     in_seconds,
@@ -31,7 +31,7 @@ _LEAST_ROWS = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Raw:
+class RawRecord:
     """A record of a file, cleaned but not yet cut.
 
     Args:
@@ -92,7 +92,7 @@ def raw_records(
     named: dict[str, float],
     *,
     several: bool,
-) -> list[Raw]:
+) -> list[RawRecord]:
     """The records of a file.
 
     Args:
@@ -120,7 +120,7 @@ def _raws(
     named: dict[str, float],
     *,
     several: bool,
-) -> list[Raw]:
+) -> list[RawRecord]:
     """The records of a table."""
     where = shown(source.path) + (f", {one_line(table.part)}" if table.part else "")
     found = []
@@ -147,7 +147,7 @@ def _raws(
                 raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
             columns = {key: replace(c, values=c.values[a:b]) for key, c in conditions.items()}
             found.append(
-                Raw(
+                RawRecord(
                     label,
                     source.path,
                     pair.reading.name,
@@ -165,7 +165,7 @@ def _raws(
     return found
 
 
-def _times(pair: Pair, table: Table, choices: ImportChoices, said: list[str], where: str) -> Array:
+def _times(pair: ColumnPair, table: Table, choices: ImportChoices, said: list[str], where: str) -> Array:
     """The times of a run, s."""
     if pair.time is not None:
         values = without_overflow(pair.time.values, said)
@@ -178,7 +178,7 @@ def _times(pair: Pair, table: Table, choices: ImportChoices, said: list[str], wh
 
 
 def _condition_columns(
-    table: Table, pair: Pair, kept: NDArray[np.bool_], said: list[str]
+    table: Table, pair: ColumnPair, kept: NDArray[np.bool_], said: list[str]
 ) -> dict[str, Channel]:
     """The columns that state conditions, by key; of several that state the same, the first."""
     found: dict[str, Channel] = {}

@@ -1,8 +1,4 @@
-"""From files to the runs of a campaign, and to its folder.
-
-From files to the runs of a campaign. Writing of imported records as a campaign, with what is not known as
-comments.
-"""
+"""From files to the runs of a campaign, and to its folder, with what is not known as comments."""
 
 from __future__ import annotations
 
@@ -17,7 +13,7 @@ import tomli_w
 
 from tunnel_sim.files.campaign_folder import IMPORT_PICTURE, IMPORT_RECIPE, checked_record, write_campaign
 from tunnel_sim.files.importing.cleaning import (
-    Piece,
+    RecordPiece,
     find_runs,
     from_rest,
     from_zero,
@@ -34,7 +30,7 @@ from tunnel_sim.files.importing.conditions import (
     from_name,
     name_pattern,
 )
-from tunnel_sim.files.importing.raw_records import Raw, raw_records
+from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
 from tunnel_sim.files.importing.source import Source, read_source
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import check_count
@@ -56,7 +52,7 @@ _WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class ImportedRun:
     """A run, or what was taken for one.
 
     Args:
@@ -70,8 +66,8 @@ class Part:
     """
 
     id: str
-    raw: Raw
-    piece: Piece
+    raw: RawRecord
+    piece: RecordPiece
     run: Run | None
     said: tuple[str, ...]
     rest: float | None
@@ -96,7 +92,7 @@ class Imported:
     """
 
     campaign: Campaign
-    parts: tuple[Part, ...]
+    parts: tuple[ImportedRun, ...]
     sources: tuple[Source, ...]
     choices: ImportChoices
     said: tuple[str, ...]
@@ -152,7 +148,7 @@ def read_records(
     pattern = None if choices.name is None else name_pattern(choices.name)
     table = None if conditions is None else ConditionTable(conditions)
     sources: list[Source] = []
-    raws: list[Raw] = []
+    raws: list[RawRecord] = []
     for path in files:
         source = read_source(path, choices)
         named = from_name(pattern, path)
@@ -177,7 +173,7 @@ def read_records(
     return Imported(campaign, tuple(parts), tuple(sources), resolved, _on_campaign(campaign, table))
 
 
-def _with_unique_ids(raws: Sequence[Raw]) -> list[tuple[str, Raw]]:
+def _with_unique_ids(raws: Sequence[RawRecord]) -> list[tuple[str, RawRecord]]:
     names = [raw.id for raw in raws]
     seen: dict[str, int] = {}
     result = []
@@ -188,21 +184,23 @@ def _with_unique_ids(raws: Sequence[Raw]) -> list[tuple[str, Raw]]:
 
 
 def _parts(
-    named: Sequence[tuple[str, Raw]], choices: ImportChoices, table: ConditionTable | None
-) -> list[Part]:
+    named: Sequence[tuple[str, RawRecord]], choices: ImportChoices, table: ConditionTable | None
+) -> list[ImportedRun]:
     parts = []
     for label, raw in named:
         time, reading = raw.cleaned.time_s, raw.cleaned.reading
         angle = raw.quantity == "angle"
         cut = choices.cut and angle and not raw.whole
-        pieces = find_runs(time, reading) if cut else [Piece(0, time.size)]
+        pieces = find_runs(time, reading) if cut else [RecordPiece(0, time.size)]
         for number, piece in enumerate(pieces, 1):
             name = label if len(pieces) == 1 else f"{label}-{number}"
             parts.append(_part(name, raw, piece, choices, table))
     return parts
 
 
-def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: ConditionTable | None) -> Part:
+def _part(
+    name: str, raw: RawRecord, piece: RecordPiece, choices: ImportChoices, table: ConditionTable | None
+) -> ImportedRun:
     where = f"{shown(raw.source)}, run '{name}'"
     stretch = choices.stretch_of(raw.source.name, name)
     piece = stated_piece(raw.cleaned.time_s, piece, stretch, where)
@@ -240,9 +238,9 @@ def _part(name: str, raw: Raw, piece: Piece, choices: ImportChoices, table: Cond
     try:
         record = _judged(from_zero(time), reading, raw.quantity, stated.get("release_angle"), where)
     except TunnelError as error:
-        return Part(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
+        return ImportedRun(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
     run = Run(name, record, **({"wind_speed": 0.0} | stated))
-    return Part(name, raw, piece, run, tuple(said), rest, sizes)
+    return ImportedRun(name, raw, piece, run, tuple(said), rest, sizes)
 
 
 def _judged(
@@ -259,7 +257,7 @@ def _judged(
     return checked_record(time, reading, "the reading", sensor, release_angle, where)
 
 
-def _on_cut(time: Array, piece: Piece) -> list[str]:
+def _on_cut(time: Array, piece: RecordPiece) -> list[str]:
     said = []
     if piece.first:
         said.append(f"begins at {time[piece.first]:.4g} s, where the body is released")
@@ -268,7 +266,9 @@ def _on_cut(time: Array, piece: Piece) -> list[str]:
     return said
 
 
-def _campaign(parts: Sequence[Part], choices: ImportChoices, name: str, quantity: Quantity) -> Campaign:
+def _campaign(
+    parts: Sequence[ImportedRun], choices: ImportChoices, name: str, quantity: Quantity
+) -> Campaign:
     runs = tuple(part.run for part in parts if part.run is not None)
     if not runs:
         part = parts[0]
@@ -294,7 +294,7 @@ def _campaign(parts: Sequence[Part], choices: ImportChoices, name: str, quantity
     )
 
 
-def _rig(parts: Sequence[Part], choices: ImportChoices) -> dict[str, float]:
+def _rig(parts: Sequence[ImportedRun], choices: ImportChoices) -> dict[str, float]:
     """The sizes of the rig, as stated or else from the files."""
     rig = choices.conditions.model_dump(include=set(RIG_KEYS), exclude_none=True)
     plausible_values(rig, "--set")
@@ -309,7 +309,7 @@ def _rig(parts: Sequence[Part], choices: ImportChoices) -> dict[str, float]:
     return rig
 
 
-def _found(raws: Sequence[Raw], choices: ImportChoices) -> dict[str, object]:
+def _found(raws: Sequence[RawRecord], choices: ImportChoices) -> dict[str, object]:
     """What was found, for a recipe: names and units that all records share."""
     units = {raw.unit for raw in raws}
     columns = tuple(dict.fromkeys(stem(raw.column) for raw in raws))

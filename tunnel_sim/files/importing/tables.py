@@ -1,8 +1,4 @@
-"""Tables of a file: columns of numbers by name and unit, before anybody knows what they mean.
-
-Units as instruments write them, and their conversion to SI and radians. Tables of a file: columns of numbers by
-name, before anybody knows what they mean.
-"""
+"""Tables of a file: columns of numbers by name and unit, before anybody knows what they mean."""
 
 from __future__ import annotations
 

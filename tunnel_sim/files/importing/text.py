@@ -1,7 +1,4 @@
-"""Tables as text in any dialect: its delimiter, decimal sign, encoding and head are found from the content.
-
-Where the numbers of a sheet of texts begin, and what the lines above them say.
-"""
+"""Tables as text in any dialect: its delimiter, decimal sign, encoding and head are found from the content."""
 
 from __future__ import annotations
 
